@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
+SOURCES := Cargo.toml Cargo.lock $(shell find crates rules -name '*.rs' -o -name Cargo.toml)
 
 .PHONY: help check setup build released aarch64 bridge demo test test-studies slow lint format registers messages bench docs dist clean
 
@@ -25,9 +25,9 @@ check:
 	@command -v cc >/dev/null || { echo "taxel needs a C compiler: on Debian, apt install build-essential"; exit 1; }
 
 # What taxel itself needs; what tests, lint, docs, benchmarks and wheels need is installed by the target that needs it.
-# Of the distributions of their own in this repository, that is what they need beside taxel.
+# Of the distributions of their own in this repository, that is what they need beside taxel. `rules` has a compiled part.
 BESIDE := studies benchmarks viewers bridge
-PROJECTS := pyproject.toml $(BESIDE:%=%/pyproject.toml)
+PROJECTS := pyproject.toml $(BESIDE:%=%/pyproject.toml) rules/pyproject.toml
 wanted = $(BIN)/python -c 'import sys, tomllib; projects = [tomllib.load(open(f, "rb"))["project"] for f in "$(PROJECTS)".split()]; extras = {"beside": [x for p in projects[1:] for x in p["dependencies"]]} | {k: v for p in projects for k, v in p.get("optional-dependencies", {}).items()}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), projects[0]["dependencies"]) if not x.startswith("taxel")))'
 # Python compiles a module when it is first imported; compiling all of them at once takes ten seconds of the first minutes.
 # Where it may not store what it compiled, each start would compile them all again.
@@ -54,16 +54,17 @@ $(VENV)/.for-%: $(PROJECTS) | $(VENV)/.installed
 # Two builds of one extension, of which one is in place: incremental, so that a change in one file takes seconds, without
 # line numbers, which take a fifth of the time to compile; and as released, which tests and benchmarks use. They share what
 # the crates of others compiled to.
-develop = PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --features test-hooks
+developed = PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --features test-hooks
+develop = $(developed) $(1) && $(developed) --manifest-path rules/Cargo.toml $(1)
 $(VENV)/.built: $(VENV)/.installed $(SOURCES)
 	@echo "taxel: building: minutes the first time"
-	@CARGO_INCREMENTAL=1 $(develop) --config 'profile.release.debug=false'
+	@export CARGO_INCREMENTAL=1; $(call develop,--config 'profile.release.debug=false')
 	@$(install) --no-deps $(BESIDE:%=--editable %)
 	@rm -f $(VENV)/.released && touch $@
 
 $(VENV)/.released: $(VENV)/.installed $(SOURCES)
 	@echo "taxel: building as it is released: minutes"
-	@$(develop)
+	@$(call develop)
 	@$(install) --no-deps $(BESIDE:%=--editable %)
 	@rm -f $(VENV)/.built && touch $@
 
@@ -103,20 +104,20 @@ test: released $(VENV)/.for-test
 	$(BIN)/python -m pytest -q -n 4 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 test-studies: released $(VENV)/.for-test
-	$(BIN)/python -m pytest -q -n 4 --dist loadfile --no-loadscope-reorder -m "not slow" $(BESIDE)
+	$(BIN)/python -m pytest -q -n 4 --dist loadfile --no-loadscope-reorder -m "not slow" rules $(BESIDE)
 
 slow: released $(VENV)/.for-test dist bridge
 	cargo test --release --workspace --quiet -- --ignored
 	cargo check --manifest-path fuzz/Cargo.toml --quiet
 	$(BIN)/python -m pytest -q -m slow
-	$(BIN)/python -m pytest -q -m slow $(BESIDE)
+	$(BIN)/python -m pytest -q -m slow rules $(BESIDE)
 
 # Either build of the extension does.
 lint: $(VENV)/.for-test $(VENV)/.for-lint
 	@$(MAKE) --question $(VENV)/.released 2>/dev/null || $(MAKE) --no-print-directory build
 	cargo fmt --all --check
 	cargo fmt --manifest-path bridge/zenoh/Cargo.toml --check
-	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
+	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs rules/src/rules/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
 	cargo clippy --workspace --all-targets --all-features --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
@@ -124,14 +125,14 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/python -m pytest -q tests/test_layers.py
-	$(BIN)/python -m mypy.stubtest taxel._core --allowlist tests/stubtest-allowed.txt
+	$(BIN)/python -m mypy.stubtest taxel._core taxel_rules._rules --allowlist tests/stubtest-allowed.txt
 	$(BIN)/python tools/messages.py --check
 	$(BIN)/python tools/page_types.py
 
 format: $(VENV)/.for-lint
 	cargo fmt --all
 	cargo fmt --manifest-path bridge/zenoh/Cargo.toml
-	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs
+	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs rules/src/rules/*.rs crates/taxel-core/src/metrics/*.rs
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
@@ -195,7 +196,7 @@ $(PEERS)/.installed: $(PROJECTS) | $(VENV)/.installed
 	@touch $@
 
 bench: released bridge $(PEERS)/.installed
-	@$(subst $(abspath $(VENV)),$(abspath $(PEERS)),$(develop))
+	@$(subst $(abspath $(VENV)),$(abspath $(PEERS)),$(call develop))
 	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_zenoh-*.whl
 	$(PEERS)/bin/taxel bench all
 
@@ -206,8 +207,9 @@ docs: build $(VENV)/.for-docs
 dist: $(VENV)/.for-dist
 	rm -rf dist
 	$(BIN)/maturin sdist --out dist
-	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/maturin build --release --zig --compatibility manylinux_2_28 --out dist
-	$(BIN)/auditwheel show dist/taxel-*.whl
+	export PATH="$(abspath $(BIN)):$$PATH"; for crate in crates/taxel-python rules; do \
+	$(BIN)/maturin build --release --zig --compatibility manylinux_2_28 --out dist --manifest-path $$crate/Cargo.toml || exit 1; done
+	for wheel in dist/taxel-*.whl dist/taxel_rules-*.whl; do $(BIN)/auditwheel show $$wheel || exit 1; done
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist $(BESIDE:%=./%)
 	@ls -l dist
 

@@ -8,8 +8,11 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import is_hypothesis_test, settings
 
+#: Scripts that made kept data: not tests, and they need packages that are not installed.
+collect_ignore = ["rules/tests/data"]
+
 settings.register_profile("slow", deadline=None, derandomize=True)
-settings.register_profile("quick", settings.get_profile("slow"), max_examples=30)
+settings.register_profile("quick", settings.get_profile("slow"), max_examples=20)
 
 # Before NumPy and scikit-learn load: their threads wait for each other by computing, and each worker has one core.
 os.environ.setdefault("OMP_NUM_THREADS", "1")

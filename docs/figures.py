@@ -31,7 +31,7 @@ def keep(report: Path, data: Path | None = None) -> None:
         if summary.exists():
             section = json.loads(summary.read_text())
             section.pop("tables")
-            if section.get("commit") != code_version("taxel", "taxel_studies"):
+            if section.get("commit") != code_version("taxel", "taxel_rules", "taxel_studies"):
                 sys.exit(f"{name}: not computed by the commit that is checked out, without local changes; run it again")
             (FIGURES / f"{name}.json").write_text(json.dumps(section) + "\n")
             keep_toy(name, FIGURES, data=data)

@@ -17,6 +17,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture
+def drawn() -> None:
+    """Asked for by a test that looks at the pictures of a report, among others that do not."""
+
+
+@pytest.fixture
+def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports whose pictures are empty, as to draw them takes most of their time; unless a test asks for `drawn`."""
+    if "drawn" not in request.fixturenames:
+        monkeypatch.setattr("taxel.report.svg._svg", lambda figure: "<svg></svg>")
+
+
+@pytest.fixture
 def full_device() -> Iterator[Path]:
     """Give a disk that is always full to one test at a time, as a recording locks its file."""
     if not Path("/dev/full").exists():

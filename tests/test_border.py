@@ -17,7 +17,7 @@ JSON = {
 TEXTS = {
     "clock_doubt", "error_line", "instructions", "numbered_path", "ConeXCertificate.text", "ConeXFit.reason",
     "Error.argument", "Error.hint", "Live.place",
-    "Panel.token", "Panel.url", "Tally.label", "Trained.ended", "WireBoard.command", "WireBoard.faults",
+    "Panel.token", "Panel.url", "Tally.label", "WireBoard.command", "WireBoard.faults",
     "WireBoard.greeting",
 }  # fmt: skip
 #: The parts of a noun, which its `_parts()` gives and its `_from_parts()` takes.

@@ -1,4 +1,4 @@
-"""The code in CONTRIBUTING works: added to a copy it gives a format, a study, an encoder, a learner, an option ..."""
+"""The code in CONTRIBUTING works: added to a copy it gives a format, a study, an encoder, a rule, an option ..."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ import pytest
 from taxel import _core
 
 ROOT = Path(__file__).resolve().parents[1]
-FORMAT, STUDY, ENCODER, LEARNER, PAGE, OPTION = "channel", "quiet", "binary", "echo", "clients", "mounted"
-#: The tests that check the laws and registries of formats, studies, encoders, learners, and parts of the page.
+FORMAT, STUDY, ENCODER, RULE, PAGE, OPTION = "channel", "quiet", "binary", "echo", "clients", "mounted"
+#: The tests that check the laws and registries of formats, studies, encoders, learning rules, and parts of the page.
 TESTS = {
     FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py", "tests/recording/test_memory.py"],
     STUDY: [
@@ -27,7 +27,7 @@ TESTS = {
         for name in ("test_study_registry", "test_quiet", "test_studies", "test_public_names")
     ],
     ENCODER: ["tests/encode/test_laws.py", "tests/encode/test_binary.py"],
-    LEARNER: ["tests/learn/test_manners.py", "tests/learn/test_echo.py"],
+    RULE: ["rules/tests/test_laws.py", "rules/tests/test_echo.py"],
     PAGE: ["tests/panel/test_page.py", "tests/panel/test_page_clients.py"],
     OPTION: ["tests/test_docstrings.py", "tests/panel/test_page_mounted.py"],
 }
@@ -75,14 +75,17 @@ def copy(tmp_path: Path) -> Path:
     """A copy of the package, its tests and their settings."""
     unneeded = shutil.ignore_patterns("__pycache__", "*.so", ".hypothesis")
     shutil.copytree(ROOT / "python", tmp_path / "python", ignore=unneeded)
-    for compiled in (ROOT / "python" / "taxel").glob("_core*.so"):
-        (tmp_path / "python" / "taxel" / compiled.name).symlink_to(compiled)
-    shutil.copytree(ROOT / "studies", tmp_path / "studies", ignore=unneeded)
-    for room in ("formats", "learn", "recording"):
+    for beside in ("rules", "studies"):
+        shutil.copytree(ROOT / beside, tmp_path / beside, ignore=unneeded)
+    for package in ("python/taxel", "rules/taxel_rules"):
+        for compiled in (ROOT / package).glob("*.so"):
+            (tmp_path / package / compiled.name).symlink_to(compiled)
+    for room in ("formats", "learn", "recording", "sound"):
         shutil.copytree(ROOT / "tests" / room, tmp_path / "tests" / room, ignore=unneeded)
-    for shared in (ROOT / "tests").glob("[!t]*.py"):
+    for shared in (ROOT / "tests").glob("*.py"):
         shutil.copy(shared, tmp_path / "tests")
-    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    for settings in ("pyproject.toml", "conftest.py"):
+        shutil.copy(ROOT / settings, tmp_path)
     # Studies refer to pages of the documentation.
     shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("_build", "pictures"))
     return tmp_path
@@ -94,12 +97,12 @@ def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
     # A missing line may break the imports of one test file; the other files then name it.
     quietly = ["-q", "-p", "no:cacheprovider", "--continue-on-collection-errors"]
     command = [sys.executable, "-m", "pytest", *quietly, *tests]
-    about = {STUDY: f"{name} or registry or without_weight", LEARNER: "echo or Echo or nothing_is_left_out"}
+    about = {STUDY: f"{name} or registry or without_weight", RULE: "echo or Echo or nothing_is_left_out"}
     about[FORMAT] = "test_channel or registry or among_the_large"
     about[ENCODER] = "binary or nothing_is_left_out"
     about[OPTION] = "live or option"
     chosen = ["-k", about[name]] if name in about else []
-    environment = os.environ | {"PYTHONPATH": f"{root / 'python'}:{root / 'studies'}"}
+    environment = os.environ | {"PYTHONPATH": ":".join(str(root / name) for name in ("python", "rules", "studies"))}
     return subprocess.run([*command, *chosen], cwd=root, env=environment, capture_output=True, text=True, check=False)
 
 
@@ -124,12 +127,12 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         ("tests/encode/test_binary.py", False),
         ("benchmarks/taxel_benchmarks/encode_binary.py", False),
     ]
-    assert [(p.path, bool(p.after)) for p in of(LEARNER)] == [
-        ("crates/taxel-core/src/learn/rivals/echo.rs", False),
-        ("crates/taxel-core/src/learn/rivals.rs", True),
-        ("python/taxel/learn/echo.py", False),
-        ("python/taxel/learn/__init__.py", True),
-        ("tests/learn/test_echo.py", False),
+    assert [(p.path, bool(p.after)) for p in of(RULE)] == [
+        ("rules/src/rules/echo.rs", False),
+        ("rules/src/rules.rs", True),
+        ("rules/taxel_rules/echo.py", False),
+        ("rules/taxel_rules/__init__.py", True),
+        ("rules/tests/test_echo.py", False),
     ]
     folder = "crates/taxel-panel"
     assert [(p.path, bool(p.after)) for p in of(PAGE)] == [
@@ -143,7 +146,7 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         ("crates/taxel-live/src/pipeline/options.rs", True),
         ("tests/panel/test_page_mounted.py", False),
     ]
-    every = [*of(FORMAT), *of(STUDY), *of(ENCODER), *of(LEARNER), *of(PAGE), *of(OPTION)]
+    every = [*of(FORMAT), *of(STUDY), *of(ENCODER), *of(RULE), *of(PAGE), *of(OPTION)]
     assert sorted(pieces()) == sorted(every)
 
 
@@ -182,28 +185,31 @@ def test_a_part_that_is_left_out_is_named(copy: Path, name: str, without: str, s
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A whole copy with the pieces of encoder, learner and page, whose extension is built from them."""
+    """A whole copy with the pieces of encoder, rule and page, whose extension is built from them."""
     root = tmp_path_factory.mktemp("built")
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     for name in tracked:
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, root / name)
-    for piece in (*of(ENCODER), *of(LEARNER), *of(PAGE), *of(OPTION)):
+    for piece in (*of(ENCODER), *of(RULE), *of(PAGE), *of(OPTION)):
         add(root, piece)
     # Dependencies are not built again: the copy uses the checkout's.
     made = ["build", "--release", "--quiet", "--features", "test-hooks"]
     made += ["--target-dir", str(ROOT / "target"), "--out", str(root / "wheel")]
-    subprocess.run([Path(sys.executable).with_name("maturin"), *made], cwd=root, check=True, capture_output=True)
-    (wheel,) = (root / "wheel").glob("*.whl")
-    with zipfile.ZipFile(wheel) as inside:
-        (compiled,) = (name for name in inside.namelist() if name.startswith("taxel/_core") and name.endswith(".so"))
-        inside.extract(compiled, root / "python")
+    for manifest, folder in (("crates/taxel-python", "python"), ("rules", "rules")):
+        build = [Path(sys.executable).with_name("maturin"), *made, "--manifest-path", f"{manifest}/Cargo.toml"]
+        subprocess.run(build, cwd=root, check=True, capture_output=True)
+        (wheel,) = (root / "wheel").glob("*.whl")
+        with zipfile.ZipFile(wheel) as inside:
+            (compiled,) = (name for name in inside.namelist() if name.endswith(".so"))
+            inside.extract(compiled, root / folder)
+        wheel.unlink()
     return root
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("name", [ENCODER, LEARNER])
+@pytest.mark.parametrize("name", [ENCODER, RULE])
 def test_what_contributing_says_of_rust_is_enough(built: Path, name: str) -> None:
     done = tried(built, name)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
@@ -215,19 +221,19 @@ def test_what_contributing_says_of_rust_is_enough(built: Path, name: str) -> Non
 @pytest.mark.parametrize(
     ("without", "said"),
     [
-        ("python/taxel/learn/__init__.py", "a line in learn/__init__.py"),
-        ("tests/learn/test_echo.py", "tests/learn/test_echo.py"),
-        ("python/taxel/learn/echo.py", "No module named 'taxel.learn.echo'"),
+        ("rules/taxel_rules/__init__.py", "a line in taxel_rules/__init__.py"),
+        ("rules/tests/test_echo.py", "rules/tests/test_echo.py"),
+        ("rules/taxel_rules/echo.py", "No module named 'taxel_rules.echo'"),
     ],
 )
-def test_a_part_of_a_learner_that_is_left_out_is_named(built: Path, without: str, said: str) -> None:
+def test_a_part_of_a_rule_that_is_left_out_is_named(built: Path, without: str, said: str) -> None:
     whole = (built / without).read_text()
     try:
         if without.endswith("__init__.py"):
             shutil.copy(ROOT / without, built / without)
         else:
             (built / without).unlink()
-        done = tried(built, LEARNER)
+        done = tried(built, RULE)
     finally:
         (built / without).write_text(whole)
     assert done.returncode != 0
@@ -293,10 +299,10 @@ def test_an_option_in_rust_is_one_of_python_and_of_the_command_line(copy: Path) 
     assert "-1" in refused.stderr
 
 
-def test_a_learner_without_its_line_in_rust_is_named(copy: Path) -> None:
-    for piece in of(LEARNER):
+def test_a_rule_without_its_line_in_rust_is_named(copy: Path) -> None:
+    for piece in of(RULE):
         if "crates" not in piece.path:
             add(copy, piece)
-    done = tried(copy, LEARNER)
+    done = tried(copy, RULE)
     assert done.returncode != 0
     assert "echo: nothing of that name has parameters" in done.stdout + done.stderr

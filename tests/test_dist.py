@@ -104,6 +104,7 @@ def test_the_wheel_runs_the_demo_in_a_bare_environment(tmp_path: Path) -> None:
 def test_the_studies_install_beside_the_wheel(tmp_path: Path) -> None:
     bare = Bare(tmp_path)
     the("taxel_studies-*.whl")
+    the("taxel_rules-*.whl")
     bare.install("--find-links", str(DIST), "taxel[studies]")
     ended = bare.run("taxel", "study", "fig6.1", "--size", "toy", "--report", "report")
     assert ended.returncode == 0, ended.stderr

@@ -6,6 +6,7 @@ import inspect
 import math
 import pickle
 import re
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -14,8 +15,7 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel import _core
-from taxel._base.parameters import Parameters, Value, described
+from taxel._base.parameters import Parameters, Value
 
 
 def of(kind: type[Parameters]) -> Iterator[type[Parameters]]:
@@ -32,28 +32,16 @@ KINDS = sorted(set(of(Parameters)), key=lambda kind: kind.__name__)
 REQUIRED: dict[str, Any] = {
     "levels": [1.0],
     "parts": {"area": taxel.encode.ContactArea()},
-    "eta": 0.1,
-    "epochs": 5,
-    "updates": "batch",
-    "initial": (0.0, 1.0),
-    "tau": 10.0,
-    "tau_s": 5.0,
-    "theta_0": 1.0,
-    "rule": "E",
-    "tau_a": 5.0,
-    "window_ms": 1.0,
 }
 
 
 def make(kind: type[Parameters], **changes: Any) -> Any:
-    return kind(**{**{name: REQUIRED[name] for name in described(kind._kind)["required"]}, **changes})
+    return kind(**{**{name: REQUIRED[name] for name in kind._described()["required"]}, **changes})
 
 
-def ranged() -> list[Any]:
+def ranged(kinds: list[Any] = KINDS) -> list[Any]:
     return [
-        pytest.param(kind, name, id=f"{kind.__name__}.{name}")
-        for kind in KINDS
-        for name in described(kind._kind)["ranges"]
+        pytest.param(kind, name, id=f"{kind.__name__}.{name}") for kind in kinds for name in kind._described()["ranges"]
     ]
 
 
@@ -69,7 +57,7 @@ Encoders = {kind.__name__ for kind in taxel.encode.Encoder._by_name.values()}
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_signature_shows_what_the_compiled_part_has(kind):
     """Names and defaults of the constructor, one by one; a group is None, which stands for its defaults."""
-    known = described(kind._kind)
+    known = kind._described()
     shown = {name: entry.default for name, entry in inspect.signature(kind).parameters.items()}
     assert [name for name, default in sorted(shown.items()) if default is inspect.Parameter.empty] == sorted(
         known["required"]
@@ -83,13 +71,13 @@ def test_the_signature_shows_what_the_compiled_part_has(kind):
 
 @pytest.mark.parametrize(("kind", "name"), ranged())
 def test_a_value_outside_its_range_is_refused_in_the_table_s_words(kind, name):
-    rules = described(kind._kind)["ranges"][name]
+    rules = kind._described()["ranges"][name]
     wrong = [math.nan]
     if "least" in rules:
         wrong.append(rules["least"] - 1 if rules["least_in"] else rules["least"])
     if "most" in rules:
         wrong.append(rules["most"] * 2 + 1 if rules["most_in"] else rules["most"])
-    default = described(kind._kind)["defaults"].get(name)
+    default = kind._described()["defaults"].get(name)
     hint = get_type_hints(kind)[name]
     whole = hint in (int, int | None)
     entries = max(1, len(default)) if isinstance(default, list) else int(hint == Sequence[float] | None)
@@ -110,13 +98,13 @@ def documented(kind: Any, name: str) -> str:
     (place,) = (k for k, line in enumerate(lines) if re.match(rf"(\w+, )*{name}\b(, \w+)*( : |$)", line))
     there = re.search(r"[Aa]s (?:in|for) `(\w+)`", " ".join(lines[place + 1 : place + 3]))
     if there and not re.search(r"\d", lines[place].partition(" : ")[2]):
-        return documented(getattr(taxel.learn, there[1]), name)
+        return documented(getattr(sys.modules[kind.__module__.rpartition(".")[0]], there[1]), name)
     return lines[place]
 
 
 @pytest.mark.parametrize(("kind", "name"), ranged())
 def test_the_documentation_says_the_table_s_range_and_unit(kind, name):
-    rules = described(kind._kind)["ranges"][name]
+    rules = kind._described()["ranges"][name]
     said = documented(kind, name)
     wanted = rules["must_be"].removesuffix(" and finite")
     if "number of us" in wanted:
@@ -151,13 +139,13 @@ def test_parameters_go_round(kind):
         assert (other == one) is isinstance(one, Value)
     for name, value in one.get_params(deep=False).items():
         assert getattr(again, name) is value
-    assert _core.check_parameters(kind._kind, one._json())
+    assert kind._compiled.check_parameters(kind._kind, one._json())
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_wrong_value_changes_nothing(kind):
     one = make(kind)
-    known = described(kind._kind)
+    known = kind._described()
     before, name = one.get_params(), next(iter(known["ranges"] or known["defaults"] or known["required"]))
     for nonsense in ({name: math.nan}, {name: object()}, {"nonsense": 1}, {f"{name}__nonsense": 1}, {"__": 1}):
         with pytest.raises(taxel.ProblemError):
@@ -183,32 +171,32 @@ def test_a_representation_shows_what_differs_from_the_default():
     assert repr(taxel.encode.ContactArea(levels=np.array([2, 4]))) == "ContactArea(levels=array([2, 4]))"
 
 
-def test_python_types_no_default_of_a_parameter():
+@pytest.mark.parametrize("kind", KINDS)
+def test_python_types_no_default_of_a_parameter(kind):
     """A constructor's default is read from the compiled part: `_DEFAULT.tau`, never a number, a word or None."""
     typed = []
-    for kind in KINDS:
-        path = Path(inspect.getsourcefile(kind))
-        tree = ast.parse(path.read_text())
-        (held,) = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name == kind.__name__]
-        for node in held.body:
-            name = node.target.id if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) else ""
-            if name not in inspect.signature(kind).parameters or node.value is None:
-                continue
-            read = isinstance(node.value, ast.Attribute) and isinstance(node.value.value, ast.Name)
-            if not (read and node.value.attr == name):
-                typed.append(f"{path.name}: {kind.__name__}.{name} = {ast.unparse(node.value)}")
+    path = Path(inspect.getsourcefile(kind))
+    tree = ast.parse(path.read_text())
+    (held,) = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name == kind.__name__]
+    for node in held.body:
+        name = node.target.id if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) else ""
+        if name not in inspect.signature(kind).parameters or node.value is None:
+            continue
+        read = isinstance(node.value, ast.Attribute) and isinstance(node.value.value, ast.Name)
+        if not (read and node.value.attr == name):
+            typed.append(f"{path.name}: {kind.__name__}.{name} = {ast.unparse(node.value)}")
     assert not typed
 
 
-def test_python_compares_no_parameter_with_a_number():
+@pytest.mark.parametrize("kind", KINDS)
+def test_python_compares_no_parameter_with_a_number(kind):
     """Ranges are checked in the compiled part: no Python class compares one of its parameters with a number."""
     typed = []
-    for kind in KINDS:
-        path = Path(inspect.getsourcefile(kind))
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Compare):
-                sides = [node.left, *node.comparators]
-                own = any(isinstance(s, ast.Attribute) and s.attr in inspect.signature(kind).parameters for s in sides)
-                if own and any(isinstance(s, ast.Constant) and isinstance(s.value, int | float) for s in sides):
-                    typed.append(f"{path.name}: {ast.unparse(node)}")
+    path = Path(inspect.getsourcefile(kind))
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Compare):
+            sides = [node.left, *node.comparators]
+            own = any(isinstance(s, ast.Attribute) and s.attr in inspect.signature(kind).parameters for s in sides)
+            if own and any(isinstance(s, ast.Constant) and isinstance(s.value, int | float) for s in sides):
+                typed.append(f"{path.name}: {ast.unparse(node)}")
     assert not typed

@@ -1,20 +1,73 @@
-"""The pages of *Start here* do what they say: their commands and Python in order, each page in its own folder.
+"""The pages of *Start here* and the way of the README do what they say, each page in its own folder.
 
 What a page prints are whole lines, or their beginning before "...".
 """
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import os
 import re
+import shlex
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.test_readme import Shell
+from live.boards import LOOPBACK
+from loopback import free_port
+from tests.test_readme import README, shell_lines
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(DOCS.glob("start-*.md"))
 #: Commands that wait for another one beside them.
 LISTENING = ("taxel record", "taxel live")
+WAY = [
+    line
+    for line in shell_lines(README)
+    if re.match(r"taxel (record|emulate|info|train|detect|live) ", line)
+    and "--panel" not in line  # tests/panel opens it
+]
+
+
+class Shell:
+    """Types lines of a page in a folder, over loopback and a free port."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.port = folder, free_port()
+
+    def arguments(self, line: str) -> list[str]:
+        # Ctrl-C ends what listens: a busy machine may need longer than a page says.
+        line = line.replace("--port 5208", f"--port {self.port}").replace("--seconds 20", "--seconds 600")
+        words = shlex.split(line, comments=True)[1:]
+        here = ["--host", LOOPBACK] if words[0] in ("record", "live") else []
+        return [sys.executable, "-m", "taxel", *words, *here]
+
+    def run(self, line: str) -> str:
+        done = subprocess.run(
+            self.arguments(line), cwd=self.folder, capture_output=True, text=True, timeout=120, check=False
+        )
+        assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    def beside(self, line: str, other: str) -> str:
+        """Start a command that listens, run the other beside it, then press Ctrl-C."""
+        with subprocess.Popen(
+            self.arguments(line), cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as process:
+            try:
+                assert process.stderr is not None
+                assert any("listening" in said for said in process.stderr), line
+                self.run(other)
+                process.send_signal(signal.SIGINT)
+                said, error = process.communicate(timeout=60)
+            finally:
+                process.kill()
+        assert process.returncode == 0, f"{line}\n{said}\n{error}"
+        return said
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:
@@ -22,22 +75,70 @@ def blocks(page: Path) -> list[tuple[str, str]]:
     return re.findall(r"^```(|python|text)\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
 
 
+def command(line: str) -> str:
+    """Return a line without its comment, and without the option that writes a report beside all else."""
+    return re.sub(r"\s+#.*| --report \S+", "", line).strip()
+
+
+Played = Callable[[Path], tuple[Path, dict[str, str]]]
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
+    """Does what a page says, once: returns its folder, and what each of its commands printed."""
+
+    @functools.cache
+    def play(page: Path) -> tuple[Path, dict[str, str]]:
+        folder, by_line, printed = tmp_path_factory.mktemp(page.stem), {}, ""
+        shell = Shell(folder)
+        for language, text in blocks(page):
+            lines = text.splitlines()
+            if language == "python":
+                with contextlib.chdir(folder):
+                    exec(compile(text, page.name, "exec"), {"__name__": page.stem})
+            elif language == "text":
+                said = {" ".join(line.split()) for line in printed.splitlines()}
+                for line in lines:
+                    whole, cut, _ = " ".join(line.split()).partition(" ...")
+                    found = whole in said or (cut and any(one.startswith(whole) for one in said))
+                    assert found, f"{page.name}: {line!r} is not in\n{printed}"
+            elif lines[0].startswith(LISTENING):
+                printed = by_line[command(lines[0])] = shell.beside(*lines)
+                by_line[command(lines[1])] = ""
+            else:
+                by_line |= {command(line): shell.run(line) for line in lines}
+                printed = "".join(by_line[command(line)] for line in lines)
+        return folder, by_line
+
+    return play
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_a_page_works_as_printed(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    shell, printed = Shell(tmp_path), ""
-    for language, text in blocks(page):
-        if language == "python":
-            exec(compile(text, page.name, "exec"), {"__name__": page.stem})
-        elif language == "text":
-            said = {" ".join(line.split()) for line in printed.splitlines()}
-            for line in text.splitlines():
-                whole, cut, _ = " ".join(line.split()).partition(" ...")
-                found = whole in said or (cut and any(one.startswith(whole) for one in said))
-                assert found, f"{page.name}: {line!r} is not in\n{printed}"
-        else:
-            lines, printed = text.splitlines(), ""
-            printed = shell.beside(*lines) if lines[0].startswith(LISTENING) else "".join(map(shell.run, lines))
+def test_a_page_works_as_printed(page: Path, played: Played) -> None:
+    played(page)
+
+
+def test_the_readmes_way_works_as_printed(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its commands are those of the page of an event board; then its Python, in the same folder."""
+    folder, printed = played(DOCS / "start-board.md")
+    record, _, info, train, detect, live = WAY
+    assert [line.split()[1] for line in WAY] == ["record", "emulate", "info", "train", "detect", "live"]
+    assert set(WAY) <= printed.keys()
+    assert "nothing lost" in printed[record]
+    assert "4096 taxels" in printed[info] or "64 x 64 taxels" in printed[info]
+    assert "written to touch.json" in printed[train]
+    found = " ".join(printed[detect].split())
+    [quoted] = re.findall(r"^```text\n(.*?)^```", README.read_text(), re.MULTILINE | re.DOTALL)
+    for line in quoted.splitlines():
+        assert " ".join(line.split()) in found, f"README: {line!r}"
+    assert "detections" in printed[live]
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    pieces = re.findall(r"^```python\n(.*?)^```", README.read_text(), re.MULTILINE | re.DOTALL)
+    assert len(pieces) == 2
+    for number, piece in enumerate(pieces):
+        exec(compile(piece, f"README, piece {number}", "exec"), {"__name__": "readme"})
+    assert os.path.getsize(folder / "ball.mcap") > 1_000_000
 
 
 def test_each_page_is_named_where_a_reader_begins() -> None:

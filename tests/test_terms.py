@@ -20,7 +20,7 @@ PAGE = (Path(__file__).parents[1] / "docs" / "terms.md").read_text()
 NAMES, OPTIONS = PAGE.split("## Names")[1].split("## Options of the command line")
 #: The names that `import taxel` shows, and the subpackages that are imported by their own names.
 ROOMS = [*(f"taxel.{n}" for n in taxel.__all__ if isinstance(getattr(taxel, n), ModuleType)), "taxel"]
-ROOMS += ["taxel.report", "taxel.simulate.circuit", "taxel_studies"]
+ROOMS += ["taxel.report", "taxel.simulate.circuit", "taxel_studies", "taxel_rules"]
 
 
 def first_cells(part: str) -> set[str]:
@@ -60,7 +60,7 @@ def test_every_place_is_there() -> None:
     roots = Path(taxel.__file__).parent, Path(__file__).parents[1]
     places = {place for row in rows for place in re.findall(r"`([^`]+)`", row)}
     gone = sorted(place for place in places if not any((root / place).exists() for root in roots))
-    assert not gone, f"docs/terms.md: {', '.join(gone)} is no file or folder of taxel or taxel_studies"
+    assert not gone, f"docs/terms.md: {', '.join(gone)} is no file or folder of taxel or of what stands beside it"
 
 
 def test_every_option_has_its_line() -> None:

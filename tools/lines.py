@@ -1,6 +1,7 @@
-"""Count the lines of code of the product's six parts: `python tools/lines.py`.
+"""Count the lines of code of the product's parts: `python tools/lines.py`.
 
-A line counts where it holds code: no comment, no docstring, no blank line, no test. Files that a tool writes count too.
+A line counts where it holds code: no comment, no docstring, no blank line, no test. Code that a tool
+writes counts too; stubs, declarations and tables (`.pyi`, `.d.ts`, `.toml`) do not.
 """
 
 import re
@@ -16,9 +17,11 @@ PARTS = {
     "taxel-panel": "crates/taxel-panel/src",
     "page": "crates/taxel-panel/web",
     "border": "crates/taxel-python/src",
+    "border, base": "crates/taxel-border/src",
     "python/taxel": "python/taxel",
 }
 BESIDE = {
+    "rules": "rules",
     "studies": "studies/taxel_studies",
     "benchmarks": "benchmarks/taxel_benchmarks",
     "viewers": "viewers/taxel_viewers",

@@ -5,7 +5,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use taxel_core::board::{Board, DATAGRAM_WORDS};
-use taxel_core::wire::v2::{self, DATAGRAM_BYTES, Header};
+use taxel_core::wire::v2::{self, DATAGRAM_BYTES, DatagramHeader};
 use taxel_core::wire::{Decoder, Registers, WORD_BYTES};
 use taxel_core::{Array, Events};
 
@@ -28,7 +28,7 @@ fuzz_target!(|input: &[u8]| {
                 taken += 1;
                 let takes = taken <= takes;
                 if datagram[0] == v2::MAGIC {
-                    assert!(datagram.len() <= DATAGRAM_BYTES && Header::read(datagram).is_ok());
+                    assert!(datagram.len() <= DATAGRAM_BYTES && DatagramHeader::read(datagram).is_ok());
                     if takes {
                         second.push(datagram, None, &mut other);
                     }

@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use taxel_core::wire::v2::{DATAGRAM_BYTES, HEADER_BYTES, Header};
+use taxel_core::wire::v2::{DATAGRAM_BYTES, HEADER_BYTES, DatagramHeader};
 use taxel_core::wire::{Decoder, Receiver};
 use taxel_core::{Array, Events};
 
@@ -26,7 +26,7 @@ fuzz_target!(|input: &[u8]| {
         bytes += datagram.len() as u64;
         receiver.push(&datagram, arrived, &mut events);
         // The same again, when its version is certain: of version 2 it gives nothing.
-        if kind & 2 != 0 && Header::read(&datagram).is_ok() {
+        if kind & 2 != 0 && DatagramHeader::read(&datagram).is_ok() {
             let (decoded, counts) = (events.len(), receiver.two().counts());
             bytes += datagram.len() as u64;
             receiver.push(&datagram, arrived, &mut events);
@@ -46,7 +46,7 @@ fuzz_target!(|input: &[u8]| {
 /// A datagram of version 2 whose checksum holds: its header's first bytes from the piece, few boards and sessions.
 fn seal(piece: &[u8], kind: u8, out: &mut Vec<u8>) {
     let (head, body) = piece.split_at(HEADER_BYTES);
-    let header = Header {
+    let header = DatagramHeader {
         kind: head[1] & 0xf,
         board: u16::from(head[2] & 1),
         sequence: u32::from_le_bytes([head[4], head[5], if kind & 4 == 0 { 0 } else { head[6] }, if kind & 4 == 0 { 0 } else { head[7] }]),

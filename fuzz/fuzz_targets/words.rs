@@ -5,7 +5,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use taxel_core::vectors::Instructions;
-use taxel_core::wire::v2::{Decoder, Header, Heard, stride};
+use taxel_core::wire::v2::{Decoder, DatagramHeader, Heard, stride};
 use taxel_core::{Array, Events};
 
 fuzz_target!(|input: &[u8]| {
@@ -20,7 +20,7 @@ fuzz_target!(|input: &[u8]| {
         let stride = if flags & 0xe0 == 0xe0 { on % 32 } else { stride(array.rows) };
         base = if flags & 0x1c == 0x1c { u64::from(on) } else { base + u64::from(on) };
         let (sequence, line) = (datagrams.len() as u32, if kind & 0x40 == 0 { 0 } else { on });
-        let header = Header { kind: kind & 7, board: 1, sequence, base, session: 1, stride, line, flags, span: 0 };
+        let header = DatagramHeader { kind: kind & 7, board: 1, sequence, base, session: 1, stride, line, flags, span: 0 };
         let mut datagram = vec![];
         header.write(body, &mut datagram);
         datagrams.push(datagram);

@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel.encode import ThresholdIzhikevich
-from taxel.learn import Tempotron
 from taxel.spikes import SpikeTrains
+from taxel_rules import Tempotron
 from taxel_studies.fabric_array import PERIOD_US, SENSOR, depth_of, pressed, read
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table

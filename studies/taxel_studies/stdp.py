@@ -13,8 +13,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from taxel.learn import STDP
 from taxel.spikes import SpikeTrains
+from taxel_rules import STDP
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table, one_task_per_seed
 

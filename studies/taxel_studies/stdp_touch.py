@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.array import Array
-from taxel.learn import STDP
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
+from taxel_rules import STDP
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, one_task_per_seed
 from taxel_studies.unlabelled import moved, threshold, unlearning

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from taxel.learn import STDP
+from taxel_rules import STDP
 from taxel_studies.gait import sources
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.runner import Task

@@ -277,7 +277,7 @@ class Study:
         folder = report / self.name
         folder.mkdir(parents=True, exist_ok=True)
         listing = dict(given)
-        code = code_version("taxel", "taxel_studies")
+        code = code_version("taxel", "taxel_rules", "taxel_studies")
         if self.courses:
             given["courses"] = SharedFolder(report / "courses", code)
             given["courses"].path.mkdir(exist_ok=True)

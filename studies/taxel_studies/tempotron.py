@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from taxel.learn import Tempotron
 from taxel.spikes import SpikeTrains
+from taxel_rules import Tempotron
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Statement, Summary
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from taxel.learn import STDP
 from taxel.spikes import SpikeTrains
+from taxel_rules import STDP
 
 __all__ = ["moved", "threshold", "unlearning"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from taxel import ProblemError
-from taxel.learn import INST
+from taxel_rules import INST
 from taxel_studies import load, rivals
 from taxel_studies.rivals import protocols
 from taxel_studies.rivals.protocols import gardner_gruning, realise, share_right, thesis

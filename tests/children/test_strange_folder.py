@@ -64,7 +64,7 @@ def plant(folder: Path) -> Path:
 def beside(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of recordings with strange files in it."""
     folder = plant(tmp_path_factory.mktemp("strange") / "recordings")
-    draw, count = np.random.default_rng(1), 1500
+    draw, count = np.random.default_rng(1), 1000
     values, labels = draw.random((count, 4, 4)).astype(np.float32) * 0.5, ["label,t_us"]
     for k in range(50, count - 50, 100):
         values[k : k + 40, 1:3, 1:3] += 50

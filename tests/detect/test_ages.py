@@ -39,12 +39,10 @@ def touched(
     ("rate", "jitter", "rise_s", "start_us"),
     [
         (25, 0, 0.02, 0),
-        (60, 0, 0.02, 0),
-        (100, 0, 0.02, 0),
+        *(pytest.param(rate, 0, 0.02, 0, marks=pytest.mark.slow) for rate in (60, 100, 1000)),
         (100, 0, 0.02, 1_795_000_000_000_000),
-        (100, 0.2, 0.02, 0),
+        pytest.param(100, 0.2, 0.02, 0, marks=pytest.mark.slow),
         (250, 0.1, 0.02, 0),
-        (1000, 0, 0.02, 0),
         (100, 0, 0.3, 0),
     ],
 )

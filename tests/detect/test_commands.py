@@ -19,6 +19,8 @@ from taxel.cli import main
 from taxel.report.svg import picture
 from taxel.tasks.labels import references
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -494,6 +496,7 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
     assert "contact, chosen: tau 1.5" in out
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_report_shows_the_sum_of_each_foot(capsys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Figure] = []
     monkeypatch.setattr("taxel.report.detections.picture", lambda figure: drawn.append(figure) or picture(figure))
@@ -509,6 +512,7 @@ def test_a_report_shows_the_sum_of_each_foot(capsys, tmp_path: Path, monkeypatch
         assert curve.get_ydata() == pytest.approx(foot.frames().values.sum(axis=(1, 2))), foot.label
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: Path, capsys, tmp_path: Path) -> None:
     arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--report")
     code, out, _ = call(capsys, *arguments, tmp_path / "with", "--truth", folder / "truth.csv")

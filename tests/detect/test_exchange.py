@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import mixed
 from refusal import refused
 from test_commands import call
 
@@ -47,26 +48,14 @@ def response(graph, branch: str, neuron: int, train: int, t_s: np.ndarray, area:
     return jump * (np.exp(-t_s / mem) - np.exp(-t_s / syn)) / (1 / syn - 1 / mem)
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
-@pytest.mark.parametrize(
-    ("delays_ms", "spike_ms"),
-    [
-        *(((0.0, 5.0), spike_ms) for spike_ms in (None, 0.1)),
-        ((2.0,), None),
-        *(
-            pytest.param(delays_ms, spike_ms, marks=pytest.mark.slow)
-            for delays_ms, spike_ms in (((0.0,), None), ((0.0,), 0.1), ((2.0,), 0.1))
-        ),
-    ],
-)
+@pytest.mark.parametrize(("kernel", "delays_ms", "spike_ms"), mixed(KERNELS, [(0.0, 5.0), (2.0,), (0.0,)], [None, 0.1]))
 def test_a_readout_comes_back_as_it_was(tmp_path: Path, kernel: dict, delays_ms: tuple, spike_ms: float | None) -> None:
     one = readout(kernel, delays_ms, run_threshold=0.9)
     one.to_nir(tmp_path / "one.nir", spike_ms=spike_ms)
     assert taxel.Readout.from_nir(tmp_path / "one.nir") == one
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
-@pytest.mark.parametrize("spike_ms", [None, 0.1])
+@pytest.mark.parametrize(("kernel", "spike_ms"), mixed(KERNELS, [None, 0.1]))
 def test_the_graph_has_our_kernels_in_si_units(tmp_path: Path, kernel: dict, spike_ms: float | None) -> None:
     one = readout(kernel, (0.0, 5.0), run_threshold=0.9)
     one.to_nir(tmp_path / "one.nir", spike_ms=spike_ms)
@@ -83,8 +72,7 @@ def test_the_graph_has_our_kernels_in_si_units(tmp_path: Path, kernel: dict, spi
                 assert np.allclose(1000.0 * theirs, ours, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
-@pytest.mark.parametrize("spike_ms", [None, 0.1])
+@pytest.mark.parametrize(("kernel", "spike_ms"), mixed(KERNELS, [None, 0.1]))
 def test_a_graph_of_others_is_read_by_its_nodes(tmp_path: Path, kernel: dict, spike_ms: float | None) -> None:
     one = readout(kernel, (0.0, 5.0))
     one.to_nir(tmp_path / "one.nir", spike_ms=spike_ms)

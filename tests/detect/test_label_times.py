@@ -86,8 +86,8 @@ def test_a_tare_that_ends_in_a_touch_holds_it(seed: int, share: float) -> None:
     assert held_by_tare([one._replace(tare=Tare.take(frames, stop_us=begin - 20_000))], FLOOR) == 0
 
 
+@pytest.mark.parametrize("shift_ms", [200, pytest.param(-200, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("shift_ms", [-200, 200])
 def test_training_says_first_by_how_much_labels_are_off(tmp_path: Path, capsys, seed: int, shift_ms: int) -> None:
     frames, truth = touched(seed)
     taxel.convert(frames, tmp_path / "a.npz")

@@ -60,7 +60,7 @@ def written(folder: Path, frames: Frames, labels: dict[str, np.ndarray], more: s
 @pytest.mark.parametrize(
     ("shape", "values"),
     [
-        ((24, 32), {"gain": 1200.0, "noise": 6.0, "offset": 3000.0}),
+        pytest.param((24, 32), {"gain": 1200.0, "noise": 6.0, "offset": 3000.0}, marks=pytest.mark.slow),
         ((16, 16), {"gain": 0.8, "noise": 0.006, "offset": 0.2}),
         ((8, 8), {"gain": 200.0, "noise": 1.0, "offset": 10.0}),
     ],
@@ -451,6 +451,7 @@ def squares(sides: list[int]) -> tuple[Frames, dict[str, list[int]]]:
     return frames, {"contact": (10_000 * starts).tolist(), "lift": (10_000 * (starts + 40)).tolist()}
 
 
+@settings(max_examples=settings.default.max_examples // 5)
 @given(st.lists(st.integers(4, 8), min_size=1, max_size=6), st.integers(2, 3))
 def test_a_touch_smaller_than_all_that_were_learnt_is_found(sides: list[int], small: int) -> None:
     frames, labels = squares(sides)
@@ -489,7 +490,7 @@ def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed
     assert advice.because.startswith("nothing was felt of 12 of 12 labels: they are of another recording, or")
 
 
-@pytest.mark.parametrize(("sides", "count"), [((2, 1), 24), ((1, 3), 60)])
+@pytest.mark.parametrize(("sides", "count"), [((2, 1), 24), pytest.param((1, 3), 60, marks=pytest.mark.slow)])
 def test_kinds_of_touch_may_be_places_on_the_array(sides: tuple[int, int], count: int) -> None:
     """Halves of the array, and the middle of three parts of it, whose touches are of all sizes."""
     random = np.random.default_rng(3)

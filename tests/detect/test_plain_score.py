@@ -14,6 +14,8 @@ from taxel.detect import Example, Fold, Part, PlainRule, Recipe, judge, run, sco
 from taxel.encode import ContactArea
 from taxel.tasks import Training, TrainOptions
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 RECIPE = Recipe(
     ContactArea(),
     {"tau": 0.5, "refractory": 15.0, "after_spike": "reset", "lb": 0.0, "ub": 3.0, "delay_ms": 0.1, "step_ms": 0.1},

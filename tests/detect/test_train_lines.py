@@ -16,6 +16,8 @@ from taxel.detect.advice import advised, loaded_at_rest
 from taxel.detect.training import Trained, trained
 from taxel.encode import ContactArea, LevelCrossing
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def recorded(folder: Path, seed: int, count: int = 6, late_us: int = 0, more: str = "") -> tuple[Path, Path]:
     """Write a recording and its labels, each so much too late."""
@@ -189,6 +191,7 @@ def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Pat
     assert (code, "nothing was felt" in error) == (2, True), "folds that were asked for are not left out"
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_page_draws_labels_as_given_and_as_felt(tmp_path: Path, capsys) -> None:
     recording, labels = recorded(tmp_path, 1, late_us=7_000)
     options = ("--labels", labels, "-o", tmp_path / "r.json", "--overwrite", "--report")

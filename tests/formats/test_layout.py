@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from draws import mixed
 from typer.testing import CliRunner
 
 import taxel
@@ -55,8 +56,10 @@ def test_tables_of_any_separator_with_or_without_names(tmp_path: Path, separator
     assert frames.array.is_channels
 
 
-@pytest.mark.parametrize("time", [None, 1, "zeit"])
-@pytest.mark.parametrize("shape", ["", "rows = 2\ncolumns = 3\n", "rows = 1\ncolumns = 6\npitch_mm = 5\n"])
+@pytest.mark.parametrize(
+    ("time", "shape"),
+    mixed([None, 1, "zeit"], ["", "rows = 2\ncolumns = 3\n", "rows = 1\ncolumns = 6\npitch_mm = 5\n"]),
+)
 def test_taxels_keep_the_names_of_their_columns(tmp_path: Path, time: int | str | None, shape: str) -> None:
     names = ["Daumen", '"Handfläche"', "", "x3y5", "a", "a"]
     called = ("Daumen", "Handfläche", "", "x3y5", "a", "a")
@@ -414,8 +417,7 @@ def test_a_layout_that_contradicts_the_file_is_refused_where_it_is_given(
     assert taxel.open(tmp_path / "one.npz").frames() == frames
 
 
-@pytest.mark.parametrize("ending", [".npz", ".h5", ".mcap"])
-@pytest.mark.parametrize("falls", ["true", "10"])
+@pytest.mark.parametrize(("ending", "falls"), mixed([".npz", ".h5", ".mcap"], ["true", "10"]))
 def test_a_recording_that_is_converted_beside_its_layout_is_turned_once(
     tmp_path: Path, ending: str, falls: str
 ) -> None:

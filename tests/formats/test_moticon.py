@@ -57,7 +57,7 @@ def test_what_a_file_holds_beside_its_taxels_is_said_and_goes_with_the_file(tmp_
     facts = json.loads(CliRunner().invoke(app, ["info", str(tmp_path / "left.mcap"), "--json"]).stdout)
     assert left.lost[0] in facts["lost"]
     page = CliRunner().invoke(app, ["info", str(tmp_path / "left.mcap")]).stdout
-    assert f"left behind         {left.lost[0]}" in page
+    assert f"not in file         {left.lost[0]}" in page
 
 
 def test_moticon_reports_are_taken_where_they_are(tmp_path):

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from draws import mixed
 from shell import call
 
 import taxel
@@ -117,8 +118,7 @@ def mat(seed: int, sign: int) -> taxel.Frames:
     return taxel.Frames(np.round(values), np.arange(3000) * 20_000, unit="counts", array=taxel.Array(16, 16))
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("bad", [None, 0, 4095])
+@pytest.mark.parametrize(("seed", "bad"), mixed(range(4), [None, 0, 4095]))
 def test_presses_that_are_held_fall_too(tmp_path, capsys, seed: int, bad: float | None) -> None:
     """A quiet stretch within a press sets the tracked rest anew; two bad taxels hide nothing and pretend nothing."""
     for sign in (1, -1):

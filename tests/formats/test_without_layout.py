@@ -36,9 +36,16 @@ def test_a_table_with_decimal_commas_and_no_layout_says_that_it_has_them(tmp_pat
         taxel.open(path)
 
 
-@pytest.mark.parametrize("flat", [True, False])
-@pytest.mark.parametrize("time", [None, "time_ms", "timestamp"])
-@pytest.mark.parametrize("ending", [".npy", ".npz", ".h5"])
+@pytest.mark.parametrize(
+    ("ending", "time", "flat"),
+    [
+        # A .h5 is opened in a process of its own.
+        pytest.param(ending, time, flat, marks=pytest.mark.slow if ending == ".h5" and flat != (time is None) else ())
+        for ending in (".npy", ".npz", ".h5")
+        for time in (None, "time_ms", "timestamp")
+        for flat in (True, False)
+    ],
+)
 def test_arrays_without_a_layout_print_the_one_that_reads_them(
     tmp_path: Path, ending: str, time: str | None, flat: bool
 ) -> None:

@@ -16,6 +16,8 @@ from taxel.labels import Note, beside, text_with
 
 from .touches import folder, ordered
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 QUICK = [
     "--window-ms",
     "60",
@@ -36,6 +38,7 @@ def run(*arguments):
     return CliRunner().invoke(app, ["information", *map(str, arguments)])
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     recording, labels = folder(tmp_path, 60)
     page = tmp_path / "page.html"

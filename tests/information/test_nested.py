@@ -7,7 +7,7 @@ from sklearn.base import clone
 from sklearn.model_selection import cross_val_score
 
 from taxel import ProblemError, SpikeTrains
-from taxel.information import ConeRReadout, TempotronReadout, nested_predictions
+from taxel.information import ConeRReadout, nested_predictions
 
 
 def clouds(trials, features, classes, seed, apart=1.0):
@@ -75,8 +75,8 @@ def test_a_class_that_a_training_set_lacks_is_said():
         (lambda: nested_predictions([np.eye(4)], [4, 4], [0, 1, 0, 1], count=2), "one a matrix"),
         (lambda: nested_predictions([np.eye(4)], [4], [0, 1, 0, 1], count=2, ridges=[0.0]), "above 0"),
         (lambda: nested_predictions([np.eye(4)], [4], [0, 0, 0, 0], count=2), "must be two at least"),
-        (lambda: TempotronReadout().predict([]), "not fitted"),
-        (lambda: TempotronReadout().set_params(epoch=1), "no parameter 'epoch'"),
+        (lambda: ConeRReadout().predict([]), "not fitted"),
+        (lambda: ConeRReadout().set_params(bounds=1), "no parameter 'bounds'"),
     ],
 )
 def test_what_cannot_be_learnt_is_one_clear_error(call, text):
@@ -87,17 +87,16 @@ def test_what_cannot_be_learnt_is_one_clear_error(call, text):
 def test_scikit_learn_can_clone_and_cross_validate_neurons():
     assert clone(ConeRReadout(tau=5.0)).get_params() == {"tau": 5.0, "bound": 0.3, "max_seconds": 10.0}
     patterns = [SpikeTrains.from_lists([[t], [30.0 - t]], stop=30.0) for t in np.linspace(1, 9, 12) + [0, 20] * 6]
-    shares = cross_val_score(TempotronReadout(tau=5.0), patterns, [0, 1] * 6, cv=3)
+    shares = cross_val_score(ConeRReadout(tau=5.0, bound=1.0), patterns, [0, 1] * 6, cv=3)
     assert shares.mean() > 0.7
 
 
-@pytest.mark.parametrize("readout", [ConeRReadout, TempotronReadout])
-def test_readouts_of_classes_refuse_graded_trains_by_name(readout):
+def test_a_readout_of_classes_refuses_graded_trains_by_name():
     graded, plain = (
         [SpikeTrains.from_lists([[1.0 + k], [2.0]], stop=10.0, values=values, kind=kind) for k in range(4)]
         for values, kind in (([[2.0], [1.0]], "graded"), (None, None))
     )
-    one = readout().fit(plain, [0, 0, 1, 1])
-    for call in (lambda: readout().fit(graded, [0, 0, 1, 1]), lambda: one.predict(graded)):
-        with refused(f"^{readout.__name__} takes no graded trains"):
+    one = ConeRReadout().fit(plain, [0, 0, 1, 1])
+    for call in (lambda: ConeRReadout().fit(graded, [0, 0, 1, 1]), lambda: one.predict(graded)):
+        with refused("^ConeRReadout takes no graded trains"):
             call()

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import mixed
 
 from taxel.cli import main
 
@@ -46,8 +47,7 @@ else:
 """
 
 
-@pytest.mark.parametrize("what", ["numbers", "texts"])
-@pytest.mark.parametrize("after_s", [0.5, 2.0])
+@pytest.mark.parametrize(("what", "after_s"), mixed(["numbers", "texts"], [2.0, 0.5]))
 def test_an_estimate_of_many_trials_answers_ctrl_c_soon(what: str, after_s: float) -> None:
     ended = subprocess.run(
         [sys.executable, "-c", CHILD, what, str(after_s)],

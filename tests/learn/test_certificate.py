@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import re
 
 import numpy as np
 import pytest
+from draws import mixed
 from making import made
 from stated import examples, graded
 
@@ -272,13 +274,17 @@ def test_the_three_checks_need_no_compiled_code(time, monkeypatch):
     assert check_gap(relaxed, [trains], [[20.0]]) <= 2 * relaxed.tolerance
 
 
-@pytest.mark.parametrize("kernel", ["alpha", "double_exponential", "exponential"])
-@pytest.mark.parametrize("time", ["grid", "continuous"])
-@pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
-@pytest.mark.parametrize("first_threshold", ["theta_0", "printed"])
-def test_the_rows_of_the_check_are_those_of_the_problem(kernel, time, after_spike, first_threshold):
-    if (kernel, time) == ("exponential", "continuous"):
-        pytest.skip("this kernel crosses no threshold in continuous time")
+@pytest.mark.parametrize(
+    ("kernel_in_time", "after_spike", "first_threshold"),
+    mixed(
+        # An exponential kernel crosses no threshold in continuous time.
+        [*itertools.product(["alpha", "double_exponential"], ["grid", "continuous"]), ("exponential", "grid")],
+        ["keep", "ignore", "reset"],
+        ["theta_0", "printed"],
+    ),
+)
+def test_the_rows_of_the_check_are_those_of_the_problem(kernel_in_time, after_spike, first_threshold):
+    kernel, time = kernel_in_time
     options = {"kernel": kernel, "time": time, "after_spike": after_spike, "first_threshold": first_threshold}
     for seed in range(3):
         random = np.random.default_rng([44, seed])

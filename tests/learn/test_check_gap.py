@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import stated
 import test_cone_r
+from draws import seeds
 from making import made
 
 from taxel import NotFittedError, ProblemError, SpikeTrains
@@ -123,7 +124,7 @@ def spoilt(random, proof):
         yield {"rows": [row for row, kept in zip(rows, keep, strict=True) if kept], "values": values[keep]}
 
 
-@pytest.mark.parametrize("part", range(8))
+@pytest.mark.parametrize("part", seeds(8, quick=2))
 def test_what_is_proven_holds_whatever_the_multipliers_and_the_weights(part, monkeypatch):
     closed = 0
     for seed in range(12 * part, 12 * part + 12):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import signal
-import threading
-import time
 import warnings
 
 import numpy as np
 import pytest
 import stated
+from draws import mixed
+from interrupts import ctrl_c_after
 from making import lists, made
 from refusal import refused
 from simulator import kernel
@@ -187,8 +186,7 @@ OPTIONS = [
 ]
 
 
-@pytest.mark.parametrize("options", OPTIONS, ids=lambda o: ",".join(f"{k}={v}" for k, v in o.items()) or "printed")
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(("options", "seed"), mixed(OPTIONS, [1, 2, 3]))
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_the_objective_is_that_of_every_row_handed_whole_to_a_solver(options, seed):
     patterns, targets = examples(seed, whole_ms=seed == 2)
@@ -430,18 +428,10 @@ def long_rows():
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_control_c_stops_a_fit_promptly_and_keeps_the_best_so_far(long_rows):
     cone = None
-
-    def fit_for_ever():
-        nonlocal cone
+    with ctrl_c_after(0.5, answered_within=10):
         for k in range(10_000):
             cone = made(ConeR, **LONG, kappa=1.2 + k / 1000)
             long_rows.fit(cone)
-
-    threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
-    begun = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        fit_for_ever()
-    assert time.monotonic() - begun < 60
     assert cone.status_ == "stopped"
     assert cone.gap_ > cone.tolerance
     assert cone.objective_ == pytest.approx(sum(cone.parts_.values()))
@@ -454,7 +444,7 @@ def test_max_seconds_ends_a_fit_with_the_best_so_far_and_a_warning(long_rows):
     assert cone.status_ == "stopped"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        ever = long_rows.fit(made(ConeR, **LONG | {"tolerance": 1e-3}))
+        ever = long_rows.fit(made(ConeR, **LONG | {"tolerance": 3e-2}))
     assert cone.objective_ * (1 - cone.gap_) <= ever.objective_
 
 

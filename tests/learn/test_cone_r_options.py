@@ -7,6 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
+from draws import seeds
 from making import lists, made
 from refusal import refused
 from test_cone_r import examples, fitted, least, shares, statement, terms
@@ -61,7 +62,7 @@ def drawn(seed):
     return patterns, targets, silence if random.random() < 0.7 else None, options
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", seeds(60, quick=20))
 def test_any_combination_is_the_least_of_what_is_stated(seed):
     patterns, targets, silence, options = drawn(seed)
     cone = made(ConeR, **options).fit(patterns, targets, silence=silence)

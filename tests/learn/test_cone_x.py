@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-import time
-
 import numpy as np
 import pytest
+from draws import mixed, stretches
+from interrupts import ctrl_c_after
 from making import lists, made
 from refusal import refused
 from stated import examples, grid_rows, row, shares, terms, threshold
@@ -93,8 +91,7 @@ OPTIONS = [
 ]
 
 
-@pytest.mark.parametrize("options", OPTIONS, ids=lambda o: ",".join(o) or "printed")
-@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+@pytest.mark.parametrize(("options", "seed"), mixed(OPTIONS, [1, 2, 3, 4]))
 def test_on_the_grid_verdict_and_objective_are_those_of_every_row_handed_whole_to_a_solver(options, seed):
     patterns, targets = examples(seed, whole_ms=seed % 2 == 0, patterns=2 if seed < 4 else 6)
     cone = made(ConeX, **{"time": "grid", "tau": 12.0, "lb": -3.0, "ub": 3.0, **options}).fit(patterns, targets)
@@ -117,9 +114,10 @@ def test_on_the_grid_verdict_and_objective_are_those_of_every_row_handed_whole_t
     assert cone.margin_.mv == pytest.approx(np.min(rows[4] + (cone.margin or 0.0) - rows[3] @ w), abs=1e-12)
 
 
-def test_verdicts_over_the_edge_of_what_can_be_met_are_those_of_highs_and_each_no_is_proven():
+@pytest.mark.parametrize("seeds", stretches(60, quick=15))
+def test_verdicts_over_the_edge_of_what_can_be_met_are_those_of_highs_and_each_no_is_proven(seeds):
     verdicts = []
-    for seed in range(60):
+    for seed in seeds:
         patterns, targets = examples(
             seed, trains=16, patterns=3 + seed % 4, targets=1 + seed % 2, whole_ms=seed % 3 == 0
         )
@@ -137,7 +135,7 @@ def test_verdicts_over_the_edge_of_what_can_be_met_are_those_of_highs_and_each_n
             assert cone.certificate_.at_all
         else:
             assert (cone.objective_, cone.gap_) == (0.0, 0.0)
-    assert 10 < sum(verdicts) < 50
+    assert len(seeds) / 6 < sum(verdicts) < len(seeds) * 5 / 6
 
 
 def test_the_problem_states_the_rows_of_the_grid_by_pattern_and_time():
@@ -360,16 +358,9 @@ def test_max_seconds_ends_a_fit_with_the_best_so_far(lambdas):
 def test_control_c_stops_a_fit_at_once_keeps_the_best_so_far_and_then_raises():
     patterns, targets = large()
     cone = ConeX(horizon=200.0)
-    threading.Timer(1.5, signal.raise_signal, [signal.SIGINT]).start()
-    begun = time.monotonic()
-
-    def fit_for_ever():
+    with ctrl_c_after(1.5, answered_within=10):
         for _ in range(1000):
             cone.fit(patterns, targets)
-
-    with pytest.raises(KeyboardInterrupt):
-        fit_for_ever()
-    assert time.monotonic() - begun < 60
     assert cone.status_ in ("stopped", "feasible", "solved", "infeasible")
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import stated
 import test_cone_r
+from draws import mixed
 from making import made
 from simulator import misfire
 
@@ -42,8 +43,7 @@ OPTIONS = [
 ]
 
 
-@pytest.mark.parametrize("options", OPTIONS, ids=str)
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("options", "seed"), mixed(OPTIONS, [1, 2]), ids=str)
 def test_the_objective_of_graded_trains_is_that_of_every_row_handed_whole_to_a_solver(options, seed, monkeypatch):
     patterns, targets = test_cone_r.examples(seed, whole_ms=seed == 2)
     patterns = stated.graded(patterns, seed)
@@ -67,9 +67,9 @@ def test_a_target_that_only_negative_weights_reach_is_reachable():
         assert made(ConeR, lb=lb, ub=ub, tau=10.0).fit([one], [[18.0]]).unreachable_ == unreachable
 
 
-@pytest.mark.parametrize("time", ["grid", "continuous"])
-@pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
-@pytest.mark.parametrize("decades", [1, 6])
+@pytest.mark.parametrize(
+    ("time", "after_spike", "decades"), mixed(["grid", "continuous"], ["keep", "ignore", "reset"], [1, 6])
+)
 def test_what_is_solved_fires_at_its_targets_and_what_is_not_is_proven(time, after_spike, decades):
     solved = refuted = 0
     for seed in (0, 3, 5):

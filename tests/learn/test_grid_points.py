@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from draws import mixed
 from making import made
 
 from taxel import Neuron, SpikeTrains
@@ -112,8 +113,7 @@ def test_a_margin_below_the_resolution_of_times_is_solved_only_where_the_neuron_
     assert ended.count("stopped") > 1
 
 
-@pytest.mark.parametrize("start", [0.0, 0.3, -17.1, -1e5, 1e7])
-@pytest.mark.parametrize("step", [0.1, 0.3])
+@pytest.mark.parametrize(("start", "step"), mixed([0.0, 0.3, -17.1, -1e5, 1e7], [0.1, 0.3]))
 def test_d_of_cone_r_is_the_sum_over_the_points(step, start):
     for seed in range(4):
         trains, target, _ = drawn(seed, start, step)

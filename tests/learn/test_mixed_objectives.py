@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from draws import mixed
 from making import made
 
 from taxel import Neuron, SpikeTrains
@@ -85,9 +86,11 @@ def optimum(cone, rows):
 LAMBDAS = [(1, 0, 0), (2, 2, 200), (1, 4, 0), (4, 1, 0), (0, 2, 100), (1, 0, 100), (0, 0, 1)]
 
 
-@pytest.mark.parametrize("options", [{}, {"norm": "square"}, {"divide_b_by": "targets", "kappa": 1.08}], ids=str)
-@pytest.mark.parametrize("reset", [False, True], ids=["keep", "reset"])
-@pytest.mark.parametrize("lambdas", LAMBDAS, ids=str)
+@pytest.mark.parametrize(
+    ("lambdas", "reset", "options"),
+    mixed(LAMBDAS, [False, True], [{}, {"norm": "square"}, {"divide_b_by": "targets", "kappa": 1.08}]),
+    ids=str,
+)
 def test_the_objective_is_the_least_and_the_bound_lies_below_it(lambdas, reset, options):
     spikes, trains, targets = draw(seed=3)
     after = "reset" if reset else "keep"

@@ -13,7 +13,7 @@ from sklearn.base import clone
 from stated import examples
 
 from taxel import Neuron, ProblemError, SpikeTrains
-from taxel.learn import INST, SKIM, ConeR, ConeX, OnlineConeR, check_certificate, check_solution
+from taxel.learn import ConeR, ConeX, OnlineConeR, check_certificate, check_solution
 
 #: Further problems are tried by `pytest -m slow`.
 QUICK, ALL = 60, 1000
@@ -269,9 +269,6 @@ def test_a_grid_of_more_points_than_can_be_had_is_one_clear_error_beforehand():
         lambda: OnlineConeR(neuron=neuron).partial_fit(trains, [20.0]),
         lambda: neuron.run([1.0] * 3, trains),
         lambda: neuron.run_many([[1.0] * 3], trains),
-        lambda: INST(step_ms=1e-9).fit([trains], [[20.0]]),
-        lambda: SKIM(step_ms=1e-9).fit([trains], [[20.0]]),
-        lambda: SKIM(step_ms=1e-9).rows(trains),
     ):
         with pytest.raises(ProblemError, match=r"step_ms is 0.000000001 ms: makes 6.0e10 grid points, at most"):
             call()

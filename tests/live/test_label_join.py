@@ -150,3 +150,12 @@ def test_a_deletion_of_one_window_is_no_conflict_for_another_but_an_older_text_i
     moved = join(both.acknowledged, both.rows, [[Edit(heel, Note("heel", 6))]])
     conflict = conflict_of(moved.acknowledged, [*both.rows, Note("hand", 1)])
     assert (conflict.missing, conflict.returned, conflict.new) == ((Note("heel", 6),), (heel,), (Note("hand", 1),))
+
+
+def test_a_row_that_is_deleted_once_and_acknowledged_once_does_not_return_to_go_again() -> None:
+    heel = Note("heel", 1)
+    known = Acknowledged(labels=(heel,), deleted=(heel,), table=())
+    assert not conflict_of(known, [heel])
+    conflict = conflict_of(known, [heel, heel])
+    assert conflict.returned == (heel,)
+    assert settled(known, [heel, heel], conflict, restore=True).rows == (heel,)

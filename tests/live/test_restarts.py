@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import seeds
 from loopback import free_port, until
 
 import taxel
@@ -49,7 +50,7 @@ def life(draw: np.random.Generator, wire: int, session: int, frames: int) -> lis
 
 
 @pytest.mark.parametrize("wire", [1, 2])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", seeds(8, quick=3))
 def test_over_any_restarts_each_step_back_is_in_the_verdict_live_as_in_the_file(
     tmp_path: Path, wire: int, seed: int
 ) -> None:
@@ -102,7 +103,7 @@ def test_over_any_restarts_each_step_back_is_in_the_verdict_live_as_in_the_file(
         assert taxel.open(tmp_path / f"b{kind}").verdict.steps_back == recording.verdict.steps_back
 
 
-@pytest.mark.parametrize("session", [None, 7])
+@pytest.mark.parametrize("session", [None, pytest.param(7, marks=pytest.mark.slow)])
 def test_an_emulated_board_that_is_killed_and_started_again_makes_no_step_back(
     tmp_path: Path, session: int | None
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from draws import mixed
 
 from taxel import Neuron, SpikeTrains
 
@@ -30,8 +31,7 @@ def kernel(neuron, ages):
     return np.where(ages > 0, ages / neuron.tau * np.exp(-ages / neuron.tau), 0.0)
 
 
-@pytest.mark.parametrize("start", [0.0, -1e5, 1e5, 1e7])
-@pytest.mark.parametrize("step", [0.1, 0.3, 1.0, 0.192])
+@pytest.mark.parametrize(("start", "step"), mixed([0.0, -1e5, 1e5, 1e7], [0.1, 0.3, 1.0, 0.192]))
 def test_a_potential_that_comes_up_to_the_threshold_fires_there(start, step):
     for seed in range(300):
         neuron, trains, weights, at, _ = touching(seed, start, step)

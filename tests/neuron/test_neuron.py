@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from draws import mixed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
@@ -118,8 +119,7 @@ def test_in_continuous_time_each_spike_is_the_root_that_brent_finds(kind):
     assert fired > 10
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=lambda k: "-".join(str(v) for v in k.values()))
-@pytest.mark.parametrize("step_ms", [1.0, 0.5, 0.192])
+@pytest.mark.parametrize(("kind", "step_ms"), mixed(KINDS, [1.0, 0.5, 0.192]))
 def test_on_a_grid_the_first_point_at_or_above_the_threshold_fires(kind, step_ms):
     for seed in range(4):
         neuron = Neuron(tau=7.0, time="grid", step_ms=step_ms, **kind)
@@ -128,8 +128,7 @@ def test_on_a_grid_the_first_point_at_or_above_the_threshold_fires(kind, step_ms
         assert neuron.run(weights, trains) == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=lambda k: "-".join(str(v) for v in k.values()))
-@pytest.mark.parametrize("tau_s", [None, 0.5, 6.5])
+@pytest.mark.parametrize(("kind", "tau_s"), mixed(KINDS, [None, 0.5, 6.5]))
 def test_with_a_double_exponential_each_spike_is_the_root_that_brent_finds(kind, tau_s):
     fired = 0
     for seed in range(3):

@@ -160,7 +160,10 @@ print((resident("VmHWM") - before) / size)
 @pytest.mark.parametrize("work", ["encode", "stream", "encode frames", "tare", "check"])
 def test_columns_are_read_in_place(work: str) -> None:
     """The peak of work that says little is a fraction of the columns: a copy of one of them would show."""
-    # What else the process takes only adds to the peak; a copy is in each of the three.
     command = [sys.executable, "-c", PEAK, work]
-    peaks = [float(subprocess.run(command, capture_output=True, text=True, check=True).stdout) for _ in range(3)]
-    assert min(peaks) < 0.1, f"{work}: {min(peaks):.2f} of the columns' bytes"
+    # What else the process takes only adds to the peak; a copy is in each of three.
+    for _ in range(3):
+        peak = float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+        if peak < 0.1:
+            return
+    pytest.fail(f"{work}: {peak:.2f} of the columns' bytes")

@@ -63,7 +63,7 @@ def test_registers_are_read_again_when_the_board_was_reset(tmp_path, version):
         assert set(floors) <= {3, 9}
 
 
-@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("version", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_preset_by_name_leaves_the_version_of_the_wire(tmp_path, version):
     with page_of_a_board(tmp_path, "--wire", str(version)) as page:
         page.send(type="credit", n=1)

@@ -192,7 +192,7 @@ def settle(pages, name, acknowledged):
         assert not +acknowledged - Counter((row["label"], row["t_us"]) for row in told["labels"])
 
 
-@pytest.mark.parametrize("older", [False, True])
+@pytest.mark.parametrize("older", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_what_windows_were_told_is_done_is_in_the_table_or_in_conflict(older, tmp_path):
     attack(tmp_path, servers=2, clients=2, tables=2, seconds=2, older=older)
 

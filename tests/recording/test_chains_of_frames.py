@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import seeds
 from formats import bags
 from numpy.typing import NDArray
 
@@ -201,7 +202,7 @@ def check(recording: taxel.Recording, models: dict[str, Model], where: str) -> N
 
 
 @pytest.mark.parametrize("maker", MAKERS)
-@pytest.mark.parametrize("seed", [*range(13), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(13, 60))])
+@pytest.mark.parametrize("seed", seeds(60, quick=5))
 def test_in_any_chain_of_steps_frames_and_what_is_beside_them_stay_or_are_said_to_be_lost(  # noqa: PLR0912, PLR0915
     tmp_path: Path, maker: str, seed: int
 ) -> None:

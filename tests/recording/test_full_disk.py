@@ -109,8 +109,14 @@ def test_a_forbidden_folder_is_a_permission_error(tmp_path: Path, ending: str) -
         tmp_path.chmod(0o700)
 
 
-@pytest.mark.parametrize("older", [False, True])
-@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv", ".h5"])
+@pytest.mark.parametrize(
+    ("ending", "older"),
+    [
+        *((ending, True) for ending in (".mcap", ".lsa", ".npz", ".csv", ".h5")),
+        (".mcap", False),
+        *(pytest.param(ending, False, marks=pytest.mark.slow) for ending in (".lsa", ".npz", ".csv", ".h5")),
+    ],
+)
 def test_a_conversion_that_fails_leaves_no_file_and_an_older_one_whole(
     tmp_path: Path, ending: str, older: bool
 ) -> None:

@@ -141,7 +141,7 @@ def test_info_shows_what_was_left_behind(tmp_path: Path) -> None:
     taxel.convert(part, tmp_path / "part.npz")
     lost = ["raw datagrams", "arrival times"]
     assert json.loads(run("info", tmp_path / "part.npz", "--json").stdout)["lost"] == lost
-    assert "left behind         raw datagrams\n" in run("info", tmp_path / "part.npz").stdout
+    assert "not in file         raw datagrams\n" in run("info", tmp_path / "part.npz").stdout
 
 
 def test_notes_of_a_folder_stay_on_another_clock(tmp_path: Path) -> None:

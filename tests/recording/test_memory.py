@@ -15,6 +15,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from draws import mixed
 from formats import bags
 from refusal import refused
 from rosbags import rosbag1, rosbag2
@@ -383,8 +384,7 @@ def of_frames(n: int, **more: Any) -> dict[str, Any]:
     return {"values": np.ones((n, 2, 2)), "t": np.arange(n)} | more
 
 
-@pytest.mark.parametrize("strange", STRANGE)
-@pytest.mark.parametrize("kind", ["npz", "h5"])
+@pytest.mark.parametrize(("strange", "kind"), mixed([*STRANGE], ["npz", "h5"]))
 def test_columns_that_do_not_fit_are_refused_before_they_are_read(
     kind: str, strange: str, tmp_path: Path, opened: Opened
 ) -> None:

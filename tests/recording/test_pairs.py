@@ -94,8 +94,15 @@ READERS: dict[str, Callable[[Path], taxel.Recording]] = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize(
+    ("reader", "kind"),
+    [
+        # A .h5 is written and opened in processes of their own; a .npz holds the same columns.
+        pytest.param(reader, kind, marks=pytest.mark.slow if kind == ".h5" and k % 4 else ())
+        for k, reader in enumerate(READERS)
+        for kind in KINDS
+    ],
+)
 def test_what_a_recording_holds_is_there_again_or_said(tmp_path: Path, reader: str, kind: str) -> None:
     recording = READERS[reader](tmp_path)
     if kind == ".lsa" and not recording.has_events:

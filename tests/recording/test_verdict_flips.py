@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from draws import seeds
 
 import taxel
 from taxel import Recording, _core
@@ -147,7 +148,7 @@ def spoilt(data: bytes, draw: np.random.Generator) -> Iterator[tuple[str, bytes]
     yield f"noise {a}:{b}", data[:a] + draw.integers(0, 256, b - a, np.uint8).tobytes() + data[b:]
 
 
-@pytest.mark.parametrize("seed", [*range(20), *(pytest.param(k, marks=pytest.mark.slow) for k in range(20, 600))])
+@pytest.mark.parametrize("seed", seeds(600, quick=20))
 def test_bytes_that_are_cut_dropped_repeated_or_lost_are_told(whole: Path, tmp_path: Path, seed: int) -> None:
     draw, data = np.random.default_rng(seed), whole.read_bytes()
     of = held_by(taxel.open(whole))

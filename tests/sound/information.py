@@ -13,7 +13,6 @@ CLOUD = np.array([[0.0, 1.0], [3.0, 2.0], [0.5, 0.0], [2.0, 2.5], [1.0, 1.0], [3
 NESTED = taxel.information.nested_predictions([CLOUD @ CLOUD.T], [2], [0, 1] * 4, count=2, inner=2)
 READOUTS = [
     taxel.information.ConeRReadout(tau=5.0, bound=1.0).fit([PLAIN, PLAIN], [0, 1]),
-    taxel.information.TempotronReadout(epochs=3).fit([PLAIN, PLAIN], [0, 1]),
 ]
 PRESSES = taxel.Events(
     np.arange(8) * 10_000 + 1000, np.arange(8) % 2, [0] * 8, [True] * 8, array=ARRAY, intensity=np.arange(8) * 50 + 50
@@ -85,12 +84,6 @@ SOUND: dict[str, Sound] = {
     "taxel.information.ConeRReadout": plain(taxel.information.ConeRReadout, tau=5.0, bound=1.0, max_seconds=1.0),
     "taxel.information.ConeRReadout.fit": method(
         taxel.information.ConeRReadout(tau=5.0, bound=1.0), "fit", patterns=[PLAIN, PLAIN], y=[0, 1]
-    ),
-    "taxel.information.TempotronReadout": plain(
-        taxel.information.TempotronReadout, tau=5.0, epochs=3, max_seconds=1.0, seed=1
-    ),
-    "taxel.information.TempotronReadout.fit": method(
-        taxel.information.TempotronReadout(epochs=3), "fit", patterns=[PLAIN, PLAIN], y=[0, 1]
     ),
     **{
         f"taxel.information.{type(readout).__name__}.{name}": method(readout, name, patterns=[PLAIN])

@@ -334,7 +334,9 @@ def test_foxglove_is_served_on_loopback_alone_and_one_that_never_reads_holds_nob
         wait_for(live, play(events, live.address[1], pace=0.001))
         assert listens(show.process.pid) == {"0100007F"}
         assert memory_mb(show.process.pid) < before + 100
-        assert show.end()["sent"]["spikes"] >= SEEN * len(events)
+        state = show.end()
+        # All spikes of the encoder were sent, or are counted as lost.
+        assert state["sent"]["spikes"] + state["lost"].get("spikes", 0) >= SEEN * len(events)
     assert live.stop().lost == 0
     assert taxel.open(path).events == events
 

@@ -125,7 +125,7 @@ impl Parameter {
     /// # Errors
     ///
     /// `Problem`, naming the parameter, its value and what is valid.
-    pub fn check(&self, value: &dyn Numbers) -> Result<()> {
+    pub fn check(&self, value: &dyn ParameterNumbers) -> Result<()> {
         let mut outcome = Ok(());
         value.each(&mut |place, value| {
             if outcome.is_ok() && !self.range.holds(value) {
@@ -145,14 +145,14 @@ impl Parameter {
 }
 
 /// The numbers in a parameter, with their indices if it is a list.
-pub trait Numbers {
+pub trait ParameterNumbers {
     /// Calls `look` with each number and its index.
     fn each(&self, look: &mut dyn FnMut(Option<usize>, f64));
 }
 
 macro_rules! one_number {
     ($($kind:ty)*) => {
-        $(impl Numbers for $kind {
+        $(impl ParameterNumbers for $kind {
             fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
                 look(None, *self as f64);
             }
@@ -161,7 +161,7 @@ macro_rules! one_number {
 }
 one_number!(f64 f32 usize u16 u32 u64);
 
-impl<T: Numbers> Numbers for Option<T> {
+impl<T: ParameterNumbers> ParameterNumbers for Option<T> {
     fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
         if let Some(value) = self {
             value.each(look);
@@ -169,19 +169,19 @@ impl<T: Numbers> Numbers for Option<T> {
     }
 }
 
-impl Numbers for [f64] {
+impl ParameterNumbers for [f64] {
     fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
         self.iter().enumerate().for_each(|(k, &value)| look(Some(k), value));
     }
 }
 
-impl<const N: usize> Numbers for [f64; N] {
+impl<const N: usize> ParameterNumbers for [f64; N] {
     fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
         self.as_slice().each(look);
     }
 }
 
-impl Numbers for Vec<f64> {
+impl ParameterNumbers for Vec<f64> {
     fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
         self.as_slice().each(look);
     }
@@ -189,6 +189,8 @@ impl Numbers for Vec<f64> {
 
 /// Defines a type's table `RANGES`, and `check_ranges`, which reads it. A name in parentheses after a parameter is the
 /// method that returns its value if the parameter is left out.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! ranges {
     ($($name:ident $(($method:ident))?: $unit:literal, $range:expr;)*) => {
         /// The valid values of its parameters.
@@ -207,7 +209,7 @@ macro_rules! ranges {
     (@ $self:ident $name:ident) => { $self.$name };
     (@ $self:ident $name:ident $method:ident) => { $self.$method() };
 }
-pub(crate) use ranges;
+pub use ranges;
 
 /// Refuses a value that is not above 0 and finite; `unit` may be empty.
 ///
@@ -273,7 +275,7 @@ mod tests {
     #[test]
     fn an_error_names_the_entry_its_value_and_unit() {
         let parameter = |unit| Parameter { name: "tau", unit, range: Range::ABOVE_0 };
-        let message = |unit, value: &dyn Numbers| parameter(unit).check(value).unwrap_err().to_string();
+        let message = |unit, value: &dyn ParameterNumbers| parameter(unit).check(value).unwrap_err().to_string();
         assert_eq!(message("ms", &-1.0), "tau is -1 ms: must be above 0 and finite");
         assert_eq!(message("", &f64::NAN), "tau is NaN: must be above 0 and finite");
         assert_eq!(message("1/ms", &-1.0), "tau is -1/ms: must be above 0 and finite");

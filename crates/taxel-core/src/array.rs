@@ -32,7 +32,7 @@ pub struct Array {
 
 /// Distance between the centres of neighbours, mm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Stated", into = "Stated")]
+#[serde(from = "PitchInFile", into = "PitchInFile")]
 pub struct Pitch {
     /// From one row to the next.
     pub rows: f64,
@@ -57,21 +57,21 @@ impl Pitch {
 /// The pitch in files.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged, expecting = "pitch_mm must be a number, a pair of numbers (rows, columns), or null")]
-enum Stated {
+enum PitchInFile {
     Square(f64),
     Pair([f64; 2]),
 }
 
-impl From<Stated> for Pitch {
-    fn from(stated: Stated) -> Self {
+impl From<PitchInFile> for Pitch {
+    fn from(stated: PitchInFile) -> Self {
         match stated {
-            Stated::Square(pitch) => Self::square(pitch),
-            Stated::Pair([rows, columns]) => Self { rows, columns },
+            PitchInFile::Square(pitch) => Self::square(pitch),
+            PitchInFile::Pair([rows, columns]) => Self { rows, columns },
         }
     }
 }
 
-impl From<Pitch> for Stated {
+impl From<Pitch> for PitchInFile {
     fn from(Pitch { rows, columns }: Pitch) -> Self {
         if rows == columns { Self::Square(rows) } else { Self::Pair([rows, columns]) }
     }

@@ -26,19 +26,19 @@ mod session;
 #[cfg(test)]
 mod tests;
 
-use afferents::Afferents;
+use afferents::BoardAfferents;
 use asynchronous::Asynchronous;
 use comparator::Comparators;
 use link::Link;
 use refresh::Refresh;
-use scan::Scan;
+use scan::ScanOrder;
 
 pub use comparator::NOT_RETURNED;
 pub use counts::BoardCounts;
 pub use crossed::Crossed;
 pub use flaws::{Flaw, Flawed, Flaws};
 pub use link::{DATAGRAM_WORDS, PORT, QUEUE_WORDS};
-pub use network::{Faults, Network, NetworkCounts};
+pub use network::{Network, NetworkCounts, NetworkFaults};
 pub use options::{IntensityWord, Previous, Version2};
 pub use play::{Armed, Play, Played};
 pub use session::{opening, session};
@@ -76,12 +76,12 @@ pub struct Board {
     written: Registers,
     active: Registers,
     reader: CommandReader,
-    scan: Scan,
+    scan: ScanOrder,
     /// Time since reset, 10 ns.
     time: u64,
     comparators: Comparators,
     /// The afferent model, used instead of the comparators with `mechanoreceptor`.
-    afferents: Afferents,
+    afferents: BoardAfferents,
     /// The taxels' own comparators, if the board does not scan.
     asynchronous: Option<Asynchronous>,
     link: Link,
@@ -115,10 +115,10 @@ impl Board {
             written: registers,
             active: registers,
             reader: CommandReader::default(),
-            scan: Scan::new(&registers, array),
+            scan: ScanOrder::new(&registers, array),
             time: 0,
             comparators: Comparators::new(array.len(), array.columns),
-            afferents: Afferents::new(array.len()),
+            afferents: BoardAfferents::new(array.len()),
             asynchronous: None,
             link: Link::new(settings, array)?,
             refresh: Refresh::default(),

@@ -19,9 +19,9 @@ pub mod ramp;
 pub mod readout;
 
 pub use adaptive::{Adaptive, Converted};
-pub use converter::{Converter, Moment, Scan};
+pub use converter::{Converter, ConverterScan, Moment};
 pub use fabric::Fabric;
-pub use grid::{Grid, Idle};
+pub use grid::{Crossbar, Idle};
 pub use limit::Limit;
 pub use ramp::{Ramp, RampShape};
 pub use readout::{Divider, VirtualGround};

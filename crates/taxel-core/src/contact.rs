@@ -38,7 +38,7 @@ pub use narrow::Narrow;
 pub use push::Push;
 pub use scene::{Scene, Surface};
 pub use sensor::{Sensor, Taxels};
-pub use shape::Shape;
+pub use shape::BodyShape;
 pub use stage::{Prepared, Stage};
 pub use touch::{Contact, TouchKind};
 pub use trajectory::Track;

@@ -37,17 +37,17 @@ impl<'a> FramesView<'a> {
     /// # Errors
     ///
     /// If the caller stops.
-    pub fn changes(self, stop: Stop<'_>) -> Result<Changes> {
+    pub fn changes(self, stop: Stop<'_>) -> Result<ChangeCounts> {
         let taxels = self.array.len();
-        let mut changes = Changes { number: vec![0; taxels], on: vec![0; taxels] };
+        let mut changes = ChangeCounts { number: vec![0; taxels], same_direction: vec![0; taxels] };
         let mut last = vec![0_i8; taxels];
         for ((_, before), (_, frame)) in self.iter().zip(self.iter().skip(1)) {
             stop.check()?;
-            let counts = changes.number.iter_mut().zip(&mut changes.on).zip(&mut last);
-            for ((&value, &before), ((number, on), last)) in frame.iter().zip(before).zip(counts) {
+            let counts = changes.number.iter_mut().zip(&mut changes.same_direction).zip(&mut last);
+            for ((&value, &before), ((number, same_direction), last)) in frame.iter().zip(before).zip(counts) {
                 let way = i8::from(value > before) - i8::from(value < before);
                 *number += u32::from(way != 0);
-                *on += u32::from(way != 0 && way == *last);
+                *same_direction += u32::from(way != 0 && way == *last);
                 *last = if way == 0 { *last } else { way };
             }
         }
@@ -57,9 +57,9 @@ impl<'a> FramesView<'a> {
 
 /// The changes of each taxel of frames.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Changes {
+pub struct ChangeCounts {
     /// Number of changes.
     pub number: Vec<u32>,
     /// Number of those in the direction of the taxel's change before.
-    pub on: Vec<u32>,
+    pub same_direction: Vec<u32>,
 }

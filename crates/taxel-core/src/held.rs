@@ -101,7 +101,7 @@ impl EventsView<'_> {
 
 /// A value that a taxel has from a time on.
 #[derive(Debug, Clone, Copy)]
-struct Change<V> {
+struct HeldChange<V> {
     t: i64,
     place: u32,
     value: V,
@@ -114,7 +114,7 @@ struct Change<V> {
 #[derive(Debug, Clone)]
 pub struct HeldOverTime<V> {
     /// The changes by time; those of equal time in order of arrival.
-    changes: Vec<Change<V>>,
+    changes: Vec<HeldChange<V>>,
     /// The state before every `stride`-th change, up to the latest time that was passed.
     states: Vec<Held<V>>,
     stride: usize,
@@ -160,8 +160,8 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
         }
         // Readers limit an array to 2^22 taxels, so an index fits in 32 bits.
         let place = |taxel: usize| places.as_ref().map_or(taxel as u32, |places| places[taxel]);
-        let changes = values.map(|(t, taxel, value)| Change { t, place: place(taxel), value });
-        let mut changes: Vec<Change<V>> = changes.filter(|change| change.place != NONE).collect();
+        let changes = values.map(|(t, taxel, value)| HeldChange { t, place: place(taxel), value });
+        let mut changes: Vec<HeldChange<V>> = changes.filter(|change| change.place != NONE).collect();
         changes.sort_by_key(|change| change.t);
         Ok(Self { changes, states: vec![], stride: begins.len().max(4096), held: begins.into(), applied: 0 })
     }

@@ -21,7 +21,7 @@ pub use van_rossum::Normalisation;
 pub use van_rossum_spatial::{OwnTrain, Smoothing};
 
 use distance::{Distance, Ready};
-use pairwise::Matrix;
+use pairwise::DistanceMatrix;
 
 use crate::parameters::Described;
 use crate::reading::{self, Unfit};
@@ -139,7 +139,7 @@ impl Metric {
     /// Those of [`Self::distance`].
     pub fn pairwise(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<Vec<f64>> {
         let ready = self.prepare(a, b)?;
-        let matrix = Matrix::new(a.count, b.map(|b| b.count));
+        let matrix = DistanceMatrix::new(a.count, b.map(|b| b.count));
         if !ready.fill(&matrix, a, b, work)? {
             matrix.each_pair(work, |i, j, stop| ready.between((a, i), (b.unwrap_or(a), j), stop))?;
         }

@@ -18,7 +18,7 @@ pub(crate) use crossing::peak;
 pub use kernel::{Kernel, KernelSum, Shape, Step};
 pub(crate) use model::AT_EDGE;
 pub use model::{AfterSpike, FirstThreshold, Neuron, Time};
-pub(crate) use points::{Grid, GridTime, MOST_LAID_OUT, check_points, points_between};
+pub use points::{Grid, GridTime, MOST_LAID_OUT, check_points, points_between};
 pub use population::Weight;
 pub use streaming::NeuronStream;
 pub use threshold::OutputSpike;

@@ -77,6 +77,8 @@ impl Described {
 /// values; `or method` names the method that returns the value of one that is left out.
 ///
 /// The struct gets `Default`, the table `RANGES`, `check_ranges`, which reads it, and `described`.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! parameters {
     (
         $(#[$about:meta])*
@@ -116,4 +118,4 @@ macro_rules! parameters {
         }
     };
 }
-pub(crate) use parameters;
+pub use parameters;

@@ -242,18 +242,6 @@ impl SpikeTrains {
         Ok(Self { times, offsets, kind: SpikeKind::Unsigned, values: None, start: self.start, stop: self.stop })
     }
 
-    /// Returns an error for graded trains, on behalf of `reader`, which reads no values.
-    ///
-    /// # Errors
-    ///
-    /// `Problem`, with the name of `reader`.
-    pub fn check_ungraded(&self, reader: &str) -> Result<()> {
-        if self.kind == SpikeKind::Graded {
-            return Err(problem!("{reader} takes no graded trains: their spikes have values, which it does not read"));
-        }
-        Ok(())
-    }
-
     /// Checks offsets, order, finiteness, window, and that values are those of the kind.
     ///
     /// # Errors

@@ -8,7 +8,7 @@
 use crate::Array;
 use crate::held::UNKNOWN;
 use crate::rest::{NOISE_FLOOR, Value};
-use crate::tracked_rest::{Grid, TrackedRest};
+use crate::tracked_rest::{TaxelGrid, TrackedRest};
 
 /// Width of a bin, us.
 pub const BIN_US: i64 = 50_000;
@@ -19,7 +19,7 @@ const SILENT_BINS: i64 = 64;
 /// A touched taxel is so many ticks above its rest.
 pub const TOUCH: f32 = 8.0;
 
-/// See the module.
+/// How many times more often than its neighbours a taxel changes when it changes by itself.
 pub const BY_ITSELF: u32 = 8;
 
 /// A taxel changes by itself so often in a bin: the value of a sound one that lies between two ticks changes about once.
@@ -35,7 +35,7 @@ struct Bin {
 
 /// Counts of a taxel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counts {
+pub struct TaxelCounts {
     /// Touches of its place that are over, by its neighbours.
     pub touches: u32,
     /// Those in which it did not change.
@@ -50,18 +50,18 @@ pub struct Counts {
 
 /// The present touch of a taxel's place.
 #[derive(Debug, Clone, Copy, Default)]
-struct Touch {
+struct PresentTouch {
     present: bool,
     changed: bool,
 }
 
-/// See the module.
+/// Counts the touches and changes of each taxel while events or frames arrive.
 ///
 /// Only taxels that had a value, and their neighbours, take memory and time: an array may be large, and few of its
 /// taxels active.
 #[derive(Debug, Clone)]
 pub struct TouchCounts {
-    grid: Grid,
+    grid: TaxelGrid,
     exists: Option<Vec<bool>>,
     /// By taxel index: 1 + its place in the vectors below; 0 for a taxel that is not counted.
     places: Vec<u32>,
@@ -71,8 +71,8 @@ pub struct TouchCounts {
     neighbours: Vec<u8>,
     rest: TrackedRest,
     bins: Vec<Bin>,
-    counts: Vec<Counts>,
-    touch: Vec<Touch>,
+    counts: Vec<TaxelCounts>,
+    touch: Vec<PresentTouch>,
     /// End of the present bin, us.
     end: Option<i64>,
 }
@@ -82,7 +82,7 @@ impl TouchCounts {
     /// values on.
     #[must_use]
     pub fn new(array: &Array, rest: f64) -> Self {
-        let grid = Grid { taxels: array.len(), columns: usize::from(array.columns) };
+        let grid = TaxelGrid { taxels: array.len(), columns: usize::from(array.columns) };
         let mut counts = Self {
             grid,
             exists: array.exists.clone(),
@@ -110,7 +110,7 @@ impl TouchCounts {
 
     /// The counts of the [`TouchCounts::taxels`], up to the last whole bin; all others have none.
     #[must_use]
-    pub fn counts(&self) -> &[Counts] {
+    pub fn counts(&self) -> &[TaxelCounts] {
         &self.counts
     }
 
@@ -178,8 +178,8 @@ impl TouchCounts {
         self.neighbours.push(if exists(taxel) { neighbours } else { 0 });
         self.taxels.push(taxel as u32);
         self.bins.push(Bin { held: f32::NAN, greatest: f32::NAN, changes: 0 });
-        self.counts.push(Counts::default());
-        self.touch.push(Touch::default());
+        self.counts.push(TaxelCounts::default());
+        self.touch.push(PresentTouch::default());
         self.places[taxel] = self.taxels.len() as u32;
     }
 
@@ -209,7 +209,7 @@ impl TouchCounts {
             let (touch, counts) = (&mut self.touch[place], &mut self.counts[place]);
             let begins = !touch.present && neighbours >= 3 && 4 * near[place] >= 3 * neighbours;
             if begins {
-                *touch = Touch { present: true, changed: false };
+                *touch = PresentTouch { present: true, changed: false };
             }
             touch.changed |= self.bins[place].changes > 0;
             if touch.present && 4 * down[place] <= neighbours {

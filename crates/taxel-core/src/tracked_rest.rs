@@ -24,7 +24,7 @@ const LEAST_SAMPLES: u32 = 4;
 
 /// The stretch being measured: statistics of each taxel's values less the first one.
 #[derive(Debug, Clone, PartialEq)]
-struct Stretch {
+struct RestStretch {
     from: i64,
     samples: u32,
     first: Vec<f32>,
@@ -34,7 +34,7 @@ struct Stretch {
     squares: Vec<f32>,
 }
 
-impl Stretch {
+impl RestStretch {
     fn new(from: i64, first: &[f32]) -> Self {
         let zeros = || vec![0.0; first.len()];
         let (least, greatest, sums, squares) = (zeros(), zeros(), zeros(), zeros());
@@ -74,7 +74,7 @@ impl Stretch {
     /// which a load may move. A taxel without a value so far, or that is not tracked, did
     /// not move.
     #[allow(clippy::cast_precision_loss)]
-    fn noise(&self, grid: Grid) -> f64 {
+    fn noise(&self, grid: TaxelGrid) -> f64 {
         let n = self.samples as f32;
         let variance = |(sum, squares): (&f32, &f32)| (squares - sum * sum / n).max(0.0) / n;
         let mut all: Vec<f32> = self.sums.iter().zip(&self.squares).map(variance).collect();
@@ -88,7 +88,7 @@ impl Stretch {
     }
 
     /// Whether it was quiet: see the module. `index` is that of a tracked taxel.
-    fn quiet(&self, far: f64, known: &[bool], grid: Grid, index: impl Fn(usize) -> usize) -> bool {
+    fn quiet(&self, far: f64, known: &[bool], grid: TaxelGrid, index: impl Fn(usize) -> usize) -> bool {
         let moved = |taxel: usize| {
             let mean = self.mean(taxel) - f64::from(self.first[taxel]);
             known[taxel] && (f64::from(self.greatest[taxel]) - mean).max(mean - f64::from(self.least[taxel])) >= far
@@ -113,12 +113,12 @@ impl Stretch {
 
 /// An array of so many taxels in so many columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Grid {
+pub(crate) struct TaxelGrid {
     pub taxels: usize,
     pub columns: usize,
 }
 
-impl Grid {
+impl TaxelGrid {
     /// Whether it is channels, in which no taxel has neighbours all around it.
     fn is_channels(self) -> bool {
         self.columns == 1 || self.taxels <= self.columns
@@ -137,7 +137,7 @@ impl Grid {
 /// stretch, from the taxels' first values on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedRest {
-    grid: Grid,
+    grid: TaxelGrid,
     /// The indices of the tracked taxels in the order of their values; `None` if all are tracked, by index.
     tracked: Option<Vec<u32>>,
     noise_floor: f64,
@@ -150,7 +150,7 @@ pub struct TrackedRest {
     known: Vec<bool>,
     /// Whether the rest of any taxel was given: then the quiet stretch found none of the others, which were loaded.
     given: bool,
-    stretch: Option<Stretch>,
+    stretch: Option<RestStretch>,
     far: f64,
     /// The first quiet stretch, us.
     quiet: Option<(i64, i64)>,
@@ -171,7 +171,7 @@ impl TrackedRest {
         let mut baseline = Baseline::tracked(rest, vec![far as f32; n]);
         (0..n).filter(|&taxel| known[taxel]).for_each(|taxel| baseline.hold(taxel));
         let given = known.contains(&true);
-        let (grid, begins) = (Grid { taxels: n, columns: columns.max(1) }, vec![f64::NO_REST; n]);
+        let (grid, begins) = (TaxelGrid { taxels: n, columns: columns.max(1) }, vec![f64::NO_REST; n]);
         let (values, tracked) = (vec![0.0; n], None);
         let falls = false;
         let (stretch, quiet) = (None, None);
@@ -188,7 +188,7 @@ impl TrackedRest {
     /// without a value.
     #[must_use]
     pub fn sparse(taxels: usize, columns: usize, noise_floor: f64) -> Self {
-        let grid = Grid { taxels, columns: columns.max(1) };
+        let grid = TaxelGrid { taxels, columns: columns.max(1) };
         Self { grid, tracked: Some(vec![]), ..Self::new(columns, noise_floor, vec![]) }
     }
 
@@ -220,7 +220,7 @@ impl TrackedRest {
         }
         match &mut self.stretch {
             Some(stretch) if stretch.from <= t => stretch.take(&self.values),
-            _ => self.stretch = Some(Stretch::new(t, &self.values)),
+            _ => self.stretch = Some(RestStretch::new(t, &self.values)),
         }
         self.baseline.take(t, &self.values);
         if self.stretch.as_ref().is_some_and(|stretch| t - stretch.from >= QUIET_US) {
@@ -241,7 +241,7 @@ impl TrackedRest {
     /// Ends the stretch at `t`: a quiet one sets rests.
     #[allow(clippy::cast_possible_truncation)]
     fn end_stretch(&mut self, t: i64) {
-        let next = Stretch::new(t, &self.values);
+        let next = RestStretch::new(t, &self.values);
         let Some(stretch) = self.stretch.replace(next) else { return };
         // Noise above the noise floor would be events without end: a load that moves is no noise.
         let noise = stretch.noise(self.grid).min(self.noise_floor);

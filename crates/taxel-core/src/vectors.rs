@@ -22,5 +22,6 @@ pub(crate) use fetch::fetch;
 pub(crate) use front::TO_FRONT;
 pub use instructions::Instructions;
 pub(crate) use instructions::{by_width, kernel, wide};
-pub(crate) use products::{add, add_lines, dot, times};
+pub use products::dot;
+pub(crate) use products::{add, add_lines, times};
 pub(crate) use windows::{ROW, WIDE, Windows};

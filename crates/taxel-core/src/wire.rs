@@ -14,10 +14,10 @@ pub mod v2;
 
 pub use columns::{Columns, Filled, Room};
 pub use command::{Command, CommandReader};
-pub use cut::{Cut, cut};
+pub use cut::{CutDatagrams, cut};
 pub use decoder::{Counts, Decoder, Pairing, decode, most_rows};
-pub use registers::{Refusal, Registers};
-pub use sender_decoder::{Ahead, DatagramInfo, Order, SenderDecoder, StepBack};
+pub use registers::{Registers, WriteRefusal};
+pub use sender_decoder::{ClockJumps, DatagramInfo, Order, SenderDecoder, StepBack};
 pub use v1::{STAMP_US, WORD_BYTES, Word, encode};
 
 /// A year, us: bounds a silence, so that no arrival time can overflow a board's 64-bit clock.

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Layers from the lowest upwards; modules in one layer must not depend on each other.
-const FLOORS: [(&str, &[&[&str]]); 4] = [
+const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-core",
         &[
@@ -65,13 +65,12 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
             &["server"],
         ],
     ),
+    ("taxel-border", &[&["errors"], &["enter", "instructions"], &["convert", "parameters"]]),
+    ("../rules", &[&["checks"], &["rules"], &["bindings"]]),
     (
         "taxel-python",
         &[
-            &["errors"],
-            &["enter", "instructions", "thread_state"],
-            &["convert", "parameters"],
-            &["threaded"],
+            &["thread_state", "threaded"],
             &["bridge", "cone_x"],
             &[
                 "calibration",
@@ -86,7 +85,6 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
                 "nouns",
                 "pictures",
                 "recording",
-                "rivals",
                 "simulate",
                 "test_hooks",
                 "wire",

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
-use taxel_core::board::{Board, Faults, Network, Version2};
-use taxel_core::wire::v2::{self, Header, Outcome};
+use taxel_core::board::{Board, Network, NetworkFaults, Version2};
+use taxel_core::wire::v2::{self, DatagramHeader, DatagramOutcome};
 use taxel_core::wire::{self, Decoder, Pairing, Registers, WORD_BYTES, Word};
 use taxel_core::{Array, Events};
 
@@ -48,7 +48,7 @@ fn sent(random: &mut StdRng, registers: Registers, frames: u32) -> (Vec<Vec<u8>>
 fn network(random: &mut StdRng) -> Network {
     let mut share = || [0.0, 0.01, 0.15][random.random_range(0..3)];
     let (lost, repeated, reordered, cut, corrupted) = (share(), share(), share(), share(), share());
-    Network::new(Faults { lost, repeated, reordered, cut, corrupted, seed: random.random() }).unwrap()
+    Network::new(NetworkFaults { lost, repeated, reordered, cut, corrupted, seed: random.random() }).unwrap()
 }
 
 fn pass(network: &mut Network, datagrams: &[Vec<u8>]) -> Vec<Vec<u8>> {
@@ -73,9 +73,13 @@ fn of_version_2_every_intact_datagram_is_decoded_once_and_all_counts_close() {
         let mut refused = 0;
         for datagram in &arrived {
             match decoder.push(datagram, None, &mut events) {
-                Outcome::Intact { .. } => *decoded.entry(Header::read(datagram).unwrap().0.sequence).or_default() += 1,
-                Outcome::Repeated => assert!(decoded.contains_key(&Header::read(datagram).unwrap().0.sequence)),
-                Outcome::Refused(_) => refused += 1,
+                DatagramOutcome::Intact { .. } => {
+                    *decoded.entry(DatagramHeader::read(datagram).unwrap().0.sequence).or_default() += 1
+                }
+                DatagramOutcome::Repeated => {
+                    assert!(decoded.contains_key(&DatagramHeader::read(datagram).unwrap().0.sequence))
+                }
+                DatagramOutcome::Refused(_) => refused += 1,
             }
         }
         // The test identifies intact datagrams by comparing bytes, not by a checksum.
@@ -164,7 +168,7 @@ fn of_version_1_every_whole_word_is_decoded_and_counts_close_to_the_byte() {
 
 /// Plays an hour of the board's time, with pauses, over a network that drops and damages datagrams; time must be
 /// monotone and correct.
-fn soak(registers: Registers, faults: Faults, seed: u64) {
+fn soak(registers: Registers, faults: NetworkFaults, seed: u64) {
     let array = Array::thesis();
     let mut random = StdRng::seed_from_u64(seed);
     let mut board = Board::new(registers, &array).unwrap();
@@ -227,8 +231,9 @@ fn slow() -> Registers {
 #[test]
 fn an_hour_of_slow_frames_stays_monotone_and_true() {
     for wire_version in [1, 2] {
-        soak(Registers { wire_version, ..slow() }, Faults::default(), 1);
-        let faults = Faults { lost: 0.01, repeated: 0.01, cut: 0.01, corrupted: 0.01, ..Faults::default() };
+        soak(Registers { wire_version, ..slow() }, NetworkFaults::default(), 1);
+        let faults =
+            NetworkFaults { lost: 0.01, repeated: 0.01, cut: 0.01, corrupted: 0.01, ..NetworkFaults::default() };
         soak(Registers { wire_version: 2, ..slow() }, faults, 2);
     }
 }
@@ -237,8 +242,8 @@ fn an_hour_of_slow_frames_stays_monotone_and_true() {
 #[ignore = "minutes: an hour of 5208 frames/s, as make slow runs it"]
 fn an_hour_at_full_rate_stays_monotone_and_true() {
     for wire_version in [1, 2] {
-        soak(Registers { wire_version, ..Registers::default() }, Faults::default(), 3);
+        soak(Registers { wire_version, ..Registers::default() }, NetworkFaults::default(), 3);
     }
-    let faults = Faults { lost: 0.01, repeated: 0.01, cut: 0.01, corrupted: 0.01, ..Faults::default() };
+    let faults = NetworkFaults { lost: 0.01, repeated: 0.01, cut: 0.01, corrupted: 0.01, ..NetworkFaults::default() };
     soak(Registers { wire_version: 2, ..Registers::default() }, faults, 4);
 }

@@ -3,10 +3,10 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use taxel_core::Array;
 use taxel_core::rest::Value;
-use taxel_core::touch_counts::{Counts, TouchCounts};
+use taxel_core::touch_counts::{TaxelCounts, TouchCounts};
 
 /// Counts by taxel index, of events of a patch whose first taxel is in this row and column.
-fn of_patch(array: &Array, row: usize, column: usize, patch: (usize, usize), seed: u64) -> Vec<Counts> {
+fn of_patch(array: &Array, row: usize, column: usize, patch: (usize, usize), seed: u64) -> Vec<TaxelCounts> {
     let mut random = StdRng::seed_from_u64(seed);
     let mut counts = TouchCounts::new(array, f64::NO_REST);
     for k in 0..4000 {
@@ -20,9 +20,9 @@ fn of_patch(array: &Array, row: usize, column: usize, patch: (usize, usize), see
         }
     }
     counts.advance(5_000_000);
-    let mut all = vec![Counts::default(); array.len()];
+    let mut all = vec![TaxelCounts::default(); array.len()];
     for (&taxel, &of) in counts.taxels().iter().zip(counts.counts()) {
-        assert_eq!(all[taxel as usize], Counts::default(), "taxel {taxel} is counted twice");
+        assert_eq!(all[taxel as usize], TaxelCounts::default(), "taxel {taxel} is counted twice");
         all[taxel as usize] = of;
     }
     all
@@ -36,14 +36,14 @@ fn a_patch_inside_a_larger_array_counts_as_the_patch_with_a_border_does() {
     for row in 0..9 {
         for column in 0..10 {
             let at = (119 + row) * 300 + 199 + column;
-            outside[at] = Counts::default();
+            outside[at] = TaxelCounts::default();
             // The taxels of the border have fewer neighbours in the small array.
             if (1..8).contains(&row) && (1..9).contains(&column) {
                 assert_eq!(inside[at], alone[row * 10 + column], "row {row}, column {column}");
             }
         }
     }
-    assert!(outside.iter().all(|&of| of == Counts::default()));
+    assert!(outside.iter().all(|&of| of == TaxelCounts::default()));
     let dead = inside[122 * 300 + 202];
     assert!(dead.touches >= 3 && dead.missed == dead.touches, "{dead:?}");
 }

@@ -1,11 +1,11 @@
 //! Receives and counts UDP datagrams: in the caller's thread, or in a separate thread between the socket and a bounded
-//! queue. Datagrams from another computer ([`Feed`]) pass through the same queue.
+//! queue. Datagrams from another computer ([`ParcelFeed`]) pass through the same queue.
 //!
 //! By default the caller receives in its own thread, which saves a wake-up and a copy. A caller that may wait for a disk requests a
 //! separate thread ([`Receiver::apart`]), which receives in the meantime.
 //!
-//! All datagrams are accounted for. At the socket: arrived messages = [`Counts::messages`] + [`Counts::dropped_by_kernel`]. Behind it:
-//! [`Counts::datagrams`] = datagrams read + datagrams waiting + [`Counts::dropped_by_queue`].
+//! All datagrams are accounted for. At the socket: arrived messages = [`CaptureCounts::messages`] + [`CaptureCounts::dropped_by_kernel`]. Behind it:
+//! [`CaptureCounts::datagrams`] = datagrams read + datagrams waiting + [`CaptureCounts::dropped_by_queue`].
 //!
 //! A *message* is what one receive call returns: a datagram, or, with `UDP_GRO`, a train of datagrams that the kernel
 //! merged. The kernel counts its drops in messages, so a datagram-exact count of what it dropped needs `gro` off.
@@ -28,11 +28,11 @@ use crate::bridged::Bridged;
 use crate::locked::lock;
 use crate::recording::now_ns;
 use crate::{Error, Result};
-pub use counts::Counts;
-pub use feed::Feed;
+pub use counts::CaptureCounts;
+pub use feed::ParcelFeed;
 pub use options::ReceiverOptions;
-pub use parcel::{LONGEST, Packer};
-use queue::Queue;
+pub use parcel::{LONGEST, ParcelPacker};
+use queue::BatchQueue;
 pub use queue::{Batch, Datagram};
 pub use sender::{SendCounts, Sender};
 use socket::Socket;
@@ -69,7 +69,7 @@ impl std::fmt::Display for Origin {
 /// Receives datagrams, from [`Receiver::bind`] or [`Receiver::fed`] until it is dropped.
 #[derive(Debug)]
 pub struct Receiver {
-    queue: Arc<Queue>,
+    queue: Arc<BatchQueue>,
     place: Origin,
     from: From,
 }
@@ -79,7 +79,7 @@ enum From {
     /// The socket, locked by a caller while it waits for datagrams, or `None` after it was moved into the thread; and
     /// the thread.
     Socket(Mutex<Option<Socket>>, Mutex<Option<JoinHandle<()>>>),
-    Feed(Feed),
+    Feed(ParcelFeed),
 }
 
 impl Receiver {
@@ -101,9 +101,12 @@ impl Receiver {
         let place = format!("UDP {address}");
         let socket = Socket::bind(address, &options).map_err(Error::socket(&place))?;
         let address = socket.address().map_err(Error::socket(&place))?;
-        let counts =
-            Counts { kernel_buffer_bytes: socket.kernel_buffer_bytes(), gro: socket.gro(), ..Counts::default() };
-        let queue = Arc::new(Queue::new(options.queue_bytes, counts));
+        let counts = CaptureCounts {
+            kernel_buffer_bytes: socket.kernel_buffer_bytes(),
+            gro: socket.gro(),
+            ..CaptureCounts::default()
+        };
+        let queue = Arc::new(BatchQueue::new(options.queue_bytes, counts));
         let from = From::Socket(Mutex::new(Some(socket)), Mutex::default());
         Ok(Self { queue, place: Origin::Udp(address), from })
     }
@@ -131,11 +134,11 @@ impl Receiver {
         Ok(())
     }
 
-    /// Receives datagrams of another computer; the caller passes its parcels to the [`Feed`].
+    /// Receives datagrams of another computer; the caller passes its parcels to the [`ParcelFeed`].
     #[must_use]
-    pub fn fed(name: &str, options: ReceiverOptions) -> (Self, Feed) {
-        let queue = Arc::new(Queue::new(options.queue_bytes, Counts::default()));
-        let feed = Feed::new(Arc::clone(&queue));
+    pub fn fed(name: &str, options: ReceiverOptions) -> (Self, ParcelFeed) {
+        let queue = Arc::new(BatchQueue::new(options.queue_bytes, CaptureCounts::default()));
+        let feed = ParcelFeed::new(Arc::clone(&queue));
         (Self { queue, place: Origin::Bridge(name.to_owned()), from: From::Feed(feed.clone()) }, feed)
     }
 
@@ -219,7 +222,7 @@ impl Receiver {
 
     /// Counts of what arrived and what was lost.
     #[must_use]
-    pub fn counts(&self) -> Counts {
+    pub fn counts(&self) -> CaptureCounts {
         self.queue.counts()
     }
 
@@ -250,7 +253,7 @@ impl Drop for Receiver {
 }
 
 /// The receiving thread: receives from the socket into the queue, until it must stop or the socket fails.
-fn receive(mut socket: Socket, queue: &Queue, gather: Duration) {
+fn receive(mut socket: Socket, queue: &BatchQueue, gather: Duration) {
     let mut scratch = Batch::new();
     let ended = loop {
         scratch.begin(AT_ONCE);

@@ -21,10 +21,10 @@ use std::collections::VecDeque;
 use taxel_core::wire::{DatagramInfo, WORD_BYTES};
 
 pub use offset::Offset;
-use pace::Arrivals;
+use pace::ArrivalDelays;
 pub use pace::{Pace, doubt};
 use points::Points;
-use stretch::{LONG_US, Point, STRETCHES, Stretch};
+use stretch::{ArrivalPoint, ArrivalStretch, LONG_US, STRETCHES};
 
 /// Duration of a stretch, the unit in which points are stored, us of the board's clock.
 const STRETCH_US: i64 = 250_000;
@@ -64,15 +64,15 @@ pub fn leaves(info: &DatagramInfo, last: Option<i64>, bytes: usize, frame_us: i6
 #[derive(Debug, Clone, Default)]
 pub struct BoardClock {
     /// Completed stretches, the oldest first.
-    stretches: VecDeque<Stretch>,
+    stretches: VecDeque<ArrivalStretch>,
     /// The current stretch.
-    running: Stretch,
+    running: ArrivalStretch,
     /// Number of consecutive stretches that are far from the line.
     far: usize,
     /// Number of stretches since the line was fitted.
     unfitted: usize,
     offset: Option<Offset>,
-    arrivals: Arrivals,
+    arrivals: ArrivalDelays,
 }
 
 impl BoardClock {
@@ -201,9 +201,9 @@ impl BoardClock {
         let (Some(zero), origin) = (last.lowest(), last.last) else { return };
         let most = if origin - first.first >= LONG_US { ANY } else { QUARTZ } * 1e-3;
         let middle = self.middle();
-        let from_middle = |&(t, late): &Point| ((t - middle) as f64, (late - zero.1) as f64);
+        let from_middle = |&(t, late): &ArrivalPoint| ((t - middle) as f64, (late - zero.1) as f64);
         let all = self.stretches.iter().flat_map(|stretch| stretch.quick.iter().map(from_middle)).collect();
-        let points = Points { all, early: self.stretches.iter().map(Stretch::early).sum() };
+        let points = Points { all, early: self.stretches.iter().map(ArrivalStretch::early).sum() };
         let slope = points.slope(self.offset.map_or(0.0, |offset| offset.drift_ppm * 1e-3), most);
         let height = points.under(slope).0 + slope * (origin - middle) as f64;
         // The slope is in ns per us, that is, in thousandths.
@@ -222,7 +222,7 @@ mod tests {
 
     /// A simulated link: a datagram each `every_us` to a host clock that starts at `start_ns` and drifts, with random
     /// delays of 5 us, more for some, and 5 ms for a fraction `spikes` of them.
-    struct Link {
+    struct SimulatedLink {
         start_ns: i64,
         drift_ppm: f64,
         every_us: i64,
@@ -230,7 +230,7 @@ mod tests {
         random: StdRng,
     }
 
-    impl Link {
+    impl SimulatedLink {
         fn new(seed: u64, drift_ppm: f64, every_us: i64) -> Self {
             let random = StdRng::seed_from_u64(seed);
             Self { start_ns: 1_700_000_000_000_000_000, drift_ppm, every_us, spikes: 0.01, random }
@@ -263,7 +263,7 @@ mod tests {
     #[test]
     fn a_thousand_datagrams_a_second_give_the_offset_within_10_us_after_1_s_and_5_us_after_10_s() {
         for (seed, drift_ppm) in [50.0, -30.0, 0.0, 199.0, -199.0].into_iter().enumerate() {
-            let mut link = Link::new(seed as u64, drift_ppm, 1000);
+            let mut link = SimulatedLink::new(seed as u64, drift_ppm, 1000);
             let mut clock = BoardClock::default();
             link.send(&mut clock, 0, 1_010_000);
             assert!(link.off(&clock, 1_000_000).abs() < 10.0, "{drift_ppm}: {} us", link.off(&clock, 1_000_000));
@@ -278,7 +278,7 @@ mod tests {
         for seed in 0..40 {
             let drift_ppm = random.random_range(-200.0..200.0);
             let every_us = [192, 500, 1000, 5000][seed as usize % 4];
-            let mut link = Link::new(seed, drift_ppm, every_us);
+            let mut link = SimulatedLink::new(seed, drift_ppm, every_us);
             link.start_ns = random.random_range(0..2_000_000_000_000_000_000);
             let begin = random.random_range(-1_000_000_000_000..1_000_000_000_000);
             let mut clock = BoardClock::default();
@@ -296,7 +296,7 @@ mod tests {
         let mut random = StdRng::seed_from_u64(seed);
         let mut off = [[0.0; 2]; 2];
         for (off, drift_ppm) in off.iter_mut().zip([-50.0, 30.0]) {
-            let (link, mut clock) = (Link::new(seed, drift_ppm, 500), BoardClock::default());
+            let (link, mut clock) = (SimulatedLink::new(seed, drift_ppm, 500), BoardClock::default());
             for board_us in (500..10_010_000).step_by(500) {
                 let mut late = late_us(board_us, &mut random);
                 if random.random_bool(0.01) {
@@ -362,7 +362,7 @@ mod tests {
     #[test]
     fn a_few_datagrams_a_second_with_late_ones_among_them_do_not_look_like_a_drift() {
         for seed in 0..20 {
-            let mut link = Link::new(seed, 10.0, 200_000);
+            let mut link = SimulatedLink::new(seed, 10.0, 200_000);
             link.spikes = 0.3;
             let mut clock = BoardClock::default();
             for second in 0..60 {
@@ -376,7 +376,7 @@ mod tests {
     #[test]
     fn after_a_pause_of_an_hour_the_line_still_holds_and_is_better_than_before() {
         for (seed, drift_ppm) in [200.0, -200.0, 35.0].into_iter().enumerate() {
-            let mut link = Link::new(seed as u64, drift_ppm, 1000);
+            let mut link = SimulatedLink::new(seed as u64, drift_ppm, 1000);
             let mut clock = BoardClock::default();
             link.send(&mut clock, 0, 20_000_000);
             link.send(&mut clock, 3_620_000_000, 3_622_000_000);
@@ -388,7 +388,7 @@ mod tests {
 
     #[test]
     fn a_clock_that_is_no_quartz_is_believed_after_ten_seconds() {
-        let mut link = Link::new(3, 5000.0, 1000);
+        let mut link = SimulatedLink::new(3, 5000.0, 1000);
         let mut clock = BoardClock::default();
         link.send(&mut clock, 0, 12_000_000);
         assert!((clock.offset().expect("something came").drift_ppm - 5000.0).abs() < 5.0);
@@ -438,7 +438,7 @@ mod tests {
     #[test]
     fn a_sender_that_does_not_keep_pace_with_its_clock_is_doubted_and_a_poor_clock_is_not() {
         for (drift_ppm, doubted) in [(-9_900.0, false), (9_900.0, false), (10_100.0, true), (-318_601.0, true)] {
-            let mut link = Link::new(11, drift_ppm, 1000);
+            let mut link = SimulatedLink::new(11, drift_ppm, 1000);
             let mut clock = BoardClock::default();
             link.send(&mut clock, 0, 20_000_000);
             let pace = clock.pace().expect("something came");

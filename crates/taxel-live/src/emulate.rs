@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use serde::Serialize;
-use taxel_core::board::{Board, BoardCounts, Crossed, Faults, Flawed, Flaws, Network, NetworkCounts};
+use taxel_core::board::{Board, BoardCounts, Crossed, Flawed, Flaws, Network, NetworkCounts, NetworkFaults};
 use taxel_core::circuit::Chain;
 use taxel_core::wire::Command;
 use taxel_core::{Array, Stop};
@@ -22,12 +22,12 @@ use taxel_core::{Array, Stop};
 use crate::Result;
 use crate::capture::{SendCounts, Sender};
 use crate::latency::Quantiles;
-use control::Control;
-pub use feed::Feed;
-use line::Line;
+use control::CommandPort;
+pub use feed::PipedFrames;
+use line::PseudoTerminal;
 use pace::wake_sharply;
 pub use replay::Replay;
-use run::Run;
+use run::BoardRun;
 pub use scenes::Scenes;
 use sync::Sync;
 
@@ -91,7 +91,7 @@ pub struct EmulatorOptions {
     /// Whether the board sends a stop marker at the end if a recording is running.
     pub marks_stop: bool,
     /// Faults of the simulated network.
-    pub faults: Option<Faults>,
+    pub faults: Option<NetworkFaults>,
     /// The circuit that the taxels share, if it is not ideal; flaws are applied after it.
     pub circuit: Option<Chain>,
     /// Flaws of the taxels.
@@ -157,7 +157,7 @@ pub struct Emulator {
     board: Board,
     array: Array,
     sender: Sender,
-    control: Control,
+    control: CommandPort,
     sync: Option<Sync>,
     network: Option<Network>,
     crossed: Option<Crossed>,
@@ -189,8 +189,8 @@ impl Emulator {
         let crossed = circuit.map(|chain| Crossed::new(chain, board.registers(), array)).transpose()?;
         let flawed = options.flaws.map(|flaws| Flawed::new(flaws, array)).transpose()?;
         let sender = Sender::open_from(options.source_port, options.to, options.segment)?;
-        let line = options.line.as_ref().map(|(link, baud)| Line::open(link, *baud)).transpose()?;
-        let control = Control::open(options.control, line, &board)?;
+        let line = options.line.as_ref().map(|(link, baud)| PseudoTerminal::open(link, *baud)).transpose()?;
+        let control = CommandPort::open(options.control, line, &board)?;
         let sync = options.sync.as_ref().map(|(path, overwrite)| Sync::open(path, *overwrite)).transpose()?;
         Ok(Self { board, array: array.clone(), sender, control, sync, network, crossed, flawed, options })
     }
@@ -259,15 +259,15 @@ impl Emulator {
     }
 
     /// The state of a run that begins now.
-    fn begin(&mut self) -> Run {
+    fn begin(&mut self) -> BoardRun {
         if self.options.real_time {
             wake_sharply();
         }
-        Run::new(&self.board, std::mem::take(&mut self.options.commands), self.options.drift_ppm)
+        BoardRun::new(&self.board, std::mem::take(&mut self.options.commands), self.options.drift_ppm)
     }
 
     /// Resets the board where its time since its start, us, has reached the next reset.
-    fn reset_where_due(&mut self, run: &mut Run, since_us: f64) -> Result<()> {
+    fn reset_where_due(&mut self, run: &mut BoardRun, since_us: f64) -> Result<()> {
         if let Some(every) = self.options.reset_every_s
             && since_us >= (run.resets + 1) as f64 * every * 1e6
         {
@@ -300,7 +300,7 @@ impl Emulator {
     }
 
     /// Scans a frame, and sends its datagrams at its end; returns the time then.
-    fn send_frame(&mut self, run: &mut Run, ticks: &[u16]) -> Result<Instant> {
+    fn send_frame(&mut self, run: &mut BoardRun, ticks: &[u16]) -> Result<Instant> {
         let (network, leaving) = (&mut self.network, &mut run.leaving);
         leaving.clear();
         self.board.frame(ticks, |datagram| {
@@ -336,7 +336,7 @@ impl Emulator {
     }
 
     /// What was done up to now.
-    fn report(&self, run: &Run) -> Report {
+    fn report(&self, run: &BoardRun) -> Report {
         Report {
             board: *self.board.counts(),
             sent: self.sender.counts(),

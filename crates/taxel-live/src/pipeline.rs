@@ -15,7 +15,7 @@ mod handle;
 mod observers;
 mod options;
 mod output;
-mod picture_buffer;
+mod preview_buffer;
 mod read_out;
 mod readout_queue;
 mod receive;
@@ -49,24 +49,26 @@ use crate::capture::{Origin, Receiver};
 use crate::locked::lock;
 use crate::{Error, Result};
 pub use copies::{Copied, Copies};
-pub use counters::{Arrival, ArrivalState, BoardState, Counters, DecodingCounts, ReadoutCounts, SourceCounts, Summary};
+pub use counters::{
+    Arrival, ArrivalState, BoardState, Counters, DecodingCounts, LiveSummary, ReadoutCounts, SourceCounts,
+};
 pub use handle::Handle;
 pub use options::{LiveOptions, Record, StatedTare};
 use output::DetectionOutput;
 use readout_queue::ReadoutQueue;
-use recorder::{Part, Recorder};
+use recorder::{Recorder, RecordingPart};
 use recordings::Recordings;
 pub use running_readout::ReadoutSetup;
 use running_readout::RunningReadout;
 use sending::Sending;
 pub use sending::{Destination, Sent};
-use shared::{Published, RecordingSlot, Shared};
-pub use sink::{Lines, OutputDetection, Sink};
-pub use source::{Place, Source, SourceKind};
+use shared::{PipelineShared, PublishedState, RecordingSlot};
+pub use sink::{LineSink, OutputDetection, Sink};
+pub use source::{FurtherSource, LineInput, SourceKind};
 use sources::Others;
 use stages::Stages;
 use threads::Threads;
-pub use viewer_queue::{Change, Piece, ViewerEvents};
+pub use viewer_queue::{Piece, TaxelChange, ViewerEvents};
 
 /// Interval at which a waiting call checks whether it must stop.
 const CHECK_EVERY: Duration = Duration::from_millis(50);
@@ -76,7 +78,7 @@ const OUTPUT_WAITING: usize = 1 << 14;
 
 /// A running pipeline from datagrams to detections, from [`Live::start`] until [`Live::stop`].
 pub struct Live {
-    shared: Arc<Shared>,
+    shared: Arc<PipelineShared>,
     detections: channel::Receiver<OutputDetection>,
     threads: Vec<JoinHandle<()>>,
     others: Mutex<Others<Live>>,
@@ -130,7 +132,7 @@ impl Live {
             return Err(taxel_core::problem!("source {name} without a recording: nothing would keep it").into());
         }
         let sources = options.sources.iter();
-        let sources = sources.map(|(name, what)| Ok(Source { name: name.clone(), kind: what.parse()? }));
+        let sources = sources.map(|(name, what)| Ok(FurtherSource { name: name.clone(), kind: what.parse()? }));
         let sources = sources.collect::<Result<_>>()?;
         Self::begin(Box::new(receiver), options, sources, readout, sinks, None)
     }
@@ -139,10 +141,10 @@ impl Live {
     fn begin(
         receiver: Box<dyn FnOnce() -> Result<Receiver> + '_>,
         options: LiveOptions,
-        sources: Vec<Source>,
+        sources: Vec<FurtherSource>,
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
-        host: Option<Part>,
+        host: Option<RecordingPart>,
     ) -> Result<Self> {
         for (name, frames) in [("guard_frames", options.guard_frames), ("gap_frames", options.gap_frames)] {
             if !(frames.is_finite() && frames >= 0.0) {
@@ -172,8 +174,8 @@ impl Live {
             (Some(record), None) => Some(Recorder::create(record, &options, &sources, receiver.place())?),
             (Some(record), Some(host)) => Some(Recorder::join(host, record, &options, receiver.place())),
         };
-        let published = Published { frame: vec![0; options.array.len()], ..Published::default() };
-        let shared = Arc::new(Shared {
+        let published = PublishedState { frame: vec![0; options.array.len()], ..PublishedState::default() };
+        let shared = Arc::new(PipelineShared {
             receiver,
             readout_queue: ReadoutQueue::new(&options.array, options.readout_events),
             published: Mutex::new(published),
@@ -370,7 +372,7 @@ impl Live {
     ///
     /// `Core(Problem)` if recordings were not to begin later ([`LiveOptions::record_later`]), `File` if the file exists or
     /// cannot be created: then the one that runs goes on. What ended that one early, or `File` if its end cannot be written.
-    pub fn record(&self, record: &Record) -> Result<Option<Summary>> {
+    pub fn record(&self, record: &Record) -> Result<Option<LiveSummary>> {
         if !self.shared.options.record_later {
             return Err(taxel_core::problem!("a recording while listening: begin without one, for later ones").into());
         }
@@ -390,7 +392,7 @@ impl Live {
     /// # Errors
     ///
     /// As [`Handle::end_recording`].
-    pub fn end_recording(&self) -> Result<Summary> {
+    pub fn end_recording(&self) -> Result<LiveSummary> {
         self.handle().end_recording()
     }
 
@@ -410,7 +412,7 @@ impl Live {
     /// # Errors
     ///
     /// The error that ended the pipeline early, or `File` if the end of the recording cannot be written.
-    pub fn stop(mut self) -> Result<Summary> {
+    pub fn stop(mut self) -> Result<LiveSummary> {
         let others = lock(&self.others).stop(|board| Ok(board.stop()?.counters));
         let joined = self.join();
         let (sources, ended) = others.map_or_else(|error| (BTreeMap::new(), Err(error)), |counts| (counts, Ok(())));
@@ -423,7 +425,7 @@ impl Live {
         joined?;
         self.check()?;
         ended?;
-        Ok(Summary { counters, verdict, path, tare: self.tare() })
+        Ok(LiveSummary { counters, verdict, path, tare: self.tare() })
     }
 
     fn join(&mut self) -> Result<()> {

@@ -28,17 +28,19 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
 pub(crate) use damage::{ADDRESS, EMPTY, REFUSED, add_order};
-pub use damage::{Found, LeftOut, damage, damage_of_version_1};
-pub use event_pictures::EventPictures;
-pub use frames::{Encoding, FrameSource, Frames};
+pub use damage::{DamageCounts, LeftOut, damage, damage_of_version_1};
+pub use event_pictures::EventPreviews;
+pub use frames::{FrameEncoding, FrameProperties, Frames};
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
-pub use mcap_reader::{Datagrams, Decoded, Message, Numbers, Place, Reader, Remarks, Unread, begin_with};
-pub use mcap_writer::{Track, Writer};
+pub use mcap_reader::{
+    ArrivalNumbers, Datagrams, DecodedRecording, Message, ReadPosition, Reader, Remarks, Unread, begin_with,
+};
+pub use mcap_writer::{SourceWriter, Writer};
 pub use output::OutputFile;
-pub use stream::{Faults, Samples, Stream, fields};
+pub use stream::{Samples, StreamColumns, StreamFaults, fields};
 pub use topic::Topic;
 pub(crate) use verdict::JUMPED_BEFORE;
-pub use verdict::{Basis, Condition, Counts, Ending, NOTHING_LOST, Rebuilt, Status, Verdict};
+pub use verdict::{Basis, Condition, FileEnding, NOTHING_LOST, Rebuilt, RecordingCounts, RecordingStatus, Verdict};
 
 /// Longest time that a datagram waits until its chunk is closed and passed to the operating system.
 ///
@@ -84,10 +86,10 @@ pub struct Header {
     pub placement: Placement,
     /// For a stream of numbers, the content of its lines; none for a board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stream: Option<Stream>,
+    pub stream: Option<StreamColumns>,
     /// For a source of frames, their unit and more; none for a board.
     #[serde(default, skip_serializing_if = "Option::is_none", alias = "pictures")]
-    pub frames: Option<FrameSource>,
+    pub frames: Option<FrameProperties>,
     /// The other sources of the file: frames on the same clock, any other with a clock of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<Header>,
@@ -261,7 +263,7 @@ impl Header {
     /// # Errors
     ///
     /// `Problem` if the name or a column is not valid.
-    pub fn of_stream(name: &str, stream: Stream, source: String, started_ns: i64) -> taxel_core::Result<Self> {
+    pub fn of_stream(name: &str, stream: StreamColumns, source: String, started_ns: i64) -> taxel_core::Result<Self> {
         stream.check(name)?;
         let columns = u16::try_from(stream.values().count()).unwrap_or(u16::MAX);
         let array = Array::unmeasured(1, columns, name);
@@ -302,13 +304,13 @@ pub struct BoardChange {
     pub t_us: Option<i64>,
     /// Kind of the change.
     #[serde(flatten)]
-    pub change: Change,
+    pub change: BoardChangeKind,
 }
 
 /// Kind of a [`BoardChange`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "change", rename_all = "lowercase")]
-pub enum Change {
+pub enum BoardChangeKind {
     /// The board was reset: its taxels' values are unknown until their next event.
     Reset,
     /// The board changed its version of the wire.

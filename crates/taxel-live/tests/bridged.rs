@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use taxel_core::{Array, Stop};
 use taxel_live::bridged::Bridged;
-use taxel_live::capture::{Feed, Receiver, ReceiverOptions, Sender};
+use taxel_live::capture::{ParcelFeed, Receiver, ReceiverOptions, Sender};
 use taxel_live::host_clock::RoundTrip;
-use taxel_live::pipeline::{Copied, Live, LiveOptions, ReadoutSetup, Summary};
+use taxel_live::pipeline::{Copied, Live, LiveOptions, LiveSummary, ReadoutSetup};
 use taxel_live::recording::{Reader, Topic, now_ns};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -70,7 +70,7 @@ fn wait_until(what: impl Fn() -> bool) {
 }
 
 /// A minute of round trips that took 300 us, ending now.
-fn compare(feed: &Feed, since_ns: i64) {
+fn compare(feed: &ParcelFeed, since_ns: i64) {
     let now = now_ns();
     for k in (1..=240).rev() {
         let asked = now - k * 250_000_000;
@@ -84,7 +84,7 @@ fn bridged(
     n: usize,
     name: &str,
     mut carry: impl FnMut(usize, Vec<u8>) -> Vec<Vec<u8>>,
-) -> (Scratch, Summary, Scratch, Summary) {
+) -> (Scratch, LiveSummary, Scratch, LiveSummary) {
     let (near, far) = (Scratch::new(&format!("{name}-near.mcap")), Scratch::new(&format!("{name}-far.mcap")));
     let since = now_ns() - 60_000_000_000;
     let source = Live::start(ANY, near.options(), ReadoutSetup::None, vec![]).expect("a port");
@@ -130,7 +130,7 @@ fn bridged(
     (near, ended.expect("ended"), far, live.stop().expect("a sound way"))
 }
 
-fn came(summary: &Summary) -> Bridged {
+fn came(summary: &LiveSummary) -> Bridged {
     summary.counters.bridged.expect("a bridge")
 }
 

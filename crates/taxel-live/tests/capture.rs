@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use taxel_live::Error;
-use taxel_live::capture::{Batch, Counts, Receiver, ReceiverOptions, SendCounts, Sender};
+use taxel_live::capture::{Batch, CaptureCounts, Receiver, ReceiverOptions, SendCounts, Sender};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
@@ -34,7 +34,7 @@ fn send(to: SocketAddr, datagrams: u64, segment: bool) -> SendCounts {
 }
 
 /// Stops, reads the rest; returns what was received (number in the payload, our number) and the counts.
-fn drain(receiver: &Receiver) -> (Vec<(u64, u64)>, Counts) {
+fn drain(receiver: &Receiver) -> (Vec<(u64, u64)>, CaptureCounts) {
     receiver.stop();
     let mut batch = Batch::new();
     let mut received = vec![];

@@ -16,7 +16,7 @@ use taxel_core::wire::{Command, Decoder, Registers};
 use taxel_core::{Array, Events, Stop};
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{self, Emulator, Report, Touch};
-use taxel_live::pipeline::{Live, LiveOptions, OutputDetection, ReadoutSetup, Sink, Summary};
+use taxel_live::pipeline::{Live, LiveOptions, LiveSummary, OutputDetection, ReadoutSetup, Sink};
 use taxel_live::recording::{Reader, Topic};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -124,7 +124,7 @@ fn wait_for(live: &Live, what: impl Fn(&Live) -> bool) {
     }
 }
 
-fn assert_closed(summary: &Summary, report: &Report) {
+fn assert_closed(summary: &LiveSummary, report: &Report) {
     let c = &summary.counters;
     assert_eq!(report.board.datagrams, report.sent.datagrams);
     assert_eq!(c.capture.datagrams, c.decoding.decoded + c.capture.dropped_by_queue);

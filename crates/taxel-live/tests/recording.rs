@@ -6,7 +6,8 @@ use taxel_core::detect::Detection;
 use taxel_core::wire::{self, Registers, v2};
 use taxel_core::{Array, Marker, Stop};
 use taxel_live::recording::{
-    Compression, Counts, Ending, Header, NOTHING_LOST, Reader, Status, Topic, Writer, WriterOptions, damage,
+    Compression, FileEnding, Header, NOTHING_LOST, Reader, RecordingCounts, RecordingStatus, Topic, Writer,
+    WriterOptions, damage,
 };
 
 /// A folder that is gone when the test ends.
@@ -46,7 +47,7 @@ fn record(path: &Path, datagrams: u64, compression: Compression) {
     writer.detection(1_000_000_000_700, &detection).unwrap();
     writer.registers(1_000_000_000_800, &header().registers.unwrap()).unwrap();
     writer.picture(1_000_000_000_900, 192, 64, &vec![75; 4096]).unwrap();
-    let counts = Counts { received: datagrams, ..Counts::default() };
+    let counts = RecordingCounts { received: datagrams, ..RecordingCounts::default() };
     writer.finish(counts).unwrap();
 }
 
@@ -92,7 +93,7 @@ fn what_was_written_is_read_back_with_any_compression() {
             (remarks.datagrams, remarks.datagram_bytes, remarks.messages[&Topic::Pressure]),
             (3000, 4_200_000, 1)
         );
-        let Some(Ending::Finished { counts }) = reader.ending() else { panic!("not finished") };
+        let Some(FileEnding::Finished { counts }) = reader.ending() else { panic!("not finished") };
         assert_eq!((counts.received, counts.recorded, counts.verdict().text.as_str()), (3000, 3000, NOTHING_LOST));
     }
 }
@@ -106,7 +107,7 @@ fn an_existing_file_is_replaced_only_when_asked() {
     assert!(error.contains("a.mcap") && error.to_lowercase().contains("exists"), "{error}");
     assert_eq!(std::fs::read(&path).unwrap(), b"precious");
     let options = WriterOptions { overwrite: true, ..WriterOptions::default() };
-    Writer::create(&path, &header(), options).unwrap().finish(Counts::default()).unwrap();
+    Writer::create(&path, &header(), options).unwrap().finish(RecordingCounts::default()).unwrap();
     assert!(Reader::open(&path).is_ok());
 }
 
@@ -282,7 +283,8 @@ fn all_that_a_decoder_of_version_2_could_not_use_is_damage() {
         ..v2::Counts::default()
     };
     let (decoder, missing) = damage(&wire::Counts::default(), 0, 0, &found);
-    let verdict = Counts { received: 9, recorded: 9, missing, decoder, ..Counts::default() }.verdict();
+    let verdict =
+        RecordingCounts { received: 9, recorded: 9, missing, decoder, ..RecordingCounts::default() }.verdict();
     let expected = [
         ("datagrams_damaged", 2 + 3 + 4 + 5),
         ("datagrams_of_an_unknown_kind", 6),
@@ -295,20 +297,26 @@ fn all_that_a_decoder_of_version_2_could_not_use_is_damage() {
         ("taxels_outside_the_array", 9),
     ];
     let damaged: Vec<_> = verdict.damaged.iter().map(|(cause, n)| (cause.as_str(), *n)).collect();
-    assert_eq!((damaged, verdict.status), (expected.to_vec(), Status::Damaged));
+    assert_eq!((damaged, verdict.status), (expected.to_vec(), RecordingStatus::Damaged));
 }
 
 #[test]
 fn the_verdict_states_what_was_lost_where() {
-    let sound = Counts { received: 10, recorded: 10, ..Counts::default() };
+    let sound = RecordingCounts { received: 10, recorded: 10, ..RecordingCounts::default() };
     assert_eq!(sound.verdict().text, NOTHING_LOST);
-    let lossy = Counts { received: 10, recorded: 6, dropped_by_kernel: 2, dropped_by_queue: 3, ..Counts::default() };
+    let lossy = RecordingCounts {
+        received: 10,
+        recorded: 6,
+        dropped_by_kernel: 2,
+        dropped_by_queue: 3,
+        ..RecordingCounts::default()
+    };
     let verdict = lossy.verdict().text;
     for part in
         ["LOST: 2 messages dropped by the kernel", "3 datagrams dropped by taxel's queue", "1 datagram received"]
     {
         assert!(verdict.contains(part), "{verdict}");
     }
-    let damaged = Counts { decoder: [("skipped".to_owned(), 7), ("short".to_owned(), 0)].into(), ..sound };
+    let damaged = RecordingCounts { decoder: [("skipped".to_owned(), 7), ("short".to_owned(), 0)].into(), ..sound };
     assert_eq!(damaged.verdict().text, format!("{NOTHING_LOST}; in the bytes that came: 7 skipped"));
 }

@@ -13,7 +13,7 @@ use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::rest::{NOISE_FLOOR, Rest, Value};
 use taxel_core::tracked_rest::TrackedRest;
-use taxel_live::pipeline::Change;
+use taxel_live::pipeline::TaxelChange;
 
 /// Columns of [`COLUMN_US`] after which a change has decayed: 127, less a sixteenth per column, is then 0.
 pub const FORGET: i64 = 64;
@@ -227,7 +227,7 @@ impl ArrayState {
     }
 
     /// Applies changes in order; those of one time together, because most of the work is per time.
-    pub fn apply(&mut self, changes: &[Change]) {
+    pub fn apply(&mut self, changes: &[TaxelChange]) {
         for together in changes.chunk_by(|one, next| one.t == next.t) {
             let t = together[0].t;
             self.advance(t);
@@ -244,13 +244,13 @@ impl ArrayState {
 
     /// Applies a single change.
     #[cfg(test)]
-    pub fn apply_one(&mut self, change: &Change) {
+    pub fn apply_one(&mut self, change: &TaxelChange) {
         self.apply(std::slice::from_ref(change));
     }
 
     /// Updates the held value, rest and recent change of the taxel of a change.
     #[inline]
-    fn apply_to_taxel(&mut self, change: &Change) {
+    fn apply_to_taxel(&mut self, change: &TaxelChange) {
         let taxel = change.taxel as usize;
         if change.ticks == UNKNOWN && self.frames.is_some() {
             let above = self.above(taxel);
@@ -543,8 +543,8 @@ mod tests {
         Keyframe::blank(taxels)
     }
 
-    fn change(t: i64, taxel: u32, ticks: u16) -> Change {
-        Change { t, taxel, ticks, up: true, repaired: false }
+    fn change(t: i64, taxel: u32, ticks: u16) -> TaxelChange {
+        TaxelChange { t, taxel, ticks, up: true, repaired: false }
     }
 
     fn raster(columns: &TimeColumns, column: i64) -> Vec<u8> {

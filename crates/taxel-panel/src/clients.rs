@@ -25,7 +25,7 @@ pub(super) enum Broadcast {
     Hello,
 }
 
-/// See the module.
+/// Counts the connected clients and sends messages to all of them.
 pub(super) struct Clients {
     messages: broadcast::Sender<Broadcast>,
     /// Counts up when a new frame can be shown.

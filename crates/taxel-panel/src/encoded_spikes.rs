@@ -14,7 +14,7 @@ use super::messages::Message;
 use super::time_columns::{SPAN, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
 use taxel_live::Result;
-use taxel_live::pipeline::Change;
+use taxel_live::pipeline::TaxelChange;
 
 /// Maximum number of spikes in a message.
 const MOST: usize = 4096;
@@ -145,7 +145,7 @@ impl EncodedSpikes {
     }
 
     /// Encodes the next changes; frames are read from their index as time advances.
-    pub(super) fn push(&mut self, changes: &[Change]) {
+    pub(super) fn push(&mut self, changes: &[TaxelChange]) {
         if self.frames.is_some() {
             return;
         }
@@ -269,7 +269,7 @@ impl EncodedSpikes {
         Some(message)
     }
 
-    fn events(&self, changes: &[Change]) -> Events {
+    fn events(&self, changes: &[TaxelChange]) -> Events {
         let columns = u32::from(self.array.columns.max(1));
         // A taxel lies on the array, whose sides fit.
         #[allow(clippy::cast_possible_truncation)]

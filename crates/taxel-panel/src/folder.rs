@@ -30,7 +30,7 @@ pub(super) struct Listed {
 /// A file, and its trial where it holds several.
 pub(super) type Key = (PathBuf, Option<String>);
 
-/// See the module.
+/// The recordings of a folder, with the keyframe indices of those that were opened.
 pub(super) struct Folder {
     path: PathBuf,
     /// The indices in use, so that a recording is indexed once however many clients show it, with the sizes of the files.
@@ -114,7 +114,7 @@ impl Folder {
     }
 
     /// An index that is in memory, of a file of this size.
-    pub(super) fn known(&self, key: &Key, bytes: u64) -> Option<Indexed> {
+    pub(super) fn stored_index(&self, key: &Key, bytes: u64) -> Option<Indexed> {
         lock(&self.indices).get(key).filter(|(length, _)| *length == bytes).and_then(|(_, index)| index.upgrade())
     }
 

@@ -22,7 +22,7 @@ use super::live_source::LiveSource;
 use super::messages::{ArrayInfo, FileInfo, Message};
 use super::options::PanelOptions;
 use super::presets;
-use super::recorder::Recorder;
+use super::recorder::RecorderControl;
 use super::time_columns::{COLUMN_US, COLUMNS_US, SPAN};
 
 /// How often new events are fetched from the live source.
@@ -33,7 +33,7 @@ const COUNT_EVERY: Duration = Duration::from_millis(250);
 
 /// The board behind the live source, as far as the panel knows it.
 #[derive(Debug, Default)]
-pub(super) struct BoardState {
+pub(super) struct KnownBoard {
     /// Its serial line, where one is connected.
     pub(super) control: Option<String>,
     pub(super) registers: Registers,
@@ -41,14 +41,14 @@ pub(super) struct BoardState {
     pub(super) known: bool,
 }
 
-/// See the module.
+/// The objects that all clients share.
 pub(super) struct Hub {
     options: PanelOptions,
     handlers: Arc<RequestHandlers>,
     live: Mutex<Option<Arc<LiveSource>>>,
     /// Labels of the readout that runs.
     readout: Mutex<Option<Vec<String>>>,
-    board: Mutex<BoardState>,
+    board: Mutex<KnownBoard>,
     presets: Mutex<UserPresets>,
     /// See [`Hub::file_turn`].
     files: Arc<tokio::sync::Mutex<()>>,
@@ -57,14 +57,14 @@ pub(super) struct Hub {
     pub(super) clients: Clients,
     pub(super) folder: Folder,
     pub(super) labels: LabelTables,
-    pub(super) recorder: Recorder,
+    pub(super) recorder: RecorderControl,
     /// Notified when the board was reset: its registers are to be read again.
     pub(super) registers_unknown: Notify,
 }
 
 impl Hub {
     pub(super) fn new(options: PanelOptions, live: Option<Handle>, handlers: RequestHandlers) -> Result<Arc<Self>> {
-        let board = BoardState { control: options.control.clone(), ..BoardState::default() };
+        let board = KnownBoard { control: options.control.clone(), ..KnownBoard::default() };
         let hub = Arc::new(Self {
             folder: Folder::new(options.folder.clone()),
             options,
@@ -77,7 +77,7 @@ impl Hub {
             resets: AtomicU64::new(0),
             clients: Clients::new(),
             labels: LabelTables::default(),
-            recorder: Recorder::default(),
+            recorder: RecorderControl::default(),
             registers_unknown: Notify::new(),
         });
         if let Some(live) = live {
@@ -134,7 +134,7 @@ impl Hub {
         lock(&self.live).clone()
     }
 
-    pub(super) fn board(&self) -> MutexGuard<'_, BoardState> {
+    pub(super) fn board(&self) -> MutexGuard<'_, KnownBoard> {
         lock(&self.board)
     }
 

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use taxel_core::Array;
 use taxel_live::Result;
-use taxel_live::pipeline::Change;
+use taxel_live::pipeline::TaxelChange;
 
 use super::array_state::{Keyframe, RestSource};
 use super::time_columns::TimeColumns;
@@ -23,7 +23,7 @@ pub use activity::Activity;
 
 /// Result of [`ChangeReader::read`].
 #[derive(Debug)]
-pub enum Read {
+pub enum ReadOutcome {
     /// Changes were appended.
     Changes,
     /// Changes are missing; these are the values held after the gap, and the number of events up to there.
@@ -41,7 +41,7 @@ pub trait ChangeReader: Send {
     /// # Errors
     ///
     /// `File` where the file cannot be read.
-    fn read(&mut self, out: &mut Vec<Change>) -> Result<Read>;
+    fn read(&mut self, out: &mut Vec<TaxelChange>) -> Result<ReadOutcome>;
 }
 
 /// The frames of several sources, one by one.
@@ -83,7 +83,7 @@ pub trait KeyframeIndex: Send + Sync {
     /// The noise floor, ticks above rest.
     fn noise_floor(&self) -> u16;
 
-    /// The frames, if it holds such: then the rest is that of the keyframe and of [`Read::Rest`], and a change without a
+    /// The frames, if it holds such: then the rest is that of the keyframe and of [`ReadOutcome::Rest`], and a change without a
     /// value is a value that is missing from then on.
     fn frames(&self) -> Option<Arc<dyn FrameSources>> {
         None

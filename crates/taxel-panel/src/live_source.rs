@@ -25,7 +25,7 @@ const BEHIND_NS: i64 = 40_000_000;
 /// A source this far behind the time shown has stalled, us; less is network delay and error of the clocks.
 const STALLED_US: i64 = 200_000;
 
-/// See the module.
+/// A live source with the state and the keyframe index that its events make.
 pub(super) struct LiveSource {
     pub(super) handle: Handle,
     events: Mutex<ViewerEvents>,
@@ -39,12 +39,12 @@ pub(super) struct LiveSource {
     rested: AtomicBool,
     /// Number of zeroings that the state has applied.
     zeroings: AtomicU64,
-    silence: Mutex<Silence>,
+    silence: Mutex<SilentTime>,
 }
 
 /// Where the board's time is while no events arrive.
 #[derive(Debug, Default)]
-struct Silence {
+struct SilentTime {
     /// Arrival (ns since 1970) and board time (us) of the latest event.
     latest: Option<(i64, i64)>,
     /// How far a stalled source is behind the host's clock, us.
@@ -53,7 +53,7 @@ struct Silence {
 
 /// What arrived since the last call of [`LiveSource::receive`].
 #[derive(Default)]
-pub(super) struct Received {
+pub(super) struct ReceivedState {
     /// A new frame can be shown.
     pub(super) frame: bool,
     /// The board was reset.
@@ -146,8 +146,8 @@ impl LiveSource {
     }
 
     /// Applies what the pipeline has copied; it copies more often while a client is connected.
-    pub(super) fn receive(&self, has_clients: bool) -> Received {
-        let mut received = Received::default();
+    pub(super) fn receive(&self, has_clients: bool) -> ReceivedState {
+        let mut received = ReceivedState::default();
         let events = lock(&self.events);
         events.set_watched(has_clients);
         while let Some(piece) = events.next() {

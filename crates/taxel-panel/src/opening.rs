@@ -31,7 +31,7 @@ pub(super) async fn index(hub: &Arc<Hub>, name: &str, trial: Option<&str>) -> Re
     let bytes = size(&path)?;
     let key = (path.clone(), trial.map(str::to_owned));
     let _turn = hub.folder.turn(&key).await;
-    if let Some(known) = hub.folder.known(&key, bytes) {
+    if let Some(known) = hub.folder.stored_index(&key, bytes) {
         return Ok(known);
     }
     let file = path.clone();

@@ -7,12 +7,12 @@ use taxel_core::problem;
 
 use super::array_state::{ArrayState, FORGET};
 use super::encoded_spikes::EncodedSpikes;
-use super::keyframe_index::{ChangeReader, KeyframeIndex, Read};
+use super::keyframe_index::{ChangeReader, KeyframeIndex, ReadOutcome};
 use super::taxel_history::TaxelHistory;
 use super::time_columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
 use taxel_live::Result;
-use taxel_live::pipeline::Change;
+use taxel_live::pipeline::TaxelChange;
 
 /// Maximum number of changes that are decoded only for the history of a taxel and the spikes of an encoder.
 const HISTORY_CHANGES: u64 = 2_000_000;
@@ -52,7 +52,7 @@ pub struct Player {
     /// First column that the state has itself; earlier ones come from the whole source.
     first_of_view: i64,
     /// Changes that were read, and how many of them were applied.
-    pending: Vec<Change>,
+    pending: Vec<TaxelChange>,
     applied: usize,
     t: i64,
     history: Option<TaxelHistory>,
@@ -138,10 +138,10 @@ impl Player {
             self.pending.clear();
             self.applied = 0;
             match self.reader.read(&mut self.pending)? {
-                Read::Changes => {}
-                Read::Held(held, events) => self.state.set_held(&held, events),
-                Read::Rest(rest) => self.state.set_rest(rest),
-                Read::End => break,
+                ReadOutcome::Changes => {}
+                ReadOutcome::Held(held, events) => self.state.set_held(&held, events),
+                ReadOutcome::Rest(rest) => self.state.set_rest(rest),
+                ReadOutcome::End => break,
             }
         }
         self.state.advance(t);
@@ -165,10 +165,10 @@ impl Player {
             self.pending.clear();
             self.applied = 0;
             match self.reader.read(&mut self.pending)? {
-                Read::Changes => {}
-                Read::Held(held, events) => self.state.set_held(&held, events),
-                Read::Rest(rest) => self.state.set_rest(rest),
-                Read::End => return Ok(None),
+                ReadOutcome::Changes => {}
+                ReadOutcome::Held(held, events) => self.state.set_held(&held, events),
+                ReadOutcome::Rest(rest) => self.state.set_rest(rest),
+                ReadOutcome::End => return Ok(None),
             }
         }
     }
@@ -186,9 +186,9 @@ impl Player {
             'reading: loop {
                 changes.clear();
                 match reader.read(&mut changes)? {
-                    Read::Changes => {}
-                    Read::Held(..) | Read::Rest(_) => continue,
-                    Read::End => break,
+                    ReadOutcome::Changes => {}
+                    ReadOutcome::Held(..) | ReadOutcome::Rest(_) => continue,
+                    ReadOutcome::End => break,
                 }
                 for change in &changes {
                     if change.t >= self.t {

@@ -67,14 +67,14 @@ pub(super) struct RecorderState {
     pub(super) error: Option<String>,
 }
 
-/// See the module.
+/// Starts and ends recordings, and tells clients how far the present one is.
 #[derive(Debug, Default)]
-pub(super) struct Recorder {
+pub(super) struct RecorderControl {
     pub(super) state: Mutex<RecorderState>,
     pub(super) stop: Notify,
 }
 
-impl Recorder {
+impl RecorderControl {
     /// The file that is being recorded.
     pub(super) fn file(&self) -> Option<String> {
         let state = lock(&self.state);

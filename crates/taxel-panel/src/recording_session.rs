@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use taxel_core::wire::Command;
 use taxel_live::locked::lock;
-use taxel_live::pipeline::{Record, Summary};
+use taxel_live::pipeline::{LiveSummary, Record};
 use taxel_live::recording::Compression;
 
 use super::hub::Hub;
@@ -145,7 +145,9 @@ async fn record(hub: &Arc<Hub>, plan: &RecordingPlan) -> Result<String, String> 
     let handle = live.handle.clone();
     let ended = tokio::task::spawn_blocking(move || handle.end_recording()).await.map_err(|_| failed())?;
     match ended.map_err(|error| error.to_string())? {
-        Summary { path: Some(_), verdict, .. } => Ok(verdict.text),
-        Summary { path: None, .. } => Err("no datagrams arrived during the recording: no file was written".to_owned()),
+        LiveSummary { path: Some(_), verdict, .. } => Ok(verdict.text),
+        LiveSummary { path: None, .. } => {
+            Err("no datagrams arrived during the recording: no file was written".to_owned())
+        }
     }
 }

@@ -40,7 +40,7 @@ const IDLE: Duration = Duration::from_secs(1);
 const ARRIVED_WITHIN: Duration = Duration::from_millis(100);
 const MOST_ARRIVING: Duration = Duration::from_secs(5);
 
-struct Session {
+struct ClientSession {
     hub: Arc<Hub>,
     connection: Connection,
     flow: FlowControl,
@@ -54,7 +54,7 @@ struct Session {
 /// Serves a client until it leaves or is disconnected.
 pub(super) async fn run(socket: WebSocket, hub: Arc<Hub>, end: watch::Receiver<bool>, slot: ClientSlot) {
     let (pending, answers) = PendingRequests::new();
-    let session = Session {
+    let session = ClientSession {
         viewport: Viewport::new(hub.live()),
         hub,
         connection: Connection::new(socket),
@@ -67,7 +67,7 @@ pub(super) async fn run(socket: WebSocket, hub: Arc<Hub>, end: watch::Receiver<b
     drop(slot);
 }
 
-impl Session {
+impl ClientSession {
     async fn serve(mut self, end: watch::Receiver<bool>, answers: mpsc::Receiver<Message>) {
         if let Err(closing) = self.run(end, answers).await {
             if matches!(closing, Closing::Silently) {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::time_columns::{SPAN, column_of};
 use taxel_core::held::UNKNOWN;
-use taxel_live::pipeline::Change;
+use taxel_live::pipeline::TaxelChange;
 
 /// Least, greatest and last value of one taxel in each column of time.
 #[derive(Debug, Clone)]
@@ -27,7 +27,7 @@ impl TaxelHistory {
     }
 
     /// Applies a change; those of other taxels are ignored.
-    pub fn apply(&mut self, change: &Change) {
+    pub fn apply(&mut self, change: &TaxelChange) {
         if change.taxel != self.taxel || change.ticks == UNKNOWN {
             return;
         }
@@ -82,8 +82,8 @@ mod tests {
     use super::super::time_columns::COLUMN_US;
     use super::*;
 
-    fn change(t: i64, taxel: u32, ticks: u16) -> Change {
-        Change { t, taxel, ticks, up: true, repaired: false }
+    fn change(t: i64, taxel: u32, ticks: u16) -> TaxelChange {
+        TaxelChange { t, taxel, ticks, up: true, repaired: false }
     }
 
     #[test]

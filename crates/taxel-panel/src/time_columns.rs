@@ -66,7 +66,7 @@ pub fn is_column(us: i64) -> bool {
 }
 
 #[derive(Debug, Clone)]
-struct Block {
+struct ColumnBlock {
     raster: Vec<u8>,
     curves: Vec<Curve>,
     values: Vec<u32>,
@@ -74,13 +74,13 @@ struct Block {
 
 /// What a column of time holds of each row, of each channel, and of each of several sources.
 #[derive(Debug, Clone, Copy)]
-struct Shape {
+struct ColumnShape {
     rows: usize,
     channels: usize,
     sources: usize,
 }
 
-impl Shape {
+impl ColumnShape {
     fn of(array: &Array) -> Self {
         let channels = if array.is_channels() && array.len() <= MOST_CHANNELS { array.len() } else { 0 };
         Self { rows: array.rows.into(), channels, sources: 0 }
@@ -97,7 +97,7 @@ impl Shape {
     }
 }
 
-impl Block {
+impl ColumnBlock {
     /// Repeats the values of its column `k`, so many, up to its end.
     fn repeat_values(&mut self, k: usize, count: usize) {
         for later in k + 1..BLOCK.unsigned_abs() as usize {
@@ -109,9 +109,9 @@ impl Block {
 /// Raster and curves by column of time, stored in blocks; a stretch without events takes no memory.
 #[derive(Debug, Clone)]
 pub struct TimeColumns {
-    shape: Shape,
+    shape: ColumnShape,
     /// Ascending by number. Nearly every access is to the newest block.
-    blocks: VecDeque<(i64, Block)>,
+    blocks: VecDeque<(i64, ColumnBlock)>,
     /// First and last known column.
     reach: Option<(i64, i64)>,
     /// Maximum number of blocks.
@@ -125,7 +125,7 @@ impl TimeColumns {
     /// Columns of an array that take at most about `bytes` bytes: the oldest blocks are dropped.
     #[must_use]
     pub fn new(array: &Array, bytes: usize) -> Self {
-        let shape = Shape::of(array);
+        let shape = ColumnShape::of(array);
         let block = shape.block_bytes();
         Self {
             shape,
@@ -168,7 +168,7 @@ impl TimeColumns {
     /// Bytes that `columns` columns of an array take.
     #[must_use]
     pub fn bytes_for(array: &Array, columns: i64) -> usize {
-        (usize::try_from(columns / BLOCK).unwrap_or(0) + 2) * Shape::of(array).block_bytes()
+        (usize::try_from(columns / BLOCK).unwrap_or(0) + 2) * ColumnShape::of(array).block_bytes()
     }
 
     /// Rows of the array.
@@ -203,7 +203,7 @@ impl TimeColumns {
         }
     }
 
-    fn block(&mut self, column: i64) -> (&mut Block, usize) {
+    fn block(&mut self, column: i64) -> (&mut ColumnBlock, usize) {
         let (key, rows, count) = (column.div_euclid(BLOCK), self.shape.rows, self.shape.values());
         let place = match self.place(key) {
             Ok(place) => place,
@@ -220,7 +220,7 @@ impl TimeColumns {
                 let before = place.checked_sub(1).map(|before| &self.blocks[before].1);
                 let curve = before.map_or(NOTHING, |before| before.curves[n - 1]);
                 let values = before.map_or_else(|| vec![0; count], |b| b.values[(n - 1) * count..].to_vec());
-                let block = Block { raster: vec![0; n * rows], curves: vec![curve; n], values: values.repeat(n) };
+                let block = ColumnBlock { raster: vec![0; n * rows], curves: vec![curve; n], values: values.repeat(n) };
                 self.blocks.insert(place, (key, block));
                 place
             }

@@ -10,13 +10,13 @@ use taxel_live::capture::{self, Receiver, ReceiverOptions};
 use taxel_live::host_clock::RoundTrip;
 use taxel_live::pipeline::{Copied, Copies as PipelineCopies};
 
-use crate::enter::{Shared, enter};
-use crate::errors::ProblemError;
+use taxel_border::enter::{Exclusive, enter};
+use taxel_border::errors::ProblemError;
 
 /// The entrance for parcels of another computer.
 #[pyclass(frozen)]
 pub struct Feed {
-    feed: capture::Feed,
+    feed: capture::ParcelFeed,
     /// `None` once a pipeline has it.
     receiver: Mutex<Option<Receiver>>,
 }
@@ -66,11 +66,11 @@ impl Feed {
 
 /// The receiving end of a pipeline's copies.
 #[pyclass(frozen)]
-pub struct Copies(Shared<PipelineCopies>);
+pub struct Copies(Exclusive<PipelineCopies>);
 
 impl Copies {
     pub(crate) fn new(copies: PipelineCopies) -> Self {
-        Self(Shared::new(copies))
+        Self(Exclusive::new(copies))
     }
 }
 

@@ -6,10 +6,10 @@ use taxel_core::circuit::Ramp;
 use taxel_core::contact::Sensor;
 use taxel_core::{Error, Result, reading};
 
-use crate::convert::{array, slice};
-use crate::enter::enter;
-use crate::errors::core;
-use crate::parameters::Plain;
+use taxel_border::convert::{array, slice};
+use taxel_border::enter::enter;
+use taxel_border::errors::core;
+use taxel_border::parameters::Plain;
 
 fn law(json: &str) -> Result<Sensor> {
     let sensor: Sensor = reading::from_text(json).map_err(|unfit| Error::scene(unfit.of("law")))?;

@@ -2,12 +2,12 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::circuit::{Adaptive, Converter, Divider, Fabric, Scan, VirtualGround};
+use taxel_core::circuit::{Adaptive, Converter, ConverterScan, Divider, Fabric, VirtualGround};
 use taxel_core::{Result, Stop};
 
-use crate::convert::{Column, array, column, slice};
-use crate::enter::enter;
-use crate::parameters::parsed;
+use taxel_border::convert::{Column, array, column, slice};
+use taxel_border::enter::enter;
+use taxel_border::parameters::parsed;
 
 type Values<'py> = Bound<'py, PyArray1<f64>>;
 
@@ -115,7 +115,7 @@ pub fn converter_ticks<'py>(
     let (converter, (rows, columns)): (Converter, _) = (parsed("Converter", json)?, shape);
     let frames = slice("volts", &volts)?;
     let out = enter(py, |stop| -> Result<Vec<f64>> {
-        let mut scan = Scan::new(converter, rows, columns)?;
+        let mut scan = ConverterScan::new(converter, rows, columns)?;
         let mut out = vec![0.0; frames.len()];
         let taxels = (rows * columns).max(1);
         for (volts, ticks) in frames.chunks(taxels).zip(out.chunks_mut(taxels)) {

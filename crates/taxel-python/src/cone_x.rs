@@ -2,13 +2,15 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::learn::{self as core_learn, ConeX, ConeXFit, Fit, GapMultipliers, Left, Margin, Round, Row, Stated};
+use taxel_core::learn::{
+    self as core_learn, ConeX, ConeXFit, Fit, GapMultipliers, Left, Margin, Round, Row, StatedRow,
+};
 use taxel_core::problem;
 
-use crate::convert::{Column, SpikesIn, array, column, slice, to_patterns};
-use crate::enter::{enter, enter_keeping};
-use crate::errors::core;
-use crate::parameters::parsed;
+use taxel_border::convert::{Column, SpikesIn, array, column, slice, to_patterns};
+use taxel_border::enter::{enter, enter_keeping};
+use taxel_border::errors::core;
+use taxel_border::parameters::parsed;
 
 fn to_cone_x(json: &str) -> PyResult<ConeX> {
     let parameters: ConeX = parsed("ConeX", json)?;
@@ -141,13 +143,13 @@ impl ConeXProblem {
 
     /// A row, with or without its margin.
     fn row<'py>(&self, py: Python<'py>, name: Name, margin: bool) -> PyResult<RowOut<'py>> {
-        let Stated { coefficients, limit } = self.problem.row(to_row(&name)?, margin).map_err(core)?;
+        let StatedRow { coefficients, limit } = self.problem.row(to_row(&name)?, margin).map_err(core)?;
         Ok((array(py, coefficients), limit))
     }
 
     /// The row of B behind a target, and the value that it aims at.
     fn behind<'py>(&self, py: Python<'py>, pattern: usize, target: usize) -> PyResult<RowOut<'py>> {
-        let Stated { coefficients, limit } = self.problem.behind(pattern, target).map_err(core)?;
+        let StatedRow { coefficients, limit } = self.problem.behind(pattern, target).map_err(core)?;
         Ok((array(py, coefficients), limit))
     }
 

@@ -1,22 +1,17 @@
 //! What is known of parameters, noun by noun, and their check: for the Python classes, whose defaults are read from here.
 
 use pyo3::prelude::*;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use taxel_core::circuit::{Adaptive, Chain, Converter, Divider, Fabric, VirtualGround};
 use taxel_core::encode::{Encoder, RunningRange};
-use taxel_core::learn::rivals::{Batch, Rival, Tempotron};
-use taxel_core::learn::{ConeR, ConeX, OnlineConeR, Stdp};
+use taxel_core::learn::{ConeR, ConeX, OnlineConeR};
 use taxel_core::metrics::{Metric, matching};
 use taxel_core::neuron::Neuron;
 use taxel_core::parameters::Described;
-use taxel_core::{Result as CoreResult, problem};
 
-use crate::errors::core;
 use crate::learn::to_online;
-use crate::parameters::{Plain, parsed};
-use crate::rivals::to_rival;
+use taxel_border::errors::core;
+use taxel_border::parameters::{Plain, checked, unknown};
 
 /// What is known of a noun's parameters: defaults, what must be given, ranges.
 #[pyfunction]
@@ -31,8 +26,6 @@ fn described(of: &str) -> Option<Described> {
         "cone_x" => Some(ConeX::described()),
         "cone_r" => Some(ConeR::described()),
         "online_cone_r" => Some(OnlineConeR::described()),
-        "stdp" => Some(Stdp::described()),
-        "tempotron" => Some(Tempotron::described()),
         "matching" => Some(matching::described()),
         "fabric" => Some(Fabric::described()),
         "virtual_ground" => Some(VirtualGround::described()),
@@ -40,10 +33,7 @@ fn described(of: &str) -> Option<Described> {
         "converter" => Some(Converter::described()),
         "circuit" => Some(Chain::described()),
         "adaptive_ramp" => Some(Adaptive::described()),
-        _ => Encoder::described(of)
-            .or_else(|| Rival::described(of))
-            .or_else(|| Batch::described(of))
-            .or_else(|| Metric::described(of)),
+        _ => Encoder::described(of).or_else(|| Metric::described(of)),
     }
 }
 
@@ -60,32 +50,14 @@ pub fn check_parameters(of: &str, parameters: &str) -> PyResult<Plain<Value>> {
             OnlineConeR::new(&cone, window).map_err(core)?;
             Ok(json!(cone))
         }
-        "stdp" => checked("STDP", parameters, Stdp::check),
-        "tempotron" => checked("Tempotron", parameters, Tempotron::check),
         "fabric" => checked("Fabric", parameters, Fabric::check),
         "virtual_ground" => checked("VirtualGround", parameters, VirtualGround::check),
         "divider" => checked("Divider", parameters, Divider::check),
         "converter" => checked("Converter", parameters, Converter::check),
         "circuit" => checked("Circuit", parameters, Chain::check),
         "adaptive_ramp" => checked("AdaptiveRamp", parameters, Adaptive::check),
-        _ if Rival::described(of).is_some() => Ok(json!(to_rival(parameters)?)),
-        _ if Batch::described(of).is_some() => Ok(json!(Batch::from_json(of, parameters).map_err(core)?)),
         _ if Encoder::described(of).is_some() => Ok(json!(Encoder::from_json(parameters).map_err(core)?)),
         _ => Err(unknown(of)),
     }
     .map(Plain)
-}
-
-fn unknown(of: &str) -> PyErr {
-    core(problem!("{of}: nothing of that name has parameters"))
-}
-
-fn checked<T: DeserializeOwned + Serialize>(
-    what: &str,
-    json: &str,
-    check: impl Fn(&T) -> CoreResult<()>,
-) -> PyResult<Value> {
-    let value: T = parsed(what, json)?;
-    check(&value).map_err(core)?;
-    Ok(json!(value))
 }

@@ -9,10 +9,10 @@ use taxel_core::detect::{
 use taxel_core::encode::{Quantity, Tare, Zeroing};
 use taxel_core::spikes::us;
 
-use crate::convert::{ArrayParts, Column, EventsIn, FramesIn, array, column, slice, to_array};
-use crate::enter::{Shared, enter};
-use crate::errors::{ProblemError, core};
-use crate::parameters::{Plain, parsed};
+use taxel_border::convert::{ArrayParts, Column, EventsIn, FramesIn, array, column, slice, to_array};
+use taxel_border::enter::{Exclusive, enter};
+use taxel_border::errors::{ProblemError, core};
+use taxel_border::parameters::{Plain, parsed};
 
 /// Detections as Python hands them over: labels, t and known in us, slope in mV/ms, repaired.
 pub(crate) type DetectionsIn<'py> = (
@@ -206,7 +206,7 @@ pub fn readout_run_frames<'py>(
 
 /// A readout or a plain rule at work.
 #[pyclass(frozen)]
-pub struct ReadoutStream(Shared<CoreStream>);
+pub struct ReadoutStream(Exclusive<CoreStream>);
 
 #[pymethods]
 impl ReadoutStream {
@@ -214,7 +214,7 @@ impl ReadoutStream {
     fn new(readout: &str, array: ArrayParts, frame_us: f64, wire_version: u8, tare: Option<&str>) -> PyResult<Self> {
         let ((readout, tare), array) = (parse(readout, tare)?, to_array(array)?);
         let frames = FrameTime::on_wire(frame_us, wire_version);
-        Ok(Self(Shared::new(readout.stream(&array, frames, tare.as_ref()).map_err(core)?)))
+        Ok(Self(Exclusive::new(readout.stream(&array, frames, tare.as_ref()).map_err(core)?)))
     }
 
     fn push_events<'py>(&self, py: Python<'py>, events: EventsIn<'py>) -> PyResult<DetectionsOut<'py>> {

@@ -6,9 +6,9 @@ use taxel_core::encode::{Encoder, LocalLoad, Pieces, Skin, Tare};
 
 use taxel_core::problem;
 
-use crate::convert::{ArrayParts, EventsIn, FramesIn, SpikesOut, from_spikes, to_array};
-use crate::enter::{Shared, enter};
-use crate::errors::core;
+use taxel_border::convert::{ArrayParts, EventsIn, FramesIn, SpikesOut, from_spikes, to_array};
+use taxel_border::enter::{Exclusive, enter};
+use taxel_border::errors::core;
 
 /// Types, x and y of a skin's afferents.
 type SkinAfferents = (Vec<&'static str>, Vec<f64>, Vec<f64>);
@@ -105,14 +105,14 @@ pub fn encode_frames<'py>(py: Python<'py>, encoder: &str, frames: FramesIn<'py>)
 
 /// An encoder at work.
 #[pyclass(frozen)]
-pub struct EncoderStream(Shared<Pieces>);
+pub struct EncoderStream(Exclusive<Pieces>);
 
 #[pymethods]
 impl EncoderStream {
     #[new]
     fn new(encoder: &str, array: ArrayParts) -> PyResult<Self> {
         let (encoder, array) = (Encoder::from_json(encoder).map_err(core)?, to_array(array)?);
-        Ok(Self(Shared::new(Pieces::new(&encoder, array).map_err(core)?)))
+        Ok(Self(Exclusive::new(Pieces::new(&encoder, array).map_err(core)?)))
     }
 
     fn push_events<'py>(&self, py: Python<'py>, events: EventsIn<'py>) -> PyResult<SpikesOut<'py>> {

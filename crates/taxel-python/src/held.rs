@@ -9,13 +9,13 @@ use taxel_core::touch_counts::{BIN_US, TouchCounts};
 use taxel_core::tracked_rest::TrackedRest;
 use taxel_core::{Error, problem};
 
-use crate::convert::{ArrayParts, EventsIn, EventsOut, FramesIn, array, from_events, slice, to_array};
-use crate::enter::{Shared, enter};
-use crate::errors::core;
+use taxel_border::convert::{ArrayParts, EventsIn, EventsOut, FramesIn, array, from_events, slice, to_array};
+use taxel_border::enter::{Exclusive, enter};
+use taxel_border::errors::core;
 
 /// What chosen taxels of a recording hold at any time; without values, each event is a step of 1 up or down.
 #[pyclass(frozen, module = "taxel._core")]
-pub struct HeldValues(Shared<HeldOverTime<f32>>);
+pub struct HeldValues(Exclusive<HeldOverTime<f32>>);
 
 #[pymethods]
 impl HeldValues {
@@ -37,7 +37,7 @@ impl HeldValues {
             let n = taxels.map_or(events.array.len(), <[u32]>::len);
             HeldOverTime::new(events, taxels, begins.map_or_else(|| vec![0.0; n], <[f32]>::to_vec))
         })?;
-        Ok(Self(Shared::new(held)))
+        Ok(Self(Exclusive::new(held)))
     }
 
     /// The values at times, us, best ascending: one row a time.
@@ -101,7 +101,7 @@ pub fn above_rest<'py>(
 /// The rest of frames without a tare: `columns` of the array, its noise floor, the rest of each taxel to begin
 /// with (NaN where unknown), and whether values fall from it with pressure.
 #[pyclass(frozen, name = "TrackedRest", module = "taxel._core")]
-pub struct PyTrackedRest(Shared<TrackedRest>);
+pub struct PyTrackedRest(Exclusive<TrackedRest>);
 
 #[pymethods]
 impl PyTrackedRest {
@@ -110,7 +110,7 @@ impl PyTrackedRest {
     fn new(columns: usize, noise_floor: f64, begins: PyReadonlyArray1<'_, f64>, falls: bool) -> PyResult<Self> {
         let begins = slice("begins", &begins)?.iter().map(|&rest| if rest.is_nan() { f64::NO_REST } else { rest });
         let rest = TrackedRest::new(columns, noise_floor, begins.collect());
-        Ok(Self(Shared::new(if falls { rest.falling() } else { rest })))
+        Ok(Self(Exclusive::new(if falls { rest.falling() } else { rest })))
     }
 
     /// Reads frames at `t` us, one after the other in `values` (NaN where a taxel has none); returns them above the
@@ -221,7 +221,7 @@ type ChangesOut<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>);
 pub fn changes_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>) -> PyResult<ChangesOut<'py>> {
     let frames = frames.view()?;
     let changes = enter(py, |stop| frames.changes(stop))?;
-    Ok((array(py, changes.number), array(py, changes.on)))
+    Ok((array(py, changes.number), array(py, changes.same_direction)))
 }
 
 /// What a touched taxel reads above rest at least, for a board's noise floor.

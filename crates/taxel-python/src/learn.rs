@@ -1,17 +1,17 @@
 //! Learners.
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
 use taxel_core::learn as core_learn;
-use taxel_core::learn::{ConeR, ConeRFit, Fit, Left, Round, Shares, Stdp, StdpNeuron};
+use taxel_core::learn::{ConeR, ConeRFit, Fit, Left, Round, Shares};
 use taxel_core::problem;
 
 use crate::cone_x::{ProofOut, proof_out};
-use crate::convert::{Column, SpikesIn, array, column, slice, to_patterns};
-use crate::enter::{Shared, enter, enter_keeping};
-use crate::errors::core;
-use crate::parameters::parsed;
+use taxel_border::convert::{Column, SpikesIn, column, slice, to_patterns};
+use taxel_border::enter::{Exclusive, enter, enter_keeping};
+use taxel_border::errors::core;
+use taxel_border::parameters::parsed;
 
 pub(crate) fn to_cone_r(json: &str) -> PyResult<ConeR> {
     let parameters: ConeR = parsed("ConeR", json)?;
@@ -113,7 +113,7 @@ impl ConeRProblem {
 /// A sliding window of patterns and its last fit.
 #[pyclass(frozen)]
 pub struct OnlineConeR {
-    window: Shared<core_learn::OnlineConeR>,
+    window: Exclusive<core_learn::OnlineConeR>,
     max_seconds: Option<f64>,
 }
 
@@ -123,7 +123,7 @@ impl OnlineConeR {
     fn new(parameters: &str) -> PyResult<Self> {
         let (parameters, window) = to_online(parameters)?;
         let window = core_learn::OnlineConeR::new(&parameters, window).map_err(core)?;
-        Ok(Self { window: Shared::new(window), max_seconds: parameters.max_seconds })
+        Ok(Self { window: Exclusive::new(window), max_seconds: parameters.max_seconds })
     }
 
     #[getter]
@@ -152,37 +152,6 @@ impl OnlineConeR {
     fn fit(&self, py: Python<'_>) -> PyResult<ConeRFitOut> {
         let (fit, raised) = enter_keeping(py, self.max_seconds, |stop, _| self.window.lock().fit(&mut |_| {}, stop))?;
         Ok(fit_out(py, fit, raised))
-    }
-}
-
-/// A neuron with spike-timing-dependent plasticity, in one stream of time.
-#[pyclass(frozen, name = "STDP")]
-pub struct Plastic(Shared<StdpNeuron>);
-
-#[pymethods]
-impl Plastic {
-    #[new]
-    fn new(parameters: &str, trains: usize) -> PyResult<Self> {
-        let parameters: Stdp = parsed("STDP", parameters)?;
-        Ok(Self(Shared::new(StdpNeuron::new(&parameters, trains).map_err(core)?)))
-    }
-
-    #[getter]
-    fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        array(py, self.0.with(py, |neuron| neuron.weights().to_vec()))
-    }
-
-    fn set_weights(&self, py: Python<'_>, weights: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
-        let weights = slice("weights", &weights)?;
-        self.0.enter(py, |neuron, _| neuron.set_weights(weights))
-    }
-
-    fn rest(&self, py: Python<'_>) {
-        self.0.with(py, StdpNeuron::rest);
-    }
-
-    fn push<'py>(&self, py: Python<'py>, piece: SpikesIn, learn: bool) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(array(py, self.0.enter(py, |neuron, stop| neuron.push(&piece.0, learn, stop))?))
     }
 }
 

@@ -2,11 +2,7 @@
 
 #![allow(clippy::too_many_arguments, reason = "Python names them")]
 
-mod convert;
-mod enter;
-mod errors;
 mod held;
-mod instructions;
 #[cfg(feature = "test-hooks")]
 mod test_hooks;
 mod thread_state;
@@ -25,10 +21,8 @@ mod metrics;
 mod neuron;
 mod nouns;
 mod panel;
-mod parameters;
 mod pictures;
 mod recording;
-mod rivals;
 mod simulate;
 mod wire;
 mod wire_v2;
@@ -70,9 +64,7 @@ mod _core {
         touches_of_events, touches_of_frames,
     };
     #[pymodule_export]
-    use crate::instructions::instructions;
-    #[pymodule_export]
-    use crate::learn::{ConeRFitOut, ConeRProblem, OnlineConeR, Plastic};
+    use crate::learn::{ConeRFitOut, ConeRProblem, OnlineConeR};
     #[pymodule_export]
     use crate::live::{Ended, Live, send, serial_ports};
     #[pymodule_export]
@@ -91,11 +83,6 @@ mod _core {
         numbered_path, open_regular, read_lsa, recording_damage, recording_verdict, whole_frames, write_lsa,
     };
     #[pymodule_export]
-    use crate::rivals::{
-        TrainedOut, batch_names, change_rival, change_tempotron, fit_batch, fit_rival, fit_tempotron, output_skim,
-        peak_tempotron, rows_skim, rule_names, run_batch, run_rival,
-    };
-    #[pymodule_export]
     use crate::simulate::{Layer, Played, Source, check_scene, draw_scene, emulate, motion, play, truth};
     #[cfg(feature = "test-hooks")]
     #[pymodule_export]
@@ -108,11 +95,13 @@ mod _core {
     };
     #[pymodule_export]
     use crate::wire_v2::{DatagramStream, EncodedDatagrams, decode_datagrams, encode_datagrams};
+    #[pymodule_export]
+    use taxel_border::instructions::instructions;
 
     #[pymodule_init]
     fn begin(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        crate::errors::register(module)?;
-        crate::instructions::cap()?;
+        taxel_border::errors::register(module)?;
+        taxel_border::instructions::cap()?;
         module.add("UNKNOWN", UNKNOWN)?;
         module.add("LOADED_TICKS", LOADED_TICKS)
     }

@@ -14,17 +14,17 @@ use taxel_core::problem;
 use taxel_live::address::of_host;
 use taxel_live::capture::Sender;
 use taxel_live::pipeline::{
-    Handle, Lines, Live as Pipeline, LiveOptions, OutputDetection, ReadoutSetup, Record, Sink, Summary,
+    Handle, LineSink, Live as Pipeline, LiveOptions, LiveSummary, OutputDetection, ReadoutSetup, Record, Sink,
 };
 use taxel_live::ports;
 
 use crate::bridge::{Copies, Feed};
-use crate::convert::array;
-use crate::enter::enter;
-use crate::errors::{ProblemError, core, live};
-use crate::parameters::{Plain, parsed};
 use crate::thread_state;
 use crate::threaded::Threaded;
+use taxel_border::convert::array;
+use taxel_border::enter::enter;
+use taxel_border::errors::{ProblemError, core, live};
+use taxel_border::parameters::{Plain, parsed};
 
 /// A detection, by name: `reported` is the time of its report in us of the board's clock, `reported_ns` in ns of the host's.
 #[derive(IntoPyObject)]
@@ -49,8 +49,8 @@ pub struct Ended {
     tare: Option<String>,
 }
 
-impl From<Summary> for Ended {
-    fn from(summary: Summary) -> Self {
+impl From<LiveSummary> for Ended {
+    fn from(summary: LiveSummary) -> Self {
         Self {
             counters: Plain(json!(summary.counters)),
             verdict: Plain(json!(summary.verdict)),
@@ -79,7 +79,7 @@ thread_local! {
 pub struct Live {
     pipeline: Threaded<Pipeline>,
     /// How it ended, once it has; locked while it is being ended.
-    summary: Mutex<Option<Summary>>,
+    summary: Mutex<Option<LiveSummary>>,
 }
 
 impl Live {
@@ -115,7 +115,7 @@ impl Live {
         options.array.check().map_err(core)?;
         let mut sinks: Vec<Box<dyn Sink>> = vec![];
         if options.lines {
-            sinks.push(Box::new(Lines(std::io::stdout())));
+            sinks.push(Box::new(LineSink(std::io::stdout())));
         }
         if let Some(say) = say {
             sinks.push(Box::new(move |output: &OutputDetection| {

@@ -9,21 +9,21 @@ use taxel_core::metrics::{Metric, NAMES, Patterns, Work};
 use taxel_core::problem;
 use taxel_core::vectors::Instructions;
 
-use crate::convert::{array, slice};
-use crate::enter::{enter, enter_with_progress};
-use crate::errors::core;
+use taxel_border::convert::{array, slice};
+use taxel_border::enter::{enter, enter_with_progress};
+use taxel_border::errors::core;
 
 /// Patterns as Python hands them over: name, count, trains, times, offsets, window, listed.
 type PatternsIn<'py> =
     (String, usize, usize, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, Option<(f64, f64)>, bool);
 
 /// Patterns with their offsets as the core wants them.
-struct Held<'py> {
+struct OffsetPatterns<'py> {
     given: PatternsIn<'py>,
     offsets: Vec<usize>,
 }
 
-impl<'py> Held<'py> {
+impl<'py> OffsetPatterns<'py> {
     fn new(given: PatternsIn<'py>) -> PyResult<Self> {
         let offsets = slice("offsets", &given.4)?.iter().map(|&o| usize::try_from(o).unwrap_or(usize::MAX)).collect();
         Ok(Self { given, offsets })
@@ -76,7 +76,7 @@ pub fn metric_names() -> Vec<&'static str> {
 /// The distance of two patterns.
 #[pyfunction]
 pub fn distance<'py>(py: Python<'py>, metric: &str, a: PatternsIn<'py>, b: PatternsIn<'py>) -> PyResult<f64> {
-    let (metric, a, b) = (to_metric(metric)?, Held::new(a)?, Held::new(b)?);
+    let (metric, a, b) = (to_metric(metric)?, OffsetPatterns::new(a)?, OffsetPatterns::new(b)?);
     let (a, b) = (a.patterns()?, b.patterns()?);
     enter(py, |stop| metric.distance(&a, &b, stop))
 }
@@ -99,8 +99,8 @@ pub fn pairwise<'py>(
     vectors: Option<&str>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let (metric, a, b) = (to_metric(metric)?, Held::new(a)?, b.map(Held::new).transpose()?);
-    let (a, b) = (a.patterns()?, b.as_ref().map(Held::patterns).transpose()?);
+    let (metric, a, b) = (to_metric(metric)?, OffsetPatterns::new(a)?, b.map(OffsetPatterns::new).transpose()?);
+    let (a, b) = (a.patterns()?, b.as_ref().map(OffsetPatterns::patterns).transpose()?);
     let instructions = to_instructions(vectors)?;
     let distances = enter_with_progress(py, |stop, caller| {
         let mut report = |done: usize, all: usize| {

@@ -4,10 +4,10 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::neuron::Neuron;
 
-use crate::convert::{SpikesIn, SpikesOut, array, from_spikes, slice};
-use crate::enter::enter;
-use crate::errors::core;
-use crate::parameters::parsed;
+use taxel_border::convert::{SpikesIn, SpikesOut, array, from_spikes, slice};
+use taxel_border::enter::enter;
+use taxel_border::errors::core;
+use taxel_border::parameters::parsed;
 
 pub(crate) fn to_neuron(json: &str) -> PyResult<Neuron> {
     let neuron: Neuron = parsed("neuron", json)?;

@@ -4,8 +4,8 @@ use pyo3::prelude::*;
 
 use taxel_core::{SpikeKind, spikes};
 
-use crate::convert::{EventsIn, SpikesIn, SpikesOut, SpikesParts, from_spikes, slice, to_offsets};
-use crate::enter::enter;
+use taxel_border::convert::{EventsIn, SpikesIn, SpikesOut, SpikesParts, from_spikes, slice, to_offsets};
+use taxel_border::enter::enter;
 
 /// Checks spike trains; raises where train or spike make no sense.
 #[pyfunction]

@@ -8,10 +8,10 @@ use pyo3::prelude::*;
 use taxel_live::address::of_host;
 use taxel_panel::{Panel as Server, PanelOptions};
 
-use crate::enter::enter;
 use crate::live::Live;
 use crate::threaded::Threaded;
 use requests::handlers;
+use taxel_border::enter::enter;
 
 /// The panel's server.
 #[pyclass(frozen)]

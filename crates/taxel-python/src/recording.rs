@@ -14,15 +14,15 @@ use taxel_core::encode::Zeroing;
 use taxel_core::{Marker, wire};
 use taxel_live::clock::{self, BoardClock, Offset};
 use taxel_live::recording::{
-    Basis, BoardChange, Counts, Encoding, Header, LsaWriter, Reader, Track, Verdict, Writer, WriterOptions,
-    damage_of_version_1, decode_lsa, numbered,
+    Basis, BoardChange, FrameEncoding, Header, LsaWriter, Reader, RecordingCounts, SourceWriter, Verdict, Writer,
+    WriterOptions, damage_of_version_1, decode_lsa, numbered,
 };
 
-use crate::convert::{ArrayParts, Column, array, column, from_events, slice, to_array};
-use crate::enter::enter;
-use crate::errors::{core, live};
-use crate::parameters::{Plain, parsed};
 use crate::threaded::Threaded;
+use taxel_border::convert::{ArrayParts, Column, array, column, from_events, slice, to_array};
+use taxel_border::enter::enter;
+use taxel_border::errors::{core, live};
+use taxel_border::parameters::{Plain, parsed};
 
 /// The decoded datagrams of a board.
 #[pyclass(frozen, get_all)]
@@ -191,7 +191,11 @@ pub struct RecordingWriter {
 }
 
 impl RecordingWriter {
-    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&Track) -> taxel_live::Result<T> + Send) -> PyResult<T> {
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&SourceWriter) -> taxel_live::Result<T> + Send,
+    ) -> PyResult<T> {
         self.writer.with(py, |writer| match &self.source {
             None => work(writer),
             Some(name) => work(&writer.track(name)?),
@@ -227,13 +231,13 @@ impl RecordingWriter {
         whole: bool,
     ) -> PyResult<()> {
         let (at_ns, t_us, values) = (slice("at_ns", &at_ns)?, slice("t_us", &t_us)?, slice("values", &values)?);
-        let encoding = if whole { Encoding::Whole } else { Encoding::Float };
+        let encoding = if whole { FrameEncoding::Whole } else { FrameEncoding::Float };
         self.with(py, |track| track.frames(first, at_ns, t_us, values, encoding))
     }
 
     /// Ends a source that is not the first, with the counts of what was received and lost, given as JSON.
     fn end(&self, py: Python<'_>, counts: &str) -> PyResult<()> {
-        let (name, counts): (_, Counts) = (self.source.clone().unwrap_or_default(), parsed("counts", counts)?);
+        let (name, counts): (_, RecordingCounts) = (self.source.clone().unwrap_or_default(), parsed("counts", counts)?);
         self.with(py, |track| {
             track.end(&name, counts);
             Ok(())
@@ -312,7 +316,7 @@ impl RecordingWriter {
 
     /// Writes what was received and lost so far, given as JSON.
     fn counts(&self, py: Python<'_>, at_ns: i64, counts: &str) -> PyResult<()> {
-        let counts: Counts = parsed("counts", counts)?;
+        let counts: RecordingCounts = parsed("counts", counts)?;
         self.with(py, |writer| writer.counts(at_ns, &counts))
     }
 
@@ -369,7 +373,7 @@ impl RecordingWriter {
 
     /// Ends the recording; `counts` is JSON.
     fn finish(&self, py: Python<'_>, counts: &str) -> PyResult<()> {
-        let counts: Counts = parsed("counts", counts)?;
+        let counts: RecordingCounts = parsed("counts", counts)?;
         self.writer.check()?;
         enter(py, |_| match self.writer.take() {
             Some(writer) => writer.finish(counts).map(drop),
@@ -469,5 +473,5 @@ pub fn numbered_path(path: PathBuf, index: u32) -> PathBuf {
 #[pyfunction]
 pub fn whole_frames(py: Python<'_>, values: PyReadonlyArray1<'_, f32>) -> PyResult<bool> {
     let values = slice("values", &values)?;
-    enter(py, |_| Ok::<_, taxel_core::Error>(Encoding::of(values) == Encoding::Whole))
+    enter(py, |_| Ok::<_, taxel_core::Error>(FrameEncoding::of(values) == FrameEncoding::Whole))
 }

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use serde::Deserialize;
 use taxel_core::board::{
-    self, Board, BoardCounts, Crossed, Faults, Flaws, IntensityWord, Play, Previous, Version2, opening,
+    self, Board, BoardCounts, Crossed, Flaws, IntensityWord, NetworkFaults, Play, Previous, Version2, opening,
 };
 use taxel_core::circuit::Chain;
 use taxel_core::contact::{Act, Bonded, Contact, Foam, FrameSequence, Motion, Narrow, Scene, Sensor, Taxels, Track};
@@ -17,12 +17,12 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, Error, Result, Stop, reading};
 use taxel_live::address::of_text;
 use taxel_live::capture::Sender;
-use taxel_live::emulate::{Emulator, EmulatorOptions, Feed, Replay, Report, Scenes, Touch};
+use taxel_live::emulate::{Emulator, EmulatorOptions, PipedFrames, Replay, Report, Scenes, Touch};
 
-use crate::convert::{ArrayParts, Column, EventsIn, array, column, from_events, slice, to_array};
-use crate::enter::{Shared, enter, enter_with_progress};
-use crate::errors::core;
-use crate::parameters::{Plain, parsed};
+use taxel_border::convert::{ArrayParts, Column, EventsIn, array, column, from_events, slice, to_array};
+use taxel_border::enter::{Exclusive, enter, enter_with_progress};
+use taxel_border::errors::core;
+use taxel_border::parameters::{Plain, parsed};
 
 /// An act as Python passes it: silence in ms, a scene as JSON, or a sequence of frames with its period in us.
 #[derive(FromPyObject)]
@@ -185,7 +185,7 @@ pub(crate) enum TouchIn<'py> {
 /// The options of an emulated board.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Chosen {
+struct EmulationOptions {
     registers: Registers,
     /// The board arms, is tared for so long, marks a start and at the end a stop; none where it does none of that.
     tare_ms: Option<f64>,
@@ -195,7 +195,7 @@ struct Chosen {
     control: Option<String>,
     line: Option<(PathBuf, u32)>,
     sync: Option<(PathBuf, bool)>,
-    faults: Option<Faults>,
+    faults: Option<NetworkFaults>,
     circuit: Option<Chain>,
     asynchronous: bool,
     flaws: Option<Flaws>,
@@ -272,8 +272,8 @@ pub fn emulate(
     watch: Py<PyAny>,
 ) -> PyResult<Plain<Report>> {
     let array = to_array(parts)?;
-    let chosen: Chosen = parsed("options", options)?;
-    let Chosen { registers, tare_ms, version_2, previous, intensity, .. } = chosen;
+    let chosen: EmulationOptions = parsed("options", options)?;
+    let EmulationOptions { registers, tare_ms, version_2, previous, intensity, .. } = chosen;
     let (frame_us, step) = (registers.frame_us(), u16::from(registers.noise_floor) + 1);
     let real_time = !matches!(touch, TouchIn::Pipe(..));
     let sensor = to_sensor(sensor)?;
@@ -296,7 +296,7 @@ pub fn emulate(
         TouchIn::Pipe(descriptor, ahead, shift, most) => {
             // SAFETY: Python has the descriptor open as long as this call lasts; the copy is ours.
             let from = unsafe { BorrowedFd::borrow_raw(descriptor) }.try_clone_to_owned()?;
-            Felt::Other(Box::new(Feed::new(array.len(), from.into(), ahead, shift, most)))
+            Felt::Other(Box::new(PipedFrames::new(array.len(), from.into(), ahead, shift, most)))
         }
     };
     enter_with_progress(py, |stop, caller| {
@@ -343,7 +343,7 @@ type TwoOut<'py, A, B> = (Bound<'py, PyArray1<A>>, Bound<'py, PyArray1<B>>);
 
 /// Foam bonded to the board.
 #[pyclass(frozen, module = "taxel._core")]
-pub struct Layer(Shared<Bonded>);
+pub struct Layer(Exclusive<Bonded>);
 
 #[pymethods]
 impl Layer {
@@ -354,7 +354,7 @@ impl Layer {
         let array = to_array(parts)?;
         let layer =
             enter(py, |stop| Ok::<_, Error>(Bonded::new(&foam, &array, cells_per_pitch, stop)?.to_within(tolerance)))?;
-        Ok(Self(Shared::new(layer)))
+        Ok(Self(Exclusive::new(layer)))
     }
 
     /// mm/MPa and the share that arrives at the base, by wave number in 1/mm.
@@ -396,7 +396,7 @@ impl Layer {
 
 /// A board that scans frames as they are pushed, and sends what it makes of them.
 #[pyclass(frozen, module = "taxel._core")]
-pub struct Source(Shared<(Board, Sender)>);
+pub struct Source(Exclusive<(Board, Sender)>);
 
 #[pymethods]
 impl Source {
@@ -407,7 +407,7 @@ impl Source {
         let version_2: Version2 = parsed("version 2", version_2)?;
         let board = Board::new(registers, &array).map_err(core)?.version_2(version_2).map_err(core)?;
         let sender = enter(py, |_| Sender::open(of_text(to)?, true))?;
-        Ok(Self(Shared::new((board, sender))))
+        Ok(Self(Exclusive::new((board, sender))))
     }
 
     /// Scans a frame and sends its events; gives how many there were.

@@ -6,8 +6,8 @@ use std::time::Duration;
 use pyo3::prelude::*;
 use taxel_core::{Error, Hint};
 
-use crate::enter::enter;
-use crate::errors::ProblemError;
+use taxel_border::enter::enter;
+use taxel_border::errors::ProblemError;
 
 /// Does what `what` names without the GIL: returns an error of a kind, panics, or waits a minute for Ctrl-C.
 #[pyfunction]

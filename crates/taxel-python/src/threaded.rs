@@ -5,8 +5,8 @@ use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 use pyo3::prelude::*;
 use taxel_core::problem;
 
-use crate::enter::enter;
-use crate::errors::ProblemError;
+use taxel_border::enter::enter;
+use taxel_border::errors::ProblemError;
 
 /// Such an object; `None` once it was ended. Locks are never waited for with the GIL: their holder may be waiting for the GIL to
 /// look for Ctrl-C.

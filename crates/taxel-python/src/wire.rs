@@ -9,26 +9,26 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use taxel_core::board::{Board, BoardCounts, Crossed, IntensityWord, Previous, Version2};
 use taxel_core::circuit::Chain;
-use taxel_core::wire::v2::{self, Outcome};
-use taxel_core::wire::{self, Command, Cut, Decoder, Pairing, Registers};
+use taxel_core::wire::v2::{self, DatagramOutcome};
+use taxel_core::wire::{self, Command, CutDatagrams, Decoder, Pairing, Registers};
 use taxel_core::{Error, Events, problem};
 
-use crate::convert::{
+use taxel_border::convert::{
     ArrayParts, ColumnsIn, EventsIn, EventsOut, FilledOut, array, from_events, from_filled, slice, to_array, to_room,
 };
-use crate::enter::{Shared, enter};
-use crate::errors::core;
-use crate::parameters::{Plain, parsed};
+use taxel_border::enter::{Exclusive, enter};
+use taxel_border::errors::core;
+use taxel_border::parameters::{Plain, parsed};
 
 /// A decoder of either version, and what the last datagram of version 2 was.
-enum Either {
+enum VersionedDecoder {
     One(Decoder),
-    Two(v2::Decoder, Option<Outcome>),
+    Two(v2::Decoder, Option<DatagramOutcome>),
 }
 
 /// Turns bytes of version 1, or datagrams of version 2, into events as they come.
 #[pyclass(module = "taxel._core", frozen)]
-pub struct WireDecoder(Shared<Either>);
+pub struct WireDecoder(Exclusive<VersionedDecoder>);
 
 #[pymethods]
 impl WireDecoder {
@@ -36,9 +36,9 @@ impl WireDecoder {
     #[new]
     fn new(version: u8, array: ArrayParts, pairing: &str, differences: bool) -> PyResult<Self> {
         let (array, pairing): (_, Pairing) = (to_array(array)?, parsed("pairing", &format!("{pairing:?}"))?);
-        Ok(Self(Shared::new(match version {
-            1 => Either::One(Decoder::new(array).pairing(pairing).differences(differences)),
-            _ => Either::Two(v2::Decoder::new(array), None),
+        Ok(Self(Exclusive::new(match version {
+            1 => VersionedDecoder::One(Decoder::new(array).pairing(pairing).differences(differences)),
+            _ => VersionedDecoder::Two(v2::Decoder::new(array), None),
         })))
     }
 
@@ -55,8 +55,8 @@ impl WireDecoder {
         let data = slice("data", &data)?;
         let room = to_room(&mut columns)?;
         let columns = self.0.enter(py, |decoder, stop| match decoder {
-            Either::One(decoder) => decoder.fill(data, arrived, room, last, stop),
-            Either::Two(decoder, outcome) => {
+            VersionedDecoder::One(decoder) => decoder.fill(data, arrived, room, last, stop),
+            VersionedDecoder::Two(decoder, outcome) => {
                 let (columns, of_this) = decoder.fill(data, arrived, room)?;
                 *outcome = Some(of_this);
                 Ok(columns)
@@ -76,8 +76,8 @@ impl WireDecoder {
     ) -> PyResult<FilledOut<'py>> {
         let (data, lengths, room) = (slice("data", &data)?, slice("lengths", &lengths)?, to_room(&mut columns)?);
         let columns = self.0.enter(py, |decoder, stop| match decoder {
-            Either::One(decoder) => decoder.fill_datagrams(data, lengths, room, stop),
-            Either::Two(..) => Err(problem!("lengths"; ": datagrams of version 2 have theirs before them")),
+            VersionedDecoder::One(decoder) => decoder.fill_datagrams(data, lengths, room, stop),
+            VersionedDecoder::Two(..) => Err(problem!("lengths"; ": datagrams of version 2 have theirs before them")),
         })?;
         Ok(from_filled(py, columns))
     }
@@ -85,8 +85,8 @@ impl WireDecoder {
     /// Releases the change that waits for its intensity.
     fn end_of_datagram<'py>(&self, py: Python<'py>) -> EventsOut<'py> {
         let events = self.0.with(py, |decoder| match decoder {
-            Either::One(decoder) => decoder.end_of_datagram(),
-            Either::Two(decoder, _) => Events::empty(decoder.array().clone()),
+            VersionedDecoder::One(decoder) => decoder.end_of_datagram(),
+            VersionedDecoder::Two(decoder, _) => Events::empty(decoder.array().clone()),
         });
         from_events(py, events)
     }
@@ -95,8 +95,8 @@ impl WireDecoder {
     fn finish<'py>(&self, py: Python<'py>) -> PyResult<EventsOut<'py>> {
         let events = self.0.enter(py, |decoder, _| {
             Ok::<_, Error>(match decoder {
-                Either::One(decoder) => decoder.finish(),
-                Either::Two(decoder, _) => Events::empty(decoder.array().clone()),
+                VersionedDecoder::One(decoder) => decoder.finish(),
+                VersionedDecoder::Two(decoder, _) => Events::empty(decoder.array().clone()),
             })
         })?;
         Ok(from_events(py, events))
@@ -105,35 +105,35 @@ impl WireDecoder {
     /// The version's counts.
     fn counts(&self, py: Python<'_>) -> Plain<Value> {
         Plain(self.0.with(py, |decoder| match decoder {
-            Either::One(decoder) => json!(decoder.counts()),
-            Either::Two(decoder, _) => json!(decoder.counts()),
+            VersionedDecoder::One(decoder) => json!(decoder.counts()),
+            VersionedDecoder::Two(decoder, _) => json!(decoder.counts()),
         }))
     }
 
     /// Of the last datagram of version 2: until when nothing comes any more, us, and whether it was decoded.
     fn last(&self, py: Python<'_>) -> Option<(Option<i64>, bool)> {
         self.0.with(py, |decoder| match decoder {
-            Either::One(_) => None,
-            Either::Two(_, last) => last.map(|outcome| match outcome {
-                Outcome::Intact { until, .. } => (until, true),
-                Outcome::Repeated | Outcome::Refused(_) => (None, false),
+            VersionedDecoder::One(_) => None,
+            VersionedDecoder::Two(_, last) => last.map(|outcome| match outcome {
+                DatagramOutcome::Intact { until, .. } => (until, true),
+                DatagramOutcome::Repeated | DatagramOutcome::Refused(_) => (None, false),
             }),
         })
     }
 
     /// The totals that the board last sent.
-    fn status(&self, py: Python<'_>) -> Option<Plain<v2::Status>> {
+    fn status(&self, py: Python<'_>) -> Option<Plain<v2::BoardTotals>> {
         self.0.with(py, |decoder| match decoder {
-            Either::One(_) => None,
-            Either::Two(decoder, _) => decoder.status().copied().map(Plain),
+            VersionedDecoder::One(_) => None,
+            VersionedDecoder::Two(decoder, _) => decoder.status().copied().map(Plain),
         })
     }
 
     /// What each taxel holds by index, -1 where that is not known.
     fn held<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i32>> {
         let held = self.0.with(py, |decoder| match decoder {
-            Either::One(decoder) => decoder.held(),
-            Either::Two(decoder, _) => decoder.held(),
+            VersionedDecoder::One(decoder) => decoder.held(),
+            VersionedDecoder::Two(decoder, _) => decoder.held(),
         });
         array(py, held.iter().map(|held| held.map_or(-1, i32::from)).collect())
     }
@@ -155,7 +155,7 @@ type CutOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>);
 #[pyfunction]
 pub fn wire_cut<'py>(py: Python<'py>, data: PyReadonlyArray1<'_, u8>) -> PyResult<CutOut<'py>> {
     let data = slice("data", &data)?;
-    let Cut { offsets, times } = enter(py, |_| Ok::<_, Error>(wire::cut(data)))?;
+    let CutDatagrams { offsets, times } = enter(py, |_| Ok::<_, Error>(wire::cut(data)))?;
     Ok((array(py, offsets.into_iter().map(|at| at as i64).collect()), array(py, times)))
 }
 
@@ -177,9 +177,9 @@ pub fn command_bytes(py: Python<'_>, register: u8, value: u32) -> PyResult<Bound
 #[pyfunction]
 pub fn command_read(data: PyReadonlyArray1<'_, u8>) -> PyResult<(u8, u32)> {
     let data = slice("data", &data)?;
-    let bytes = data
-        .try_into()
-        .map_err(|_| crate::errors::FormatError::new_err(format!("command of {} bytes: must be 5", data.len())))?;
+    let bytes = data.try_into().map_err(|_| {
+        taxel_border::errors::FormatError::new_err(format!("command of {} bytes: must be 5", data.len()))
+    })?;
     let command = Command::from_bytes(bytes).map_err(core)?;
     Ok((command.register, command.value))
 }
@@ -282,7 +282,7 @@ struct WireBoardOptions {
 
 /// The emulated board, and the circuit through which it reads.
 #[pyclass(module = "taxel._core", frozen)]
-pub struct WireBoard(Shared<(Board, Option<Crossed>)>);
+pub struct WireBoard(Exclusive<(Board, Option<Crossed>)>);
 
 #[pymethods]
 impl WireBoard {
@@ -298,7 +298,7 @@ impl WireBoard {
             board = board.asynchronous().map_err(core)?;
         }
         let crossed = circuit.map(|chain| Crossed::new(chain, &registers, &array)).transpose().map_err(core)?;
-        Ok(Self(Shared::new((board, crossed))))
+        Ok(Self(Exclusive::new((board, crossed))))
     }
 
     /// Resets the board.

@@ -6,10 +6,10 @@ use pyo3::types::PyBytes;
 use taxel_core::Error;
 use taxel_core::wire::v2::{self, StreamReader};
 
-use crate::convert::{
+use taxel_border::convert::{
     ArrayParts, Column, ColumnsIn, EventsIn, FilledOut, column, from_filled, slice, to_array, to_room,
 };
-use crate::enter::{Shared, enter};
+use taxel_border::enter::{Exclusive, enter};
 
 /// Decodes a whole stream of datagrams, each behind its length, into columns.
 #[pyfunction]
@@ -60,13 +60,13 @@ pub fn encode_datagrams<'py>(
 
 /// Cuts a stream into datagrams.
 #[pyclass(frozen, module = "taxel._core")]
-pub struct DatagramStream(Shared<StreamReader>);
+pub struct DatagramStream(Exclusive<StreamReader>);
 
 #[pymethods]
 impl DatagramStream {
     #[new]
     fn new() -> Self {
-        Self(Shared::new(StreamReader::default()))
+        Self(Exclusive::new(StreamReader::default()))
     }
 
     /// Takes bytes; returns the datagrams that they complete.

@@ -18,28 +18,29 @@ from taxel._core import ProblemError
 
 
 @cache
-def described(kind: str) -> dict[str, Any]:
-    """Return the compiled part's description of the parameters of a class.
+def described(kind: str, compiled: Any = _core) -> dict[str, Any]:
+    """Return the description of the parameters of a class by its compiled part: that of taxel, or another module.
 
     ``defaults`` by name, the names that are ``required``, and the ``ranges`` of numbers by name, with their ``unit``
     and the text of an error, ``must_be``.
     """
-    return _core.parameters(kind)
+    found: dict[str, Any] = compiled.parameters(kind)
+    return found
 
 
-def defaults(kind: str) -> Any:
+def defaults(kind: str, compiled: Any = _core) -> Any:
     """Return the defaults of a class as attributes, for its signature; None stands for a group of parameters."""
 
     def plain(value: object) -> object:
         return tuple(value) if isinstance(value, list) else None if isinstance(value, dict) else value
 
-    return SimpleNamespace(**{name: plain(value) for name, value in described(kind)["defaults"].items()})
+    return SimpleNamespace(**{name: plain(value) for name, value in described(kind, compiled)["defaults"].items()})
 
 
-def ranges(kind: str) -> dict[str, Any]:
+def ranges(kind: str, compiled: Any = _core) -> dict[str, Any]:
     """Return the ranges of the parameters of a class by name; empty for an unknown class."""
     try:
-        return dict(described(kind)["ranges"])
+        return dict(described(kind, compiled)["ranges"])
     except ProblemError:
         return {}
 
@@ -47,14 +48,15 @@ def ranges(kind: str) -> dict[str, Any]:
 class Parameters:
     """Hold the parameters of the constructor, unchanged, as attributes of the same names.
 
-    A subclass defines its name in the compiled part (`_kind`), and which of its parameters are groups of parameters
-    themselves (`_nested`). Parameters are checked in the constructor and in `set_params`.
+    A subclass defines its name (`_kind`) in the compiled part that has it (`_compiled`), and which of its parameters
+    are groups of parameters themselves (`_nested`). Parameters are checked in the constructor and in `set_params`.
 
     The interface is scikit-learn's, which is not imported: `get_params`, `set_params`, nested names (``neuron__tau``),
     tags.
     """
 
     _kind: ClassVar[str]
+    _compiled: ClassVar[Any] = _core
     _nested: ClassVar[Mapping[str, type[Parameters]]] = {}
 
     def __post_init__(self) -> None:
@@ -67,10 +69,15 @@ class Parameters:
         return tuple(signature(cls).parameters)
 
     @classmethod
+    def _described(cls) -> dict[str, Any]:
+        """Return the description of the parameters by the compiled part."""
+        return described(cls._kind, cls._compiled)
+
+    @classmethod
     def _stands_for(cls, name: str) -> Parameters | None:
         """Return the group of defaults that None stands for in a parameter; None if the parameter is not a group."""
         kind = cls._nested.get(name)
-        return kind() if kind is not None and isinstance(described(cls._kind)["defaults"].get(name), dict) else None
+        return kind() if kind is not None and isinstance(cls._described()["defaults"].get(name), dict) else None
 
     @classmethod
     def _from_values(cls, values: Mapping[str, Any]) -> Self:
@@ -88,7 +95,7 @@ class Parameters:
     def _plain(self) -> dict[str, Any]:
         """Return the parameters as the compiled part reads them, which fills in the defaults of an omitted group."""
         plain: dict[str, Any] = {}
-        units = ranges(self._kind)
+        units = ranges(self._kind, self._compiled)
         for name, value in self._values().items():
             if value is None and self._stands_for(name) is not None:
                 continue
@@ -103,7 +110,7 @@ class Parameters:
         return parameters(self._plain())
 
     def _check(self) -> None:
-        _core.check_parameters(self._kind, self._json())
+        self._compiled.check_parameters(self._kind, self._json())
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """Return all parameters by name, unchanged.

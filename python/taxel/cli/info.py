@@ -190,9 +190,9 @@ def _page(facts: dict[str, Any]) -> list[str]:
     head = f"{facts['file']}: {kind_of_file(facts['kind'])}" + f", from {facts['source']}" * bool(facts["source"])
     rows = [*_contents(facts), *_rates(facts), *_losses(facts), ("verdict", facts["verdict"])]
     rows += [("remark", line) for line in facts["remarks"]]
-    left = [("left behind", line) for line in facts["lost"]]
+    missing = [("not in file", line) for line in facts["lost"]]
     # What was left out of a bag, or has other times, concerns all that follows.
-    rows = [*left, *rows] if facts["kind"] == "ros" else [*rows, *left]
+    rows = [*missing, *rows] if facts["kind"] == "ros" else [*rows, *missing]
     lines = [head, *(f"  {name:<19} {value}" for name, value in rows)]
     return [*lines, *(f"{what} written to {facts[what]}" for what in ("picture", "table") if what in facts)]
 

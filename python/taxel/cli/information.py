@@ -58,7 +58,7 @@ def information(
     encoder: Annotated[str, typer.Option(help="The encoder: change_events or fa1.")] = "change_events",
     values: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=SET_HELP)] = None,
     classifiers: Annotated[
-        str, typer.Option("--also", help="Further classifiers: neighbours, cone_r, tempotron.")
+        str, typer.Option("--also", help="Further classifiers: neighbours, cone_r; with taxel_rules tempotron.")
     ] = "neighbours",
     draws: Annotated[int, typer.Option(help="How many random phases of the sampling are averaged.")] = 5,
     folds: Annotated[int, typer.Option(help="Number of folds; groups are never split.")] = 10,

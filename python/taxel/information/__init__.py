@@ -15,7 +15,7 @@ from taxel.information.estimate import Estimate, ZeroTest, estimate, zero_test
 from taxel.information.folds import folds
 from taxel.information.keeping import Verdict, keeps
 from taxel.information.nested import Nested, nested_predictions, training_curve
-from taxel.information.spiking import ConeRReadout, TempotronReadout
+from taxel.information.spiking import ConeRReadout
 from taxel.information.trials import LabelledTrial, notes_as_trials, read_trials, recordings_as_trials
 
 __all__ = [
@@ -26,7 +26,6 @@ __all__ = [
     "LabelledTrial",
     "Nested",
     "Point",
-    "TempotronReadout",
     "Verdict",
     "ZeroTest",
     "answer",

@@ -24,15 +24,13 @@ from taxel.information.sampling import (
     Spikes,
     frames_of,
 )
-from taxel.information.spiking import readout_responses
+from taxel.information.spiking import readout_names, readout_responses
 from taxel.information.trials import LabelledTrial
 from taxel.information.wire_rate import kilobits_per_second
 from taxel.spikes import to_ms
 
-__all__ = ["CLASSIFIERS", "answer"]
+__all__ = ["answer"]
 
-#: Classifiers that `answer` can also run at the reference setting, beside the discriminants of every setting.
-CLASSIFIERS = ("neighbours", "cone_r", "tempotron")
 #: Numbers of neighbours that are tried.
 NEIGHBOURS = (1, 3, 5, 9, 15)
 #: Frames are compared with events only where they have at most so many values.
@@ -81,8 +79,9 @@ def answer(
     folds : int, 2 or more
     shuffles : int, 1 or more
         Of the test against zero.
-    classifiers : sequence of {"neighbours", "cone_r", "tempotron"}
-        Beside the discriminants, at the full setting.
+    classifiers : sequence of str
+        Beside the discriminants, at the full setting: "neighbours", "cone_r", or the name of an entry point of
+        the group ``taxel.classifiers``, as "tempotron" where taxel_rules is installed.
     seed : int, 0 or more
     progress : function of (what, done, all), optional
         What is computed next, and how much of the expected time of all has passed, in ms of one core. The first call
@@ -105,7 +104,8 @@ def answer(
             callback(name, function)
     for name, value, least in (("draws", draws, 1), ("folds", folds, 2), ("shuffles", shuffles, 1), ("seed", seed, 0)):
         whole(name, value, least)
-    also = [text("classifiers", classifier, CLASSIFIERS) for classifier in several("classifiers", classifiers)]
+    names = ("neighbours", *readout_names())
+    also = [text("classifiers", classifier, names) for classifier in several("classifiers", classifiers)]
     answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed))
     answering.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms)
     # On small matrices several threads are slower than one, and far slower where other processes compute as well.

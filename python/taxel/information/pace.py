@@ -55,11 +55,10 @@ class Work:
         return 4 * self.estimate() + self.rasters(finest) + 2 * self.prediction(finest)
 
     def classifier(self, name: str) -> float:
-        """Return the time of a further classifier: "neighbours", "cone_r" or "tempotron"."""
+        """Return the time of a further classifier: "neighbours", or neurons."""
         if name == "neighbours":
             return 4 * self._predicted(5)
-        each = {"cone_r": 6e-3, "tempotron": 3e-4}[name]
-        return each * self._question.events * len(np.unique(self._question.labels)) * self._question.folds
+        return 6e-3 * self._question.events * len(np.unique(self._question.labels)) * self._question.folds
 
     def all(self, classifiers: list[str], shuffles: int) -> float:
         """Return the time of all."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from importlib.metadata import entry_points
 from typing import Any, Self
 
 import numpy as np
@@ -16,14 +17,14 @@ from taxel._base.parameters import Parameters
 from taxel._core import NotFittedError
 from taxel.information._labels import labelled, words
 from taxel.information.sampling import Spikes
-from taxel.learn import ConeR, Tempotron
+from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms
 
-__all__ = ["ConeRReadout", "TempotronReadout", "patterns_of", "readout_responses"]
+__all__ = ["ConeRReadout", "NeuronPerClass", "patterns_of", "readout_names", "readout_responses"]
 
 
-class _NeuronPerClass(Parameters, ABC):
+class NeuronPerClass(Parameters, ABC):
     """Classify by one neuron per class: the class of the highest potential is predicted.
 
     scikit-learn's `clone` and `cross_val_score` accept it; Python checks the parameters.
@@ -51,7 +52,7 @@ class _NeuronPerClass(Parameters, ABC):
         Examples
         --------
         >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
-        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).classes_.tolist()
+        >>> ConeRReadout(tau=3.0, bound=3.0).fit(patterns, ["a", "b"] * 2).classes_.tolist()
         ['a', 'b']
         """
         trains = _listed(self, patterns)
@@ -95,7 +96,7 @@ class _NeuronPerClass(Parameters, ABC):
         Examples
         --------
         >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
-        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).predict(patterns).tolist()
+        >>> ConeRReadout(tau=3.0, bound=3.0).fit(patterns, ["a", "b"] * 2).predict(patterns).tolist()
         ['a', 'b', 'a', 'b']
         """
         best = self.decision_function(patterns).argmax(1)
@@ -116,7 +117,7 @@ class _NeuronPerClass(Parameters, ABC):
         Examples
         --------
         >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
-        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).score(patterns, ["a", "b"] * 2)
+        >>> ConeRReadout(tau=3.0, bound=3.0).fit(patterns, ["a", "b"] * 2).score(patterns, ["a", "b"] * 2)
         1.0
         """
         found, labels = self.predict(patterns), words("y", y)
@@ -143,7 +144,7 @@ class _NeuronPerClass(Parameters, ABC):
         """Return the potential that is compared between classes, mV."""
 
 
-class ConeRReadout(_NeuronPerClass):
+class ConeRReadout(NeuronPerClass):
     """Classify by a neuron a class, which `ConeR` teaches to fire at the window's end on its own class and never else.
 
     Parameters
@@ -192,53 +193,6 @@ class ConeRReadout(_NeuronPerClass):
         return float(learner.neuron_.potential(learner.weights_, trains, [trains.stop])[0])
 
 
-class TempotronReadout(_NeuronPerClass):
-    """Classify by a `Tempotron` a class, taught to fire on its own class and on no other.
-
-    Parameters
-    ----------
-    tau : float, ms, above 0
-    epochs : int, 1 or more
-    max_seconds : float, above 0
-        Of training a neuron.
-    seed : int, 0 or more
-
-    Attributes
-    ----------
-    classes_ : shape (classes,)
-    learners_ : list of Tempotron
-
-    Raises
-    ------
-    ProblemError : a parameter that is invalid
-
-    Notes
-    -----
-    Gütig and Sompolinsky (2006), Nature Neuroscience 9:420. The class of the highest peak is predicted.
-    """
-
-    learners_: list[Tempotron]
-
-    def __init__(self, *, tau: float = 15.0, epochs: int = 100, max_seconds: float = 10.0, seed: int = 0) -> None:
-        self.tau = tau
-        self.epochs = epochs
-        self.max_seconds = max_seconds
-        self.seed = seed
-        super().__init__()
-
-    def _check(self) -> None:
-        self._learner()
-
-    def _learner(self) -> Tempotron:
-        return Tempotron(tau=self.tau, epochs=self.epochs, max_seconds=self.max_seconds, seed=self.seed)
-
-    def _trained(self, trains: list[SpikeTrains], is_of_class: NDArray[np.bool_]) -> Tempotron:
-        return self._learner().fit(trains, is_of_class)
-
-    def _potential(self, learner: Tempotron, trains: SpikeTrains) -> float:
-        return learner.peak(learner.weights_, trains)[0]
-
-
 def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
     """Return each trial's events as spike trains, ON and OFF of each taxel that ever sends one.
 
@@ -266,6 +220,14 @@ def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
     return patterns
 
 
+def readout_names() -> tuple[str, ...]:
+    """Return the names of classifiers of spikes: "cone_r" and the entry points of the group ``taxel.classifiers``.
+
+    Such an entry point names a `NeuronPerClass` whose time constant is the argument `tau`, ms.
+    """
+    return ("cone_r", *sorted(entry_points(group="taxel.classifiers").names))
+
+
 def readout_responses(
     name: str, spikes: Spikes, window_us: float, labels: NDArray[np.generic], folds: NDArray[np.int64]
 ) -> NDArray[np.generic]:
@@ -273,7 +235,8 @@ def readout_responses(
 
     Parameters
     ----------
-    name : {"cone_r", "tempotron"}
+    name : str
+        One of `readout_names`.
     spikes : Spikes
     window_us : float, us
     labels : labels, shape (trials,)
@@ -283,15 +246,15 @@ def readout_responses(
     -------
     shape (trials,)
     """
-    text("name", name, ("cone_r", "tempotron"))
+    text("name", name, readout_names())
+    kind = ConeRReadout if name == "cone_r" else entry_points(group="taxel.classifiers")[name].load()
     patterns = patterns_of(spikes, window_us)
     responses = np.empty_like(labels)
     # With a far shorter constant the potential at the window's end would hold nothing of its beginning.
     tau = max(1.0, to_ms(window_us) / 3)
     for fold in np.unique(folds):
         train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
-        model: Any = ConeRReadout(tau=tau) if name == "cone_r" else TempotronReadout(tau=tau)
-        model.fit([patterns[k] for k in train], labels[train])
+        model = kind(tau=tau).fit([patterns[k] for k in train], labels[train])
         responses[test] = model.predict([patterns[k] for k in test])
     return responses
 

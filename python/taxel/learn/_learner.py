@@ -16,7 +16,7 @@ from taxel.metrics import f1
 from taxel.spikes import SpikeTrains
 
 #: How a fit ended, of all learners; the page on errors has the table.
-Status = Literal["solved", "feasible", "infeasible", "right", "epochs", "stopped", "assigned"]
+Status = Literal["solved", "feasible", "infeasible", "stopped", "assigned"]
 #: What a fit says of its weights. It does not hold of others; a certificate and multipliers are of the problem.
 _OF_WEIGHTS = ("objective_", "parts_", "gap_", "violation_", "margin_", "reason_")
 

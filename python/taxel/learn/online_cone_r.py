@@ -116,6 +116,16 @@ class OnlineConeR(ConeR):
         Warns
         -----
         UserWarning : as `ConeR.fit`
+
+        Examples
+        --------
+        >>> from taxel import Neuron
+        >>> window = OnlineConeR(window=2, neuron=Neuron(tau=5.0, time="grid"), ub=1.0)
+        >>> for first in (1.0, 2.0, 3.0):
+        ...     pattern = SpikeTrains.from_lists([[first], [3.0], [4.0]], stop=20.0)
+        ...     window = window.partial_fit(pattern, [6.0])
+        >>> window.patterns_, window.status_
+        (2, 'solved')
         """
         with self._locked():
             if not hasattr(self, "_stream"):

@@ -115,7 +115,8 @@ def conflict_of(known: Acknowledged, theirs: Sequence[Note]) -> Conflict:
     missing = minus(known.labels, theirs)
     added = () if known.table is None else minus(theirs, known.table)
     deleted = set(map(_key, known.deleted))
-    returned = tuple(row for row in added if _key(row) in deleted)
+    # Of equal rows one may be deleted and another acknowledged, which is missed where it is not there.
+    returned = tuple(row for row in _common(added, minus(theirs, known.labels)) if _key(row) in deleted)
     return Conflict(missing, returned, minus(added, returned) if missing or returned else ())
 
 

@@ -41,19 +41,22 @@ class StatedOptions:
     )
     registers: str | Registers | None = option(
         None,
-        'The board\'s registers: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: "5.2 kHz"; a remote board reports its '
-        "own.",
+        'The board\'s registers, by a preset: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: those of a remote board, '
+        "else those of a board of this array at reset.",
         commands="live record",
         flag="--preset",
     )
     differences: bool = option(False, "The board sends intensity differences.", commands="live record")
     readout: Readout | PlainRule | None = option(
         None,
-        "A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none.",
+        "A trained readout or a plain rule; without one nothing is detected.",
         metavar="FILE",
+        typed="taxel train writes such files (JSON).",
     )
     tare: Tare | float | None = option(
-        None, "Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON)."
+        None,
+        "Rest of the taxels: a saved tare, or how many seconds of rest at the beginning to take a fresh one from.",
+        metavar="FILE|SECONDS",
     )
     record: str | os.PathLike[str] | None = option(None, "Record in a new file (.mcap or .lsa).")
     record_later: bool = option(
@@ -63,10 +66,11 @@ class StatedOptions:
     sources: Mapping[str, str] | None = option(
         None,
         "Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU "
-        "(serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated.",
+        "(serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay).",
         commands="record",
         flag="--source",
         metavar="NAME=WHAT",
+        typed="May be repeated.",
     )
     compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.", commands="record")
     overwrite: bool = option(False, "Replace the file if it exists.", commands="record")
@@ -79,8 +83,9 @@ class StatedOptions:
     lines: bool = option(False, "Print one line of JSON for each detection, and nothing else.", flag="--json")
     send: str | Sequence[str] = option(
         (),
-        "Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be repeated.",
+        "Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD.",
         metavar="WHERE",
+        typed="May be repeated.",
     )
     kernel_buffer_bytes: int = option(
         33554432, "How much may wait in the kernel, bytes.", least=0, most=2_147_483_647, commands=""

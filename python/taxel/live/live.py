@@ -57,18 +57,17 @@ class Live:
     array : Array, optional
         Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.
     registers : str or Registers, optional
-        The board's registers: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: "5.2 kHz"; a remote board reports its
-        own. The contents of the registers, or the name of a preset, of which a smaller array drives fewer lines.
-        Default: those of a board of this array at reset.
+        The board's registers, by a preset: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: those of a remote board,
+        else those of a board of this array at reset. Or their contents. A smaller array drives fewer lines of a preset.
     differences : bool
         The board sends intensity differences. The panel's "delta intensity".
     readout : Readout or PlainRule, optional
-        A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none. Without one nothing
-        is detected.
+        A trained readout or a plain rule; without one nothing is detected.
     tare : Tare or float, optional
-        Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON). For a plain rule, or a
-        readout whose encoder needs one: a tare, or how long to take a fresh one from the first event on, s, which ends
-        early where the board marks a start. The board must be at rest then, with its noise floor at 0.
+        Rest of the taxels: a saved tare, or how many seconds of rest at the beginning to take a fresh one from. For a
+        plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event
+        on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at
+        0.
     record : path, optional
         Record in a new file (.mcap or .lsa). `.mcap` holds all data, `.lsa` the raw bytes of the manual.
     record_later : bool
@@ -78,8 +77,8 @@ class Live:
         The board's name among the sources of the recording.
     sources : mapping of str to str, optional
         Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU
-        (serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated. By name, in a `.mcap`, each with its own
-        clock: "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which sends to that address of this machine;
+        (serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). By name, in a `.mcap`, each with its own clock:
+        "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which sends to that address of this machine;
         "serial:PATH@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard input); "given" are numbers that a
         program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of a line (default: those of the
         first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called `t_us`, `time_ms` ...;
@@ -95,10 +94,9 @@ class Live:
     lines : bool
         Print one line of JSON for each detection, and nothing else.
     send : str or sequence of str
-        Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be repeated. UDP
-        sends a datagram each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab
-        streaming layer. Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and
-        counted.
+        Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD. UDP sends a datagram
+        each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab streaming layer.
+        Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and counted.
     kernel_buffer_bytes : int, 0 to 2147483647
         How much may wait in the kernel, bytes.
     queue_bytes : int, 0 to 2147483647

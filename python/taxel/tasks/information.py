@@ -34,7 +34,7 @@ class InformationOptions:
     draws, shuffles : int, 1 or more
     folds : int, 2 or more
     seed : int, 0 or more
-    classifiers : sequence of {"neighbours", "cone_r", "tempotron"}
+    classifiers : sequence of {"neighbours", "cone_r"}
 
     Raises
     ------

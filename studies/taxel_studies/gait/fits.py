@@ -14,8 +14,9 @@ from taxel import ProblemError
 from taxel.detect import Example, Fold, Part, Recipe, Score, judge, score
 from taxel.detections import Detections
 from taxel.encode import Encoder
-from taxel.learn import SKIM, ConeR
+from taxel.learn import ConeR
 from taxel.spikes import to_ms, to_us
+from taxel_rules import SKIM
 from taxel_studies.gait import insole, protocols, rules
 from taxel_studies.gait.pieces import Piece, joined
 from taxel_studies.gait.protocols import Scope

@@ -11,8 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from taxel.learn import FILT, FP, HTP, INST, PSD, SPAN, Chronotron, ConeX, ReSuMe
+from taxel.learn import ConeX
 from taxel.neuron import Neuron
+from taxel_rules import FILT, FP, HTP, INST, PSD, SPAN, Chronotron, ReSuMe
 
 __all__ = ["CHOSEN_ON", "RULES", "Rule", "learner"]
 

@@ -8,7 +8,7 @@ const WORD_FRACTION: u32 = 10;
 
 /// What a taxel's afferent remembers.
 #[derive(Debug, Clone, Copy)]
-struct Afferent {
+struct BoardAfferent {
     /// The compressed pressure (5.1) when the integral (5.3) was last reset.
     base: u32,
     /// The threshold (5.5).
@@ -19,9 +19,9 @@ struct Afferent {
 
 /// The afferents by taxel; none before a taxel's first reading.
 #[derive(Debug, Clone)]
-pub(super) struct Afferents(Vec<Option<Afferent>>);
+pub(super) struct BoardAfferents(Vec<Option<BoardAfferent>>);
 
-impl Afferents {
+impl BoardAfferents {
     /// Afferents without a reading.
     pub(super) fn new(taxels: usize) -> Self {
         Self(vec![None; taxels])
@@ -39,8 +39,8 @@ impl Afferents {
         let rest = rest(registers);
         let share = |part: u16, whole: u32| (u64::from(part) * u64::from(rest) / u64::from(whole)) as u32;
         let pressure = pressure(ticks);
-        let Some(Afferent { base, threshold, fired }) = &mut self.0[taxel] else {
-            self.0[taxel] = Some(Afferent { base: pressure, threshold: rest, fired: 0 });
+        let Some(BoardAfferent { base, threshold, fired }) = &mut self.0[taxel] else {
+            self.0[taxel] = Some(BoardAfferent { base: pressure, threshold: rest, fired: 0 });
             return false;
         };
         let integral = i64::from(pressure) - i64::from(*base);

@@ -2,7 +2,7 @@
 
 /// A taxel whose value has changed by a step since its last event, and the time at which it did.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Crossing {
+pub(super) struct TaxelCrossing {
     /// Time since reset, 10 ns.
     pub(super) at: u64,
     pub(super) x: u16,
@@ -24,7 +24,7 @@ pub(super) struct Asynchronous {
     /// Start of the previous frame, and its reading of each taxel; `None` before the first frame.
     last: Option<(u64, Vec<u16>)>,
     /// Crossings later than the start of the frame in which they were found.
-    waiting: Vec<Crossing>,
+    waiting: Vec<TaxelCrossing>,
 }
 
 /// A reading: its taxel, its time after the frame's start, and its value.
@@ -54,7 +54,7 @@ impl Asynchronous {
         let Sample { taxel, x, y, after, ticks } = sample;
         let Some((began, last)) = &self.last else {
             let (p, moved) = (ticks >= *sent, ticks.abs_diff(*sent));
-            self.waiting.push(Crossing { at: begins, x, y, p, value: ticks, moved });
+            self.waiting.push(TaxelCrossing { at: begins, x, y, p, value: ticks, moved });
             *sent = ticks;
             return;
         };
@@ -67,12 +67,12 @@ impl Asynchronous {
             let passed = if p { *sent <= from } else { *sent >= from };
             let share = if passed || way == 0.0 { 0.0 } else { f64::from(sent.abs_diff(from)) / way };
             let at = began + after + (share * span as f64) as u64;
-            self.waiting.push(Crossing { at, x, y, p, value: *sent, moved });
+            self.waiting.push(TaxelCrossing { at, x, y, p, value: *sent, moved });
         }
     }
 
     /// Ends a frame that began at `begins`: stores its readings, and returns the crossings before `begins`, by time.
-    pub(super) fn end_frame(&mut self, begins: u64, ticks: impl Iterator<Item = u16>) -> Vec<Crossing> {
+    pub(super) fn end_frame(&mut self, begins: u64, ticks: impl Iterator<Item = u16>) -> Vec<TaxelCrossing> {
         match &mut self.last {
             Some((began, last)) => {
                 *began = begins;

@@ -2,7 +2,7 @@
 
 use super::Board;
 use super::refresh::totals;
-use crate::wire::v2::Status;
+use crate::wire::v2::BoardTotals;
 use crate::wire::{Command, Registers};
 
 impl Board {
@@ -31,7 +31,7 @@ impl Board {
             return self.greeting().trim_end().to_owned();
         }
         if register == 6 && value == 9 {
-            let Status { frames, events, dropped, datagrams, faults } = self.totals();
+            let BoardTotals { frames, events, dropped, datagrams, faults } = self.totals();
             return format!(
                 "status frames={frames} events={events} dropped={dropped} datagrams={datagrams} faults={faults}"
             );
@@ -69,7 +69,7 @@ impl Board {
     }
 
     /// The totals since reset.
-    pub(super) fn totals(&self) -> Status {
+    pub(super) fn totals(&self) -> BoardTotals {
         totals(&self.counts, &self.at_reset, self.markers_dropped)
     }
 

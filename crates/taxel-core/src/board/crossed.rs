@@ -1,7 +1,7 @@
 //! Effects of lines that taxels share, and of real comparators, on trip times before the board compares them.
 
 use super::NOT_RETURNED;
-use crate::circuit::{Chain, Converter, Ramp, Scan};
+use crate::circuit::{Chain, Converter, ConverterScan, Ramp};
 use crate::contact::Sensor;
 use crate::wire::Registers;
 use crate::{Array, Result, Stop, problem};
@@ -16,7 +16,7 @@ pub struct Crossed {
     chain: Chain,
     array: Array,
     registers: Registers,
-    scan: Scan,
+    scan: ConverterScan,
     /// Voltage of each reading, in the middle of its tick, because the counter shows whole ticks.
     alone_v: Vec<f64>,
     conductance_us: Vec<f64>,
@@ -31,7 +31,8 @@ impl Crossed {
     /// `Problem` if a parameter is out of range.
     pub fn new(chain: Chain, registers: &Registers, array: &Array) -> Result<Self> {
         chain.check()?;
-        let scan = Scan::new(timed(&chain.converter, registers, array), array.rows.into(), array.columns.into())?;
+        let scan =
+            ConverterScan::new(timed(&chain.converter, registers, array), array.rows.into(), array.columns.into())?;
         Ok(Self {
             alone_v: voltages(registers),
             conductance_us: vec![0.0; array.len()],

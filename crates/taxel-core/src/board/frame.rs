@@ -1,7 +1,7 @@
 //! One frame of the board: it scans the array, queues the changes and advances time.
 
 use super::Board;
-use super::asynchronous::{Asynchronous, Crossing, Sample};
+use super::asynchronous::{Asynchronous, Sample, TaxelCrossing};
 use super::comparator::NOT_RETURNED;
 use super::link::ScannedEvent;
 use super::options::{IntensityWord, Previous};
@@ -9,7 +9,7 @@ use crate::{Result, problem};
 
 /// What is given of a frame, by taxel: trip times, and whose events find room.
 #[derive(Clone, Copy)]
-struct Read<'a> {
+struct FrameReading<'a> {
     ticks: &'a [u16],
     accepted: Option<&'a [bool]>,
 }
@@ -48,7 +48,7 @@ impl Board {
         {
             return Err(problem!("accepted of {} taxels: the array has {}", accepted.len(), self.array.len()));
         }
-        let read = Read { ticks, accepted };
+        let read = FrameReading { ticks, accepted };
         self.link.offer(&mut self.counts, &mut sink);
         self.take_over(&mut sink);
         let registers = self.active;
@@ -101,7 +101,7 @@ impl Board {
 
     /// Queues the events of one driven line: step by step, channel by channel. For version 2, with all events of a
     /// frame at one time, row by row, because the words' positions must ascend.
-    fn line(&mut self, x: u16, start: u64, read: Read<'_>, sink: &mut impl FnMut(&[u8]) -> bool) {
+    fn line(&mut self, x: u16, start: u64, read: FrameReading<'_>, sink: &mut impl FnMut(&[u8]) -> bool) {
         let registers = self.active;
         if registers.wire_version == 2 && registers.frame_sync {
             for y in 0..self.array.rows {
@@ -117,7 +117,7 @@ impl Board {
     }
 
     /// Queues the event of a taxel, if it has one.
-    fn taxel(&mut self, at: u64, (x, y): (u16, u16), read: Read<'_>, sink: &mut impl FnMut(&[u8]) -> bool) {
+    fn taxel(&mut self, at: u64, (x, y): (u16, u16), read: FrameReading<'_>, sink: &mut impl FnMut(&[u8]) -> bool) {
         let registers = self.active;
         let taxel = self.array.index(x, y);
         if !self.comparators.changed[taxel] || !self.exists(taxel) {
@@ -138,7 +138,7 @@ impl Board {
     }
 
     /// Finds the crossings of taxels that compare by themselves, and queues those before this frame.
-    fn queue_crossings(&mut self, any: bool, read: Read<'_>, sink: &mut impl FnMut(&[u8]) -> bool) {
+    fn queue_crossings(&mut self, any: bool, read: FrameReading<'_>, sink: &mut impl FnMut(&[u8]) -> bool) {
         let Some(mut asynchronous) = self.asynchronous.take() else { return };
         let (registers, columns, new) = (self.active, usize::from(self.array.columns), asynchronous.is_new());
         let ticks = read.ticks;
@@ -161,7 +161,7 @@ impl Board {
         self.asynchronous = Some(asynchronous);
         // At reset, the events of all taxels are in the first frame itself.
         debug_assert!(!new || due.is_empty());
-        for Crossing { at, x, y, p, value, moved } in due {
+        for TaxelCrossing { at, x, y, p, value, moved } in due {
             let intensity = if self.intensity == IntensityWord::Difference { moved } else { value };
             self.enqueue(ScannedEvent { at, x, y, p, intensity }, read, sink);
         }
@@ -169,7 +169,7 @@ impl Board {
 
     /// Queues an event on the active version of the wire; returns false if the queue was full and the event was
     /// dropped.
-    fn enqueue(&mut self, found: ScannedEvent, read: Read<'_>, sink: &mut impl FnMut(&[u8]) -> bool) -> bool {
+    fn enqueue(&mut self, found: ScannedEvent, read: FrameReading<'_>, sink: &mut impl FnMut(&[u8]) -> bool) -> bool {
         self.counts.changes += 1;
         if read.accepted.is_some_and(|accepted| !accepted[self.array.index(found.x, found.y)]) {
             self.link.refuse(&mut self.counts);

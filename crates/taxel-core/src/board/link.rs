@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use super::counts::BoardCounts;
-use crate::wire::v2::{Packer, Settings, Status};
+use crate::wire::v2::{BoardTotals, Packer, Settings};
 use crate::wire::{WORD_BYTES, Word};
 use crate::{Array, Result};
 
@@ -40,7 +40,7 @@ pub(super) struct Link {
     filling: Vec<u8>,
     /// Builds the datagrams of version 2.
     packer: Packer,
-    queue: Queue,
+    queue: DatagramQueue,
 }
 
 impl Link {
@@ -50,7 +50,7 @@ impl Link {
             capacity: QUEUE_WORDS,
             filling: Vec::with_capacity(DATAGRAM_WORDS * WORD_BYTES),
             packer: Packer::new(settings, array)?,
-            queue: Queue::default(),
+            queue: DatagramQueue::default(),
         })
     }
 
@@ -194,7 +194,7 @@ impl Link {
     pub(super) fn status(
         &mut self,
         now: u64,
-        status: &Status,
+        status: &BoardTotals,
         counts: &mut BoardCounts,
         sink: &mut impl FnMut(&[u8]) -> bool,
     ) {
@@ -205,12 +205,12 @@ impl Link {
 
 /// Datagrams that the sink has not accepted yet, oldest first, and the number of words as which they count.
 #[derive(Debug, Clone, Default)]
-struct Queue {
+struct DatagramQueue {
     waiting: VecDeque<(Vec<u8>, usize)>,
     words: usize,
 }
 
-impl Queue {
+impl DatagramQueue {
     /// Passes the waiting datagrams to the sink, oldest first.
     fn offer(&mut self, counts: &mut BoardCounts, sink: &mut impl FnMut(&[u8]) -> bool) {
         while let Some((oldest, words)) = self.waiting.front() {

@@ -14,7 +14,7 @@ const BEHIND: usize = 8;
 /// Probability of each fault for a datagram, 0 to 1; at most one fault hits a datagram.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Faults {
+pub struct NetworkFaults {
     /// Never delivered.
     pub lost: f64,
     /// Delivered twice.
@@ -29,7 +29,7 @@ pub struct Faults {
     pub seed: u64,
 }
 
-impl Faults {
+impl NetworkFaults {
     fn shares(&self) -> [(&'static str, f64); 5] {
         [
             ("lost", self.lost),
@@ -63,7 +63,7 @@ pub struct NetworkCounts {
 /// Forwards a board's datagrams to a host, with faults.
 #[derive(Debug, Clone)]
 pub struct Network {
-    faults: Faults,
+    faults: NetworkFaults,
     draw: StdRng,
     /// Reordered datagrams that wait, each with the number of datagrams that still have to overtake it.
     behind: VecDeque<(usize, Vec<u8>)>,
@@ -76,7 +76,7 @@ impl Network {
     /// # Errors
     ///
     /// `Problem` if a probability, or the sum of all, is not between 0 and 1.
-    pub fn new(faults: Faults) -> Result<Self> {
+    pub fn new(faults: NetworkFaults) -> Result<Self> {
         let shares = faults.shares();
         for (name, share) in shares {
             if !(0.0..=1.0).contains(&share) {
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn counts_close_and_what_is_not_befallen_comes_out_as_it_was() {
-        let faults = Faults { lost: 0.1, repeated: 0.1, reordered: 0.2, cut: 0.1, corrupted: 0.1, seed: 3 };
+        let faults = NetworkFaults { lost: 0.1, repeated: 0.1, reordered: 0.2, cut: 0.1, corrupted: 0.1, seed: 3 };
         let mut network = Network::new(faults).unwrap();
         let mut out = vec![];
         for k in 0..10_000_u32 {
@@ -191,9 +191,9 @@ mod tests {
     #[test]
     fn shares_that_are_none_are_refused() {
         for faults in [
-            Faults { lost: -0.1, ..Faults::default() },
-            Faults { cut: f64::NAN, ..Faults::default() },
-            Faults { lost: 0.6, corrupted: 0.6, ..Faults::default() },
+            NetworkFaults { lost: -0.1, ..NetworkFaults::default() },
+            NetworkFaults { cut: f64::NAN, ..NetworkFaults::default() },
+            NetworkFaults { lost: 0.6, corrupted: 0.6, ..NetworkFaults::default() },
         ] {
             assert!(Network::new(faults).is_err());
         }

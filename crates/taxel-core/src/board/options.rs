@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::wire::Registers;
-use crate::wire::v2::{Kind, Settings};
+use crate::wire::v2::{BodyKind, Settings};
 
 /// The reference with which a new value is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -55,13 +55,13 @@ impl Version2 {
     /// The settings that the datagrams of a session share, on a board with these registers.
     pub(super) fn settings(&self, registers: &Registers, intensity: IntensityWord, session: u16) -> Settings {
         let kind = if registers.mechanoreceptor {
-            Kind::Large
+            BodyKind::Large
         } else if intensity == IntensityWord::Nothing {
-            Kind::Changes
+            BodyKind::Changes
         } else if registers.ramp <= 255 {
-            Kind::Small
+            BodyKind::Small
         } else {
-            Kind::Large
+            BodyKind::Large
         };
         Settings {
             board: self.board,

@@ -2,7 +2,7 @@
 
 use super::counts::BoardCounts;
 use crate::wire::Registers;
-use crate::wire::v2::Status;
+use crate::wire::v2::BoardTotals;
 
 /// What a board repeats: a line each time that its share of the period is over, the totals each time that the period is.
 #[derive(Debug, Clone, Copy, Default)]
@@ -47,9 +47,9 @@ impl Refresh {
 
 /// The totals since reset, in which `markers` of what was dropped were no events. In a datagram the packer replaces the
 /// number of datagrams by those before it.
-pub(super) fn totals(now: &BoardCounts, at_reset: &BoardCounts, markers: u64) -> Status {
+pub(super) fn totals(now: &BoardCounts, at_reset: &BoardCounts, markers: u64) -> BoardTotals {
     let dropped = now.dropped - at_reset.dropped;
-    Status {
+    BoardTotals {
         frames: now.frames - at_reset.frames,
         events: now.changes - at_reset.changes + markers - dropped,
         dropped,

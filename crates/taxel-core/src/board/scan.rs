@@ -5,13 +5,13 @@ use crate::wire::Registers;
 
 /// The driven lines of a frame and the sense lines of each, in their order.
 #[derive(Debug, Clone)]
-pub(super) struct Scan {
+pub(super) struct ScanOrder {
     /// The sense lines of a driven line, by step and then by channel, each with its step.
     sense_lines: Vec<(u64, u16)>,
     lfsr: Lfsr,
 }
 
-impl Scan {
+impl ScanOrder {
     /// The state of the scan at reset.
     ///
     /// In step s, channel c reads sense line (steps x c + s); lines beyond the array's rows are left out.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::converter::{Converter, Scan, TICKS_A_US};
+use super::converter::{Converter, ConverterScan, TICKS_A_US};
 use super::ramp::RAMP_END_V;
 use crate::allowed::Range;
 use crate::parameters::parameters;
@@ -38,7 +38,7 @@ pub struct Converted {
     pub t_us: Vec<f64>,
     /// How long the ramp of each lasted, ticks.
     pub ramp: Vec<u32>,
-    /// The ticks, as [`Scan::frame`] gives them, frame after frame.
+    /// The ticks, as [`ConverterScan::frame`] gives them, frame after frame.
     pub ticks: Vec<f64>,
     /// The voltage of each number of ticks, V: that of the ramp halfway to the next tick, or at its end.
     pub volts: Vec<f64>,
@@ -114,7 +114,7 @@ impl Adaptive {
         }
         let mut out = Converted::default();
         let (mut ramp, mut t_us) = (self.gentlest, 0.0);
-        let mut scan = Scan::new(self.with(ramp), rows, columns)?;
+        let mut scan = ConverterScan::new(self.with(ramp), rows, columns)?;
         let (mut now, mut ticks, mut before) = (vec![0.0; taxels], vec![0.0; taxels], vec![f64::NAN; taxels]);
         let mut coarser_v = 0.0;
         loop {
@@ -177,7 +177,7 @@ mod tests {
         let got = converted(&adaptive, |_| 1.7, 3000);
         assert!(got.ramp.iter().all(|&ramp| ramp == 510) && got.ramp.len() > 40);
         let mut ticks = vec![0.0; 32];
-        Scan::new(adaptive.with(510), 4, 8).unwrap().frame(&[1.7; 32], &mut ticks);
+        ConverterScan::new(adaptive.with(510), 4, 8).unwrap().frame(&[1.7; 32], &mut ticks);
         assert!(got.ticks.iter().zip(ticks.iter().cycle()).all(|(a, b)| (a - b).abs() < 1e-6));
         let line_us = 3.0 + 4.0 * 360.0 / 300.0;
         assert!((got.t_us[1] - 8.0 * line_us).abs() < 1e-9);

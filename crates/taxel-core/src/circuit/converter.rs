@@ -239,7 +239,7 @@ pub struct Moment {
 
 /// A converter that scans frame after frame, with its state at the end of the last one.
 #[derive(Debug, Clone)]
-pub struct Scan {
+pub struct ConverterScan {
     converter: Converter,
     columns: usize,
     /// By row: the line as its column ends. By channel: the comparator's input and output as its step ends.
@@ -249,7 +249,7 @@ pub struct Scan {
     begun: bool,
 }
 
-impl Scan {
+impl ConverterScan {
     /// A scan of an array.
     ///
     /// # Errors
@@ -328,7 +328,7 @@ mod tests {
     use super::*;
 
     fn frames(converter: Converter, frames: &[&[f64]], columns: usize) -> Vec<Vec<f64>> {
-        let mut scan = Scan::new(converter, frames[0].len() / columns, columns).unwrap();
+        let mut scan = ConverterScan::new(converter, frames[0].len() / columns, columns).unwrap();
         let mut ticks = vec![0.0; frames[0].len()];
         frames
             .iter()
@@ -426,7 +426,7 @@ mod tests {
             (Converter { line_us: 2.9, ..Converter::default() }, "line_us"),
             (Converter { hysteresis_v: f64::NAN, ..Converter::default() }, "hysteresis_v"),
         ] {
-            assert!(Scan::new(wrong, 4, 4).unwrap_err().to_string().contains(name));
+            assert!(ConverterScan::new(wrong, 4, 4).unwrap_err().to_string().contains(name));
         }
         assert!(Converter::default().trace(&[1.0; 3], 0.01, 1.0).is_err());
     }

@@ -152,11 +152,11 @@ impl Matrix {
     /// # Errors
     ///
     /// `Problem` where it is not positive definite in float64.
-    pub(super) fn factor(mut self) -> Result<Factor> {
+    pub(super) fn factor(mut self) -> Result<FactoredMatrix> {
         let n = self.rows;
         let (mut lower, mut inverse) = (vec![0.0; n * n], vec![0.0; n]);
         if eliminate(&mut self, &mut lower, &mut inverse) {
-            Ok(Factor { upper: self, lower, inverse })
+            Ok(FactoredMatrix { upper: self, lower, inverse })
         } else {
             Err(beyond())
         }
@@ -170,13 +170,13 @@ pub(super) fn beyond() -> crate::Error {
 
 /// A matrix, factored.
 #[derive(Debug, Clone)]
-pub(super) struct Factor {
+pub(super) struct FactoredMatrix {
     upper: Matrix,
     lower: Vec<f64>,
     inverse: Vec<f64>,
 }
 
-impl Factor {
+impl FactoredMatrix {
     /// Solves for all columns of a right-hand side, in place.
     pub(super) fn solve(&self, right: &mut Matrix) {
         substitute(&self.upper, &self.lower, &self.inverse, right);

@@ -36,7 +36,7 @@ pub enum Idle {
 
 /// A network's lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grid {
+pub struct Crossbar {
     /// Sense lines.
     pub rows: usize,
     /// Driven lines.
@@ -56,7 +56,7 @@ pub struct Grid {
 /// The least wire resistance above 0: with less the system is too badly conditioned.
 pub const LEAST_WIRE_OHM: f64 = 1e-3;
 
-impl Grid {
+impl Crossbar {
     /// The current out of each sense line while each driven line is read, uA, `[row * columns + column]`.
     ///
     /// `conductance_us` is as long and in the same order; `drive_v` is the read line's voltage and `sense_v` each sense
@@ -297,11 +297,11 @@ impl Sparse {
 mod tests {
     use super::*;
 
-    fn grid(sense_ohm: f64, drive_ohm: f64, wire_ohm: f64, idle: Idle) -> Grid {
-        Grid { rows: 2, columns: 2, sense_ohm, drive_ohm, wire_ohm, idle, limit: None }
+    fn grid(sense_ohm: f64, drive_ohm: f64, wire_ohm: f64, idle: Idle) -> Crossbar {
+        Crossbar { rows: 2, columns: 2, sense_ohm, drive_ohm, wire_ohm, idle, limit: None }
     }
 
-    fn currents(grid: &Grid, g: &[f64], sense_v: &[f64]) -> Vec<f64> {
+    fn currents(grid: &Crossbar, g: &[f64], sense_v: &[f64]) -> Vec<f64> {
         grid.currents_ua(g, -1.0, sense_v, Stop::never()).unwrap()
     }
 
@@ -345,7 +345,7 @@ mod tests {
         for idle in [Idle::Held, Idle::Floating] {
             let with = |wire_ohm| {
                 let (rows, columns, sense_ohm, drive_ohm) = (5, 7, 47.0, 5.0);
-                let grid = Grid { rows, columns, sense_ohm, drive_ohm, wire_ohm, idle, limit: None };
+                let grid = Crossbar { rows, columns, sense_ohm, drive_ohm, wire_ohm, idle, limit: None };
                 grid.currents_ua(&g, -1.3, &[0.0, 1e-3, 0.0, -2e-3, 0.0], Stop::never()).unwrap()
             };
             for (without, nearly) in with(0.0).iter().zip(with(LEAST_WIRE_OHM)) {

@@ -18,7 +18,7 @@ pub struct Limit {
 
 /// The limit that a source is at, if any.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum End {
+enum RangeEnd {
     Within,
     Least,
     Most,
@@ -48,29 +48,30 @@ impl Limit {
         let limits: Vec<[f64; 2]> =
             sense_v.iter().map(|source| [self.least_v, self.most_v].map(|v| (v - source) / between)).collect();
         let past = |row: usize, current: f64| match limits[row] {
-            [_, most] if current > most + 1e-12 * most.abs() => End::Most,
-            [least, _] if current < least - 1e-12 * least.abs() => End::Least,
-            _ => End::Within,
+            [_, most] if current > most + 1e-12 * most.abs() => RangeEnd::Most,
+            [least, _] if current < least - 1e-12 * least.abs() => RangeEnd::Least,
+            _ => RangeEnd::Within,
         };
-        let within = |(row, of_row): (usize, &[f64])| of_row.iter().all(|&current| past(row, current) == End::Within);
+        let within =
+            |(row, of_row): (usize, &[f64])| of_row.iter().all(|&current| past(row, current) == RangeEnd::Within);
         if currents.chunks_exact(columns.max(1)).enumerate().all(within) {
             return Ok(());
         }
         let response = response()?;
         for column in 0..columns {
             let given: Vec<f64> = (0..rows).map(|row| currents[row * columns + column]).collect();
-            let mut ends = vec![End::Within; rows];
+            let mut ends = vec![RangeEnd::Within; rows];
             let mut now = given.clone();
             let mut moved = vec![0.0; rows];
             for round in 0.. {
                 let wanted = |row: usize| match (ends[row], moved[row]) {
-                    (End::Within, _) => past(row, now[row]),
+                    (RangeEnd::Within, _) => past(row, now[row]),
                     // A source that would have to give more than without limits is at none.
-                    (End::Most, e) if e > 0.0 => End::Within,
-                    (End::Least, e) if e < 0.0 => End::Within,
+                    (RangeEnd::Most, e) if e > 0.0 => RangeEnd::Within,
+                    (RangeEnd::Least, e) if e < 0.0 => RangeEnd::Within,
                     (end, _) => end,
                 };
-                let changes: Vec<(usize, End)> =
+                let changes: Vec<(usize, RangeEnd)> =
                     (0..rows).map(|row| (row, wanted(row))).filter(|&(row, end)| end != ends[row]).collect();
                 if changes.is_empty() {
                     break;
@@ -81,7 +82,7 @@ impl Limit {
                 // All at once is quick; one at a time, the first, is sure to end (Murty 1974).
                 let at_once = if round < rows { changes.len() } else { 1 };
                 changes[..at_once].iter().for_each(|&(row, end)| ends[row] = end);
-                let at: Vec<usize> = (0..rows).filter(|&row| ends[row] != End::Within).collect();
+                let at: Vec<usize> = (0..rows).filter(|&row| ends[row] != RangeEnd::Within).collect();
                 let mut matrix = Matrix::zeros(at.len(), at.len());
                 let mut right = Matrix::zeros(at.len(), 1);
                 for (i, &row) in at.iter().enumerate() {
@@ -89,7 +90,7 @@ impl Limit {
                         *matrix.at_mut(i, j) = response[row * rows + limited];
                     }
                     *matrix.at_mut(i, i) += between.recip();
-                    *right.at_mut(i, 0) = limits[row][usize::from(ends[row] == End::Most)] - given[row];
+                    *right.at_mut(i, 0) = limits[row][usize::from(ends[row] == RangeEnd::Most)] - given[row];
                 }
                 matrix.factor()?.solve(&mut right);
                 moved.fill(0.0);
@@ -109,12 +110,12 @@ impl Limit {
 mod tests {
     use super::*;
     use crate::Stop;
-    use crate::circuit::{Grid, Idle};
+    use crate::circuit::{Crossbar, Idle};
 
     /// Rows of amplifiers at 1.3 V whose rails lie at 0 and 5 V, 47 kOhm.
-    fn grid(rows: usize, columns: usize, sense_ohm: f64, wire_ohm: f64) -> Grid {
+    fn grid(rows: usize, columns: usize, sense_ohm: f64, wire_ohm: f64) -> Crossbar {
         let limit = Some(Limit { least_v: -1.3, most_v: 3.7, ohm: 47e3 });
-        Grid { rows, columns, sense_ohm, drive_ohm: 20.0, wire_ohm, idle: Idle::Held, limit }
+        Crossbar { rows, columns, sense_ohm, drive_ohm: 20.0, wire_ohm, idle: Idle::Held, limit }
     }
 
     #[test]
@@ -156,7 +157,7 @@ mod tests {
                         from.map_or(sense_v[i], |v| v - (47e3 - sense_ohm) * current(i))
                     })
                     .collect();
-                let free = Grid { limit: None, ..grid };
+                let free = Crossbar { limit: None, ..grid };
                 let again = free.currents_ua(&g, -1.3, &source, Stop::never()).unwrap();
                 for i in 0..n {
                     let (a, b) = (got[i * m + column], again[i * m + column]);

@@ -5,7 +5,7 @@ use rand::rngs::StdRng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use super::grid::{Grid, Idle, LEAST_WIRE_OHM};
+use super::grid::{Crossbar, Idle, LEAST_WIRE_OHM};
 use super::limit::Limit;
 use crate::allowed::Range;
 use crate::parameters::parameters;
@@ -73,12 +73,12 @@ impl VirtualGround {
     ///
     /// # Errors
     ///
-    /// As [`Grid::currents_ua`].
+    /// As [`Crossbar::currents_ua`].
     pub fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64], stop: Stop<'_>) -> Result<Vec<f64>> {
         let feedback_ohm = 1e3 * self.feedback_kohm;
         // An amplifier's input is its source V_trans A / (1 + A) behind R_f / (1 + A).
         let share = self.gain.map_or(0.0, |gain| (1.0 + gain).recip());
-        let grid = Grid {
+        let grid = Crossbar {
             rows,
             columns,
             sense_ohm: feedback_ohm * share,
@@ -144,11 +144,11 @@ impl Divider {
     ///
     /// # Errors
     ///
-    /// As [`Grid::currents_ua`].
+    /// As [`Crossbar::currents_ua`].
     pub fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64], stop: Stop<'_>) -> Result<Vec<f64>> {
         let sense_ohm = 1e3 * self.resistor_kohm;
         let (drive_ohm, wire_ohm, idle) = (self.switch_ohm, self.wire_ohm, self.idle);
-        let grid = Grid { rows, columns, sense_ohm, drive_ohm, wire_ohm, idle, limit: None };
+        let grid = Crossbar { rows, columns, sense_ohm, drive_ohm, wire_ohm, idle, limit: None };
         let currents = grid.currents_ua(conductance_us, self.supply_v, &vec![0.0; rows], stop)?;
         Ok(currents.iter().map(|current| -1e-6 * sense_ohm * current).collect())
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Shape;
+use super::BodyShape;
 use super::within;
 use crate::allowed::Range;
 use crate::{Error, Result};
@@ -40,7 +40,7 @@ impl Material {
 #[serde(deny_unknown_fields)]
 pub struct Body {
     /// Its shape from below.
-    pub shape: Shape,
+    pub shape: BodyShape,
     /// Where its middle first touches, mm right of the first taxel.
     pub x_mm: f64,
     /// Where, mm below the first taxel.

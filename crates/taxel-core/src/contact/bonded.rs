@@ -20,9 +20,9 @@ mod tests;
 
 pub use cell::Cell;
 use descent::{Descent, Plane};
-use plan::Plan;
+use plan::CellPlane;
 pub use plan::{check_cells, most_cells};
-use spread::Spread;
+use spread::PressureSpread;
 use sweep::{Influence, Sweep};
 
 /// More cells than these, times those along a pitch, are solved by waves: a sweep costs their square, a convolution the
@@ -77,8 +77,8 @@ impl Bonded {
         foam.check()?;
         check_cells(foam, array, cells_per_pitch)?;
         let pitch_mm = pitch_of(array)?;
-        let Plan { per_pitch, reach, margin, tall, wide } =
-            Plan::of(foam, array, pitch_mm, usize::from(cells_per_pitch));
+        let CellPlane { per_pitch, reach, margin, tall, wide } =
+            CellPlane::of(foam, array, pitch_mm, usize::from(cells_per_pitch));
         let (pitch, thick) = (pitch_mm / f64::from(cells_per_pitch), foam.thickness_mm);
         let of = |taxels: u16| (usize::from(taxels) + 2 * margin) * per_pitch;
         let (rows, columns) = (of(array.rows), of(array.columns));
@@ -307,7 +307,8 @@ impl Bonded {
         let n = self.per_pitch;
         if loaded <= self.most_swept() {
             let margin = self.margin / n;
-            let spread = Spread { table: &self.spread, per_pitch: n, reach: self.reach, margin, array: self.array };
+            let spread =
+                PressureSpread { table: &self.spread, per_pitch: n, reach: self.reach, margin, array: self.array };
             for (cell, pressure) in cells.iter().zip(pressure) {
                 if *pressure > 0.0 {
                     spread.add(out, *cell, *pressure as f32);

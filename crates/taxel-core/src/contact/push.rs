@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use super::bonded::{Bonded, Cell, MOST_SWEPT};
-use super::{Foam, Shape};
+use super::{BodyShape, Foam};
 use crate::{Result, Stop};
 
 /// Depths at which a table holds the force, evenly spaced in the square root of depth.
@@ -50,7 +50,7 @@ impl Push {
     pub fn of(foam: &Foam, body: &Body, layer: Option<&mut Bonded>, stop: Stop<'_>) -> Result<Self> {
         let give = body.stiffness_n_mm.map_or(0.0, f64::recip);
         let mut forces: Box<dyn FnMut(f64) -> Result<f64>> = match (layer, &body.shape) {
-            (None, Shape::Sphere { radius_mm }) => {
+            (None, BodyShape::Sphere { radius_mm }) => {
                 let (foam, radius_mm) = (foam.clone(), *radius_mm);
                 if give == 0.0 {
                     return Ok(Self::Columns { foam, radius_mm });
@@ -193,7 +193,7 @@ pub(super) struct Sinking {
 
 impl Sinking {
     /// Finds them of bodies given by shape, place of the middle and depth of the lowest point, all in mm.
-    pub fn find(&mut self, layer: &Bonded, bodies: &[(&Shape, (f64, f64), f64)]) {
+    pub fn find(&mut self, layer: &Bonded, bodies: &[(&BodyShape, (f64, f64), f64)]) {
         let (rows, columns) = layer.shape();
         let nothing = (f64::NEG_INFINITY, 0);
         self.grid.resize(rows * columns, nothing);

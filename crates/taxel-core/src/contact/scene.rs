@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::body::WAIT;
 use super::bonded::check_cells;
-use super::{Body, Ending, Foam, Move, Press, Shape, pitch_of, within};
+use super::{Body, BodyShape, Ending, Foam, Move, Press, pitch_of, within};
 use crate::allowed::Range;
 use crate::{Array, Error, Result};
 
@@ -98,7 +98,7 @@ impl Scene {
                 array.rows, array.columns
             )));
         }
-        let shape = Shape::Sphere { radius_mm: between(25.0, 35.0) };
+        let shape = BodyShape::Sphere { radius_mm: between(25.0, 35.0) };
         let foam = Foam { modulus_kpa: between(50.0, 75.0), damping_s_m: between(0.1, 0.3), ..Foam::default() };
         let (x_mm, y_mm) = (MARGIN_MM + between(0.0, width), MARGIN_MM + between(0.0, height));
         let (height_mm, lead_ms) = (between(100.0, 200.0), between(50.0, 250.0));
@@ -178,7 +178,7 @@ impl Scene {
                     self.cells_per_pitch
                 )));
             }
-            let [Body { shape: Shape::Sphere { radius_mm }, motion, .. }] = self.bodies.as_slice() else {
+            let [Body { shape: BodyShape::Sphere { radius_mm }, motion, .. }] = self.bodies.as_slice() else {
                 return Err(columns_take_one_ball());
             };
             let straight = matches!(motion, Move::Dropped { .. } | Move::Pressed(_)) && self.slant_deg == 0.0;
@@ -219,7 +219,7 @@ mod tests {
     #[test]
     fn the_hardest_drop_does_not_bottom_out() {
         let mut scene = Scene::draw(&Array::thesis(), 1, 0, false).unwrap();
-        scene.bodies[0].shape = Shape::Sphere { radius_mm: 25.0 };
+        scene.bodies[0].shape = BodyShape::Sphere { radius_mm: 25.0 };
         if let Move::Dropped { height_mm, .. } = &mut scene.bodies[0].motion {
             *height_mm = 200.0;
         }
@@ -241,8 +241,8 @@ mod tests {
         let good = Scene::draw(&Array::thesis(), 1, 0, false).unwrap();
         good.check(&Array::thesis()).unwrap();
         let wrong: [(&str, Spoil); 14] = [
-            ("radius_mm", |s| s.bodies[0].shape = Shape::Sphere { radius_mm: -5.0 }),
-            ("\"layer\"", |s| s.bodies[0].shape = Shape::Sphere { radius_mm: 5.0 }),
+            ("radius_mm", |s| s.bodies[0].shape = BodyShape::Sphere { radius_mm: -5.0 }),
+            ("\"layer\"", |s| s.bodies[0].shape = BodyShape::Sphere { radius_mm: 5.0 }),
             ("\"layer\"", |s| s.foam.poisson = 0.2),
             ("\"layer\"", |s| s.slant_deg = 20.0),
             ("\"layer\"", |s| s.bodies.push(s.bodies[0].clone())),

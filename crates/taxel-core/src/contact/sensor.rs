@@ -103,7 +103,7 @@ pub struct Taxels {
     ticks_of: Vec<f32>,
     exponent: f32,
     area_mm2: f32,
-    noise: Noise,
+    noise: GaussianNoise,
 }
 
 impl Taxels {
@@ -137,7 +137,7 @@ impl Taxels {
             ticks_of,
             exponent: sensor.exponent as f32,
             area_mm2: (sensor.side_mm * sensor.side_mm) as f32,
-            noise: Noise::new(sensor.noise_ticks * f64::from(ramp) / STATED_RAMP, draw.random()),
+            noise: GaussianNoise::new(sensor.noise_ticks * f64::from(ramp) / STATED_RAMP, draw.random()),
         })
     }
 
@@ -184,13 +184,13 @@ impl Taxels {
 ///
 /// One draw of 16 bits ends at 4.2 standard deviations, short of what crosses a noise floor of six: two are added.
 #[derive(Debug, Clone)]
-struct Noise {
+struct GaussianNoise {
     quantiles: Vec<f32>,
     draw: StdRng,
     bytes: Vec<u8>,
 }
 
-impl Noise {
+impl GaussianNoise {
     fn new(sd: f64, seed: u64) -> Self {
         let quantiles = if sd > 0.0 {
             let n = 65_536;

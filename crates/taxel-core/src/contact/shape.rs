@@ -9,7 +9,7 @@ use crate::allowed::Range;
 /// The lower face of a body, which does not bend.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Shape {
+pub enum BodyShape {
     /// A ball.
     Sphere {
         /// mm.
@@ -47,7 +47,7 @@ pub enum Shape {
 /// Longest side of a body, mm.
 const LARGEST_MM: f64 = 1_000.0;
 
-impl Shape {
+impl BodyShape {
     /// Checks that it makes sense.
     ///
     /// # Errors
@@ -225,10 +225,10 @@ mod tests {
     fn nothing_below_a_height_lies_beyond_its_reach() {
         let heights_mm = (0..7).map(|y| (0..5).map(|x| f64::from(x * y) * 0.3).collect()).collect();
         for shape in [
-            Shape::Sphere { radius_mm: 12.0 },
-            Shape::Cylinder { radius_mm: 9.0, length_mm: 40.0, axis_deg: 35.0 },
-            Shape::Edge { slope_deg: 50.0, length_mm: 30.0, axis_deg: -70.0 },
-            Shape::HeightMap { heights_mm, pitch_mm: 3.0 },
+            BodyShape::Sphere { radius_mm: 12.0 },
+            BodyShape::Cylinder { radius_mm: 9.0, length_mm: 40.0, axis_deg: 35.0 },
+            BodyShape::Edge { slope_deg: 50.0, length_mm: 30.0, axis_deg: -70.0 },
+            BodyShape::HeightMap { heights_mm, pitch_mm: 3.0 },
         ] {
             shape.check("body").unwrap();
             for height in [0.05, 1.0, 5.0, 30.0] {
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn a_height_map_is_as_wide_as_the_body_that_it_shows() {
-        let map = |of: &Shape| Shape::HeightMap {
+        let map = |of: &BodyShape| BodyShape::HeightMap {
             heights_mm: (0..121)
                 .map(|y| {
                     (0..161).map(|x| of.height_mm(0.1 * f64::from(x - 80), 0.1 * f64::from(y - 60)).min(9.0)).collect()
@@ -258,10 +258,10 @@ mod tests {
         // Of two chords across each other through a point of a disc the shorter one has, in the mean, this many diameters.
         let disc = 4.359 * 8.0 / std::f64::consts::PI * (1.0 - 0.5_f64.sqrt());
         for (shape, height, width, seen) in [
-            (Shape::Sphere { radius_mm: 5.0 }, 0.5, 4.359, disc),
-            (Shape::Cylinder { radius_mm: 4.0, length_mm: 12.0, axis_deg: 0.0 }, 0.2, 2.498, 2.498),
-            (Shape::Cylinder { radius_mm: 9.0, length_mm: 1.5, axis_deg: 90.0 }, 0.9, 1.5, 1.5),
-            (Shape::Edge { slope_deg: 45.0, length_mm: 10.0, axis_deg: 90.0 }, 0.6, 1.2, 1.2),
+            (BodyShape::Sphere { radius_mm: 5.0 }, 0.5, 4.359, disc),
+            (BodyShape::Cylinder { radius_mm: 4.0, length_mm: 12.0, axis_deg: 0.0 }, 0.2, 2.498, 2.498),
+            (BodyShape::Cylinder { radius_mm: 9.0, length_mm: 1.5, axis_deg: 90.0 }, 0.9, 1.5, 1.5),
+            (BodyShape::Edge { slope_deg: 45.0, length_mm: 10.0, axis_deg: 90.0 }, 0.6, 1.2, 1.2),
         ] {
             assert!((shape.width_mm(height) / width - 1.0).abs() < 0.01, "{shape:?}: {}", shape.width_mm(height));
             let map = map(&shape).width_mm(height);
@@ -269,18 +269,18 @@ mod tests {
         }
         // Two ridges are no wider than one.
         let ridges = vec![(0..81).map(|x: i32| f64::from((x - 20).abs().min((x - 60).abs()))).collect(); 9];
-        let seen = Shape::HeightMap { heights_mm: ridges, pitch_mm: 0.5 }.width_mm(2.0);
+        let seen = BodyShape::HeightMap { heights_mm: ridges, pitch_mm: 0.5 }.width_mm(2.0);
         assert!((seen / 2.0 - 1.0).abs() < 0.1, "{seen}");
     }
 
     #[test]
     fn each_nonsense_parameter_is_named() {
-        let ragged = Shape::HeightMap { heights_mm: vec![vec![0.0, 1.0], vec![0.0]], pitch_mm: 1.0 };
-        let below = Shape::HeightMap { heights_mm: vec![vec![0.0, 1.0], vec![0.0, -1.0]], pitch_mm: 1.0 };
+        let ragged = BodyShape::HeightMap { heights_mm: vec![vec![0.0, 1.0], vec![0.0]], pitch_mm: 1.0 };
+        let below = BodyShape::HeightMap { heights_mm: vec![vec![0.0, 1.0], vec![0.0, -1.0]], pitch_mm: 1.0 };
         for (name, shape) in [
-            ("radius_mm", Shape::Sphere { radius_mm: -1.0 }),
-            ("length_mm", Shape::Cylinder { radius_mm: 1.0, length_mm: f64::NAN, axis_deg: 0.0 }),
-            ("slope_deg", Shape::Edge { slope_deg: 90.0, length_mm: 5.0, axis_deg: 0.0 }),
+            ("radius_mm", BodyShape::Sphere { radius_mm: -1.0 }),
+            ("length_mm", BodyShape::Cylinder { radius_mm: 1.0, length_mm: f64::NAN, axis_deg: 0.0 }),
+            ("slope_deg", BodyShape::Edge { slope_deg: 90.0, length_mm: 5.0, axis_deg: 0.0 }),
             ("heights_mm", ragged),
             ("row 1, column 1: heights_mm", below),
         ] {

@@ -8,9 +8,9 @@ mod columns;
 mod groups;
 mod layer;
 
-use columns::Columns;
+use columns::BallOnColumns;
 use groups::GROUPS;
-use layer::Layer;
+use layer::LayerScene;
 
 /// The most frames whose forces are listed: 10 hours of the preset "5.2 kHz", and 800 MB.
 const MOST_FORCES: usize = 200_000_000;
@@ -23,7 +23,7 @@ const MOST_FORCES: usize = 200_000_000;
 pub struct Stage {
     taxels: Taxels,
     frame_us: f64,
-    parts: Vec<Part>,
+    parts: Vec<ScenePart>,
     contacts: Vec<Contact>,
     narrow: Vec<(usize, Narrow)>,
     /// Part and frame within it that come next.
@@ -35,7 +35,7 @@ pub struct Stage {
 /// An act made ready, in any thread, for a [`Stage`] to play.
 #[derive(Debug)]
 pub struct Prepared {
-    part: Part,
+    part: ScenePart,
     contacts: Vec<Contact>,
     narrow: Option<Narrow>,
 }
@@ -52,7 +52,7 @@ impl Prepared {
                 if !(0.0..=86_400_000.0).contains(ms) {
                     return Err(Error::scene(format!("silence of {ms} ms: must be 0 to a day")));
                 }
-                let part = Part { frames: (us(*ms) / frame_us).round() as usize, what: What::Silence };
+                let part = ScenePart { frames: (us(*ms) / frame_us).round() as usize, what: ScenePartKind::Silence };
                 Ok(Self { part, contacts: vec![], narrow: None })
             }
             Act::Scene(scene) => {
@@ -65,17 +65,21 @@ impl Prepared {
                 let (contacts, narrow) = (std::mem::take(&mut motion.contacts), motion.narrow.take());
                 let frames = motion.len().div_ceil(GROUPS);
                 let what = match layer {
-                    Some(layer) => What::Layer(Box::new(Layer::new(scene, layer, motion, array))),
-                    None => What::Columns(Box::new(Columns::new(scene, motion.tracks.swap_remove(0), array)?)),
+                    Some(layer) => ScenePartKind::Layer(Box::new(LayerScene::new(scene, layer, motion, array))),
+                    None => ScenePartKind::Columns(Box::new(BallOnColumns::new(
+                        scene,
+                        motion.tracks.swap_remove(0),
+                        array,
+                    )?)),
                 };
-                Ok(Self { part: Part { frames, what }, contacts, narrow })
+                Ok(Self { part: ScenePart { frames, what }, contacts, narrow })
             }
             Act::Frames(sequence) => {
                 let size = array.len();
                 let count = sequence.count(size, frame_us)?;
                 let frames = (count as f64 * sequence.period_us / frame_us).ceil() as usize;
                 let contacts = sequence.touched(count, size);
-                let part = Part { frames, what: What::Frames { sequence: sequence.clone(), count } };
+                let part = ScenePart { frames, what: ScenePartKind::Frames { sequence: sequence.clone(), count } };
                 Ok(Self { part, contacts, narrow: None })
             }
         }
@@ -83,16 +87,16 @@ impl Prepared {
 }
 
 #[derive(Debug)]
-struct Part {
+struct ScenePart {
     frames: usize,
-    what: What,
+    what: ScenePartKind,
 }
 
 #[derive(Debug)]
-enum What {
+enum ScenePartKind {
     Silence,
-    Columns(Box<Columns>),
-    Layer(Box<Layer>),
+    Columns(Box<BallOnColumns>),
+    Layer(Box<LayerScene>),
     Frames { sequence: FrameSequence, count: usize },
 }
 
@@ -167,9 +171,9 @@ impl Stage {
         let mut force = Vec::with_capacity(self.frames());
         for part in &self.parts {
             match &part.what {
-                What::Columns(ball) => force.extend((0..part.frames).map(|k| ball.track.force_n[GROUPS * k])),
-                What::Layer(layer) => force.extend((0..part.frames).map(|k| layer.motion.force_n(GROUPS * k))),
-                What::Silence | What::Frames { .. } => force.resize(force.len() + part.frames, 0.0),
+                ScenePartKind::Columns(ball) => force.extend((0..part.frames).map(|k| ball.track.force_n[GROUPS * k])),
+                ScenePartKind::Layer(layer) => force.extend((0..part.frames).map(|k| layer.motion.force_n(GROUPS * k))),
+                ScenePartKind::Silence | ScenePartKind::Frames { .. } => force.resize(force.len() + part.frames, 0.0),
             }
         }
         Ok(force)
@@ -186,16 +190,18 @@ impl Stage {
         }
         while self.parts.get(self.part).is_some_and(|p| self.frame == p.frames) {
             // The tables of a part that is over are freed; its number of frames is still needed.
-            self.parts[self.part].what = What::Silence;
+            self.parts[self.part].what = ScenePartKind::Silence;
             self.part += 1;
             self.frame = 0;
         }
         let Some(part) = self.parts.get_mut(self.part) else { return Ok(false) };
         match &mut part.what {
-            What::Silence => {}
-            What::Columns(ball) => ball.show(self.frame, self.frame_us, &self.taxels, &mut self.clean),
-            What::Layer(layer) => layer.show(self.frame, self.frame_us, &self.taxels, &mut self.clean, stop)?,
-            What::Frames { sequence, count } => {
+            ScenePartKind::Silence => {}
+            ScenePartKind::Columns(ball) => ball.show(self.frame, self.frame_us, &self.taxels, &mut self.clean),
+            ScenePartKind::Layer(layer) => {
+                layer.show(self.frame, self.frame_us, &self.taxels, &mut self.clean, stop)?
+            }
+            ScenePartKind::Frames { sequence, count } => {
                 let place = self.frame as f64 * self.frame_us / sequence.period_us;
                 let (k, share) = ((place as usize).min(*count - 1), place.fract() as f32);
                 let size = self.clean.len();

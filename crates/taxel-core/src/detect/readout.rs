@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::{above_0, is_weight, no_weight};
-use crate::detect::stream::{Inputs, NamedNeuron, Neurons, Ranges};
+use crate::detect::stream::{DelayedNeurons, NamedNeuron, Ranges, ReceivedTrains};
 use crate::detect::{self, FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeuron};
 use crate::encode::{Composite, Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
@@ -192,11 +192,11 @@ impl Readout {
                 Encoder::Composite(own) if !cell.inputs.is_empty() => Some(own.of_parts(&cell.inputs, array)?),
                 _ => None,
             };
-            let (encoder, inputs) = (self.encoder_of(cell)?, Inputs::new(received, self.delays_ms.len()));
+            let (encoder, inputs) = (self.encoder_of(cell)?, ReceivedTrains::new(received, self.delays_ms.len()));
             let named = NamedNeuron::new(label, cell, self.run_threshold, encoder.latency_ms(), inputs);
             Ok(named.with_ranges(Ranges::new(self.seen.get(label).cloned(), encoder.kind())))
         });
-        let neurons = Neurons::new(neurons.collect::<Result<_>>()?, self.delays_ms.clone());
+        let neurons = DelayedNeurons::new(neurons.collect::<Result<_>>()?, self.delays_ms.clone());
         Ok(ReadoutStream::new(encoder.stream(array)?, array.clone(), FrameClock::new(frames)?, neurons))
     }
 

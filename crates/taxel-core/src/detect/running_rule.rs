@@ -57,7 +57,7 @@ pub struct Decision {
 
 /// Frames in a row, all so far, in which the load begins or ends.
 #[derive(Debug, Clone, Copy)]
-struct Run {
+struct LoadRun {
     /// The number of the first of these frames.
     first: i64,
     /// The time at which the quantity passed the limit in it, us.
@@ -67,7 +67,7 @@ struct Run {
 
 /// A load that waits for the age at which it is decided.
 #[derive(Debug, Clone, Copy)]
-struct Waiting {
+struct WaitingLoad {
     t: i64,
     at: i64,
     repaired: bool,
@@ -87,10 +87,10 @@ pub(super) struct RunningRule {
     passed: i64,
     /// Whether a quantity changed together with a repair in a frame that is not complete.
     repaired: bool,
-    run: Option<Run>,
+    run: Option<LoadRun>,
     /// The quantity that is compared with the threshold.
     quantity: f64,
-    waiting: VecDeque<Waiting>,
+    waiting: VecDeque<WaitingLoad>,
 }
 
 impl RunningRule {
@@ -155,9 +155,9 @@ impl RunningRule {
             return;
         }
         // Frames before that of the last change were counted when it came.
-        let run = self.run.get_or_insert(Run { first: self.changed, t: self.passed, repaired: false });
+        let run = self.run.get_or_insert(LoadRun { first: self.changed, t: self.passed, repaired: false });
         run.repaired |= repaired;
-        let Run { first, t, repaired } = *run;
+        let LoadRun { first, t, repaired } = *run;
         if open - first < self.limits.frames {
             return;
         }
@@ -171,7 +171,7 @@ impl RunningRule {
                 repaired,
                 value: self.quantity,
             }),
-            Some(age) if self.loaded => self.waiting.push_back(Waiting { t, at: t + age, repaired }),
+            Some(age) if self.loaded => self.waiting.push_back(WaitingLoad { t, at: t + age, repaired }),
             Some(_) => {}
         }
     }

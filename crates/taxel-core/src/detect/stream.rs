@@ -17,8 +17,8 @@ mod repairs;
 mod tests;
 
 use labelled_rule::LabelledRule;
-pub(super) use named_neuron::{Inputs, NamedNeuron};
-pub(super) use neurons::Neurons;
+pub(super) use named_neuron::{NamedNeuron, ReceivedTrains};
+pub(super) use neurons::DelayedNeurons;
 pub(super) use ranges::Ranges;
 use repairs::Repairs;
 
@@ -54,12 +54,12 @@ pub struct ReadoutStream {
 /// What turns the encoder's spikes into detections.
 #[derive(Clone)]
 enum Decides {
-    Neurons(Neurons),
+    Neurons(DelayedNeurons),
     Rule(LabelledRule),
 }
 
 impl ReadoutStream {
-    pub(super) fn new(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, neurons: Neurons) -> Self {
+    pub(super) fn new(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, neurons: DelayedNeurons) -> Self {
         Self::of(encoder, array, clock, Decides::Neurons(neurons))
     }
 
@@ -75,7 +75,7 @@ impl ReadoutStream {
     }
 
     fn of(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, decides: Decides) -> Self {
-        let repairs = Repairs::within(encoder.hears_repaired_ms());
+        let repairs = Repairs::within(encoder.repaired_span_ms());
         let (emitted, zeroings) = (vec![], VecDeque::new());
         Self { encoder, array, decides, clock, now: None, emitted, repairs, zeroings, late: 0, begin: i64::MIN }
     }
@@ -192,7 +192,7 @@ impl ReadoutStream {
             Decides::Neurons(neurons) => Some(neurons),
             Decides::Rule(_) => None,
         };
-        neurons.into_iter().flat_map(Neurons::potentials)
+        neurons.into_iter().flat_map(DelayedNeurons::potentials)
     }
 
     /// Processes a recording of events, checking `stop` between pieces.

@@ -6,7 +6,7 @@
 use super::blocks::{BLOCK, Block, NextFrame, blocks, in_blocks};
 use super::channels::Channels;
 use super::loaded::Loaded;
-use super::sampled::Source;
+use super::sampled::StreamInput;
 use super::stream::Stream;
 use crate::held::Held;
 use crate::spikes::ms;
@@ -43,7 +43,7 @@ pub(super) struct ByStamp<M> {
     held: Held<f32>,
     changed: Vec<bool>,
     channels: Channels,
-    source: Source,
+    source: StreamInput,
     /// Whether a value or a rest changed that was not computed with.
     fresh: bool,
     /// The last stamp that was computed, us.
@@ -61,7 +61,7 @@ impl<M: Measure> ByStamp<M> {
             changed: vec![false; blocks(array.len())],
             // Channels are all places here; `loaded` defines which taxels exist.
             channels: Channels::new(&Array { exists: None, ..array.clone() }),
-            source: Source::Unknown,
+            source: StreamInput::Unknown,
             fresh: false,
             stamp: 0,
             again: None,
@@ -141,7 +141,7 @@ impl<M: Measure> Stream for ByStamp<M> {
         self.fresh = true;
         match self.source {
             // Marks the block as changed, so that it is computed with the new rest in the next frame.
-            Source::Frames { .. } => self.changed[place / BLOCK] = true,
+            StreamInput::Frames { .. } => self.changed[place / BLOCK] = true,
             _ => self.loaded.take(place, self.held.values()[place]),
         }
     }
@@ -164,9 +164,9 @@ impl<M: Measure> Stream for ByStamp<M> {
 
     fn advance(&mut self, t: i64, out: &mut Vec<Spike>) {
         match &mut self.source {
-            Source::Unknown => {}
-            Source::Frames { open } => *open = t.max(*open),
-            Source::Events { present, .. } => {
+            StreamInput::Unknown => {}
+            StreamInput::Frames { open } => *open = t.max(*open),
+            StreamInput::Events { present, .. } => {
                 let stamp = *present;
                 *present = t.max(stamp);
                 self.pass(stamp, t, out);
@@ -176,9 +176,9 @@ impl<M: Measure> Stream for ByStamp<M> {
 
     fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64> {
         let end = match self.source {
-            Source::Unknown => return None,
-            Source::Events { present, .. } => present,
-            Source::Frames { open } => open - 1,
+            StreamInput::Unknown => return None,
+            StreamInput::Events { present, .. } => present,
+            StreamInput::Frames { open } => open - 1,
         };
         self.advance(end + 1, out);
         Some(ms(end))

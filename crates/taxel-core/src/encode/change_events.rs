@@ -61,7 +61,7 @@ impl Encoding for ChangeEvents {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let changes = Changes {
+        let changes = ChangeRule {
             floor: self.noise_floor as f32,
             most: ((1_u32 << self.bits) - 1) as f32,
             previous: self.previous,
@@ -73,7 +73,7 @@ impl Encoding for ChangeEvents {
 }
 
 #[derive(Clone)]
-struct Changes {
+struct ChangeRule {
     floor: f32,
     most: f32,
     previous: Previous,
@@ -81,7 +81,7 @@ struct Changes {
     last: Vec<Block>,
 }
 
-impl Rule for Changes {
+impl Rule for ChangeRule {
     fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
         self.last = held.to_vec();
     }

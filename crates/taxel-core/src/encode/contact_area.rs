@@ -48,7 +48,7 @@ impl Encoding for ContactArea {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let crossings = Crossings { levels: self.levels.clone(), reported: 0 };
+        let crossings = AreaCrossings { levels: self.levels.clone(), reported: 0 };
         array.check_neighbours("contact area")?;
         let loaded = Loaded::new("contact area", array, self.tare.as_ref(), self.noise_floor)?;
         Ok(Box::new(ByStamp::new(crossings, loaded, array)))
@@ -69,13 +69,13 @@ impl Encoding for ContactArea {
 
 /// Crossings of levels by the area.
 #[derive(Clone)]
-struct Crossings {
+struct AreaCrossings {
     levels: Vec<u32>,
     /// The area at the end of the last stamp.
     reported: u32,
 }
 
-impl Measure for Crossings {
+impl Measure for AreaCrossings {
     fn trains(&self) -> usize {
         2 * self.levels.len()
     }

@@ -7,7 +7,7 @@
 //! one array less.)
 //!
 //! Few afferents fire at a sample, and computing a power is slow. Therefore each afferent has a bound, proportional to
-//! its threshold: while its pressure differs by less from that at its last spike it cannot fire (`Afferents::reach`).
+//! its threshold: while its pressure differs by less from that at its last spike it cannot fire (`Fa1Afferents::reach`).
 //! Equations 5.1 and 5.4 are computed only for afferents beyond their bound. The bound is conservative, so the spikes
 //! equal to the bit those of computing every afferent.
 //!
@@ -92,7 +92,7 @@ impl Encoding for Fa1 {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let afferents = Afferents::new(self);
+        let afferents = Fa1Afferents::new(self);
         Ok(Box::new(Sampled::new(self, afferents, array, self.period_ms)?.steady()))
     }
 }
@@ -100,7 +100,7 @@ impl Encoding for Fa1 {
 /// The state of the afferents of one block, aligned to cache lines so that no vector crosses a boundary.
 #[derive(Clone)]
 #[repr(align(64))]
-struct Afferent {
+struct Fa1Block {
     /// rho (5.1) when U was last reset: U, the sum of changes since then (5.3), is rho minus this value.
     base: [f64; BLOCK],
     /// theta (5.5) of the next sample.
@@ -122,7 +122,7 @@ struct Near {
 }
 
 #[derive(Clone)]
-pub(super) struct Afferents {
+pub(super) struct Fa1Afferents {
     alpha: f64,
     jump: f64,
     decay: f64,
@@ -135,7 +135,7 @@ pub(super) struct Afferents {
     per_least: f64,
     /// The largest value of a spike.
     most: f64,
-    blocks: Vec<Afferent>,
+    blocks: Vec<Fa1Block>,
     /// Buffer for the afferents that may fire at a sample.
     near: Vec<Near>,
     /// Equation 5.1 for every tick up to the largest so far.
@@ -148,7 +148,7 @@ const SOUND: RangeInclusive<f64> = 1e-18..=1e18;
 /// Number of different ticks that a word of the wire can hold.
 const TICKS: usize = 65_536;
 
-impl Afferents {
+impl Fa1Afferents {
     pub(super) fn new(parameters: &Fa1) -> Self {
         let (theta_0, t) = (parameters.baseline(), parameters.period_ms);
         let decay = match parameters.decay {
@@ -257,7 +257,7 @@ impl Afferents {
     }
 }
 
-impl Afferent {
+impl Fa1Block {
     /// The afferents of a block that may fire, as a bit mask.
     #[inline(always)]
     fn near(&self, held: &Block) -> u64 {
@@ -287,9 +287,9 @@ impl Afferent {
     }
 }
 
-impl Rule for Afferents {
+impl Rule for Fa1Afferents {
     fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
-        let blank = Afferent {
+        let blank = Fa1Block {
             base: [0.0; BLOCK],
             theta: [0.0; BLOCK],
             reference: [0.0; BLOCK],
@@ -368,8 +368,8 @@ mod tests {
 
     /// Reference for the tests: equations 5.1 to 5.5 for every afferent at every sample.
     fn plainly(parameters: &Fa1, frames: &[Block]) -> Vec<Spike> {
-        let afferents = Afferents::new(parameters);
-        let Afferents { alpha, jump, decay, theta_0, .. } = afferents;
+        let afferents = Fa1Afferents::new(parameters);
+        let Fa1Afferents { alpha, jump, decay, theta_0, .. } = afferents;
         let (mut base, mut rho, mut theta) = ([0.0; BLOCK], [0.0; BLOCK], [theta_0; BLOCK]);
         power(&frames[0], alpha, &mut base);
         let mut out = vec![];
@@ -422,7 +422,7 @@ mod tests {
                     held.map(|held| (held * size) as f32)
                 })
                 .collect();
-            let mut afferents = Afferents::new(&parameters);
+            let mut afferents = Fa1Afferents::new(&parameters);
             let mut out = vec![];
             afferents.begin(0, &frames[..1], &mut out);
             for (t, frame) in (1..).zip(frames[1..].chunks(1)) {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::blocks::BLOCK;
 use super::channels::Channels;
 use super::encoding::Encoding;
-use super::receptor::{ByTaxel, Filter, Firing, Lanes, LowPass};
+use super::receptor::{TaxelAfferents, Filter, Firing, Lanes, LowPass};
 use super::sampled::Sampled;
 use super::stream::Stream;
 use crate::allowed::Range;
@@ -69,7 +69,7 @@ impl Encoding for Fa2 {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let afferents = ByTaxel::new(self.filter(), self.firing(), self.range, Channels::new(array).len());
+        let afferents = TaxelAfferents::new(self.filter(), self.firing(), self.range, Channels::new(array).len());
         Ok(Box::new(Sampled::new(self, afferents, array, self.period_ms)?.steady()))
     }
 

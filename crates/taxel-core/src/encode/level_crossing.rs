@@ -9,7 +9,7 @@ use super::bracket::{Bracket, check_levels};
 use super::channels::Channels;
 use super::encoding::Encoding;
 use super::periods::micros;
-use super::running_range::{RunningRange, Window};
+use super::running_range::{RunningRange, SampleWindow};
 use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, sort_from};
 use crate::allowed::{Range, ranges};
@@ -119,7 +119,7 @@ impl Encoding for LevelCrossing {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let crossings = Crossings::new(self, Channels::new(array).len())?;
+        let crossings = LevelCrossings::new(self, Channels::new(array).len())?;
         Ok(Box::new(Sampled::new(self, crossings, array, self.period_ms)?))
     }
 
@@ -148,7 +148,7 @@ struct ChannelLevel {
 }
 
 #[derive(Clone)]
-struct Crossings {
+struct LevelCrossings {
     channels: usize,
     levels: Vec<f64>,
     releases: Vec<f64>,
@@ -160,7 +160,7 @@ struct Crossings {
     /// duration is the same for all, so the queue is ordered by time.
     trials: VecDeque<(i64, usize)>,
     tonic: Option<Tonic>,
-    window: Option<Window>,
+    window: Option<SampleWindow>,
 }
 
 #[derive(Clone)]
@@ -174,7 +174,7 @@ struct Tonic {
     above_since: Vec<Option<i64>>,
 }
 
-impl Crossings {
+impl LevelCrossings {
     fn new(parameters: &LevelCrossing, channels: usize) -> Result<Self> {
         parameters.check()?;
         let levels = parameters.levels.clone();
@@ -203,7 +203,7 @@ impl Crossings {
             bracket: Bracket::new(blocks(channels)),
             trials: VecDeque::new(),
             tonic,
-            window: parameters.running_range.as_ref().map(|r| Window::new(r, blocks(channels))).transpose()?,
+            window: parameters.running_range.as_ref().map(|r| SampleWindow::new(r, blocks(channels))).transpose()?,
             levels,
             releases,
         })
@@ -339,7 +339,7 @@ impl Crossings {
     }
 }
 
-impl Rule for Crossings {
+impl Rule for LevelCrossings {
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
         match &mut self.window {
             None => self.settle(t, held, out),

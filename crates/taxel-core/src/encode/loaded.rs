@@ -139,7 +139,7 @@ pub(super) struct Loaded {
 
 /// Sums over the taxels that count.
 #[derive(Default)]
-pub(super) struct Sums {
+pub(super) struct LoadedSums {
     /// Sum of the values above rest.
     pub(super) total: f64,
     /// Largest value above rest.
@@ -181,14 +181,14 @@ impl Loaded {
     }
 
     /// Sums over the taxels that count, from the values of all places; they are added in the order of places.
-    pub(super) fn sums(&self, held: &[Block]) -> Sums {
+    pub(super) fn sums(&self, held: &[Block]) -> LoadedSums {
         let columns = self.places.columns;
         self.sums_at(held, |place| [(place % columns) as f64, (place / columns) as f64])
     }
 
     /// The same, with x and y of each place.
-    pub(super) fn sums_at(&self, held: &[Block], at: impl Fn(usize) -> [f64; 2]) -> Sums {
-        let mut sums = Sums::default();
+    pub(super) fn sums_at(&self, held: &[Block], at: impl Fn(usize) -> [f64; 2]) -> LoadedSums {
+        let mut sums = LoadedSums::default();
         if self.area() == 0 {
             return sums;
         }

@@ -6,8 +6,8 @@ use super::blocks::{Block, NextFrame};
 use super::by_stamp::{ByStamp, Measure};
 use super::encoding::Encoding;
 use super::loaded::{Loaded, given};
-use super::local_sums::{LocalSums, Sums, Values};
-use super::recent::{Recent, Window};
+use super::local_sums::{LocalSums, SumPair, Values};
+use super::recent::{RecentSamples, PastWindow};
 use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, spikes_of_events, spikes_of_frames};
 use super::tare::Tare;
@@ -156,12 +156,12 @@ impl LocalLoad {
         LocalSums::new(array, tare, least, self.rest == LocalRest::Tracked, running_us)
     }
 
-    fn sampled(&self, array: &Array, emit: Emit) -> Result<Sampled<Load>> {
+    fn sampled(&self, array: &Array, emit: Emit) -> Result<Sampled<LocalLoadRule>> {
         let whole = |ms: f64| us(ms).round() as i64;
-        let windows: Vec<Window> =
-            self.windows().map(|([from, to], of)| Window { from: whole(from), to: whole(to), of }).collect();
-        let recent = Recent::new(windows[0].of, &windows);
-        let rule = Load { sums: self.sums(array, &self.running_us())?, recent, quantities: vec![], emit };
+        let windows: Vec<PastWindow> =
+            self.windows().map(|([from, to], of)| PastWindow { from: whole(from), to: whole(to), of }).collect();
+        let recent = RecentSamples::new(windows[0].of, &windows);
+        let rule = LocalLoadRule { sums: self.sums(array, &self.running_us())?, recent, quantities: vec![], emit };
         Sampled::new(self, rule, array, self.period_ms)
     }
 }
@@ -187,9 +187,9 @@ impl Encoding for LocalLoad {
         }
         let loaded = Loaded::new("local load", array, self.tare.as_ref(), self.noise_floor)?;
         let sums = self.sums(array, &self.running_us())?;
-        let level = |&at: &f64| Level { at, left_below: self.release * at, reached: false };
+        let level = |&at: &f64| SumLevel { at, left_below: self.release * at, reached: false };
         let levels = (0..self.sums_with_levels()).flat_map(|_| self.levels.iter().map(level)).collect();
-        Ok(Box::new(ByStamp::new(Levels { sums, largest: vec![], levels }, loaded, array)))
+        Ok(Box::new(ByStamp::new(SumLevels { sums, largest: vec![], levels }, loaded, array)))
     }
 
     fn trains(&self, _array: &Array) -> usize {
@@ -225,7 +225,7 @@ impl LargestSum {
 
 /// A level of one of the largest sums.
 #[derive(Clone)]
-struct Level {
+struct SumLevel {
     at: f64,
     left_below: f64,
     reached: bool,
@@ -233,15 +233,15 @@ struct Level {
 
 /// Crossings of levels by the largest sums.
 #[derive(Clone)]
-struct Levels {
+struct SumLevels {
     sums: LocalSums,
     /// The largest sums of the last stamp: above the rest, then above and below each running mean.
     largest: Vec<f64>,
     /// All levels of the first sum, then those of the next.
-    levels: Vec<Level>,
+    levels: Vec<SumLevel>,
 }
 
-impl Measure for Levels {
+impl Measure for SumLevels {
     fn trains(&self) -> usize {
         2 * self.levels.len()
     }
@@ -257,7 +257,7 @@ impl Measure for Levels {
     fn emit(&mut self, t: i64, _loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>) {
         let Self { sums, largest, levels } = self;
         largest.clear();
-        sums.take(t, Values::Frame(held.as_flattened()), |Sums { largest: [up, down], .. }| {
+        sums.take(t, Values::Frame(held.as_flattened()), |SumPair { largest: [up, down], .. }| {
             let present = if largest.is_empty() { &[up][..] } else { &[up, down][..] };
             largest.extend_from_slice(present);
         });
@@ -288,19 +288,19 @@ enum Emit {
 }
 
 #[derive(Clone)]
-struct Load {
+struct LocalLoadRule {
     sums: LocalSums,
-    recent: Recent,
+    recent: RecentSamples,
     quantities: Vec<f64>,
     emit: Emit,
 }
 
-impl Load {
+impl LocalLoadRule {
     fn take(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
         let quantities = &mut self.quantities;
         quantities.clear();
         self.sums.take(t, Values::Taxels(held.as_flattened()), |sums| {
-            let Sums { largest: [up, down], places, area: [area, area_below], total: [total, total_below] } = sums;
+            let SumPair { largest: [up, down], places, area: [area, area_below], total: [total, total_below] } = sums;
             if quantities.is_empty() {
                 quantities.extend([area, up, places, total]);
             } else {
@@ -321,7 +321,7 @@ impl Load {
     }
 }
 
-impl Rule for Load {
+impl Rule for LocalLoadRule {
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
         self.take(t, held, out);
     }

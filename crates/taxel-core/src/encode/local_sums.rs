@@ -21,19 +21,19 @@ const LANES: usize = 16;
 /// The cells of a grid: the places of an array with a border of one empty cell around each row, in which the neighbours
 /// of any place lie at the same distances.
 #[derive(Debug, Clone)]
-struct Grid {
+struct CellGrid {
     rows: usize,
     /// Distance from a cell to the one below it.
     stride: usize,
     /// Number of cells, whole blocks.
     cells: usize,
     /// Neighbouring taxels that exist, in a row.
-    runs: Vec<Run>,
+    runs: Vec<TaxelRun>,
 }
 
 /// Existing taxels next to each other in a row.
 #[derive(Debug, Clone, Copy)]
-struct Run {
+struct TaxelRun {
     /// The first one's number among the existing taxels.
     channel: usize,
     /// The first one's index in the array.
@@ -49,11 +49,11 @@ pub(super) enum Values<'a> {
     Frame(&'a [f32]),
 }
 
-impl Grid {
+impl CellGrid {
     fn new(array: &Array) -> Self {
         let (rows, columns) = (usize::from(array.rows), usize::from(array.columns));
         let stride = columns + 1;
-        let mut runs: Vec<Run> = vec![];
+        let mut runs: Vec<TaxelRun> = vec![];
         let mut channel = 0;
         for place in 0..array.len() {
             if array.exists.as_ref().is_some_and(|exists| !exists[place]) {
@@ -62,7 +62,7 @@ impl Grid {
             let cell = (place / columns + 1) * stride + place % columns + 1;
             match runs.last_mut() {
                 Some(run) if run.cell + run.len == cell && run.place + run.len == place => run.len += 1,
-                _ => runs.push(Run { channel, place, cell, len: 1 }),
+                _ => runs.push(TaxelRun { channel, place, cell, len: 1 }),
             }
             channel += 1;
         }
@@ -102,7 +102,7 @@ impl Grid {
 
 /// The noise of each cell; a cell without a taxel, or with one whose rest is not known, is left out of all sums.
 #[derive(Clone)]
-struct Noise {
+struct CellNoise {
     floor: f64,
     /// Standard deviation of each taxel's values at rest, at least the smallest allowed; `None` of cells left out.
     sd: Vec<Option<f64>>,
@@ -115,8 +115,8 @@ struct Noise {
     per_noise: Vec<f32>,
 }
 
-impl Noise {
-    fn new(grid: &Grid, sd: Vec<Option<f64>>, least: f64, floor: f64) -> Self {
+impl CellNoise {
+    fn new(grid: &CellGrid, sd: Vec<Option<f64>>, least: f64, floor: f64) -> Self {
         let n = grid.cells;
         let mut new = Self { floor, sd, least, clip: vec![0.0; n], large: vec![f32::INFINITY; n], per_noise: vec![] };
         for cell in 0..n {
@@ -166,7 +166,7 @@ impl Noise {
 
 /// Sums of values above a baseline, and of those below it.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Sums {
+pub(super) struct SumPair {
     /// The largest sum over 3 x 3 clipped values, in units of its noise, at least 0; above and below.
     pub(super) largest: [f64; 2],
     /// The number of places whose sum is above 4 units of its noise.
@@ -254,7 +254,7 @@ struct Side {
 }
 
 impl Side {
-    fn new(grid: &Grid, noise: &Noise, baseline: Baseline, times: f64, below: bool) -> Self {
+    fn new(grid: &CellGrid, noise: &CellNoise, baseline: Baseline, times: f64, below: bool) -> Self {
         let paired = || Paired::new(grid.rows + 2, grid.stride);
         let zeros = vec![0.0; grid.cells];
         let (above, below) = (paired(), below.then(paired));
@@ -266,14 +266,14 @@ impl Side {
     }
 
     /// Reads a cell's noise.
-    fn changed(&mut self, noise: &Noise, cell: usize) {
+    fn changed(&mut self, noise: &CellNoise, cell: usize) {
         let from = noise.stands_out_from(cell, self.times);
         for paired in [Some(&mut self.above), self.below.as_mut()].into_iter().flatten() {
             paired.set_from(cell, from);
         }
     }
 
-    fn take(&mut self, t: i64, values: &[f32], grid: &Grid, noise: &Noise) -> Sums {
+    fn take(&mut self, t: i64, values: &[f32], grid: &CellGrid, noise: &CellNoise) -> SumPair {
         let above = self.baseline.take(t, values);
         let total =
             clip(in_blocks(above), in_blocks(&noise.clip), in_blocks(&noise.large), self.clipped.as_chunks_mut().0);
@@ -291,7 +291,7 @@ impl Side {
         vertically(from(first - stride, n + 2), from(first, n + 2), from(first + stride, n + 2), sums);
         let per_noise = &noise.per_noise[first + 1..first + 1 + n];
         let (largest, smallest, places) = horizontally(&sums[..n], &sums[1..=n], &sums[2..], per_noise);
-        Sums {
+        SumPair {
             largest: [f64::from(largest), f64::from(-smallest)],
             places: f64::from(places),
             area: [self.above.area(), self.below.as_ref().map_or(0, Paired::area)].map(f64::from),
@@ -303,8 +303,8 @@ impl Side {
 /// Sums above a rest, tracked or measured, and above any running means.
 #[derive(Clone)]
 pub(super) struct LocalSums {
-    grid: Grid,
-    noise: Noise,
+    grid: CellGrid,
+    noise: CellNoise,
     sides: Vec<Side>,
     values: Vec<f32>,
     /// Cells that have been 0 since the first value: they have no value yet, and count as at rest.
@@ -321,13 +321,13 @@ impl LocalSums {
         tracked: bool,
         running_us: &[f64],
     ) -> Result<Self> {
-        let (rest, measured, grid) = (tare.rest_of(array)?, tare.noise_of_places(), Grid::new(array));
+        let (rest, measured, grid) = (tare.rest_of(array)?, tare.noise_of_places(), CellGrid::new(array));
         let (mut begins, mut sd) = (vec![f64::NO_REST; grid.cells], vec![None; grid.cells]);
         for (cell, place) in grid.taxels() {
             begins[cell] = rest.values()[place];
             sd[cell] = (begins[cell] != f64::NO_REST).then(|| measured[place].max(least));
         }
-        let noise = Noise::new(&grid, sd, least, floor);
+        let noise = CellNoise::new(&grid, sd, least, floor);
         let baseline = if tracked {
             let far = (0..grid.cells).map(|cell| noise.stands_out_from(cell, FAR_NOISE) as f32).collect();
             Baseline::tracked(begins, far)
@@ -342,7 +342,7 @@ impl LocalSums {
     }
 
     /// Reads the next values, at `t` us; gives `each` the sums above the rest, then those above each running mean.
-    pub(super) fn take(&mut self, t: i64, values: Values<'_>, mut each: impl FnMut(Sums)) {
+    pub(super) fn take(&mut self, t: i64, values: Values<'_>, mut each: impl FnMut(SumPair)) {
         self.grid.spread(values, &mut self.values);
         let (values, rest) = (&mut self.values, self.sides[0].baseline.values());
         if !self.begun {

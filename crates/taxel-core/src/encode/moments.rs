@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::blocks::{Block, NextFrame};
 use super::encoding::Encoding;
-use super::loaded::{Loaded, Sums};
+use super::loaded::{Loaded, LoadedSums};
 use super::periods::micros;
 use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, sort_from};
@@ -85,15 +85,15 @@ impl Moments {
     }
 
     /// All levels, each with its moment: area, total, peak, x, y.
-    fn all_levels(&self) -> Vec<Level> {
+    fn all_levels(&self) -> Vec<MomentLevel> {
         let mut all = vec![];
         let [area, total, peak, way] = self.ranges().map(|(_, range)| range);
         for (moment, range) in [area, total, peak, way, way].into_iter().enumerate() {
             let Some([least, most]) = range else { continue };
             let levels = in_equal_ratios(least, most, self.levels);
-            all.extend(levels.iter().map(|&at| Level { moment, at }));
+            all.extend(levels.iter().map(|&at| MomentLevel { moment, at }));
             if moment >= 3 {
-                all.extend(levels.iter().map(|&at| Level { moment, at: -at }));
+                all.extend(levels.iter().map(|&at| MomentLevel { moment, at: -at }));
             }
         }
         all
@@ -159,7 +159,7 @@ impl Encoding for Moments {
         let loaded = Loaded::new("moments", array, self.tare.as_ref(), self.noise_floor)?;
         let way = if self.displacement_mm.is_some() { Some(Way::on(array)?) } else { None };
         let levels = self.all_levels();
-        let passing = Passing {
+        let passing = LevelPass {
             loaded,
             way,
             touch: None,
@@ -207,12 +207,12 @@ const CENTRE: usize = 4;
 
 /// A level of one moment; a negative level is crossed downwards.
 #[derive(Clone, Copy)]
-struct Level {
+struct MomentLevel {
     moment: usize,
     at: f64,
 }
 
-impl Level {
+impl MomentLevel {
     fn is_reached(self, moments: &[f64; 5]) -> bool {
         let value = moments[self.moment];
         if self.at > 0.0 { value >= self.at } else { value <= self.at }
@@ -241,7 +241,7 @@ impl Way {
 }
 
 #[derive(Clone)]
-struct Passing {
+struct LevelPass {
     loaded: Loaded,
     /// How the centre is measured; `None` where its displacement is not asked for.
     way: Option<Way>,
@@ -249,7 +249,7 @@ struct Passing {
     touch: Option<(i64, [f64; 2])>,
     /// The moments of the last sample: area, total, peak, and the displacement of the centre in x and y, mm.
     moments: [f64; 5],
-    levels: Vec<Level>,
+    levels: Vec<MomentLevel>,
     /// The number of the first train after those of the levels.
     first_graded: usize,
     /// The moments that are emitted as graded spikes.
@@ -269,14 +269,14 @@ struct Passing {
     due: VecDeque<(i64, usize, i64)>,
 }
 
-impl Passing {
+impl LevelPass {
     /// Computes the moments at `t` us.
     fn measure(&mut self, t: i64, held: &[Block]) {
         if self.loaded.area() == 0 {
             (self.touch, self.moments) = (None, [0.0; 5]);
             return;
         }
-        let (Sums { total, peak, x, y }, unit) = match &self.way {
+        let (LoadedSums { total, peak, x, y }, unit) = match &self.way {
             Some(Way::Places(at)) => (self.loaded.sums_at(held, |place| at[place]), [1.0; 2]),
             Some(Way::Pitch(Pitch { rows, columns })) => (self.loaded.sums(held), [*columns, *rows]),
             None => (self.loaded.sums(held), [0.0; 2]),
@@ -286,7 +286,7 @@ impl Passing {
         let way = |axis: usize| (centre[axis] - origin[axis]) * unit[axis];
         self.moments = [f64::from(self.loaded.area()), total, peak, way(0), way(1)];
         if let Some(half) = self.centre {
-            let Sums { total, x, y, .. } = self.loaded.sums(held);
+            let LoadedSums { total, x, y, .. } = self.loaded.sums(held);
             let [column, row] = [x / total / half[0] - 1.0, y / total / half[1] - 1.0];
             self.place = [column, column * column, row, row * row];
         }
@@ -342,7 +342,7 @@ impl Passing {
     }
 }
 
-impl Rule for Passing {
+impl Rule for LevelPass {
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {
             self.loaded.take_block(block, values);

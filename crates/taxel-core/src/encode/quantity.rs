@@ -41,7 +41,7 @@ impl Quantity {
         let mut local = LocalLoad { noise_floor, tare: tare.cloned(), ..LocalLoad::default() };
         local.least_noise *= step_of(noise_floor);
         let local = several.contains(&Self::LocalLoad).then(|| local.largest(array)).transpose()?;
-        let loads = Loads { quantities: several.to_vec(), values: vec![0.0; several.len()], local };
+        let loads = QuantityMeasure { quantities: several.to_vec(), values: vec![0.0; several.len()], local };
         Ok(Box::new(ByStamp::new(loads, loaded, array)))
     }
 
@@ -57,14 +57,14 @@ impl Quantity {
 
 /// Quantities, with their values at the end of the last stamp.
 #[derive(Clone)]
-struct Loads {
+struct QuantityMeasure {
     quantities: Vec<Quantity>,
     values: Vec<f32>,
     /// Computes the local load, if it is among the quantities.
     local: Option<LargestSum>,
 }
 
-impl Measure for Loads {
+impl Measure for QuantityMeasure {
     fn trains(&self) -> usize {
         self.quantities.len()
     }

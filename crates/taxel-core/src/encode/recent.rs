@@ -9,7 +9,7 @@ const LANES: usize = 4;
 /// A window of the past: its ages from (included) and to (excluded), us, and the number of the first quantities whose
 /// means are wanted.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Window {
+pub(super) struct PastWindow {
     pub(super) from: i64,
     pub(super) to: i64,
     pub(super) of: usize,
@@ -17,8 +17,8 @@ pub(super) struct Window {
 
 /// The samples that windows of the past need.
 #[derive(Clone)]
-pub(super) struct Recent {
-    windows: Vec<Window>,
+pub(super) struct RecentSamples {
+    windows: Vec<PastWindow>,
     /// Groups of quantities in a sample.
     groups: usize,
     /// Times of the samples, us; those before index `first` are no longer needed.
@@ -27,8 +27,8 @@ pub(super) struct Recent {
     first: usize,
 }
 
-impl Recent {
-    pub(super) fn new(quantities: usize, windows: &[Window]) -> Self {
+impl RecentSamples {
+    pub(super) fn new(quantities: usize, windows: &[PastWindow]) -> Self {
         let groups = quantities.div_ceil(LANES);
         Self { windows: windows.to_vec(), groups, times: vec![], samples: vec![], first: 0 }
     }
@@ -40,7 +40,7 @@ impl Recent {
             self.samples.push(std::array::from_fn(|lane| group.get(lane).copied().unwrap_or(0.0)));
         }
         for k in 0..self.windows.len() {
-            let Window { from, to, of } = self.windows[k];
+            let PastWindow { from, to, of } = self.windows[k];
             let (begin, end) = self.within(t, from, to);
             let rows = &self.samples[begin * self.groups..end * self.groups];
             let per = ((end - begin) as f64).recip();

@@ -74,7 +74,7 @@ const RECOVERED: f64 = 1e-12;
 /// The afferents of one block, aligned to cache lines so that no vector crosses a boundary.
 #[derive(Clone)]
 #[repr(align(64))]
-struct Afferent<S> {
+struct FilterBlock<S> {
     state: S,
     u: Lanes,
     /// The current rise of the threshold.
@@ -87,15 +87,15 @@ struct Afferent<S> {
 
 /// The afferents of one type, in blocks.
 #[derive(Clone)]
-pub(super) struct Afferents<F: Filter> {
+pub(super) struct FilterAfferents<F: Filter> {
     filter: F,
     firing: Firing,
     /// The factor by which the rise of the threshold decays in one sample.
     keep: f64,
-    blocks: Vec<Afferent<F::State>>,
+    blocks: Vec<FilterBlock<F::State>>,
 }
 
-impl<F: Filter> Afferents<F> {
+impl<F: Filter> FilterAfferents<F> {
     pub(super) fn new(filter: F, firing: Firing) -> Self {
         Self { filter, firing, keep: (-firing.period_ms / firing.recovery_ms).exp(), blocks: vec![] }
     }
@@ -107,7 +107,7 @@ impl<F: Filter> Afferents<F> {
             .map(|x| {
                 let (state, u) = self.filter.settled(x);
                 let raised = std::array::from_fn(|lane| (u[lane] - threshold).max(0.0));
-                Afferent { state, u, raised, wait: [0.0; BLOCK], still: false }
+                FilterBlock { state, u, raised, wait: [0.0; BLOCK], still: false }
             })
             .collect();
     }
@@ -181,16 +181,16 @@ impl<F: Filter> Afferents<F> {
 
 /// Afferents of one type, one per taxel.
 #[derive(Clone)]
-pub(super) struct ByTaxel<F: Filter> {
-    afferents: Afferents<F>,
+pub(super) struct TaxelAfferents<F: Filter> {
+    afferents: FilterAfferents<F>,
     /// Factor from the sensor's unit to fractions of the range.
     scale: f64,
     channels: usize,
 }
 
-impl<F: Filter> ByTaxel<F> {
+impl<F: Filter> TaxelAfferents<F> {
     pub(super) fn new(filter: F, firing: Firing, range: f64, channels: usize) -> Self {
-        Self { afferents: Afferents::new(filter, firing), scale: 1.0 / range, channels }
+        Self { afferents: FilterAfferents::new(filter, firing), scale: 1.0 / range, channels }
     }
 }
 
@@ -200,7 +200,7 @@ fn share(scale: f64, pressure: f32) -> f64 {
     f64::from(pressure.max(0.0)) * scale
 }
 
-impl<F: Filter> Rule for ByTaxel<F> {
+impl<F: Filter> Rule for TaxelAfferents<F> {
     fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
         debug_assert_eq!(held.len(), blocks(self.channels));
         let x: Vec<Lanes> = held.iter().map(|values| values.map(|value| share(self.scale, value))).collect();
@@ -295,7 +295,7 @@ mod tests {
                 held.chunks(BLOCK).map(block).collect()
             })
             .collect();
-        let mut rule = ByTaxel::new(filter.clone(), firing, range, channels);
+        let mut rule = TaxelAfferents::new(filter.clone(), firing, range, channels);
         let (mut out, mut left_out) = (vec![], 0);
         rule.begin(0, &frames[0], &mut out);
         for (t, pair) in (1..).zip(frames.windows(2)) {

@@ -62,7 +62,7 @@ impl RunningRange {
 
 /// The samples of the last window, and the time of the next update.
 #[derive(Clone)]
-pub(super) struct Window {
+pub(super) struct SampleWindow {
     low: f64,
     high: f64,
     length: i64,
@@ -84,7 +84,7 @@ pub(super) struct First {
     pub(super) samples: Vec<(i64, Vec<Block>)>,
 }
 
-impl Window {
+impl SampleWindow {
     pub(super) fn new(range: &RunningRange, blocks: usize) -> Result<Self> {
         Ok(Self {
             low: range.low,

@@ -77,7 +77,7 @@ wide! {
 
 /// The input of a stream: events or frames, never both.
 #[derive(Clone)]
-pub(super) enum Source {
+pub(super) enum StreamInput {
     Unknown,
     Events {
         /// Current time of the stream: later input counts as of this time or later.
@@ -91,40 +91,42 @@ pub(super) enum Source {
     },
 }
 
-impl Source {
+impl StreamInput {
     /// Advances the time by events; returns the time before them, `None` if there is no event.
     pub(super) fn events(&mut self, times: &[i64]) -> Result<Option<i64>> {
         let Some(&first) = times.first() else { return Ok(None) };
         let (before, mut late) = match *self {
-            Source::Frames { .. } => return Err(problem!("event at {first} us: this stream was begun with frames")),
-            Source::Events { present, late } => (present, late),
-            Source::Unknown => (first, 0),
+            StreamInput::Frames { .. } => {
+                return Err(problem!("event at {first} us: this stream was begun with frames"));
+            }
+            StreamInput::Events { present, late } => (present, late),
+            StreamInput::Unknown => (first, 0),
         };
         let mut present = before;
         for &t in times {
             present = present.max(t);
             late += u64::from(present - t > FARTHEST_BACK_US);
         }
-        *self = Source::Events { present, late };
+        *self = StreamInput::Events { present, late };
         Ok(Some(before))
     }
 
     /// Number of events that were too far behind the current time.
     pub(super) fn late(&self) -> u64 {
-        if let Source::Events { late, .. } = self { *late } else { 0 }
+        if let StreamInput::Events { late, .. } = self { *late } else { 0 }
     }
 
     /// Advances the time by a frame.
     pub(super) fn frame(&mut self, t: i64) -> Result<()> {
         match *self {
-            Source::Events { .. } => return Err(problem!("frame at {t} us: this stream was begun with events")),
-            Source::Frames { open } if t < open => {
+            StreamInput::Events { .. } => return Err(problem!("frame at {t} us: this stream was begun with events")),
+            StreamInput::Frames { open } if t < open => {
                 return Err(problem!("frame at {t} us: must come at {open} us or later, times ascend"));
             }
             _ if t.unsigned_abs() > FARTHEST => return Err(problem!("frame at {t} us: lies too far from 0")),
             _ => {}
         }
-        *self = Source::Frames { open: t + 1 };
+        *self = StreamInput::Frames { open: t + 1 };
         Ok(())
     }
 }
@@ -144,7 +146,7 @@ pub(super) struct Sampled<R> {
     held: Held<f32>,
     changed: Vec<bool>,
     quiet: bool,
-    source: Source,
+    source: StreamInput,
     /// The time of the next sample of events.
     next: i64,
     /// The time of the last sample, once begun.
@@ -186,7 +188,7 @@ impl<R: Rule> Sampled<R> {
             held: Held::all(n * BLOCK, 0.0),
             changed: vec![false; n],
             quiet: true,
-            source: Source::Unknown,
+            source: StreamInput::Unknown,
             next: 0,
             last: 0,
             begun: false,
@@ -263,7 +265,7 @@ impl<R: Rule> Stream for Sampled<R> {
         let Some(intensity) = &events.intensity else {
             return Err(problem!("events without intensities: this encoder reads held values, so record intensities"));
         };
-        let fresh = matches!(self.source, Source::Unknown);
+        let fresh = matches!(self.source, StreamInput::Unknown);
         let Some(mut present) = self.source.events(events.t)? else { return Ok(()) };
         if fresh {
             self.next = present;
@@ -298,13 +300,13 @@ impl<R: Rule> Stream for Sampled<R> {
         Ok(())
     }
 
-    fn hears_repaired_ms(&self) -> Option<f64> {
+    fn repaired_span_ms(&self) -> Option<f64> {
         R::SPIKES_OF_REPAIRED.then(|| ms(self.period) + self.latency_ms)
     }
 
     fn set_rest(&mut self, t: i64, place: usize, rest: f64, out: &mut Vec<Spike>) {
         let Some(channel) = self.channels.of_place(place) else { return };
-        if let Source::Events { present, .. } = &mut self.source {
+        if let StreamInput::Events { present, .. } = &mut self.source {
             *present = t.max(*present);
             self.sample_until(t, out);
         }
@@ -354,12 +356,12 @@ impl<R: Rule> Stream for Sampled<R> {
     fn advance(&mut self, t: i64, out: &mut Vec<Spike>) {
         let t = t.clamp(-(FARTHEST as i64), FARTHEST as i64);
         match &mut self.source {
-            Source::Unknown => return,
-            Source::Events { present, .. } => {
+            StreamInput::Unknown => return,
+            StreamInput::Events { present, .. } => {
                 *present = t.max(*present);
                 self.sample_until(t, out);
             }
-            Source::Frames { open } => *open = t.max(*open),
+            StreamInput::Frames { open } => *open = t.max(*open),
         }
         if self.begun {
             pass(&mut self.rule, t, out);
@@ -370,9 +372,9 @@ impl<R: Rule> Stream for Sampled<R> {
         // Rounded up, to include a spike that is due exactly after the latency.
         let latency = us(self.latency_ms).ceil() as i64;
         let end = match self.source {
-            Source::Unknown => return None,
-            Source::Events { present, .. } => present + self.period + latency,
-            Source::Frames { open } => open - 1 + latency,
+            StreamInput::Unknown => return None,
+            StreamInput::Events { present, .. } => present + self.period + latency,
+            StreamInput::Frames { open } => open - 1 + latency,
         };
         self.advance(end + 1, out);
         Some(ms(end))

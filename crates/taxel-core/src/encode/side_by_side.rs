@@ -6,13 +6,13 @@ use crate::{EventsView, Result, Spike, SpikeKind};
 
 /// A running part.
 #[derive(Clone)]
-struct Part {
+struct EncoderPart {
     /// The number of its first train in the whole.
     first: u32,
     stream: Box<dyn Stream>,
 }
 
-impl Part {
+impl EncoderPart {
     /// Appends spikes of the part to `out` as those of the whole.
     fn join(&self, spikes: Vec<Spike>, out: &mut Vec<Spike>) {
         let (kind, trains) = (self.stream.kind(), self.stream.trains() as u32);
@@ -27,7 +27,7 @@ impl Part {
 /// The parts as one stream.
 #[derive(Clone)]
 pub(super) struct SideBySide {
-    parts: Vec<Part>,
+    parts: Vec<EncoderPart>,
     trains: usize,
     kind: SpikeKind,
     /// Spikes that a spike of another part may still precede.
@@ -37,7 +37,7 @@ pub(super) struct SideBySide {
 impl SideBySide {
     /// Joins streams, each with the number of its first train in the whole, to one of so many `trains`.
     pub(super) fn new(streams: Vec<(usize, Box<dyn Stream>)>, trains: usize, kind: SpikeKind) -> Self {
-        let parts = streams.into_iter().map(|(first, stream)| Part { first: first as u32, stream }).collect();
+        let parts = streams.into_iter().map(|(first, stream)| EncoderPart { first: first as u32, stream }).collect();
         Self { parts, trains, kind, held: vec![] }
     }
 
@@ -81,8 +81,8 @@ impl Stream for SideBySide {
         Ok(())
     }
 
-    fn hears_repaired_ms(&self) -> Option<f64> {
-        self.parts.iter().filter_map(|part| part.stream.hears_repaired_ms()).reduce(f64::max)
+    fn repaired_span_ms(&self) -> Option<f64> {
+        self.parts.iter().filter_map(|part| part.stream.repaired_span_ms()).reduce(f64::max)
     }
 
     fn set_rest(&mut self, t: i64, place: usize, rest: f64, out: &mut Vec<Spike>) {

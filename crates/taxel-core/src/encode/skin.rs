@@ -10,7 +10,7 @@ use super::encoding::Encoding;
 use super::fa1::{self, Decay, Fa1};
 use super::fa2::{Fa2, Fast};
 use super::fields::Fields;
-use super::receptor::ByTaxel;
+use super::receptor::TaxelAfferents;
 use super::sa1::Sa1;
 use super::sa2::Sa2;
 use super::sampled::{Rule, Sampled};
@@ -185,7 +185,7 @@ impl Encoding for Skin {
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let placed = self.afferents(array)?;
-        let sampled = Sampled::new(self, Afferents::new(self, array, &placed)?, array, self.period_ms)?;
+        let sampled = Sampled::new(self, PlacedAfferents::new(self, array, &placed)?, array, self.period_ms)?;
         Ok(Box::new(sampled.steady().above(self.tare.as_ref(), array)?))
     }
 
@@ -300,14 +300,14 @@ impl<R: Rule> Type<R> {
 }
 
 #[derive(Clone)]
-struct Afferents {
-    sa1: Type<ByTaxel<Slow>>,
-    fa1: Type<fa1::Afferents>,
-    sa2: Type<ByTaxel<Slow>>,
-    fa2: Type<ByTaxel<Fast>>,
+struct PlacedAfferents {
+    sa1: Type<TaxelAfferents<Slow>>,
+    fa1: Type<fa1::Fa1Afferents>,
+    sa2: Type<TaxelAfferents<Slow>>,
+    fa2: Type<TaxelAfferents<Fast>>,
 }
 
-impl Afferents {
+impl PlacedAfferents {
     fn new(skin: &Skin, array: &Array, placed: &[Placed]) -> Result<Self> {
         let (range, period_ms) = (skin.range, skin.period_ms);
         let sa1 = Sa1 { range, period_ms, ..Sa1::default() };
@@ -318,15 +318,15 @@ impl Afferents {
         let of = |kind| placed.iter().filter(|p| p.kind == kind).collect::<Vec<_>>();
         let [a, b, c, d] = skin.types().map(|(kind, _, field)| (first(kind), of(kind), field));
         Ok(Self {
-            sa1: Type::new(ByTaxel::new(sa1.filter(), sa1.firing(), range, a.1.len()), array, a.0, &a.1, a.2)?,
-            fa1: Type::new(fa1::Afferents::new(&fa1), array, b.0, &b.1, b.2)?,
-            sa2: Type::new(ByTaxel::new(sa2.filter(), sa2.firing(), range, c.1.len()), array, c.0, &c.1, c.2)?,
-            fa2: Type::new(ByTaxel::new(fa2.filter(), fa2.firing(), range, d.1.len()), array, d.0, &d.1, d.2)?,
+            sa1: Type::new(TaxelAfferents::new(sa1.filter(), sa1.firing(), range, a.1.len()), array, a.0, &a.1, a.2)?,
+            fa1: Type::new(fa1::Fa1Afferents::new(&fa1), array, b.0, &b.1, b.2)?,
+            sa2: Type::new(TaxelAfferents::new(sa2.filter(), sa2.firing(), range, c.1.len()), array, c.0, &c.1, c.2)?,
+            fa2: Type::new(TaxelAfferents::new(fa2.filter(), fa2.firing(), range, d.1.len()), array, d.0, &d.1, d.2)?,
         })
     }
 }
 
-impl Rule for Afferents {
+impl Rule for PlacedAfferents {
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
         self.sa1.begin(t, held, out);
         self.fa1.begin(t, held, out);

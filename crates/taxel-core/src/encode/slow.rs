@@ -68,7 +68,7 @@ macro_rules! slowly_adapting {
     ($(#[$about:meta])* $Kind:ident, threshold: $threshold:expr, onset: $onset:expr, loss: $loss:expr) => {
         use super::channels::Channels;
         use super::encoding::Encoding;
-        use super::receptor::{ByTaxel, Firing};
+        use super::receptor::{TaxelAfferents, Firing};
         use super::sampled::Sampled;
         use super::slow::Slow;
         use super::stream::Stream;
@@ -141,7 +141,7 @@ macro_rules! slowly_adapting {
 
             fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
                 let channels = Channels::new(array).len();
-                let afferents = ByTaxel::new(self.filter(), self.firing(), self.range, channels);
+                let afferents = TaxelAfferents::new(self.filter(), self.firing(), self.range, channels);
                 let sampled = Sampled::new(self, afferents, array, self.period_ms)?;
                 Ok(Box::new(sampled.steady().above(self.tare.as_ref(), array)?))
             }

@@ -27,7 +27,7 @@ pub trait Stream: Send {
 
     /// The longest delay between an event that a state repaired and its spikes, ms; none for an encoder of changes,
     /// which moves its reference with such an event and emits no spike.
-    fn hears_repaired_ms(&self) -> Option<f64> {
+    fn repaired_span_ms(&self) -> Option<f64> {
         Some(self.latency_ms())
     }
 

@@ -30,7 +30,7 @@ pub struct ThresholdIzhikevich {
     pub levels: Vec<f64>,
     /// One of the two published parameter sets; default that of 6.5.1.
     #[serde(default)]
-    pub published: Published,
+    pub published: PublishedSet,
     /// The initial state of the neurons; default settled.
     #[serde(default)]
     pub begin: Begin,
@@ -41,7 +41,7 @@ pub struct ThresholdIzhikevich {
 
 /// The published parameter sets; both have b = 0.25, c = -65 mV, d = 6.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum Published {
+pub enum PublishedSet {
     /// Thesis 3.4.3: a = 0.02, I = 0.5; latency 20.2 ms.
     #[serde(rename = "3.4.3")]
     Curvature,
@@ -51,13 +51,13 @@ pub enum Published {
     Gait,
 }
 
-impl Published {
+impl PublishedSet {
     /// Latency from the input's step to the spike of a settled neuron, ms.
     #[must_use]
     pub fn latency_ms(self) -> f64 {
         match self {
-            Published::Curvature => 20.2,
-            Published::Gait => 15.8,
+            PublishedSet::Curvature => 20.2,
+            PublishedSet::Gait => 15.8,
         }
     }
 }
@@ -88,7 +88,7 @@ impl ThresholdIzhikevich {
     /// An encoder with the neurons of 6.5.1 and these levels.
     #[must_use]
     pub fn at(levels: Vec<f64>) -> Self {
-        let (published, begin) = (Published::default(), Begin::default());
+        let (published, begin) = (PublishedSet::default(), Begin::default());
         Self { levels, published, begin, period_ms: super::periods::stamp_period() }
     }
 }
@@ -131,10 +131,10 @@ struct Model {
 }
 
 impl Model {
-    fn published(which: Published) -> Self {
+    fn published(which: PublishedSet) -> Self {
         let (a, gain) = match which {
-            Published::Curvature => (0.02, 0.5),
-            Published::Gait => (0.005, 0.6),
+            PublishedSet::Curvature => (0.02, 0.5),
+            PublishedSet::Gait => (0.005, 0.6),
         };
         Self { a, gain, dt: 0.1 }
     }
@@ -169,7 +169,7 @@ impl Model {
 const LANES: usize = 8;
 
 #[derive(Clone)]
-struct Neurons {
+struct IzhikevichNeurons {
     v: [f64; LANES],
     u: [f64; LANES],
     input: [f64; LANES],
@@ -177,7 +177,7 @@ struct Neurons {
     still: bool,
 }
 
-impl Neurons {
+impl IzhikevichNeurons {
     /// Computes `steps` steps; calls `fired` with the step and lane of each spike.
     #[inline(always)]
     fn run(&mut self, model: Model, steps: i64, mut fired: impl FnMut(i64, usize)) {
@@ -228,8 +228,8 @@ struct Pairs {
     bracket: Bracket,
     /// Whether each train's taxel is at or above its level; padded to a multiple of eight.
     on: Vec<[bool; LANES]>,
-    rises: Vec<Neurons>,
-    falls: Vec<Neurons>,
+    rises: Vec<IzhikevichNeurons>,
+    falls: Vec<IzhikevichNeurons>,
     /// The start of the next step, us.
     next: i64,
     /// Spikes of steps that began before the current time and end after it.
@@ -239,7 +239,7 @@ struct Pairs {
 impl Pairs {
     fn new(parameters: &ThresholdIzhikevich, channels: usize) -> Self {
         let (v, u) = Model::rest();
-        let neurons = Neurons { v: [v; LANES], u: [u; LANES], input: [0.0; LANES], still: false };
+        let neurons = IzhikevichNeurons { v: [v; LANES], u: [u; LANES], input: [0.0; LANES], still: false };
         let groups = (channels * parameters.levels.len()).div_ceil(LANES);
         Self {
             model: Model::published(parameters.published),
@@ -370,11 +370,11 @@ mod tests {
     use super::*;
 
     /// Time from the onset of an input to the resting neuron's first spike, ms.
-    fn latency(which: Published, gain: Option<f64>, dt: f64) -> Option<f64> {
+    fn latency(which: PublishedSet, gain: Option<f64>, dt: f64) -> Option<f64> {
         let published = Model::published(which);
         let model = Model { dt, gain: gain.unwrap_or(published.gain), ..published };
         let (v, u) = Model::rest();
-        let mut neurons = Neurons { v: [v; LANES], u: [u; LANES], input: [model.gain; LANES], still: false };
+        let mut neurons = IzhikevichNeurons { v: [v; LANES], u: [u; LANES], input: [model.gain; LANES], still: false };
         let mut spikes = vec![];
         neurons.run(model, (500.0 / dt) as i64, |step, lane| spikes.push((step, lane)));
         assert!(spikes.len() <= LANES || gain.is_some(), "phasic: one spike a step of the input");
@@ -384,8 +384,8 @@ mod tests {
     #[test]
     fn latencies_are_the_known_ones_at_every_step() {
         for (which, known) in [
-            (Published::Curvature, [(1.0, 23.0), (0.2, 20.6), (0.1, 20.2), (0.05, 20.05), (0.01, 19.92)]),
-            (Published::Gait, [(1.0, 18.0), (0.2, 16.2), (0.1, 15.8), (0.05, 15.7), (0.01, 15.53)]),
+            (PublishedSet::Curvature, [(1.0, 23.0), (0.2, 20.6), (0.1, 20.2), (0.05, 20.05), (0.01, 19.92)]),
+            (PublishedSet::Gait, [(1.0, 18.0), (0.2, 16.2), (0.1, 15.8), (0.05, 15.7), (0.01, 15.53)]),
         ] {
             for (dt, wanted) in known {
                 let got = latency(which, None, dt).unwrap();
@@ -398,13 +398,13 @@ mod tests {
 
     #[test]
     fn weak_inputs_come_late_or_never() {
-        assert_eq!(latency(Published::Curvature, Some(0.3), 0.1), None);
-        assert!(latency(Published::Curvature, Some(0.4), 0.1).unwrap() > 23.0);
+        assert_eq!(latency(PublishedSet::Curvature, Some(0.3), 0.1), None);
+        assert!(latency(PublishedSet::Curvature, Some(0.4), 0.1).unwrap() > 23.0);
     }
 
     #[test]
     fn settled_neurons_are_fixed_points_so_that_leaving_steps_out_is_exact() {
-        for which in [Published::Curvature, Published::Gait] {
+        for which in [PublishedSet::Curvature, PublishedSet::Gait] {
             let model = Model::published(which);
             for input in [0.0, model.gain] {
                 let (v, u) = model.settled(input);
@@ -415,9 +415,9 @@ mod tests {
 
     #[test]
     fn groups_that_are_left_out_while_still_spike_as_single_steps_do() {
-        let model = Model::published(Published::Gait);
+        let model = Model::published(PublishedSet::Gait);
         let (v, u) = model.settled(0.0);
-        let mut grouped = Neurons { v: [v; LANES], u: [u; LANES], input: [0.0; LANES], still: false };
+        let mut grouped = IzhikevichNeurons { v: [v; LANES], u: [u; LANES], input: [0.0; LANES], still: false };
         let mut plain: Vec<(f64, f64)> = vec![(v, u); LANES];
         let (mut got, mut wanted) = (vec![], vec![]);
         for (begin, lane, input) in [(0, 0, 0.0), (400, 3, 0.6), (900, 5, 0.6), (1000, 3, 0.0), (90_000, 0, 0.6)] {

@@ -8,6 +8,6 @@ mod mix;
 mod raised;
 mod shortest;
 
-pub(crate) use cone_r::Asked;
+pub(crate) use cone_r::PatternDemand;
 pub use cone_r::{ConeR, ConeRFit, ConeRProblem, GapMultipliers, Shares};
 pub use cone_x::{ConeX, ConeXFit, ConeXProblem, Horizon};

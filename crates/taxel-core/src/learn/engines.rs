@@ -9,7 +9,7 @@ mod nearest;
 mod rounds;
 mod touched;
 
-pub(crate) use augmented::Start;
+pub(crate) use augmented::WarmStart;
 pub(crate) use cone_program::{ConeProgram, HardRows, Hinges};
-pub use dual_active_set::{DualActiveSet, Multipliers, Outcome, Ray, RowId};
+pub use dual_active_set::{DualActiveSet, Multipliers, Ray, RowId, SolveOutcome};
 pub(crate) use nearest::nearest;

@@ -20,14 +20,13 @@ mod targets;
 pub use bounds::{Bound, Bounds};
 pub(crate) use bounds::{bounds_of, check_bounds};
 pub use certificate::Certificate;
-pub(crate) use examples::{
-    check_example, check_examples, check_pattern, check_silence, check_some_target, check_trains, check_untargeted,
-};
+pub(crate) use examples::{check_example, check_silence};
+pub use examples::{check_examples, check_pattern, check_some_target, check_trains};
 pub(crate) use objective::{Choice, NOTHING, Objective, relative_gap};
 pub use objective::{Divisor, DivisorC, DivisorD, Norm, Parts, Sides};
-pub(crate) use peak::{Peak, exceeds, largest};
-pub(crate) use relaxed::{Point, Proof, Relaxed, Tangents};
-pub use rows::{Margin, Row, Stated, Statement};
+pub(crate) use peak::{SilencePeak, exceeds, largest};
+pub(crate) use relaxed::{Relaxed, RelaxedPoint, RelaxedProof, Tangents};
+pub use rows::{Margin, Row, StatedRow, Statement};
 pub(crate) use rows::{end_of, until};
 pub(crate) use silence::Silence;
 pub(crate) use targets::Targets;

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::pairwise::{Matrix, Work};
+use super::pairwise::{DistanceMatrix, Work};
 use super::patterns::Patterns;
 use crate::parameters::Described;
 use crate::{Result, Stop};
@@ -27,7 +27,7 @@ pub(super) trait Ready: Sync {
     fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64>;
 
     /// Fills a whole matrix if there is a faster way than pair by pair, and returns whether there is.
-    fn fill(&self, _: &Matrix, _: &Patterns<'_>, _: Option<&Patterns<'_>>, _: &mut Work<'_>) -> Result<bool> {
+    fn fill(&self, _: &DistanceMatrix, _: &Patterns<'_>, _: Option<&Patterns<'_>>, _: &mut Work<'_>) -> Result<bool> {
         Ok(false)
     }
 }

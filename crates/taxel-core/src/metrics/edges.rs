@@ -7,15 +7,15 @@ use crate::{Result, Stop, problem};
 
 /// The start and end of the time that counts, ms.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Window {
+pub(super) struct ObservationWindow {
     pub(super) start: f64,
     pub(super) stop: f64,
 }
 
 /// A distance of two ascending trains inside a window.
 pub(super) struct Within {
-    pub(super) window: Window,
-    pub(super) between: fn(&[f64], &[f64], Window) -> f64,
+    pub(super) window: ObservationWindow,
+    pub(super) between: fn(&[f64], &[f64], ObservationWindow) -> f64,
 }
 
 impl Ready for Within {
@@ -25,7 +25,11 @@ impl Ready for Within {
 }
 
 /// The given window, or by default the widest of the patterns' own; every spike must be inside.
-pub(super) fn window(asked: Option<(f64, f64)>, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Window> {
+pub(super) fn window(
+    asked: Option<(f64, f64)>,
+    a: &Patterns<'_>,
+    b: Option<&Patterns<'_>>,
+) -> Result<ObservationWindow> {
     let sides = || std::iter::once(a).chain(b);
     let widest = || {
         sides().map(|p| p.window).try_fold((f64::INFINITY, f64::NEG_INFINITY), |wide, own| {
@@ -47,7 +51,7 @@ pub(super) fn window(asked: Option<(f64, f64)>, a: &Patterns<'_>, b: Option<&Pat
             }
         }
     }
-    Ok(Window { start, stop })
+    Ok(ObservationWindow { start, stop })
 }
 
 /// Declares a distance that is the mean of a profile over the window, which the function `between` of its file computes.
@@ -80,17 +84,17 @@ macro_rules! averaged {
 pub(super) use averaged;
 
 /// A train with at least one spike, walked interval by interval.
-pub(super) struct Walk<'s> {
+pub(super) struct IntervalWalk<'s> {
     pub(super) spikes: &'s [f64],
-    pub(super) window: Window,
+    pub(super) window: ObservationWindow,
     /// The number of spikes already passed.
     pub(super) k: usize,
     /// The length of the present interval, ms.
     pub(super) interval: f64,
 }
 
-impl<'s> Walk<'s> {
-    fn new(spikes: &'s [f64], window: Window) -> Self {
+impl<'s> IntervalWalk<'s> {
+    fn new(spikes: &'s [f64], window: ObservationWindow) -> Self {
         let k = begun(spikes, window);
         Self { spikes, window, k, interval: interval(spikes, k, window) }
     }
@@ -109,8 +113,13 @@ impl<'s> Walk<'s> {
 
 /// The mean over the window, 0 if it has no duration, of a profile whose integral over each piece without a spike in it
 /// is `piece`, of both trains and the piece's start and end.
-pub(super) fn mean(a: &[f64], b: &[f64], window: Window, piece: impl Fn(&Walk<'_>, &Walk<'_>, f64, f64) -> f64) -> f64 {
-    let (mut a, mut b) = (Walk::new(a, window), Walk::new(b, window));
+pub(super) fn mean(
+    a: &[f64],
+    b: &[f64],
+    window: ObservationWindow,
+    piece: impl Fn(&IntervalWalk<'_>, &IntervalWalk<'_>, f64, f64) -> f64,
+) -> f64 {
+    let (mut a, mut b) = (IntervalWalk::new(a, window), IntervalWalk::new(b, window));
     let (mut sum, mut last) = (0.0, window.start);
     loop {
         let (next_a, next_b) = (a.next(), b.next());
@@ -130,7 +139,7 @@ pub(super) fn mean(a: &[f64], b: &[f64], window: Window, piece: impl Fn(&Walk<'_
 }
 
 /// The spikes as these distances use them: without duplicates; an empty train gets a spike at each end of the window.
-pub(super) fn distinct(train: &[f64], window: Window) -> Vec<f64> {
+pub(super) fn distinct(train: &[f64], window: ObservationWindow) -> Vec<f64> {
     if train.is_empty() {
         return vec![window.start, window.stop];
     }
@@ -143,7 +152,7 @@ pub(super) fn distinct(train: &[f64], window: Window) -> Vec<f64> {
 ///
 /// Before the first and after the last spike the interval extends to the window's edge, or is as long as the
 /// neighbouring interval if that is longer.
-fn interval(spikes: &[f64], k: usize, window: Window) -> f64 {
+fn interval(spikes: &[f64], k: usize, window: ObservationWindow) -> f64 {
     let n = spikes.len();
     let beside = |j: usize| if n > 1 { spikes[j + 1] - spikes[j] } else { 0.0 };
     if k == 0 {
@@ -156,6 +165,6 @@ fn interval(spikes: &[f64], k: usize, window: Window) -> f64 {
 }
 
 /// The number of spikes at the window's start: 0 or 1.
-pub(super) fn begun(spikes: &[f64], window: Window) -> usize {
+pub(super) fn begun(spikes: &[f64], window: ObservationWindow) -> usize {
     usize::from(spikes[0] <= window.start)
 }

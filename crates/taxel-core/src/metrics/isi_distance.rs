@@ -1,7 +1,7 @@
 //! ISI distance: the difference between the trains' interspike intervals, averaged over time.
 
 use super::distance::{Distance, Ready};
-use super::edges::{Window, Within, averaged, distinct, mean};
+use super::edges::{ObservationWindow, Within, averaged, distinct, mean};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
 use crate::Result;
@@ -17,7 +17,7 @@ averaged! {
 }
 
 /// The distance between two ascending trains inside the window.
-fn between(a: &[f64], b: &[f64], window: Window) -> f64 {
+fn between(a: &[f64], b: &[f64], window: ObservationWindow) -> f64 {
     mean(&distinct(a, window), &distinct(b, window), window, |a, b, start, end| {
         let (x, y) = (a.interval, b.interval);
         (x - y).abs() / x.max(y) * (end - start)

@@ -78,14 +78,14 @@ pub fn in_order(found: &[i64], truth: &[i64], windows: &[i64], stop: Stop<'_>) -
     }
 
     #[derive(Clone, Copy)]
-    enum Step {
+    enum AlignmentStep {
         PassDetection,
         PassEvent,
         Match,
     }
     // A single number orders by more pairs, then by less distance: distances sum to less than 2^64.
     const PAIR: i128 = 1 << 64;
-    let mut steps: Vec<Vec<Step>> = Vec::with_capacity(rows);
+    let mut steps: Vec<Vec<AlignmentStep>> = Vec::with_capacity(rows);
     let mut above: Vec<i128> = vec![0];
     let (mut above_low, mut above_high) = (0, 0);
     for i in 0..rows {
@@ -96,15 +96,15 @@ pub fn in_order(found: &[i64], truth: &[i64], windows: &[i64], stop: Stop<'_>) -
         row.push(from_above(low[i]));
         for j in low[i]..high[i] {
             let apart = found[j].abs_diff(truth[i]);
-            let (mut best, mut step) = (from_above(j + 1), Step::PassEvent);
+            let (mut best, mut step) = (from_above(j + 1), AlignmentStep::PassEvent);
             let left = row[j - low[i]];
             if left > best {
-                (best, step) = (left, Step::PassDetection);
+                (best, step) = (left, AlignmentStep::PassDetection);
             }
             if apart <= windows[i].unsigned_abs() {
                 let pair = from_above(j) + PAIR - i128::from(apart);
                 if pair > best {
-                    (best, step) = (pair, Step::Match);
+                    (best, step) = (pair, AlignmentStep::Match);
                 }
             }
             row.push(best);
@@ -120,9 +120,9 @@ pub fn in_order(found: &[i64], truth: &[i64], windows: &[i64], stop: Stop<'_>) -
         j = j.min(high[i]);
         while j > low[i] {
             match steps[i][j - 1 - low[i]] {
-                Step::PassDetection => j -= 1,
-                Step::PassEvent => break,
-                Step::Match => {
+                AlignmentStep::PassDetection => j -= 1,
+                AlignmentStep::PassEvent => break,
+                AlignmentStep::Match => {
                     j -= 1;
                     pairs.push((j, i));
                     break;

@@ -105,7 +105,7 @@ impl<'a> Work<'a> {
 /// The distances of all pairs while they are computed.
 ///
 /// The cells are atomic so that any thread may write any cell; no two threads write the same cell at once.
-pub(super) struct Matrix {
+pub(super) struct DistanceMatrix {
     rows: usize,
     columns: usize,
     /// Whether rows and columns are the same patterns: then only cells above the diagonal are computed, and mirrored.
@@ -113,7 +113,7 @@ pub(super) struct Matrix {
     cells: Vec<AtomicU64>,
 }
 
-impl Matrix {
+impl DistanceMatrix {
     /// A matrix of zeros for `rows` patterns against `columns` others, or against each other.
     pub(super) fn new(rows: usize, columns: Option<usize>) -> Self {
         let width = columns.unwrap_or(rows);

@@ -1,7 +1,7 @@
 //! SPIKE distance: the distance of spikes to the nearest spikes of the other train, averaged over time.
 
 use super::distance::{Distance, Ready};
-use super::edges::{Walk, Window, Within, averaged, begun, distinct, mean};
+use super::edges::{IntervalWalk, ObservationWindow, Within, averaged, begun, distinct, mean};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
 use crate::Result;
@@ -17,11 +17,11 @@ averaged! {
 }
 
 /// The distance between two ascending trains inside the window.
-fn between(a: &[f64], b: &[f64], window: Window) -> f64 {
+fn between(a: &[f64], b: &[f64], window: ObservationWindow) -> f64 {
     let (a, b) = (distinct(a, window), distinct(b, window));
     let (far_a, far_b) = (Far::new(&a, &b, window), Far::new(&b, &a, window));
     // The profile at `t`, which must be inside the present intervals of both trains.
-    let profile = |a: &Walk<'_>, b: &Walk<'_>, t: f64| {
+    let profile = |a: &IntervalWalk<'_>, b: &IntervalWalk<'_>, t: f64| {
         let sum = a.interval + b.interval;
         2.0 * (far_a.at(a, t) * (b.interval / sum) + far_b.at(b, t) * (a.interval / sum)) / sum
     };
@@ -38,7 +38,7 @@ struct Far {
 }
 
 impl Far {
-    fn new(spikes: &[f64], other: &[f64], window: Window) -> Self {
+    fn new(spikes: &[f64], other: &[f64], window: ObservationWindow) -> Self {
         // Outside its own spikes the other train gets one more on either side, at the distance of its edge intervals.
         let m = other.len();
         let beyond = |j: usize| if m > 1 { other[j + 1] - other[j] } else { 0.0 };
@@ -57,7 +57,7 @@ impl Far {
     }
 
     /// The distance of the spikes around `t` to the other train, ms: linear between spikes, constant outside.
-    fn at(&self, walk: &Walk<'_>, t: f64) -> f64 {
+    fn at(&self, walk: &IntervalWalk<'_>, t: f64) -> f64 {
         let (k, n) = (walk.k, walk.spikes.len());
         if k == 0 {
             return self.nearest[0];

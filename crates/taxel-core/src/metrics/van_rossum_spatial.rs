@@ -72,7 +72,7 @@ impl Smoothing {
     }
 
     /// The kernel for these patterns; each train must have a taxel in the array.
-    pub(super) fn laid_out(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Kernel> {
+    pub(super) fn smoothing_kernel(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<SmoothingKernel> {
         let taxels = self.array.len();
         for side in std::iter::once(a).chain(b) {
             if side.trains % taxels != 0 {
@@ -89,7 +89,7 @@ impl Smoothing {
                 }
             }
         }
-        Kernel::new(self)
+        SmoothingKernel::new(self)
     }
 }
 
@@ -117,23 +117,23 @@ impl Distance for VanRossumSpatial {
     }
 
     fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        Ok(Box::new(Smoothed(self, self.smoothing.laid_out(a, b)?)))
+        Ok(Box::new(SmoothedDistance(self, self.smoothing.smoothing_kernel(a, b)?)))
     }
 }
 
-struct Smoothed<'m>(&'m VanRossumSpatial, Kernel);
+struct SmoothedDistance<'m>(&'m VanRossumSpatial, SmoothingKernel);
 
 impl VanRossumSpatial {
     /// The distance between two patterns.
-    pub(super) fn between(&self, kernel: &Kernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
+    pub(super) fn between(&self, kernel: &SmoothingKernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         Ok(self.normalisation.root(self.square(kernel, a, b, stop)?, self.smoothing.tau))
     }
 
     /// The squared distance between two patterns, in units of tau / 2.
-    fn square(&self, kernel: &Kernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
+    fn square(&self, kernel: &SmoothingKernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         let tau = self.smoothing.tau;
         let mut square = 0.0;
-        kernel.walk(tau, a, b, Gauge::Squares, stop, |sum, from, to| {
+        kernel.walk(tau, a, b, SmoothingState::Squares, stop, |sum, from, to| {
             square -= sum * (-2.0 * (to - from) / tau).exp_m1();
         })?;
         Ok(square)
@@ -141,7 +141,7 @@ impl VanRossumSpatial {
 }
 
 /// The contribution of each taxel's spikes to every taxel's smoothed train.
-pub(super) struct Kernel {
+pub(super) struct SmoothingKernel {
     rows: usize,
     columns: usize,
     exists: Option<Vec<bool>>,
@@ -152,7 +152,7 @@ pub(super) struct Kernel {
 
 /// The quantity that is summed over taxels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Gauge {
+pub(super) enum SmoothingState {
     Squares,
     Absolutes,
 }
@@ -160,7 +160,7 @@ pub(super) enum Gauge {
 /// Heights are stored in units that grow with time, and rescaled when the power exceeds this.
 const HIGHEST: f64 = 200.0;
 
-impl Kernel {
+impl SmoothingKernel {
     fn new(smoothing: &Smoothing) -> Result<Self> {
         let array = &smoothing.array;
         let pitch = array.pitch("the distance over the array")?;
@@ -197,7 +197,7 @@ impl Kernel {
         tau: f64,
         (a, p): Pattern<'_>,
         (b, q): Pattern<'_>,
-        gauge: Gauge,
+        gauge: SmoothingState,
         stop: Stop<'_>,
         mut stretch: impl FnMut(f64, f64, f64),
     ) -> Result<()> {
@@ -225,7 +225,7 @@ impl Kernel {
             for &(_, n, more) in group {
                 self.add(&mut heights, n, more * risen);
             }
-            sum = self.total(&heights, gauge) / if gauge == Gauge::Squares { risen * risen } else { risen };
+            sum = self.total(&heights, gauge) / if gauge == SmoothingState::Squares { risen * risen } else { risen };
             last = t;
         }
         if sum > 0.0 {
@@ -245,8 +245,8 @@ impl Kernel {
         }
     }
 
-    fn total(&self, heights: &[f64], gauge: Gauge) -> f64 {
-        let of = |h: f64| if gauge == Gauge::Squares { h * h } else { h.abs() };
+    fn total(&self, heights: &[f64], gauge: SmoothingState) -> f64 {
+        let of = |h: f64| if gauge == SmoothingState::Squares { h * h } else { h.abs() };
         if let Some(exists) = &self.exists {
             return heights.iter().zip(exists.iter().cycle()).filter(|(_, there)| **there).map(|(&h, _)| of(h)).sum();
         }

@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::distance::{Distance, Pattern, Ready};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
-use super::van_rossum_spatial::{Gauge, Kernel, Smoothing};
+use super::van_rossum_spatial::{SmoothingState, SmoothingKernel, Smoothing};
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop};
@@ -43,13 +43,13 @@ impl Distance for VanRossumSpatialAbsolute {
     }
 
     fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        Ok(Box::new(Smoothed(self, self.smoothing.laid_out(a, b)?)))
+        Ok(Box::new(SmoothedAbsolute(self, self.smoothing.smoothing_kernel(a, b)?)))
     }
 }
 
-struct Smoothed<'m>(&'m VanRossumSpatialAbsolute, Kernel);
+struct SmoothedAbsolute<'m>(&'m VanRossumSpatialAbsolute, SmoothingKernel);
 
-impl Ready for Smoothed<'_> {
+impl Ready for SmoothedAbsolute<'_> {
     fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         self.0.between(&self.1, a, b, stop)
     }
@@ -61,12 +61,12 @@ impl VanRossumSpatialAbsolute {
     }
 
     /// The distance between two patterns.
-    pub(super) fn between(&self, kernel: &Kernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
+    pub(super) fn between(&self, kernel: &SmoothingKernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         let tau = self.smoothing.tau;
         let exposure = Exposure::new(tau, self.window, self.step_ms);
         let mut sum = 0.0;
         kernel
-            .walk(tau, a, b, Gauge::Absolutes, stop, |height, from, to| sum += height * exposure.between(from, to))?;
+            .walk(tau, a, b, SmoothingState::Absolutes, stop, |height, from, to| sum += height * exposure.between(from, to))?;
         Ok(sum)
     }
 }

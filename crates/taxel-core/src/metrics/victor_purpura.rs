@@ -5,13 +5,13 @@ mod lanes;
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, Pattern, Ready, number_or_name, summed};
-use super::pairwise::{Matrix, Work};
+use super::pairwise::{DistanceMatrix, Work};
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::vectors::Instructions;
 use crate::{Result, Stop};
-use lanes::{Block, lanes};
+use lanes::{TrainBlock, lanes};
 
 /// The least cost of turning one train into the other: 1 for each spike removed or added, `q |dt|` for each spike
 /// moved.
@@ -49,7 +49,7 @@ impl Ready for &VictorPurpura {
     ///
     /// Train after train, the columns' trains are sorted by length, so that trains processed side by side have similar
     /// lengths.
-    fn fill(&self, matrix: &Matrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
+    fn fill(&self, matrix: &DistanceMatrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
         if !self.has_reach() || work.instructions == Instructions::Plain {
             return Ok(false);
         }
@@ -59,9 +59,9 @@ impl Ready for &VictorPurpura {
         for n in 0..a.trains {
             let mut order: Vec<usize> = (0..others.count).collect();
             order.sort_by_key(|&p| others.train(p, n).len());
-            let blocks: Vec<Block> = order
+            let blocks: Vec<TrainBlock> = order
                 .chunks(lanes)
-                .map(|chunk| Block::new(lanes, &chunk.iter().map(|&p| others.train(p, n)).collect::<Vec<_>>()))
+                .map(|chunk| TrainBlock::new(lanes, &chunk.iter().map(|&p| others.train(p, n)).collect::<Vec<_>>()))
                 .collect();
             // For patterns against each other, a row is compared with those that follow in the order.
             let row = |at: usize| if b.is_some() { (at, 0) } else { (order[at], at + 1) };

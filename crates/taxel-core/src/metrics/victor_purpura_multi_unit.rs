@@ -127,13 +127,13 @@ impl<'m> Matching<'m> {
             let mut reached = vec![(start, 0.0)];
             let mut at = 0;
             // The best end found so far: a free column, or a row that becomes unmatched.
-            let (mut least, mut end) = (f64::INFINITY, End::Row(start));
+            let (mut least, mut end) = (f64::INFINITY, PathEnd::Row(start));
             loop {
                 while let Some(&(row, here)) = reached.get(at) {
                     at += 1;
                     let base = here - self.height[row];
                     if base + APART < least {
-                        (least, end) = (base + APART, End::Row(row));
+                        (least, end) = (base + APART, PathEnd::Row(row));
                     }
                     for column in self.near(row) {
                         let pair = self.costs.pair(self.rows[row], self.columns[column]);
@@ -147,7 +147,7 @@ impl<'m> Matching<'m> {
                             }
                             (far[column], from[column]) = (there, row);
                             if self.of_column[column].is_none() {
-                                (least, end) = (there, End::Column(column));
+                                (least, end) = (there, PathEnd::Column(column));
                             } else {
                                 next.push(Reverse(Ordered(there, column)));
                             }
@@ -197,10 +197,10 @@ impl<'m> Matching<'m> {
     }
 
     /// Exchanges partners along the path from `start` to its end.
-    fn turn(&mut self, start: usize, end: End, from: &[usize]) {
+    fn turn(&mut self, start: usize, end: PathEnd, from: &[usize]) {
         let (mut row, mut column) = match end {
-            End::Row(row) => (row, self.of_row[row].take()),
-            End::Column(column) => {
+            PathEnd::Row(row) => (row, self.of_row[row].take()),
+            PathEnd::Column(column) => {
                 let row = from[column];
                 let before = self.of_row[row].replace(column);
                 self.of_column[column] = Some(row);
@@ -218,7 +218,7 @@ impl<'m> Matching<'m> {
 
 /// The end of an augmenting path.
 #[derive(Debug, Clone, Copy)]
-enum End {
+enum PathEnd {
     /// A row that becomes unmatched.
     Row(usize),
     /// A column that was unmatched.

@@ -19,12 +19,14 @@ pub enum Kernel {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shape {
     pub(crate) kernel: Kernel,
-    pub(crate) tau: f64,
-    pub(crate) tau_s: f64,
+    /// Its time constant, ms.
+    pub tau: f64,
+    /// Its second one, ms.
+    pub tau_s: f64,
     /// `V0`.
-    pub(crate) scale: f64,
+    pub scale: f64,
     /// `1/tau_s - 1/tau`.
-    pub(crate) rate: f64,
+    pub rate: f64,
 }
 
 /// The state of a weighted sum of kernels without further input.

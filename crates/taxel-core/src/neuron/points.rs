@@ -8,19 +8,21 @@ use super::rounding_ms;
 use crate::{Result, problem};
 
 /// Limits on the points that are stored (a few GB), and on those that are stepped through (about ten seconds).
-pub(crate) const MOST_LAID_OUT: f64 = 2e7;
+pub const MOST_LAID_OUT: f64 = 2e7;
 pub(super) const MOST_STEPPED: f64 = 1e9;
 
 /// The points `start + k step_ms`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Grid {
-    pub(crate) start: f64,
-    pub(crate) step_ms: f64,
+pub struct Grid {
+    /// The time of point 0, ms.
+    pub start: f64,
+    /// The time between points, ms.
+    pub step_ms: f64,
 }
 
 /// A time relative to the nearest point of a grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct GridTime {
+pub struct GridTime {
     /// The number of the nearest point.
     point: f64,
     /// The time since that point, ms; 0 at the point itself, negative before it.
@@ -29,44 +31,46 @@ pub(crate) struct GridTime {
 
 impl GridTime {
     /// The point with number `point` itself.
-    pub(crate) fn at(point: f64) -> Self {
+    pub fn at(point: f64) -> Self {
         Self { point, rest: 0.0 }
     }
 
     /// Whether the time is exactly a grid point.
-    pub(crate) fn is_point(self) -> bool {
+    pub fn is_point(self) -> bool {
         self.rest == 0.0
     }
 
     /// The first point at or after the time.
-    pub(crate) fn from(self) -> f64 {
+    pub fn from(self) -> f64 {
         if self.rest > 0.0 { self.point + 1.0 } else { self.point }
     }
 
     /// The first point after the time.
-    pub(crate) fn behind(self) -> f64 {
+    pub fn behind(self) -> f64 {
         if self.rest >= 0.0 { self.point + 1.0 } else { self.point }
     }
 
     /// The last point at or before the time.
-    pub(crate) fn until(self) -> f64 {
+    pub fn until(self) -> f64 {
         if self.rest < 0.0 { self.point - 1.0 } else { self.point }
     }
 }
 
 impl Grid {
-    pub(crate) fn new(start: f64, step_ms: f64) -> Self {
+    /// The grid of these.
+    #[must_use]
+    pub fn new(start: f64, step_ms: f64) -> Self {
         Self { start, step_ms }
     }
 
     /// The time of a point, ms.
-    pub(crate) fn time(&self, point: f64) -> f64 {
+    pub fn time(&self, point: f64) -> f64 {
         self.start + point * self.step_ms
     }
 
     /// The place of a time. The nearest point's rounded time decides whether `t` is before or after it; the distance is
     /// exact.
-    pub(crate) fn place(&self, t: f64) -> GridTime {
+    pub fn place(&self, t: f64) -> GridTime {
         let since = t - self.start;
         let point = (since / self.step_ms).round();
         let rounded = self.time(point);
@@ -81,29 +85,29 @@ impl Grid {
     }
 
     /// Whether a time is at or before a point, within rounding.
-    pub(crate) fn has_come(&self, t: f64, point: f64) -> bool {
+    pub fn has_come(&self, t: f64, point: f64) -> bool {
         let now = self.time(point);
         t <= now + rounding_ms(now)
     }
 
     /// Whether a time is a grid point, within rounding.
-    pub(crate) fn is_at_point(&self, t: f64) -> bool {
+    pub fn is_at_point(&self, t: f64) -> bool {
         self.place(t).rest.abs() <= rounding_ms(t)
     }
 
     /// The first point at or after a time, within rounding.
-    pub(crate) fn first_from(&self, t: f64) -> f64 {
+    pub fn first_from(&self, t: f64) -> f64 {
         let nearest = self.place(t).point;
         if self.has_come(t, nearest) { nearest } else { nearest + 1.0 }
     }
 
     /// The time from `from` to `to`, ms.
-    pub(crate) fn between(&self, from: GridTime, to: GridTime) -> f64 {
+    pub fn between(&self, from: GridTime, to: GridTime) -> f64 {
         (to.point - from.point) * self.step_ms + (to.rest - from.rest)
     }
 
     /// The number of points up to `end`, including a point that is after `end` by rounding alone.
-    pub(crate) fn points_until(&self, end: f64) -> f64 {
+    pub fn points_until(&self, end: f64) -> f64 {
         let place = self.place(end);
         let last = if self.time(place.point) <= end + rounding_ms(end) { place.point } else { place.until() };
         (last + 1.0).max(0.0)
@@ -116,12 +120,12 @@ impl Grid {
 }
 
 /// The number of points of a grid of `step_ms` from `start` to `end`, ms.
-pub(crate) fn points_between(start: f64, end: f64, step_ms: f64) -> f64 {
+pub fn points_between(start: f64, end: f64, step_ms: f64) -> f64 {
     Grid::new(start, step_ms).points_until(end)
 }
 
 /// Refuses more points than `most`, before memory is allocated.
-pub(crate) fn check_points(points: f64, most: f64, step_ms: f64) -> Result<()> {
+pub fn check_points(points: f64, most: f64, step_ms: f64) -> Result<()> {
     if points <= most {
         return Ok(());
     }

@@ -15,11 +15,11 @@ use crate::{Result, Spike, problem};
 pub struct NeuronStream {
     weights: Vec<f64>,
     now: f64,
-    clock: Clock,
+    clock: TimeStream,
 }
 
 #[derive(Debug, Clone)]
-enum Clock {
+enum TimeStream {
     Continuous(ContinuousStream),
     Grid(GridStream),
 }
@@ -33,8 +33,8 @@ impl NeuronStream {
             return Err(problem!("start"; " is {start} ms: must be finite"));
         }
         let clock = match neuron.time {
-            Time::Continuous => Clock::Continuous(ContinuousStream::new(neuron, threshold, start)),
-            Time::Grid => Clock::Grid(GridStream::new(neuron, threshold, start)),
+            Time::Continuous => TimeStream::Continuous(ContinuousStream::new(neuron, threshold, start)),
+            Time::Grid => TimeStream::Grid(GridStream::new(neuron, threshold, start)),
         };
         Ok(Self { weights: weights.to_vec(), now: start, clock })
     }
@@ -55,8 +55,8 @@ impl NeuronStream {
         self.now = t;
         let value = f64::from(value);
         match &mut self.clock {
-            Clock::Continuous(stream) => stream.push(t, weight, value, out),
-            Clock::Grid(stream) => stream.push(t, weight, value, out),
+            TimeStream::Continuous(stream) => stream.push(t, weight, value, out),
+            TimeStream::Grid(stream) => stream.push(t, weight, value, out),
         }
         Ok(())
     }
@@ -66,8 +66,8 @@ impl NeuronStream {
         if t >= self.now {
             self.now = t;
             match &mut self.clock {
-                Clock::Continuous(stream) => stream.settle(t, f64::INFINITY, out),
-                Clock::Grid(stream) => stream.settle(t, out),
+                TimeStream::Continuous(stream) => stream.settle(t, f64::INFINITY, out),
+                TimeStream::Grid(stream) => stream.settle(t, out),
             }
         }
     }
@@ -81,8 +81,8 @@ impl NeuronStream {
     #[must_use]
     pub fn potential(&self) -> f64 {
         let (refractory, value) = match &self.clock {
-            Clock::Continuous(s) => (&s.threshold, s.potential(self.now)),
-            Clock::Grid(s) => (&s.threshold, s.potential(self.now)),
+            TimeStream::Continuous(s) => (&s.threshold, s.potential(self.now)),
+            TimeStream::Grid(s) => (&s.threshold, s.potential(self.now)),
         };
         if refractory.silent_at(self.now) { 0.0 } else { value }
     }

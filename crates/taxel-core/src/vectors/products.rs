@@ -5,7 +5,7 @@ use super::instructions::kernel;
 
 kernel! {
     /// The dot product `a.b`, including an incomplete last group.
-    pub(crate) fn dot<V>(a: &[f64], b: &[f64]) -> f64 {
+    pub fn dot<V>(a: &[f64], b: &[f64]) -> f64 {
         let mut sums = [V::splat(0.0); 4];
         let (a4, b4) = (lines(a).chunks_exact(4), lines(b).chunks_exact(4));
         for (x, y) in a4.clone().zip(b4.clone()) {

@@ -1,6 +1,6 @@
 //! Cuts raw bytes of version 1 into datagrams, as a recorder would have received them.
 
-use super::decoder::clock::Clock;
+use super::decoder::clock::StampClock;
 use super::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
 
 /// Largest datagram, bytes: 280 words.
@@ -12,7 +12,7 @@ const LONGEST_US: i64 = 1_000_000;
 
 /// Datagrams, stored one after the other.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Cut {
+pub struct CutDatagrams {
     /// Where each datagram begins, and where the last one ends.
     pub offsets: Vec<usize>,
     /// The board's time of each datagram's first stamp, us, which stands for its arrival time; never decreases.
@@ -24,9 +24,9 @@ pub struct Cut {
 /// The bytes have no arrival times. Each datagram gets the time of its first stamp, unwrapped from the stamps alone, so
 /// that a reader can unwrap the stamps again; a datagram spans at most a second.
 #[must_use]
-pub fn cut(bytes: &[u8]) -> Cut {
+pub fn cut(bytes: &[u8]) -> CutDatagrams {
     let stamped = stamped(bytes);
-    let mut cut = Cut { offsets: vec![0], times: vec![] };
+    let mut cut = CutDatagrams { offsets: vec![0], times: vec![] };
     let (mut begin, mut k) = (0, 0);
     while begin < bytes.len() {
         k += stamped[k..].partition_point(|&(at, _)| at < begin);
@@ -48,7 +48,7 @@ pub fn cut(bytes: &[u8]) -> Cut {
 
 /// Offsets of the whole words that have a time (changes and markers), and the latest time up to each, us.
 fn stamped(bytes: &[u8]) -> Vec<(usize, i64)> {
-    let mut clock = Clock::default();
+    let mut clock = StampClock::default();
     let (mut found, mut latest, mut at) = (vec![], i64::MIN, 0);
     while let Some(word) = bytes.get(at..).and_then(|rest| rest.first_chunk::<WORD_BYTES>()) {
         let whole = word[0] & FIRST != 0 && word[1..].iter().all(|byte| byte & FIRST == 0);

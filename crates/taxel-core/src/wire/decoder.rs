@@ -13,9 +13,9 @@ pub use counts::Counts;
 pub use pairing::Pairing;
 
 use blocks::Carried;
-use clock::Clock;
-use filling::{Change, Filling};
-use pairing::{ByTaxel, append};
+use clock::StampClock;
+use filling::{FilledColumns, PendingChange};
+use pairing::{UnpairedChanges, append};
 
 use crate::vectors::Instructions;
 use crate::wire::columns::{self, Filled, Room};
@@ -43,9 +43,9 @@ pub struct Decoder {
     /// The bytes of an incomplete word.
     partial: [u8; WORD_BYTES],
     have: usize,
-    clock: Clock,
-    waiting: Option<Change>,
-    by_taxel: Option<ByTaxel>,
+    clock: StampClock,
+    waiting: Option<PendingChange>,
+    by_taxel: Option<UnpairedChanges>,
     /// Each taxel's last value, if intensities are differences; none if it is unknown.
     held: Option<Vec<Option<u16>>>,
     counts: Counts,
@@ -60,7 +60,7 @@ impl Decoder {
             instructions: Instructions::best(),
             partial: [0; WORD_BYTES],
             have: 0,
-            clock: Clock::default(),
+            clock: StampClock::default(),
             waiting: None,
             by_taxel: None,
             held: None,
@@ -71,7 +71,7 @@ impl Decoder {
     /// Chooses which change an intensity belongs to.
     #[must_use]
     pub fn pairing(mut self, pairing: Pairing) -> Self {
-        self.by_taxel = (pairing == Pairing::Taxel).then(|| ByTaxel::new(&self.array));
+        self.by_taxel = (pairing == Pairing::Taxel).then(|| UnpairedChanges::new(&self.array));
         self
     }
 
@@ -196,7 +196,7 @@ impl Decoder {
     /// Discards an incomplete word and the time, but not the counts.
     fn as_new(&mut self) {
         self.give_up_partial();
-        self.clock = Clock::default();
+        self.clock = StampClock::default();
         if let Some(held) = &mut self.held {
             held.fill(Some(0));
         }
@@ -210,7 +210,7 @@ impl Decoder {
         paired: bool,
         markers: &mut Vec<Marker>,
     ) -> Filled {
-        let mut filling = Filling { room, rows: 0, paired, open: false };
+        let mut filling = FilledColumns { room, rows: 0, paired, open: false };
         if let Some(change) = self.waiting.take() {
             filling.change(change);
         }
@@ -239,7 +239,7 @@ impl Decoder {
     /// Decodes the plain words at the start of `bytes`; returns how many bytes they have.
     ///
     /// None if the stamps alone do not unwrap the words: before the first stamp, and until this arrival time was used.
-    fn plain(&mut self, bytes: &[u8], arrived: Option<i64>, filling: &mut Filling<'_>) -> usize {
+    fn plain(&mut self, bytes: &[u8], arrived: Option<i64>, filling: &mut FilledColumns<'_>) -> usize {
         if self.by_taxel.is_some() || self.held.is_some() || self.clock.arrived != arrived {
             return 0;
         }
@@ -267,7 +267,7 @@ impl Decoder {
         done
     }
 
-    fn byte(&mut self, byte: u8, arrived: Option<i64>, filling: &mut Filling<'_>, markers: &mut Vec<Marker>) {
+    fn byte(&mut self, byte: u8, arrived: Option<i64>, filling: &mut FilledColumns<'_>, markers: &mut Vec<Marker>) {
         if byte & FIRST != 0 {
             self.give_up_partial();
         } else if self.have == 0 {
@@ -292,7 +292,7 @@ impl Decoder {
         self.have = 0;
     }
 
-    fn word(&mut self, word: Word, arrived: Option<i64>, filling: &mut Filling<'_>, markers: &mut Vec<Marker>) {
+    fn word(&mut self, word: Word, arrived: Option<i64>, filling: &mut FilledColumns<'_>, markers: &mut Vec<Marker>) {
         let open = std::mem::take(&mut filling.open);
         match word {
             Word::Contradictory => self.counts.contradictory += 1,
@@ -308,7 +308,7 @@ impl Decoder {
             }
             Word::Change { stamp, x, y, p } => {
                 self.counts.changes += 1;
-                let change = Change { t: self.time(stamp, arrived), x: x.into(), y: y.into(), p };
+                let change = PendingChange { t: self.time(stamp, arrived), x: x.into(), y: y.into(), p };
                 match &mut self.by_taxel {
                     Some(by_taxel) => by_taxel.change(change),
                     None => filling.change(change),

@@ -35,7 +35,7 @@ pub fn fields() -> &'static [Field] {
 
 /// A write that the rules forbid; nothing has changed.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refusal {
+pub struct WriteRefusal {
     /// The register that the write addressed.
     pub register: u8,
     /// Which rule of the reference (5 and 6 only warn).
@@ -44,8 +44,8 @@ pub struct Refusal {
     pub text: String,
 }
 
-impl From<Refusal> for Error {
-    fn from(refusal: Refusal) -> Self {
+impl From<WriteRefusal> for Error {
+    fn from(refusal: WriteRefusal) -> Self {
         Self::device(refusal.text)
     }
 }
@@ -201,11 +201,11 @@ impl Registers {
     /// # Errors
     ///
     /// The rule that forbids the write; then no register has changed.
-    pub fn write(&mut self, command: Command, array: &Array) -> std::result::Result<(), Refusal> {
+    pub fn write(&mut self, command: Command, array: &Array) -> std::result::Result<(), WriteRefusal> {
         let Command { register, value } = command;
         if value & !Self::mask(register) != 0 {
             let text = format!("REG{register}=0x{value:08X} sets reserved bits: they must be 0 (rule 4)");
-            return Err(Refusal { register, rule: 4, text });
+            return Err(WriteRefusal { register, rule: 4, text });
         }
         let mut next = *self;
         next.store(register, value);
@@ -231,7 +231,7 @@ impl Registers {
 
     /// The rules that refuse, in the order in which the board checks them; the first is that every value is in its
     /// range.
-    fn rules(&self, register: u8, array: &Array) -> std::result::Result<(), Refusal> {
+    fn rules(&self, register: u8, array: &Array) -> std::result::Result<(), WriteRefusal> {
         for field in fields() {
             let value = self.get(field);
             if value < field.least || value > field.greatest {
@@ -243,12 +243,12 @@ impl Registers {
                         field.name, field.least, field.greatest
                     )
                 };
-                return Err(Refusal { register, rule: 4, text });
+                return Err(WriteRefusal { register, rule: 4, text });
             }
         }
         let scanned = Scanned { steps: self.steps(array), driven_lines: array.columns, sense_lines: array.rows };
         match rules::refused(self, &scanned) {
-            Some((rule, text)) => Err(Refusal { register, rule, text }),
+            Some((rule, text)) => Err(WriteRefusal { register, rule, text }),
             None => Ok(()),
         }
     }

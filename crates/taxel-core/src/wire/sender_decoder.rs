@@ -7,11 +7,11 @@ mod recent;
 use crate::wire::decoder::{Counts, Decoder};
 use crate::wire::silence;
 use crate::wire::v1::{FIRST, WORD_BYTES};
-use crate::wire::v2::{self, Header, Outcome};
+use crate::wire::v2::{self, DatagramHeader, DatagramOutcome};
 use crate::{Array, Events};
-pub use ahead::Ahead;
+pub use ahead::ClockJumps;
 pub use order::{Order, StepBack};
-use recent::Recent;
+use recent::RecentDatagrams;
 
 /// For how long only whole words of version 1 must arrive before a sender of version 2 counts as changed to version 1,
 /// us.
@@ -53,9 +53,9 @@ pub struct SenderDecoder {
     whole_since: Option<i64>,
     refused: u64,
     changes: u64,
-    ahead: Ahead,
+    ahead: ClockJumps,
     order: Order,
-    recent: Recent,
+    recent: RecentDatagrams,
     repeated: u64,
     empty: u64,
 }
@@ -76,9 +76,9 @@ impl SenderDecoder {
             whole_since: None,
             refused: 0,
             changes: 0,
-            ahead: Ahead::default(),
+            ahead: ClockJumps::default(),
             order: Order::default(),
-            recent: Recent::default(),
+            recent: RecentDatagrams::default(),
             repeated: 0,
             empty: 0,
         }
@@ -122,7 +122,7 @@ impl SenderDecoder {
 
     /// The jumps of time of version 1 ahead of the host's clock.
     #[must_use]
-    pub fn ahead(&self) -> &Ahead {
+    pub fn ahead(&self) -> &ClockJumps {
         &self.ahead
     }
 
@@ -163,13 +163,13 @@ impl SenderDecoder {
         // An empty datagram is a short one of version 2, and no words of version 1.
         let second = match datagram.first() {
             None => self.version == 2,
-            Some(&first) => first == v2::MAGIC && (self.version == 2 || Header::read(datagram).is_ok()),
+            Some(&first) => first == v2::MAGIC && (self.version == 2 || DatagramHeader::read(datagram).is_ok()),
         };
         if second {
             if self.version == 1 {
                 self.change(2, out);
             }
-            if let Outcome::Intact { until, missing, reset } = self.version_2.push(datagram, arrived, out) {
+            if let DatagramOutcome::Intact { until, missing, reset } = self.version_2.push(datagram, arrived, out) {
                 self.whole_since = None;
                 (info.until, info.missing, info.reset) = (until, missing, reset);
             }
@@ -291,7 +291,7 @@ mod tests {
         let mut before = 0;
         for (session, arrived) in [0, i64::MAX, i64::MIN, i64::MAX, 0, i64::MAX].into_iter().enumerate() {
             // Only a promise, from a board that was reset each time.
-            let header = Header {
+            let header = DatagramHeader {
                 kind: 0,
                 board: 1,
                 sequence: 0,

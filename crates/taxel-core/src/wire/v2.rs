@@ -25,11 +25,11 @@ mod encode;
 mod packer;
 mod stream;
 
-pub use counts::{Counts, Status};
-pub use decoder::{Decoder, Outcome, stream_rows};
+pub use counts::{BoardTotals, Counts};
+pub use decoder::{DatagramOutcome, Decoder, stream_rows};
 pub use encode::{Encoded, encode};
 pub use packer::{Packer, Settings};
-pub use stream::{Decoded, StreamReader, decode};
+pub use stream::{DecodedStream, StreamReader, decode};
 
 use crate::{Array, problem};
 
@@ -72,7 +72,7 @@ const BASE_BITS: u32 = 48;
 
 /// What a datagram's body holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum BodyKind {
     /// Changes without values: 16-bit words of polarity and 15 bits of skip.
     Changes,
     /// Changes with values to 255: polarity, 7 bits of skip, 8 of value.
@@ -81,15 +81,15 @@ pub enum Kind {
     Large,
     /// Markers: offset from the base (us, 32 bits), code (16), argument (16).
     Markers,
-    /// The board's own totals, 64 bits each, in the order of [`Status`].
+    /// The board's own totals, 64 bits each, in the order of [`BoardTotals`].
     Status,
-    /// As [`Kind::Small`], values that the board repeats.
+    /// As [`BodyKind::Small`], values that the board repeats.
     SmallStates,
-    /// As [`Kind::Large`], values that the board repeats.
+    /// As [`BodyKind::Large`], values that the board repeats.
     LargeStates,
 }
 
-impl Kind {
+impl BodyKind {
     /// The kind with this number; none if the number is unknown (yet).
     #[must_use]
     pub fn of(number: u8) -> Option<Self> {
@@ -158,7 +158,7 @@ pub(crate) const STOP: u16 = 2;
 
 /// A datagram's fields other than its body and checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Header {
+pub struct DatagramHeader {
     /// Number of the kind, known or not.
     pub kind: u8,
     /// Number of the board.
@@ -203,7 +203,7 @@ pub enum Refused {
     Checksum,
 }
 
-impl Header {
+impl DatagramHeader {
     /// Splits a datagram into header and body.
     ///
     /// # Errors
@@ -247,7 +247,7 @@ impl Header {
 
     /// The value of [`Self::common`] for plain changes with this header.
     #[inline(always)]
-    fn common_of(kind: Kind, board: u16, session: u16, stride: u8) -> u64 {
+    fn common_of(kind: BodyKind, board: u16, session: u16, stride: u8) -> u64 {
         let [board, session, stride] = [u64::from(board), u64::from(session), u64::from(stride)];
         u64::from(MAGIC) | u64::from(2 << 4 | kind.number()) << 8 | board << 16 | session << 32 | stride << 48
     }
@@ -307,7 +307,7 @@ pub fn begins(bytes: &[u8]) -> bool {
     let whole = |bytes: &[u8]| {
         bytes.first() == Some(&MAGIC)
             && (HEADER_BYTES + TRAILER_BYTES..=DATAGRAM_BYTES.min(bytes.len()))
-                .any(|length| Header::read(&bytes[..length]).is_ok())
+                .any(|length| DatagramHeader::read(&bytes[..length]).is_ok())
     };
     whole(bytes) || bytes.get(2..).is_some_and(whole)
 }
@@ -340,7 +340,7 @@ mod tests {
 
     #[test]
     fn a_header_comes_back_and_any_flipped_bit_is_seen() {
-        let header = Header {
+        let header = DatagramHeader {
             kind: 1,
             board: 0xbeef,
             sequence: 0xfedc_ba98,
@@ -353,14 +353,14 @@ mod tests {
         };
         let mut bytes = vec![];
         header.write(&[1, 2, 3, 4], &mut bytes);
-        assert_eq!(Header::read(&bytes), Ok((header, &[1, 2, 3, 4][..])));
+        assert_eq!(DatagramHeader::read(&bytes), Ok((header, &[1, 2, 3, 4][..])));
         for bit in 0..8 * bytes.len() {
             let mut flipped = bytes.clone();
             flipped[bit / 8] ^= 1 << (bit % 8);
-            assert!(Header::read(&flipped).is_err(), "bit {bit}");
+            assert!(DatagramHeader::read(&flipped).is_err(), "bit {bit}");
         }
         for length in 0..bytes.len() {
-            assert!(Header::read(&bytes[..length]).is_err(), "{length} bytes");
+            assert!(DatagramHeader::read(&bytes[..length]).is_err(), "{length} bytes");
         }
     }
 

@@ -2,7 +2,7 @@
 
 use rand::{SeedableRng, rngs::StdRng};
 use taxel_core::board::Board;
-use taxel_core::wire::v2::{Decoder, Header, Kind, Outcome, Packer, Settings};
+use taxel_core::wire::v2::{BodyKind, DatagramHeader, DatagramOutcome, Decoder, Packer, Settings};
 use taxel_core::wire::{Decoder as Decoder1, Registers};
 use taxel_core::{Array, Events};
 
@@ -52,7 +52,7 @@ fn the_host_decodes_the_events_that_the_board_sent() {
                         events.t[before..].iter().all(|&t| t >= until),
                         "seed {seed}: an event before the promised time"
                     );
-                    let Outcome::Intact { until: promised, missing: 0, reset: false } = heard else {
+                    let DatagramOutcome::Intact { until: promised, missing: 0, reset: false } = heard else {
                         panic!("{heard:?}")
                     };
                     until = until.max(promised.unwrap_or(0));
@@ -125,7 +125,7 @@ fn a_slow_board_still_promises_and_silence_has_its_heartbeats() {
     for k in 0..20_u16 {
         board
             .frame(&[if k == 3 { 50 } else { 0 }; 16], |datagram| {
-                if let Outcome::Intact { until: Some(u), .. } =
+                if let DatagramOutcome::Intact { until: Some(u), .. } =
                     decoder.push(datagram, None, &mut Events::empty(array.clone()))
                 {
                     until = until.max(u);
@@ -141,7 +141,7 @@ fn a_slow_board_still_promises_and_silence_has_its_heartbeats() {
         let mut sent = 0;
         quiet
             .frame(&[if k < 100 { 0 } else { 50 }; 4096], |datagram| {
-                let (header, body) = Header::read(datagram).unwrap();
+                let (header, body) = DatagramHeader::read(datagram).unwrap();
                 sent += usize::from(body.is_empty() && header.kind == 1);
                 true
             })
@@ -160,7 +160,7 @@ fn a_datagram_of_one_event_is_one_word_wherever_it_lies_in_the_first_128_lines()
     let settings = Settings {
         board: 1,
         session: 1,
-        kind: Kind::Small,
+        kind: BodyKind::Small,
         frame_sync: true,
         differences: false,
         hold_us: 0,

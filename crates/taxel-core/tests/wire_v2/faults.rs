@@ -6,7 +6,7 @@ use rand::{Rng, SeedableRng, rngs::StdRng, seq::SliceRandom};
 use taxel_core::board::{Board, IntensityWord, Version2};
 use taxel_core::vectors::Instructions;
 use taxel_core::wire::Registers;
-use taxel_core::wire::v2::{Decoder, Header, Outcome};
+use taxel_core::wire::v2::{DatagramHeader, DatagramOutcome, Decoder};
 use taxel_core::{Array, Events};
 
 use crate::scenes::{board, rows, scene};
@@ -61,9 +61,9 @@ fn each_intact_datagram_is_decoded_once_whatever_the_network_does() {
         let (mut once, mut refused) = (vec![], 0);
         for (k, datagram) in &arriving {
             match decoder.push(datagram, None, &mut events) {
-                Outcome::Intact { .. } => once.push(*k),
-                Outcome::Repeated => assert!(once.contains(k)),
-                Outcome::Refused(_) => refused += 1,
+                DatagramOutcome::Intact { .. } => once.push(*k),
+                DatagramOutcome::Repeated => assert!(once.contains(k)),
+                DatagramOutcome::Refused(_) => refused += 1,
             }
         }
         assert_eq!(refused, hurt);
@@ -139,7 +139,7 @@ fn time_goes_on_after_a_reset_which_is_counted() {
             board
                 .frame(&frame, |datagram| {
                     let heard = decoder.push(datagram, Some(arrived), &mut events);
-                    resets += u64::from(matches!(heard, Outcome::Intact { reset: true, .. }));
+                    resets += u64::from(matches!(heard, DatagramOutcome::Intact { reset: true, .. }));
                     true
                 })
                 .unwrap();
@@ -161,17 +161,18 @@ fn a_number_drawn_twice_is_a_reset_once() {
     let mut events = Events::empty(Array::thesis());
     let mut datagram = Vec::new();
     let mut hear = |sequence, base| {
-        let header = Header { kind: 1, board: 1, sequence, base, session: 9, stride: 6, line: 0, flags: 0, span: 192 };
+        let header =
+            DatagramHeader { kind: 1, board: 1, sequence, base, session: 9, stride: 6, line: 0, flags: 0, span: 192 };
         header.write(&[0x05, 0x80], &mut datagram);
         decoder.push(&datagram, None, &mut events)
     };
-    let intact = |heard| matches!(heard, Outcome::Intact { .. });
+    let intact = |heard| matches!(heard, DatagramOutcome::Intact { .. });
     assert!(intact(hear(70_000, 20_000_000)));
     assert!(intact(hear(70_001, 20_000_192)));
     // After the reset each number is decoded once; a repeated one stays repeated, and the old session has ended.
     for sequence in 0..5 {
         assert!(intact(hear(sequence, 192 * u64::from(sequence))));
-        assert!(matches!(hear(sequence, 192 * u64::from(sequence)), Outcome::Repeated));
+        assert!(matches!(hear(sequence, 192 * u64::from(sequence)), DatagramOutcome::Repeated));
     }
     let counts = decoder.counts();
     assert_eq!((counts.intact, counts.repeated, counts.resets, counts.missing), (7, 5, 1, 0));
@@ -185,8 +186,17 @@ fn what_another_board_sent_under_the_same_number_is_refused_by_every_set_of_inst
         let array = Array::thesis();
         let sent = |random: &mut StdRng, sequence: u32| {
             let base = 192 * u64::from(sequence) + random.random_range(0..3);
-            let header =
-                Header { kind: 1, board: 1, sequence, base, session: 9, stride: 6, line: 0, flags: 0, span: 192 };
+            let header = DatagramHeader {
+                kind: 1,
+                board: 1,
+                sequence,
+                base,
+                session: 9,
+                stride: 6,
+                line: 0,
+                flags: 0,
+                span: 192,
+            };
             let mut datagram = vec![];
             header.write(&[random.random_range(0..4), 0x80], &mut datagram);
             datagram
@@ -200,7 +210,8 @@ fn what_another_board_sent_under_the_same_number_is_refused_by_every_set_of_inst
         let mut first = BTreeMap::new();
         let (mut again, mut other) = (0, 0);
         for datagram in &came {
-            let known: &Vec<u8> = first.entry(Header::read(datagram).unwrap().0.sequence).or_insert(datagram.clone());
+            let known: &Vec<u8> =
+                first.entry(DatagramHeader::read(datagram).unwrap().0.sequence).or_insert(datagram.clone());
             again += u64::from(known == datagram);
             other += u64::from(known != datagram);
         }
@@ -230,7 +241,7 @@ fn unknown_kinds_and_flags_are_counted_and_anything_is_survived() {
     let mut bytes = vec![];
     for sequence in 0..20_000_u32 {
         let body: Vec<u8> = (0..random.random_range(0..80)).map(|_| random.random()).collect();
-        let header = Header {
+        let header = DatagramHeader {
             kind: random.random_range(0..16),
             board: 3,
             sequence,

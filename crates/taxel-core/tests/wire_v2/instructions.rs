@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use taxel_core::Events;
 use taxel_core::vectors::Instructions;
-use taxel_core::wire::v2::{Decoder, Header, Outcome};
+use taxel_core::wire::v2::{DatagramHeader, DatagramOutcome, Decoder};
 
 use crate::scenes::{arrays, as_a_network, words};
 
@@ -23,7 +23,7 @@ fn every_set_of_instructions_decodes_the_same() {
                 let flags = if random.random_bool(0.9) { 1 } else { random.random() };
                 let line = if random.random_bool(0.5) { 0 } else { random.random() };
                 let header =
-                    Header { kind, board: 1, sequence, base: time, session: 1, stride, line, flags, span: 192 };
+                    DatagramHeader { kind, board: 1, sequence, base: time, session: 1, stride, line, flags, span: 192 };
                 let mut datagram = vec![];
                 header.write(&words(&mut random, kind), &mut datagram);
                 datagram
@@ -34,9 +34,9 @@ fn every_set_of_instructions_decodes_the_same() {
         for set in Instructions::ALL.into_iter().filter(|set| set.present()) {
             let mut decoder = Decoder::new(array.clone()).instructions(set).unwrap();
             let mut events = Events::empty(array.clone());
-            let found: Vec<Outcome> =
+            let found: Vec<DatagramOutcome> =
                 datagrams.iter().map(|datagram| decoder.push(datagram, None, &mut events)).collect();
-            assert!(seed % 2 == 1 || found.iter().all(|heard| matches!(heard, Outcome::Intact { .. })));
+            assert!(seed % 2 == 1 || found.iter().all(|heard| matches!(heard, DatagramOutcome::Intact { .. })));
             events.view().check().unwrap();
             let heard = (events, decoder.counts(), decoder.held(), found);
             let first = first.get_or_insert_with(|| heard.clone());

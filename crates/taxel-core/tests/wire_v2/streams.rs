@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use taxel_core::vectors::Instructions;
 use taxel_core::wire::Room;
-use taxel_core::wire::v2::{self, Counts, Decoder, Header, MAGIC, StreamReader};
+use taxel_core::wire::v2::{self, Counts, DatagramHeader, Decoder, MAGIC, StreamReader};
 use taxel_core::{Array, Events, Stop};
 
 use crate::scenes::{arrays, as_a_network, few_words, words};
@@ -15,8 +15,17 @@ fn a_stream_is_cut_anywhere_and_found_again_after_damage() {
         let (mut stream, mut sent, mut junk) = (vec![], vec![], 0);
         for sequence in 0..random.random_range(1..30) {
             let body: Vec<u8> = (0..random.random_range(0..200)).map(|_| random.random()).collect();
-            let header =
-                Header { kind: 1, board: 1, sequence, base: 0, session: 1, stride: 6, line: 0, flags: 0, span: 0 };
+            let header = DatagramHeader {
+                kind: 1,
+                board: 1,
+                sequence,
+                base: 0,
+                session: 1,
+                stride: 6,
+                line: 0,
+                flags: 0,
+                span: 0,
+            };
             let mut bytes = vec![];
             header.write(&body, &mut bytes);
             let mut framed = [&(bytes.len() as u16).to_le_bytes()[..], &bytes].concat();
@@ -146,7 +155,7 @@ fn a_stream_in_one_call_gives_what_its_datagrams_give_one_by_one() {
                 if reset {
                     (session, sequence, time) = (random.random_range(1..4), random.random_range(0..3), 0);
                 }
-                let header = Header {
+                let header = DatagramHeader {
                     kind,
                     board: u16::from(foreign),
                     sequence,

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// Counts of what arrived and what was lost so far; see [`crate::capture`] for the equations between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Counts {
+pub struct CaptureCounts {
     /// Number of messages: receive calls that returned data.
     pub messages: u64,
     /// Number of datagrams in the messages.
@@ -39,7 +39,7 @@ pub(super) struct Totals {
     pub(super) changes_of_address: u64,
 }
 
-impl Counts {
+impl CaptureCounts {
     /// Adds the results of receive calls, and the socket's totals; returns the first datagram's number.
     pub(super) fn add(&mut self, datagrams: usize, bytes: usize, messages: u64, totals: Totals) -> u64 {
         let first = self.datagrams;

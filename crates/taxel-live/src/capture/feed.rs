@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::counts::Totals;
 use super::parcel::Parcel;
-use super::queue::{Batch, Queue};
+use super::queue::{Batch, BatchQueue};
 use crate::bridged::Bridged;
 use crate::host_clock::{HostClock, RoundTrip};
 use crate::locked::lock;
@@ -16,7 +16,7 @@ use crate::locked::lock;
 const SILENT: Duration = Duration::from_secs(1);
 
 #[derive(Debug, Clone, Copy)]
-struct Session {
+struct FeedSession {
     session: u64,
     number: u64,
     /// The number of the next datagram if none is missing.
@@ -29,25 +29,25 @@ struct Session {
 struct FeedState {
     bridged: Bridged,
     clock: HostClock,
-    session: Option<Session>,
+    session: Option<FeedSession>,
     received: Option<Instant>,
     batch: Batch,
 }
 
 /// Accepts the parcels of another computer; clones accept them for the same queue.
 #[derive(Debug, Clone)]
-pub struct Feed {
-    queue: Arc<Queue>,
+pub struct ParcelFeed {
+    queue: Arc<BatchQueue>,
     state: Arc<Mutex<FeedState>>,
 }
 
-impl Feed {
-    pub(super) fn new(queue: Arc<Queue>) -> Self {
+impl ParcelFeed {
+    pub(super) fn new(queue: Arc<BatchQueue>) -> Self {
         Self { queue, state: Arc::default() }
     }
 
     /// Queues the datagrams of a parcel. Returns false without any effect if the parcel begins a session and
-    /// [`Feed::begin_session`] was not called for it.
+    /// [`ParcelFeed::begin_session`] was not called for it.
     ///
     /// Parcels that cannot be read, and repeated ones, are counted and ignored.
     pub fn push(&self, parcel: &[u8]) -> bool {
@@ -77,7 +77,7 @@ impl Feed {
             }
             None => {}
         }
-        *session = Some(Session {
+        *session = Some(FeedSession {
             session: parcel.session,
             number: parcel.number,
             next: parcel.before.saturating_add(u64::from(parcel.count)),

@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReceiverOptions {
     /// Requested size of the kernel's own queue, bytes;
-    /// [`Counts::kernel_buffer_bytes`](super::Counts::kernel_buffer_bytes) is the size that the kernel granted.
+    /// [`Counts::kernel_buffer_bytes`](super::CaptureCounts::kernel_buffer_bytes) is the size that the kernel granted.
     pub kernel_buffer_bytes: usize,
     /// Capacity of taxel's queue, bytes; memory is bounded by twice this.
     pub queue_bytes: usize,

@@ -106,7 +106,7 @@ fn first(body: &[u8]) -> Option<(i32, &[u8], &[u8])> {
 
 /// Gathers datagrams into parcels.
 #[derive(Debug)]
-pub struct Packer {
+pub struct ParcelPacker {
     session: u64,
     number: u64,
     base_ns: i64,
@@ -118,7 +118,7 @@ pub struct Packer {
     body: Vec<u8>,
 }
 
-impl Packer {
+impl ParcelPacker {
     /// Starts a session after this number of received datagrams.
     #[must_use]
     pub fn after(received: u64) -> Self {
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn what_is_packed_is_unpacked() {
-        let mut packer = Packer::after(0);
+        let mut packer = ParcelPacker::after(0);
         let sent: Vec<(i64, Vec<u8>)> = (0..3000)
             .map(|k: i64| (7_000_000_000 + k * k * 1000, vec![(k % 251) as u8; (k * 7 % 1400) as usize]))
             .collect();
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn datagrams_that_a_queue_dropped_are_counted() {
-        let mut packer = Packer::after(10);
+        let mut packer = ParcelPacker::after(10);
         assert!(packer.push(10, 0, b"ten", 0).is_none());
         let parcel = packer.push(15, 0, b"fifteen", 0).expect("11 to 14 are missing");
         assert_eq!(Parcel::read(&parcel).expect("whole").dropped, 0);
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     fn what_is_cut_or_changed_is_refused_or_read_and_never_a_panic() {
-        let mut packer = Packer::after(0);
+        let mut packer = ParcelPacker::after(0);
         for k in 0..3 {
             packer.push(k, i64::MAX - 5, b"bytes", 0);
         }

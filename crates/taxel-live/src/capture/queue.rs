@@ -4,7 +4,7 @@ use std::io;
 use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use super::counts::{Counts, Totals};
+use super::counts::{CaptureCounts, Totals};
 use crate::locked::lock;
 use crate::recording::now_ns;
 
@@ -108,8 +108,8 @@ impl Batch {
 /// Two batches alternate: one is filled while the other is read. While the reader is behind, datagrams are copied into one batch, so
 /// that small ones are packed tightly and the limit in bytes is also a limit in time.
 #[derive(Debug)]
-pub(super) struct Queue {
-    state: Mutex<Received>,
+pub(super) struct BatchQueue {
+    state: Mutex<QueueState>,
     came: Condvar,
     /// The time when the end was requested, ns of the host's clock since 1970.
     stop: OnceLock<i64>,
@@ -117,25 +117,25 @@ pub(super) struct Queue {
 }
 
 #[derive(Debug)]
-struct Received {
+struct QueueState {
     waiting: Batch,
-    counts: Counts,
+    counts: CaptureCounts,
     /// Promise of a feed: every datagram that arrived before this time is in the queue or was read, ns.
     until_ns: Option<i64>,
     closed: bool,
     failed: Option<io::Error>,
 }
 
-impl Queue {
-    pub(super) fn new(limit: usize, counts: Counts) -> Self {
-        let state = Received { waiting: Batch::new(), counts, until_ns: None, closed: false, failed: None };
+impl BatchQueue {
+    pub(super) fn new(limit: usize, counts: CaptureCounts) -> Self {
+        let state = QueueState { waiting: Batch::new(), counts, until_ns: None, closed: false, failed: None };
         Self { state: Mutex::new(state), came: Condvar::new(), stop: OnceLock::new(), limit }
     }
 
     /// Moves received datagrams into the waiting batch; those that do not fit are dropped and counted.
     pub(super) fn put(&self, received: &mut Batch, messages: u64, totals: Totals) {
         let mut state = self.state();
-        let Received { waiting, counts, .. } = &mut *state;
+        let QueueState { waiting, counts, .. } = &mut *state;
         let first = counts.add(received.datagrams.len(), received.bytes.len(), messages, totals);
         if waiting.is_empty() && received.bytes.len() <= self.limit {
             received.number_from(first);
@@ -168,7 +168,7 @@ impl Queue {
     pub(super) fn pop(&self, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
         batch.clear();
         let state = self.state();
-        let nothing = |s: &mut Received| s.waiting.is_empty() && !s.closed;
+        let nothing = |s: &mut QueueState| s.waiting.is_empty() && !s.closed;
         let (mut state, _) =
             self.came.wait_timeout_while(state, timeout, nothing).unwrap_or_else(PoisonError::into_inner);
         std::mem::swap(&mut state.waiting, batch);
@@ -192,9 +192,9 @@ impl Queue {
         state.until_ns.filter(|_| state.waiting.is_empty())
     }
 
-    pub(super) fn counts(&self) -> Counts {
+    pub(super) fn counts(&self) -> CaptureCounts {
         let state = self.state();
-        Counts { waiting: state.waiting.len() as u64, ..state.counts }
+        CaptureCounts { waiting: state.waiting.len() as u64, ..state.counts }
     }
 
     pub(super) fn close(&self, failed: Option<io::Error>) {
@@ -221,7 +221,7 @@ impl Queue {
 
     /// Locks the state. No holder of the lock can panic half-way through a change, so a poisoned lock still guards a
     /// valid state.
-    fn state(&self) -> MutexGuard<'_, Received> {
+    fn state(&self) -> MutexGuard<'_, QueueState> {
         lock(&self.state)
     }
 }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use serde::Serialize;
 
 use super::offset::Offset;
-use super::stretch::{LONG_US, Point, STRETCHES};
+use super::stretch::{ArrivalPoint, LONG_US, STRETCHES};
 use crate::latency::{Latencies, Quantiles};
 
 /// Reading: no two clocks differ by more (crystals by 0.01 %, the worst oscillators by 1 %), ppm.
@@ -52,19 +52,19 @@ pub struct Pace {
 
 /// Delays, and the fastest arrivals of the last 64 s, whichever line was fitted to them.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Arrivals {
+pub(super) struct ArrivalDelays {
     delays: Latencies,
-    fastest: VecDeque<Point>,
+    fastest: VecDeque<ArrivalPoint>,
 }
 
-impl Arrivals {
+impl ArrivalDelays {
     /// Notes how much later than the line a datagram arrived.
     pub(super) fn note(&mut self, late_ns: i64) {
         self.delays.note(late_ns);
     }
 
     /// Notes the fastest arrival of a stretch.
-    pub(super) fn end_stretch(&mut self, fastest: Option<Point>) {
+    pub(super) fn end_stretch(&mut self, fastest: Option<ArrivalPoint>) {
         if self.fastest.len() == STRETCHES {
             self.fastest.pop_front();
         }

@@ -17,13 +17,13 @@ pub(super) const LONG_US: i64 = 10_000_000;
 const EARLY: f64 = 0.01;
 
 /// Board time in us, and arrival minus board time in ns.
-pub(super) type Point = (i64, i64);
+pub(super) type ArrivalPoint = (i64, i64);
 
 /// The fastest points of a stretch, and the mean time of all its points.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Stretch {
+pub(super) struct ArrivalStretch {
     /// The fastest points; those of one part are adjacent if they arrived in order.
-    pub(super) quick: Vec<Point>,
+    pub(super) quick: Vec<ArrivalPoint>,
     pub(super) points: u64,
     /// Sum of board times since the first, us.
     pub(super) sum: i64,
@@ -31,8 +31,8 @@ pub(super) struct Stretch {
     pub(super) last: i64,
 }
 
-impl Stretch {
-    pub(super) fn push(&mut self, point: Point) {
+impl ArrivalStretch {
+    pub(super) fn push(&mut self, point: ArrivalPoint) {
         if self.points > 0 && point.0 == self.last {
             // Datagrams of a train, which could all be sent at one time, form one point: the fastest of them.
             if let Some(same) = self.quick.iter_mut().rev().find(|quick| quick.0 == point.0) {
@@ -66,7 +66,7 @@ impl Stretch {
     }
 
     /// The lowest point.
-    pub(super) fn lowest(&self) -> Option<Point> {
+    pub(super) fn lowest(&self) -> Option<ArrivalPoint> {
         self.quick.iter().copied().min_by_key(|quick| quick.1)
     }
 

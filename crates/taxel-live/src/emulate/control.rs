@@ -5,20 +5,20 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 
 use taxel_core::board::Board;
 
-use super::line::Line;
+use super::line::PseudoTerminal;
 use crate::{Error, Result};
 
 /// Reads commands from the connected host. On the TCP port there is one host at a time, as a UART has one cable: a new connection
 /// replaces the old one.
 #[derive(Debug)]
-pub(super) struct Control {
+pub(super) struct CommandPort {
     listener: Option<(TcpListener, SocketAddr)>,
     cable: Option<TcpStream>,
-    line: Option<Line>,
+    line: Option<PseudoTerminal>,
 }
 
-impl Control {
-    pub(super) fn open(address: Option<SocketAddr>, line: Option<Line>, board: &Board) -> Result<Self> {
+impl CommandPort {
+    pub(super) fn open(address: Option<SocketAddr>, line: Option<PseudoTerminal>, board: &Board) -> Result<Self> {
         let mut control = Self { listener: None, cable: None, line };
         if let Some(address) = address {
             let place = |error| Error::socket(format!("TCP {address}"))(error);

@@ -15,7 +15,7 @@ const LOOK_EVERY_MS: i32 = 10;
 /// Frames from a pipe as the input of a board. The pipe determines the pace: the board scans a frame whenever one is
 /// complete.
 #[derive(Debug)]
-pub struct Feed {
+pub struct PipedFrames {
     from: File,
     /// Bytes of frames that were already read together with the preceding header line.
     bytes: Vec<u8>,
@@ -28,7 +28,7 @@ pub struct Feed {
     ended: bool,
 }
 
-impl Feed {
+impl PipedFrames {
     /// Reads frames of `taxels` taxels from a file or pipe, preceded by bytes that were read already. Values are
     /// shifted right by `shift` and limited to `most`.
     #[must_use]
@@ -37,7 +37,7 @@ impl Feed {
     }
 }
 
-impl Touch for Feed {
+impl Touch for PipedFrames {
     fn is_there(&mut self) -> Result<bool> {
         let mut piece = [0; 1 << 16];
         while !self.ended && self.bytes.len() < self.wanted {

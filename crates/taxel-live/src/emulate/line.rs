@@ -20,7 +20,7 @@ const WAITING: usize = 4096;
 
 /// One end of a pseudo-terminal; the other end has a name in the file system, as a serial device has.
 #[derive(Debug)]
-pub(super) struct Line {
+pub(super) struct PseudoTerminal {
     ours: File,
     /// Kept open, so that the line stays up while no other program has it open.
     _theirs: OwnedFd,
@@ -33,7 +33,7 @@ pub(super) struct Line {
     waiting: VecDeque<u8>,
 }
 
-impl Line {
+impl PseudoTerminal {
     /// Opens a line and creates a link to it at `link`; replaces an earlier link, but not a file.
     ///
     /// # Errors
@@ -125,7 +125,7 @@ impl Line {
     }
 }
 
-impl Drop for Line {
+impl Drop for PseudoTerminal {
     fn drop(&mut self) {
         let _ = std::fs::remove_file(&self.link);
     }
@@ -137,7 +137,7 @@ mod tests {
 
     use super::*;
 
-    fn until(line: &mut Line, mut enough: impl FnMut(&mut Line) -> bool) {
+    fn until(line: &mut PseudoTerminal, mut enough: impl FnMut(&mut PseudoTerminal) -> bool) {
         let begun = Instant::now();
         while !enough(line) {
             assert!(begun.elapsed() < Duration::from_secs(30), "never came");
@@ -149,7 +149,7 @@ mod tests {
     fn a_line_has_a_name_and_carries_bytes_no_faster_than_its_rate() {
         let link = std::env::temp_dir().join(format!("taxel-{}-line", std::process::id()));
         let begun = Instant::now();
-        let mut line = Line::open(&link, 9600).expect("a pseudo-terminal");
+        let mut line = PseudoTerminal::open(&link, 9600).expect("a pseudo-terminal");
         let mut host = File::options().read(true).write(true).open(&link).expect("the other end");
         host.write_all(&[7; 480]).expect("room");
         let mut came = vec![];
@@ -175,7 +175,7 @@ mod tests {
     fn a_file_is_not_replaced_by_a_line() {
         let place = std::env::temp_dir().join(format!("taxel-{}-no-line", std::process::id()));
         std::fs::write(&place, "kept").expect("room");
-        assert!(Line::open(&place, 115_200).is_err());
+        assert!(PseudoTerminal::open(&place, 115_200).is_err());
         assert_eq!(std::fs::read_to_string(&place).expect("still there"), "kept");
         std::fs::remove_file(&place).expect("ours");
     }

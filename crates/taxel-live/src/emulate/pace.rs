@@ -9,11 +9,11 @@ const STEP: Duration = Duration::from_nanos(100);
 /// Waits until frames are due. A sleeping thread wakes some 10 us late, later on an idle core than on a busy one. So the sleep ends
 /// earlier by that much, and the rest is a busy wait.
 #[derive(Debug, Default)]
-pub(super) struct Pace {
+pub(super) struct FramePacer {
     sooner: Duration,
 }
 
-impl Pace {
+impl FramePacer {
     /// Waits until `due`, if it is not past; returns the time then.
     pub(super) fn wait_until(&mut self, due: Instant) -> Instant {
         let mut now = Instant::now();
@@ -51,7 +51,7 @@ mod tests {
 
     #[test]
     fn a_frame_is_never_sent_before_it_is_due_nor_waited_for_awake_for_long() {
-        let mut pace = Pace::default();
+        let mut pace = FramePacer::default();
         let mut due = Instant::now();
         for _ in 0..300 {
             due += Duration::from_micros(400);

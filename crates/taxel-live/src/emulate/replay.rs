@@ -7,7 +7,7 @@ use crate::Result;
 
 /// The content that is replayed.
 #[derive(Debug)]
-enum What {
+enum ReplayedContent {
     /// Taxel and value of each event.
     Events(Vec<(u32, u16)>),
     /// Ticks, frame after frame.
@@ -20,7 +20,7 @@ enum What {
 pub struct Replay {
     /// Times, us from the first, ascending.
     times: Vec<i64>,
-    what: What,
+    what: ReplayedContent,
     held: Vec<u16>,
     next: usize,
     frame: u64,
@@ -53,7 +53,7 @@ impl Replay {
         }
         held.fill(rest);
         let times = order.iter().map(|&k| events.t[k]).collect();
-        Self::new(times, What::Events(played), held, frame_us, speed)
+        Self::new(times, ReplayedContent::Events(played), held, frame_us, speed)
     }
 
     /// Replays frames of ticks, one after the other in `values`, at `times` us; each holds until the next.
@@ -67,10 +67,10 @@ impl Replay {
             return Err(problem!("{} values for {n} frames of {taxels} taxels, in order of time", values.len()).into());
         }
         let held = values.get(..array.len()).map_or_else(|| vec![0; array.len()], <[u16]>::to_vec);
-        Self::new(times, What::Frames(values), held, frame_us, speed)
+        Self::new(times, ReplayedContent::Frames(values), held, frame_us, speed)
     }
 
-    fn new(mut times: Vec<i64>, what: What, held: Vec<u16>, frame_us: f64, speed: f64) -> Result<Self> {
+    fn new(mut times: Vec<i64>, what: ReplayedContent, held: Vec<u16>, frame_us: f64, speed: f64) -> Result<Self> {
         if !(speed > 0.0 && speed.is_finite()) {
             return Err(problem!("speed"; " is {speed}: must be above 0").into());
         }
@@ -91,11 +91,11 @@ impl Touch for Replay {
             let now = (self.frame - 1) as f64 * self.frame_us * self.speed;
             while let Some(_due) = self.times.get(self.next).filter(|&&t| t as f64 <= now) {
                 match &self.what {
-                    What::Events(events) => {
+                    ReplayedContent::Events(events) => {
                         let (taxel, value) = events[self.next];
                         self.held[taxel as usize] = value;
                     }
-                    What::Frames(values) => {
+                    ReplayedContent::Frames(values) => {
                         let taxels = self.held.len();
                         self.held.copy_from_slice(&values[self.next * taxels..(self.next + 1) * taxels]);
                     }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use taxel_core::board::Board;
 use taxel_core::wire::Command;
 
-use super::pace::Pace;
+use super::pace::FramePacer;
 use crate::latency::Latencies;
 use crate::recording::now_ns;
 
@@ -20,9 +20,9 @@ const REPORT_EVERY: Duration = Duration::from_millis(100);
 const READINGS: usize = 16;
 
 /// A run of the board, from its first frame on.
-pub(super) struct Run {
-    pub(super) leaving: Leaving,
-    pub(super) pace: Pace,
+pub(super) struct BoardRun {
+    pub(super) leaving: OutgoingDatagrams,
+    pub(super) pace: FramePacer,
     /// How long after its end each frame was sent, and how many were sent more than a frame late.
     pub(super) late: Latencies,
     pub(super) late_frames: u64,
@@ -42,14 +42,14 @@ pub(super) struct Run {
     reported: Instant,
 }
 
-impl Run {
+impl BoardRun {
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn new(board: &Board, commands: Vec<(u64, Command)>, drift_ppm: f64) -> Self {
         let (begun, begun_ns) = now_by_both();
         let started_us = board.time_us();
         Self {
-            leaving: Leaving::default(),
-            pace: Pace::default(),
+            leaving: OutgoingDatagrams::default(),
+            pace: FramePacer::default(),
             late: Latencies::default(),
             late_frames: 0,
             resets: 0,
@@ -116,12 +116,12 @@ fn is_due(last: &mut Instant, now: Instant, every: Duration) -> bool {
 
 /// Datagrams that are sent when the frame ends, not earlier: a train is sent as soon as a datagram of another length follows.
 #[derive(Default)]
-pub(super) struct Leaving {
+pub(super) struct OutgoingDatagrams {
     bytes: Vec<u8>,
     ends: Vec<usize>,
 }
 
-impl Leaving {
+impl OutgoingDatagrams {
     pub(super) fn push(&mut self, datagram: &[u8]) {
         if !datagram.is_empty() {
             self.bytes.extend_from_slice(datagram);

@@ -4,12 +4,12 @@ use taxel_core::detect::{Detection, ReadoutStream};
 use taxel_core::encode::Zeroing;
 use taxel_core::{EventsView, Result};
 
-use super::readout_queue::Quiet;
+use super::readout_queue::QuietUntil;
 
 /// A readout, and copies of it that advance by the host's clock while no data arrive. The next event discards those that it
 /// proves wrong. So an event that comes later than the silence was assumed to last affects only detections that were output too
 /// early.
-pub(super) struct Ahead {
+pub(super) struct SpeculativeReadout {
     /// Had the events that arrived and nothing else, so its detections are those of the recording.
     certain: Box<ReadoutStream>,
     /// Up to the time that the board is assumed to have reached.
@@ -39,7 +39,7 @@ impl Advanced {
     }
 }
 
-impl Ahead {
+impl SpeculativeReadout {
     pub(super) fn new(certain: Box<ReadoutStream>) -> Self {
         Self { certain, ahead: None, behind: None, early: vec![], wrong: 0, found: vec![] }
     }
@@ -65,7 +65,7 @@ impl Ahead {
                 out.push(detection.clone());
             }
         }
-        let t = Quiet::Believed(t).certain();
+        let t = QuietUntil::ByHostClock(t).certain();
         if self.certain.now().is_none_or(|now| now < t) {
             let behind = self.behind.get_or_insert_with(|| Advanced::of(&self.certain));
             behind.stream.advance(t, &mut behind.found)?;
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     /// A readout that detects once, some 7 ms after a change at taxel 0.
-    fn readout() -> Ahead {
+    fn readout() -> SpeculativeReadout {
         let neuron = Neuron { tau: 20.0, refractory: 500.0, theta_0: 0.3, ..Neuron::default() };
         let one = TrainedNeuron { delay_ms: 0.0, inputs: vec![], weights: vec![1.2; 8], neuron };
         let readout = Readout {
@@ -163,7 +163,7 @@ mod tests {
             neurons: [("touch".to_owned(), one)].into(),
             seen: BTreeMap::new(),
         };
-        Ahead::new(Box::new(readout.stream(&array(), 192.0, None).unwrap()))
+        SpeculativeReadout::new(Box::new(readout.stream(&array(), 192.0, None).unwrap()))
     }
 
     fn array() -> Array {

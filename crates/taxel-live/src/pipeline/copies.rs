@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 use crossbeam_channel as channel;
 use serde_json::json;
 
-use super::shared::Shared;
+use super::shared::PipelineShared;
 use super::sink::OutputDetection;
-use crate::capture::{Batch, Packer};
+use crate::capture::{Batch, ParcelPacker};
 use crate::recording::{LOW_RATE_EVERY, now_ns};
 
 /// Longest time for which a parcel gathers datagrams.
@@ -35,7 +35,7 @@ pub enum Copied {
 
 /// The receiving end of the copies.
 pub struct Copies {
-    shared: Arc<Shared>,
+    shared: Arc<PipelineShared>,
     parcels: channel::Receiver<Vec<u8>>,
     detections: channel::Receiver<OutputDetection>,
     sent_frame: Instant,
@@ -44,7 +44,7 @@ pub struct Copies {
 
 impl Copies {
     pub(super) fn new(
-        shared: Arc<Shared>,
+        shared: Arc<PipelineShared>,
         parcels: channel::Receiver<Vec<u8>>,
         detections: channel::Receiver<OutputDetection>,
     ) -> Self {
@@ -98,7 +98,7 @@ fn detection(output: OutputDetection) -> Option<Copied> {
 /// The decoding thread's end of the copies.
 pub(super) struct Copier {
     parcels: channel::Sender<Vec<u8>>,
-    packer: Packer,
+    packer: ParcelPacker,
     /// When the current parcel was begun, or the last one was closed.
     since: Instant,
 }
@@ -106,7 +106,7 @@ pub(super) struct Copier {
 /// A copier that starts after this number of received datagrams, and the receiver of its parcels.
 pub(super) fn copier(received: u64) -> (Copier, channel::Receiver<Vec<u8>>) {
     let (give, parcels) = channel::bounded(WAITING);
-    (Copier { parcels: give, packer: Packer::after(received), since: Instant::now() }, parcels)
+    (Copier { parcels: give, packer: ParcelPacker::after(received), since: Instant::now() }, parcels)
 }
 
 impl Copier {

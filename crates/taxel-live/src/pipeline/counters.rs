@@ -12,7 +12,7 @@ use crate::bridged::Bridged;
 use crate::capture;
 use crate::clock::{Offset, Pace};
 use crate::latency::Quantiles;
-use crate::recording::{Found, Verdict};
+use crate::recording::{DamageCounts, Verdict};
 
 /// Counts of what arrived, how it was processed, and what was lost at which stage.
 ///
@@ -22,7 +22,7 @@ use crate::recording::{Found, Verdict};
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Counters {
     /// Counts of the socket and of the queue behind it.
-    pub capture: capture::Counts,
+    pub capture: capture::CaptureCounts,
     /// Losses between another computer, which receives the board's datagrams, and this one.
     pub bridged: Option<Bridged>,
     /// What was decoded.
@@ -194,7 +194,7 @@ impl Counters {
         let (now, before) = (&self.capture, &earlier.capture);
         let dropped_by_queue = now.dropped_by_queue - before.dropped_by_queue;
         let datagrams = decoded + dropped_by_queue;
-        let capture = capture::Counts {
+        let capture = capture::CaptureCounts {
             // A message may have arrived whose datagrams still wait.
             messages: if datagrams == 0 { 0 } else { (now.messages - before.messages).max(1) },
             datagrams,
@@ -259,7 +259,7 @@ impl ReadoutCounts {
 
 /// How a [`Live`](super::Live) ended.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Summary {
+pub struct LiveSummary {
     /// The final counts, whose sums are complete.
     pub counters: Counters,
     /// The verdict: nothing lost after arrival, what was lost where, or that nothing arrived.
@@ -291,6 +291,6 @@ pub enum SourceCounts {
         trouble: Option<String>,
         /// What is wrong with its lines and stamps, as a verdict states it.
         #[serde(skip)]
-        faults: Found,
+        faults: DamageCounts,
     },
 }

@@ -8,7 +8,7 @@ use taxel_core::wire::{DatagramInfo, Decoder, SenderDecoder};
 
 use super::counters::Counters;
 use super::options::LiveOptions;
-use super::readout_queue::Quiet;
+use super::readout_queue::QuietUntil;
 use crate::capture::Datagram;
 use crate::clock::{BoardClock, Offset, Pace, leaves};
 
@@ -19,7 +19,7 @@ const TICK: Duration = Duration::from_micros(500);
 pub(super) struct DecodeStage {
     decoder: SenderDecoder,
     promise: Promise,
-    arrivals: Arrivals,
+    arrivals: Heartbeats,
     clock: BoardClock,
     /// What the clock showed when its last stretch ended.
     pace: Option<Pace>,
@@ -40,7 +40,7 @@ pub(super) struct DecodeStage {
 }
 
 /// A datagram that was decoded.
-pub(super) struct Decoded {
+pub(super) struct DecodedDatagram {
     pub(super) info: DatagramInfo,
     pub(super) arrived_ns: i64,
     bytes: usize,
@@ -77,7 +77,7 @@ impl Promise {
 
 /// The latest arrival, and the heartbeats of a board of version 2.
 #[derive(Debug, Clone, Copy, Default)]
-struct Arrivals {
+struct Heartbeats {
     latest_ns: Option<i64>,
     /// The board's time of the latest datagram, us, and missing sequence numbers up to there.
     now: Option<i64>,
@@ -86,7 +86,7 @@ struct Arrivals {
     heartbeat_us: Option<i64>,
 }
 
-impl Arrivals {
+impl Heartbeats {
     /// Notes a datagram; `empty`: without events, which in version 2 is a heartbeat.
     fn note(&mut self, info: &DatagramInfo, arrived_ns: i64, empty: bool) {
         self.latest_ns = self.latest_ns.max(Some(arrived_ns));
@@ -111,7 +111,7 @@ impl DecodeStage {
         Self {
             decoder: fresh_decoder(options),
             promise: Promise::default(),
-            arrivals: Arrivals::default(),
+            arrivals: Heartbeats::default(),
             clock: BoardClock::default(),
             pace: None,
             sent: None,
@@ -129,15 +129,15 @@ impl DecodeStage {
 
     /// Decodes a datagram. After a reset ([`DatagramInfo::reset`]) the caller must first pass on the events before it
     /// ([`DecodeStage::split_at_reset`]), and then continue with [`DecodeStage::note`], as for every datagram.
-    pub(super) fn push(&mut self, datagram: &Datagram, bytes: &[u8]) -> Decoded {
+    pub(super) fn push(&mut self, datagram: &Datagram, bytes: &[u8]) -> DecodedDatagram {
         let first = (self.events.len(), self.events.markers.len());
         let arrived_ns = datagram.arrived_ns;
         let info = self.decoder.push(bytes, Some(arrived_ns / 1000), &mut self.events);
-        Decoded { info, arrived_ns, bytes: bytes.len(), first }
+        DecodedDatagram { info, arrived_ns, bytes: bytes.len(), first }
     }
 
     /// Removes and returns the events after a reset; those before it stay.
-    pub(super) fn split_at_reset(&mut self, decoded: &mut Decoded) -> Events {
+    pub(super) fn split_at_reset(&mut self, decoded: &mut DecodedDatagram) -> Events {
         let (rows, markers) = std::mem::take(&mut decoded.first);
         self.events.split_off(rows, markers)
     }
@@ -151,8 +151,8 @@ impl DecodeStage {
     /// Counts a datagram, and takes from it the board's clock and its promise. `announced` is the time up to which the readout was
     /// informed that no more events will follow, us: events before it are late.
     #[allow(clippy::cast_possible_truncation)]
-    pub(super) fn note(&mut self, decoded: &Decoded, announced: Option<i64>) {
-        let Decoded { info, arrived_ns, bytes, first: (row, _) } = decoded;
+    pub(super) fn note(&mut self, decoded: &DecodedDatagram, announced: Option<i64>) {
+        let DecodedDatagram { info, arrived_ns, bytes, first: (row, _) } = decoded;
         self.decoded += 1;
         self.latest = info.now.or(self.latest);
         self.arrivals.note(info, *arrived_ns, self.events.len() == *row);
@@ -173,7 +173,7 @@ impl DecodeStage {
     }
 
     /// The stamps of a datagram's first event and of its first marker, us.
-    pub(super) fn first_stamps(&self, decoded: &Decoded) -> (Option<i64>, Option<i64>) {
+    pub(super) fn first_stamps(&self, decoded: &DecodedDatagram) -> (Option<i64>, Option<i64>) {
         let (row, marker) = decoded.first;
         (self.events.t.get(row).copied(), self.events.markers.get(marker).map(|marker| marker.t))
     }
@@ -285,7 +285,7 @@ impl DecodeStage {
     /// The board's time before which everything has arrived, if nothing arrived until `until_ns`: the latest datagram's, and as
     /// much as has passed since on the host's clock. A sender that lags its own clock is not assumed to have caught up.
     #[allow(clippy::cast_possible_truncation)]
-    pub(super) fn quiet(&self, until_ns: Option<i64>) -> Option<Quiet> {
+    pub(super) fn quiet(&self, until_ns: Option<i64>) -> Option<QuietUntil> {
         if self.decoder.version() != 1 {
             return None;
         }
@@ -293,6 +293,6 @@ impl DecodeStage {
         let (board_us, host_ns) = self.sent?;
         let since = Offset { board_us, host_ns, ..self.clock.offset().unwrap_or_default() };
         // Events of a frame are sent at its end: all events before the start of the frame that ends now have arrived.
-        Some(Quiet::Believed(since.board_us(until_ns?) - self.frame_us() - guard))
+        Some(QuietUntil::ByHostClock(since.board_us(until_ns?) - self.frame_us() - guard))
     }
 }

@@ -9,10 +9,10 @@ use taxel_core::encode::Zeroing;
 use taxel_core::wire::Registers;
 
 use super::copies::Copies;
-use super::counters::{Counters, Summary};
+use super::counters::{Counters, LiveSummary};
 use super::options::{LiveOptions, Record};
 use super::recordings::Recordings;
-use super::shared::{Request, Shared};
+use super::shared::{PipelineRequest, PipelineShared};
 use super::sink::OutputDetection;
 use super::viewer_queue::ViewerEvents;
 use crate::Result;
@@ -25,7 +25,7 @@ const COPIED_WAITING: usize = 1 << 12;
 /// A handle to a [`Live`](super::Live), for other threads, valid while it runs and after.
 #[derive(Clone)]
 pub struct Handle {
-    pub(super) shared: Arc<Shared>,
+    pub(super) shared: Arc<PipelineShared>,
     pub(super) recordings: Arc<Recordings>,
 }
 
@@ -69,7 +69,7 @@ impl Handle {
     /// Announces a write of the board's registers: it is recorded, and its version of the wire is expected.
     pub fn wrote(&self, registers: Registers) {
         *lock(&self.shared.registers) = registers;
-        self.shared.request(Request::Registers(registers));
+        self.shared.request(PipelineRequest::Registers(registers));
     }
 
     /// Returns copies of the events from the next batch on, for a viewer.
@@ -79,7 +79,7 @@ impl Handle {
     /// `Core(Problem)` if the pipeline has ended.
     pub fn events(&self) -> Result<ViewerEvents> {
         let (answer, events) = channel::bounded(1);
-        self.shared.request(Request::View(answer));
+        self.shared.request(PipelineRequest::View(answer));
         self.shared.wait(&events)
     }
 
@@ -91,7 +91,7 @@ impl Handle {
     pub fn copy(&self) -> Result<Copies> {
         let (answer, parcels) = channel::bounded(1);
         let detections = self.detections(COPIED_WAITING);
-        self.shared.request(Request::Copy(answer));
+        self.shared.request(PipelineRequest::Copy(answer));
         Ok(Copies::new(Arc::clone(&self.shared), self.shared.wait(&parcels)?, detections))
     }
 
@@ -110,7 +110,7 @@ impl Handle {
     ///
     /// `File` if the file exists or cannot be created: then the one that runs goes on. What ended that one early, or `File`
     /// if its end cannot be written. `Core(Problem)` if all is over.
-    pub fn record(&self, record: &Record) -> Result<Option<Summary>> {
+    pub fn record(&self, record: &Record) -> Result<Option<LiveSummary>> {
         self.recordings.record(record)
     }
 
@@ -119,7 +119,7 @@ impl Handle {
     /// # Errors
     ///
     /// What ended it early, or `File` if its end cannot be written; `Core(Problem)` if there is none.
-    pub fn end_recording(&self) -> Result<Summary> {
+    pub fn end_recording(&self) -> Result<LiveSummary> {
         self.recordings.end()
     }
 
@@ -163,7 +163,7 @@ impl Handle {
     /// cannot hold it: then none is zeroed. `File` where the disk is full.
     pub fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let (answer, zeroed) = channel::bounded(1);
-        self.shared.request(Request::Zero(taxels.to_vec(), answer));
+        self.shared.request(PipelineRequest::Zero(taxels.to_vec(), answer));
         self.shared.wait(&zeroed).and_then(std::convert::identity)
     }
 

@@ -8,13 +8,13 @@ use taxel_core::Events;
 use taxel_core::held::Held;
 
 use super::copies::{Copier, GATHER, copier};
-use super::shared::Shared;
+use super::shared::PipelineShared;
 use super::viewer_queue::{ViewerEvents, ViewerQueue, viewer_queue};
 use crate::capture::Batch;
 use crate::recording::LOW_RATE_EVERY;
 
 pub(super) struct Observers {
-    shared: Arc<Shared>,
+    shared: Arc<PipelineShared>,
     viewers: Vec<ViewerQueue>,
     copiers: Vec<Copier>,
     /// Number of datagrams that were received before the next one.
@@ -23,7 +23,7 @@ pub(super) struct Observers {
 }
 
 impl Observers {
-    pub(super) fn new(shared: Arc<Shared>) -> Self {
+    pub(super) fn new(shared: Arc<PipelineShared>) -> Self {
         Self { shared, viewers: vec![], copiers: vec![], received: 0, published_frame: Instant::now() }
     }
 

@@ -55,10 +55,10 @@ options! {
         #[serde(skip_serializing)]
         array: Array = Array::thesis(), "commands" = "live record", "metavar" = "ROWSxCOLUMNS[xMM]",
             "python" = "Array | None", "typed" = "As 24x20x5; without a pitch 2.67 mm, or unknown with --rate-hz.";
-        /// The board's registers: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: "5.2 kHz"; a remote board reports its own.
+        /// The board's registers, by a preset: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: those of a remote board, else
+        /// those of a board of this array at reset.
         ///
-        /// The contents of the registers, or the name of a preset, of which a smaller array drives fewer lines. Default: those
-        /// of a board of this array at reset.
+        /// Or their contents. A smaller array drives fewer lines of a preset.
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
         #[serde(skip_serializing)]
         registers: Registers = Registers::default(), "commands" = "live record", "flag" = "--preset",
@@ -67,19 +67,17 @@ options! {
         ///
         /// The panel's "delta intensity".
         differences: bool = false, "commands" = "live record";
-        /// A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none.
-        ///
-        /// Without one nothing is detected.
+        /// A trained readout or a plain rule; without one nothing is detected.
         #[serde(skip_serializing)]
         readout: Option<String> = None, "metavar" = "FILE",
-            "python" = "Readout | PlainRule | None";
-        /// Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON).
+            "python" = "Readout | PlainRule | None", "typed" = "taxel train writes such files (JSON).";
+        /// Rest of the taxels: a saved tare, or how many seconds of rest at the beginning to take a fresh one from.
         ///
         /// For a plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event
         /// on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
         #[serde(skip_serializing)]
-        tare: Option<StatedTare> = None, "python" = "Tare | float | None";
+        tare: Option<StatedTare> = None, "python" = "Tare | float | None", "metavar" = "FILE|SECONDS";
         /// Record in a new file (.mcap or .lsa).
         ///
         /// `.mcap` holds all data, `.lsa` the raw bytes of the manual.
@@ -92,7 +90,7 @@ options! {
         /// The board's name among the sources of the recording.
         name: String = "board".to_owned(), "commands" = "record";
         /// Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU
-        /// (serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated.
+        /// (serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay).
         ///
         /// By name, in a `.mcap`, each with its own clock: "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which
         /// sends to that address of this machine; "serial:PATH@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard
@@ -101,7 +99,7 @@ options! {
         /// `t_us`, `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its
         /// arrival.
         sources: Vec<(String, String)> = vec![], "commands" = "record", "flag" = "--source", "metavar" = "NAME=WHAT",
-            "python" = "Mapping[str, str] | None";
+            "python" = "Mapping[str, str] | None", "typed" = "May be repeated.";
         /// Compression of a .mcap: none, lz4 or zstd.
         compression: String = "none".to_owned(), "commands" = "record";
         /// Replace the file if it exists.
@@ -112,12 +110,12 @@ options! {
         gap_frames: f64 = 1.0, "commands" = "", "minimum" = 0;
         /// Print one line of JSON for each detection, and nothing else.
         lines: bool = false, "flag" = "--json";
-        /// Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be repeated.
+        /// Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD.
         ///
         /// UDP sends a datagram each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab
         /// streaming layer. Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and
         /// counted.
-        send: Vec<String> = vec![], "metavar" = "WHERE", "python" = "str | Sequence[str]";
+        send: Vec<String> = vec![], "metavar" = "WHERE", "python" = "str | Sequence[str]", "typed" = "May be repeated.";
         /// How much may wait in the kernel, bytes.
         kernel_buffer_bytes: usize = ReceiverOptions::default().kernel_buffer_bytes, "commands" = "",
             "maximum" = 2_147_483_647;

@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use crossbeam_channel::Sender;
 use taxel_core::detect::Detection;
 
-use super::shared::Shared;
+use super::shared::PipelineShared;
 use super::sink::{OutputDetection, Sink};
 use crate::locked::lock;
 use crate::recording::now_ns;
@@ -23,11 +23,11 @@ pub(super) struct DetectionOutput(Mutex<State>);
 struct State {
     waiting: VecDeque<Detection>,
     /// `None` while a thread uses them.
-    targets: Option<Targets>,
+    targets: Option<DetectionSinks>,
 }
 
 /// The receivers of detections.
-struct Targets {
+struct DetectionSinks {
     sinks: Vec<Box<dyn Sink>>,
     /// The queue of [`Live::next`](super::Live::next).
     queue: Sender<OutputDetection>,
@@ -37,12 +37,12 @@ struct Targets {
 
 impl DetectionOutput {
     pub(super) fn new(sinks: Vec<Box<dyn Sink>>, queue: Sender<OutputDetection>) -> Self {
-        let targets = Some(Targets { sinks, queue, failed: false });
+        let targets = Some(DetectionSinks { sinks, queue, failed: false });
         Self(Mutex::new(State { waiting: VecDeque::new(), targets }))
     }
 
     /// Adds detections; returns whether no thread is outputting at present.
-    pub(super) fn add(&self, shared: &Shared, found: &mut Vec<Detection>) -> bool {
+    pub(super) fn add(&self, shared: &PipelineShared, found: &mut Vec<Detection>) -> bool {
         let mut state = lock(&self.0);
         let room = WAITING.saturating_sub(state.waiting.len()).min(found.len());
         let lost = found.len() - room;
@@ -56,7 +56,7 @@ impl DetectionOutput {
     }
 
     /// Outputs the waiting detections, and those that are added meanwhile, unless another thread is outputting.
-    pub(super) fn run(&self, shared: &Shared) {
+    pub(super) fn run(&self, shared: &PipelineShared) {
         let mut state = lock(&self.0);
         let Some(mut targets) = state.targets.take() else { return };
         while let Some(detection) = state.waiting.pop_front() {
@@ -73,9 +73,9 @@ impl DetectionOutput {
     }
 }
 
-impl Targets {
+impl DetectionSinks {
     /// Passes a detection to the sinks first, then to the recording and the receivers.
-    fn output(&mut self, shared: &Shared, detection: Detection) -> Result<()> {
+    fn output(&mut self, shared: &PipelineShared, detection: Detection) -> Result<()> {
         let reported_ns = now_ns();
         let offset = shared.published().counters.board.offset;
         let output = OutputDetection {

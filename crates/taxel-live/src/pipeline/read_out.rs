@@ -4,9 +4,9 @@ use taxel_core::Events;
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 
-use super::readout_queue::{BatchEnd, Quiet};
+use super::readout_queue::{BatchEnd, QuietUntil};
 use super::running_readout::RunningReadout;
-use super::shared::Shared;
+use super::shared::PipelineShared;
 
 pub(super) struct ReadOutStage {
     /// Whether there is a readout at all.
@@ -31,14 +31,14 @@ impl ReadOutStage {
     }
 
     /// Publishes its state before the first events.
-    pub(super) fn begin(&self, shared: &Shared) {
+    pub(super) fn begin(&self, shared: &PipelineShared) {
         if let Some(readout) = &self.readout {
             readout.begin(shared);
         }
     }
 
     /// Moves the readout to another thread.
-    pub(super) fn separate(&mut self) {
+    pub(super) fn move_to_thread(&mut self) {
         if let Some(readout) = self.readout.take() {
             self.separated = Some(Box::new(readout));
         }
@@ -50,7 +50,7 @@ impl ReadOutStage {
     }
 
     /// Detections that do not wait for output yet.
-    pub(super) fn found(&mut self) -> &mut Vec<Detection> {
+    pub(super) fn pending_detections(&mut self) -> &mut Vec<Detection> {
         self.readout.as_mut().map_or(&mut self.nothing, |readout| &mut readout.found)
     }
 
@@ -64,13 +64,13 @@ impl ReadOutStage {
     }
 
     /// Processes events, with the time before which the board has promised no more; `events` may be empty after it.
-    pub(super) fn push(&mut self, shared: &Shared, events: &mut Events, promised: Option<i64>) {
+    pub(super) fn push(&mut self, shared: &PipelineShared, events: &mut Events, promised: Option<i64>) {
         if !self.is_on || (promised.is_none() && events.is_empty() && events.markers.is_empty()) {
             return;
         }
         match &mut self.readout {
             Some(readout) => {
-                readout.push(shared, events, BatchEnd { quiet: promised.map(Quiet::Promised), last: false });
+                readout.push(shared, events, BatchEnd { quiet: promised.map(QuietUntil::ByBoard), last: false });
             }
             None => {
                 let dropped = shared.readout_queue.push(events, promised);
@@ -81,14 +81,14 @@ impl ReadOutStage {
     }
 
     /// Processes a silence: no events before a time.
-    pub(super) fn quiet(&mut self, shared: &Shared, quiet: Quiet) {
+    pub(super) fn quiet(&mut self, shared: &PipelineShared, quiet: QuietUntil) {
         match &mut self.readout {
             Some(readout) => readout.advance(shared, BatchEnd { quiet: Some(quiet), last: false }),
             None => shared.readout_queue.quiet(quiet),
         }
     }
 
-    pub(super) fn zero(&mut self, shared: &Shared, zeroings: &[Zeroing]) {
+    pub(super) fn zero(&mut self, shared: &PipelineShared, zeroings: &[Zeroing]) {
         match &mut self.readout {
             Some(readout) => readout.zero(zeroings),
             None if self.is_on => shared.readout_queue.zero(zeroings),
@@ -97,7 +97,7 @@ impl ReadOutStage {
     }
 
     /// Ends the input.
-    pub(super) fn close(&mut self, shared: &Shared, quiet: Option<Quiet>) {
+    pub(super) fn close(&mut self, shared: &PipelineShared, quiet: Option<QuietUntil>) {
         match &mut self.readout {
             Some(readout) => readout.advance(shared, BatchEnd { quiet, last: true }),
             None => shared.readout_queue.close(quiet),

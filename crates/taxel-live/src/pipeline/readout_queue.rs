@@ -11,15 +11,15 @@ use crate::locked::lock;
 /// Events that wait for the readout, and the time up to which there are no more.
 #[derive(Debug)]
 pub(super) struct ReadoutQueue {
-    state: Mutex<Waiting>,
+    state: Mutex<WaitingEvents>,
     came: Condvar,
     limit: usize,
 }
 
 #[derive(Debug)]
-struct Waiting {
+struct WaitingEvents {
     events: Events,
-    quiet: Option<Quiet>,
+    quiet: Option<QuietUntil>,
     zeroings: Vec<Zeroing>,
     dropped: u64,
     closed: bool,
@@ -27,20 +27,20 @@ struct Waiting {
 
 /// A time before which no data follow the queued events, us.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Quiet {
+pub(super) enum QuietUntil {
     /// By the host's clock: an event that arrives late may contradict it.
-    Believed(i64),
+    ByHostClock(i64),
     /// As the board has promised.
-    Promised(i64),
+    ByBoard(i64),
 }
 
-impl Quiet {
+impl QuietUntil {
     /// The time before which no data can follow, us: a silence that is believed counts once an event in it would be too late
     /// to be accepted.
     pub(super) fn certain(self) -> i64 {
         match self {
-            Self::Believed(t) => t - FARTHEST_BACK_US,
-            Self::Promised(t) => t,
+            Self::ByHostClock(t) => t - FARTHEST_BACK_US,
+            Self::ByBoard(t) => t,
         }
     }
 }
@@ -49,7 +49,7 @@ impl Quiet {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct BatchEnd {
     /// The time before which no more events follow.
-    pub quiet: Option<Quiet>,
+    pub quiet: Option<QuietUntil>,
     /// No more data will arrive.
     pub last: bool,
 }
@@ -57,7 +57,7 @@ pub(super) struct BatchEnd {
 impl ReadoutQueue {
     pub(super) fn new(array: &Array, limit: usize) -> Self {
         let events = Events::empty(array.clone());
-        let state = Waiting { events, quiet: None, zeroings: vec![], dropped: 0, closed: false };
+        let state = WaitingEvents { events, quiet: None, zeroings: vec![], dropped: 0, closed: false };
         Self { state: Mutex::new(state), came: Condvar::new(), limit }
     }
 
@@ -74,7 +74,7 @@ impl ReadoutQueue {
             state.events.append(events, room.min(events.len()));
             events.clear();
         }
-        state.quiet = promised.map(Quiet::Promised);
+        state.quiet = promised.map(QuietUntil::ByBoard);
         let dropped = state.dropped;
         drop(state);
         self.came.notify_one();
@@ -82,7 +82,7 @@ impl ReadoutQueue {
     }
 
     /// Sets the time before which no data follow the queued events.
-    pub(super) fn quiet(&self, quiet: Quiet) {
+    pub(super) fn quiet(&self, quiet: QuietUntil) {
         self.state().quiet = Some(quiet);
         self.came.notify_one();
     }
@@ -94,7 +94,7 @@ impl ReadoutQueue {
     }
 
     /// Ends the queue; `quiet` is the time before which nothing arrived.
-    pub(super) fn close(&self, quiet: Option<Quiet>) {
+    pub(super) fn close(&self, quiet: Option<QuietUntil>) {
         let mut state = self.state();
         state.quiet = quiet.or(state.quiet);
         state.closed = true;
@@ -105,7 +105,7 @@ impl ReadoutQueue {
     /// Waits until something is there and removes all of it; adds to `zeroings`.
     pub(super) fn pop(&self, events: &mut Events, zeroings: &mut Vec<Zeroing>) -> BatchEnd {
         events.clear();
-        let nothing = |s: &mut Waiting| {
+        let nothing = |s: &mut WaitingEvents| {
             let silent = s.events.is_empty() && s.events.markers.is_empty() && s.zeroings.is_empty();
             silent && s.quiet.is_none() && !s.closed
         };
@@ -117,7 +117,7 @@ impl ReadoutQueue {
 
     /// Locks the state. No holder of the lock can panic half-way through a change, so a poisoned lock still guards a
     /// valid state.
-    fn state(&self) -> MutexGuard<'_, Waiting> {
+    fn state(&self) -> MutexGuard<'_, WaitingEvents> {
         lock(&self.state)
     }
 }
@@ -166,13 +166,13 @@ mod tests {
     fn silence_is_popped_once_and_only_where_nothing_came_after_it() {
         let readout_queue = ReadoutQueue::new(&Array::thesis(), 10);
         let mut popped = Events::empty(Array::thesis());
-        readout_queue.quiet(Quiet::Believed(100));
-        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, Some(Quiet::Believed(100)));
-        readout_queue.quiet(Quiet::Believed(200));
+        readout_queue.quiet(QuietUntil::ByHostClock(100));
+        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, Some(QuietUntil::ByHostClock(100)));
+        readout_queue.quiet(QuietUntil::ByHostClock(200));
         readout_queue.push(&mut events(&[150], None), None);
         assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, None);
         readout_queue.push(&mut events(&[], None), Some(300));
-        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, Some(Quiet::Promised(300)));
+        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, Some(QuietUntil::ByBoard(300)));
         readout_queue.close(None);
         assert!(readout_queue.pop(&mut popped, &mut vec![]).last);
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::shared::Shared;
+use super::shared::PipelineShared;
 use crate::Result;
 use crate::capture::Batch;
 
@@ -11,18 +11,18 @@ use crate::capture::Batch;
 const TOGETHER: Duration = Duration::from_millis(1);
 
 pub(super) struct ReceiveStage {
-    shared: Arc<Shared>,
+    shared: Arc<PipelineShared>,
     /// The buffer of the last batch.
     batch: Batch,
 }
 
 impl ReceiveStage {
-    pub(super) fn new(shared: Arc<Shared>) -> Self {
+    pub(super) fn new(shared: Arc<PipelineShared>) -> Self {
         Self { shared, batch: Batch::new() }
     }
 
     /// Moves receiving to a separate thread; without a readout it may gather datagrams.
-    pub(super) fn separate(&self, reads_out: bool) -> Result<()> {
+    pub(super) fn move_to_thread(&self, reads_out: bool) -> Result<()> {
         self.shared.receiver.apart(if reads_out { Duration::ZERO } else { TOGETHER })
     }
 

@@ -12,23 +12,23 @@ use taxel_core::{Events, Marker};
 
 use super::counters::Counters;
 use super::decode::fresh_decoder;
-use super::picture_buffer::PictureBuffer;
+use super::preview_buffer::PreviewBuffer;
 use super::recorder::Recorder;
-use super::shared::{Ended, Shared};
+use super::shared::{EndedRecording, PipelineShared};
 use crate::Result;
 use crate::capture::Batch;
 use crate::locked::lock;
-use crate::recording::{BoardChange, Change, now_ns};
+use crate::recording::{BoardChange, BoardChangeKind, now_ns};
 
 /// Interval at which the counts are written to an unfinished recording.
 pub(super) const COUNTS_EVERY: Duration = Duration::from_secs(1);
 
 pub(super) struct RecordStage {
-    shared: Arc<Shared>,
+    shared: Arc<PipelineShared>,
     /// Decodes from a recording's first datagram on, as a reader of the file will, until the offset between the
     /// recording's clock and the pipeline's is known.
     origin: Option<Box<SenderDecoder>>,
-    picture_buffer: PictureBuffer,
+    preview_buffer: PreviewBuffer,
     /// Number of decoded datagrams when the last picture was considered.
     considered: u64,
     /// Whether the recording has the fresh tare.
@@ -38,11 +38,11 @@ pub(super) struct RecordStage {
 }
 
 impl RecordStage {
-    pub(super) fn new(shared: Arc<Shared>) -> Self {
+    pub(super) fn new(shared: Arc<PipelineShared>) -> Self {
         Self {
             shared,
             origin: None,
-            picture_buffer: PictureBuffer::new(),
+            preview_buffer: PreviewBuffer::new(),
             considered: 0,
             tared: false,
             counted: Instant::now(),
@@ -74,14 +74,14 @@ impl RecordStage {
     }
 
     /// Records a change of the board that a datagram showed: a reset, or another version of the wire.
-    pub(super) fn board(&self, info: &DatagramInfo, at_ns: i64) -> Result<()> {
+    pub(super) fn record_board_change(&self, info: &DatagramInfo, at_ns: i64) -> Result<()> {
         if info.version == 1 && !info.changed {
             return Ok(());
         }
-        let wire = info.changed.then_some(Change::Wire { version: info.version, asked: false });
+        let wire = info.changed.then_some(BoardChangeKind::Wire { version: info.version, asked: false });
         self.with(|recorder| {
             recorder.check_version(info.version)?;
-            for change in wire.into_iter().chain(info.reset.then_some(Change::Reset)) {
+            for change in wire.into_iter().chain(info.reset.then_some(BoardChangeKind::Reset)) {
                 recorder.board_change(&BoardChange { at_ns, t_us: info.now, change })?;
             }
             Ok(())
@@ -90,7 +90,7 @@ impl RecordStage {
 
     /// Records that the board was set to another version of the wire; `t_us` is its latest time.
     pub(super) fn asked_for_version(&self, version: u8, t_us: Option<i64>) -> Result<()> {
-        let change = Change::Wire { version, asked: true };
+        let change = BoardChangeKind::Wire { version, asked: true };
         self.with(|recorder| recorder.board_change(&BoardChange { at_ns: now_ns(), t_us, change }))
     }
 
@@ -128,7 +128,7 @@ impl RecordStage {
 
     /// Ends the running recording, and starts the next one, if there is one, with the taxels' values. What was decoded
     /// so far belongs to the former, what arrives from now on to the latter.
-    pub(super) fn switch(&mut self, next: Option<Box<Recorder>>, held: &Held) -> Result<Ended> {
+    pub(super) fn switch(&mut self, next: Option<Box<Recorder>>, held: &Held) -> Result<EndedRecording> {
         let now = self.shared.counters();
         let ended = lock(&self.shared.recording.recorder).take();
         self.origin = None;
@@ -152,7 +152,7 @@ impl RecordStage {
     /// Records earlier zeroings, which remain valid in a new recording.
     fn earlier_zeroings(&self) -> Result<()> {
         let zeroed: Vec<Zeroing> = self.shared.published().zeroed.values().copied().collect();
-        self.with(|recorder| zeroed.iter().try_for_each(|one| recorder.zeroing(one)))
+        self.with(|recorder| zeroed.iter().try_for_each(|zeroing| recorder.zeroing(zeroing)))
     }
 
     /// Records zeroings; on an error the caller zeroes nothing.
@@ -166,26 +166,28 @@ impl RecordStage {
     /// Buffers a picture if one is due, and records the selected ones; with `last` also the final one.
     pub(super) fn pictures(&mut self, decoded: u64, held: &Held, last: bool) -> Result<()> {
         let now = Instant::now();
-        if !(last || self.picture_buffer.is_due(now)) {
+        if !(last || self.preview_buffer.is_due(now)) {
             return Ok(());
         }
         let times = std::mem::take(&mut *lock(&self.shared.recording.picture_times));
         if !self.runs() {
-            self.picture_buffer.clear();
+            self.preview_buffer.clear();
             return Ok(());
         }
         let new = decoded != self.considered;
         self.considered = decoded;
         if let (true, Some(t_us)) = (new, self.shared.published().counters.board.board_us) {
-            self.picture_buffer.push(now, now_ns(), t_us, held.frame());
+            self.preview_buffer.push(now, now_ns(), t_us, held.frame());
         }
-        times.into_iter().for_each(|t| self.picture_buffer.around(t));
+        times.into_iter().for_each(|t| self.preview_buffer.around(t));
         let columns = self.shared.options.array.columns;
-        let mut picture_buffer = std::mem::replace(&mut self.picture_buffer, PictureBuffer::new());
+        let mut preview_buffer = std::mem::replace(&mut self.preview_buffer, PreviewBuffer::new());
         let outcome = self.with(|recorder| {
-            picture_buffer.take_wanted().try_for_each(|one| recorder.picture(one.at_ns, one.t_us, columns, &one.held))
+            preview_buffer
+                .take_wanted()
+                .try_for_each(|preview| recorder.picture(preview.at_ns, preview.t_us, columns, &preview.held))
         });
-        self.picture_buffer = picture_buffer;
+        self.preview_buffer = preview_buffer;
         outcome
     }
 

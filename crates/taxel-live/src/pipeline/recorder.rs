@@ -12,10 +12,10 @@ use taxel_core::{Marker, problem};
 use super::counters::{Counters, DecodingCounts};
 use super::options::{LiveOptions, Record};
 use super::sink::OutputDetection;
-use super::source::Source;
+use super::source::FurtherSource;
 use crate::capture::{Batch, Origin};
 use crate::locked::lock;
-use crate::recording::{self, BoardChange, Decoding, Header, LsaWriter, OutputFile, Track, Writer, now_ns};
+use crate::recording::{self, BoardChange, Decoding, Header, LsaWriter, OutputFile, SourceWriter, Writer, now_ns};
 use crate::{Error, Result};
 
 /// One recording, from its reservation to its end. A raw `.lsa` contains bytes only: notes, markers and the like are
@@ -35,14 +35,14 @@ pub(super) struct Recorder {
     reserved: Mutex<Option<OutputFile>>,
     /// The counters at the recording's beginning, if it began while the pipeline was running.
     since: Option<Box<Counters>>,
-    clock: Mutex<Clock>,
+    clock: Mutex<RecordingClock>,
     /// The pipeline that owns the file, if it is another one.
-    host: Option<Part>,
+    host: Option<RecordingPart>,
 }
 
 /// The relation of the recording's clock, which begins with its first stamp, to the pipeline's.
 #[derive(Clone, Copy)]
-enum Clock {
+enum RecordingClock {
     /// The recording's clock is this many us behind.
     Behind(i64),
     /// The file is begun only when the offset is known, and states it in its header: its times are then those of the
@@ -55,14 +55,14 @@ enum Clock {
 enum RecordingFile {
     Mcap(Box<Writer>),
     /// A part of another pipeline's recording.
-    Track(Box<Track>),
+    Track(Box<SourceWriter>),
     /// The lock is needed for the borrow only: one thread writes.
     Lsa(Mutex<LsaWriter>),
 }
 
 impl RecordingFile {
     /// The writer of messages; a raw file has none.
-    fn track(&self) -> Option<&Track> {
+    fn track(&self) -> Option<&SourceWriter> {
         match self {
             Self::Mcap(writer) => Some(writer),
             Self::Track(track) => Some(track),
@@ -74,7 +74,7 @@ impl RecordingFile {
 /// The pipeline whose recording contains the parts of others.
 pub(super) trait Host: Send + Sync {
     /// Opens the part of another source.
-    fn part(&self, name: &str) -> Result<Track>;
+    fn part(&self, name: &str) -> Result<SourceWriter>;
 
     /// Ends the pipeline because of an error.
     fn fail(&self, error: Error);
@@ -82,14 +82,14 @@ pub(super) trait Host: Send + Sync {
 
 /// A source's part of a recording that another pipeline began.
 #[derive(Clone)]
-pub(super) struct Part {
+pub(super) struct RecordingPart {
     pub(super) host: Weak<dyn Host>,
     pub(super) name: String,
 }
 
-impl Part {
+impl RecordingPart {
     /// Opens the part: the file is begun from then on.
-    pub(super) fn open(&self) -> Result<Track> {
+    pub(super) fn open(&self) -> Result<SourceWriter> {
         let host = self.host.upgrade().ok_or_else(|| problem!("source {}: the recording has ended", self.name))?;
         host.part(&self.name)
     }
@@ -106,32 +106,32 @@ impl Recorder {
             file: OnceLock::new(),
             reserved: Mutex::default(),
             since: None,
-            clock: Mutex::new(Clock::Behind(0)),
+            clock: Mutex::new(RecordingClock::Behind(0)),
             host: None,
         }
     }
 
     /// A part of another pipeline's recording.
-    pub(super) fn join(host: Part, record: &Record, options: &LiveOptions, place: &Origin) -> Self {
+    pub(super) fn join(host: RecordingPart, record: &Record, options: &LiveOptions, place: &Origin) -> Self {
         let name = host.name.clone();
         let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(place), now_ns());
         Self { host: Some(host), ..Self::of(record, Header { name, ..board }) }
     }
 
     /// A part of another pipeline's recording that begins while this pipeline's board is being received.
-    pub(super) fn part_of(&self, host: Part, options: &LiveOptions, place: &Origin) -> Result<Self> {
+    pub(super) fn part_of(&self, host: RecordingPart, options: &LiveOptions, place: &Origin) -> Result<Self> {
         let track = self.track_of(&host.name)?;
         let part = Self::join(host, &self.record, options, place);
         Ok(Self {
             file: OnceLock::from(RecordingFile::Track(Box::new(track))),
             since: Some(Box::default()),
-            clock: Mutex::new(Clock::Unknown),
+            clock: Mutex::new(RecordingClock::Unknown),
             ..part
         })
     }
 
     /// The writer of another source's part of this recording.
-    pub(super) fn track_of(&self, name: &str) -> Result<Track> {
+    pub(super) fn track_of(&self, name: &str) -> Result<SourceWriter> {
         match self.create_once()? {
             RecordingFile::Mcap(writer) => writer.track(name),
             RecordingFile::Track(_) | RecordingFile::Lsa(_) => {
@@ -141,7 +141,12 @@ impl Recorder {
     }
 
     /// A recording from the pipeline's beginning: a new file is begun at once.
-    pub(super) fn create(record: &Record, options: &LiveOptions, sources: &[Source], place: &Origin) -> Result<Self> {
+    pub(super) fn create(
+        record: &Record,
+        options: &LiveOptions,
+        sources: &[FurtherSource],
+        place: &Origin,
+    ) -> Result<Self> {
         let (recorder, file) = Self::open(record, options, sources, place)?;
         let new = file.is_new();
         *lock(&recorder.reserved) = Some(file);
@@ -152,7 +157,12 @@ impl Recorder {
     }
 
     /// A recording that begins while the pipeline runs: the file is reserved now, and written later.
-    pub(super) fn reserve(record: &Record, options: &LiveOptions, sources: &[Source], place: &Origin) -> Result<Self> {
+    pub(super) fn reserve(
+        record: &Record,
+        options: &LiveOptions,
+        sources: &[FurtherSource],
+        place: &Origin,
+    ) -> Result<Self> {
         let (recorder, file) = Self::open(record, options, sources, place)?;
         let recorder = Self { since: Some(Box::default()), ..recorder };
         if kind_of_name(&record.path)? == "lsa" {
@@ -162,14 +172,19 @@ impl Recorder {
         // Without other sources the file waits for the board's first stamp, so that its times are the pipeline's.
         let for_clock = recorder.header.sources.is_empty();
         let writer = Writer::plan(file, &recorder.header, record.compression, for_clock);
-        let clock = Mutex::new(if for_clock { Clock::Waits } else { Clock::Unknown });
+        let clock = Mutex::new(if for_clock { RecordingClock::Waits } else { RecordingClock::Unknown });
         Ok(Self { file: OnceLock::from(RecordingFile::Mcap(Box::new(writer))), clock, ..recorder })
     }
 
     /// A recording whose file is opened and locked, but not changed.
-    fn open(record: &Record, options: &LiveOptions, sources: &[Source], place: &Origin) -> Result<(Self, OutputFile)> {
+    fn open(
+        record: &Record,
+        options: &LiveOptions,
+        sources: &[FurtherSource],
+        place: &Origin,
+    ) -> Result<(Self, OutputFile)> {
         let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(place), now_ns());
-        let sources = sources.iter().map(Source::header).collect::<taxel_core::Result<_>>()?;
+        let sources = sources.iter().map(FurtherSource::header).collect::<taxel_core::Result<_>>()?;
         let decoding = Decoding { difference: options.differences, ..Decoding::default() };
         let header = Header { decoding, name: options.name.clone(), sources, ..board };
         let (path, kind) = (&record.path, kind_of_name(&record.path)?);
@@ -225,21 +240,21 @@ impl Recorder {
             Some(RecordingFile::Mcap(writer)) => writer.begin(origin_us)?,
             _ => false,
         };
-        *lock(&self.clock) = Clock::Behind(if in_header { 0 } else { origin_us });
+        *lock(&self.clock) = RecordingClock::Behind(if in_header { 0 } else { origin_us });
         Ok(())
     }
 
     /// Converts a time of the pipeline's clock to the recording's clock; none if the offset is not known yet.
     fn timed(&self, t: i64) -> Option<i64> {
         match *lock(&self.clock) {
-            Clock::Behind(us) => Some(t - us),
-            Clock::Waits => Some(t),
-            Clock::Unknown => None,
+            RecordingClock::Behind(us) => Some(t - us),
+            RecordingClock::Waits => Some(t),
+            RecordingClock::Unknown => None,
         }
     }
 
     /// Writes messages, which a raw file omits.
-    fn with_track(&self, work: impl FnOnce(&Track) -> Result<()>) -> Result<()> {
+    fn with_track(&self, work: impl FnOnce(&SourceWriter) -> Result<()>) -> Result<()> {
         if kind_of_name(&self.record.path)? == "lsa" {
             return Ok(());
         }
@@ -369,7 +384,7 @@ impl Recorder {
     }
 
     /// The losses, as the file states them.
-    pub(super) fn losses(&self, counters: &Counters) -> recording::Counts {
+    pub(super) fn losses(&self, counters: &Counters) -> recording::RecordingCounts {
         losses(counters, self.since())
     }
 
@@ -428,7 +443,7 @@ fn kind_of_name(path: &Path) -> Result<&str> {
 }
 
 /// The losses, as recordings state them; with `since`, those since a recording began.
-pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::Counts {
+pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::RecordingCounts {
     // Datagrams that wait at the end belong to a later recording.
     let now = since.map_or_else(|| counters.clone(), |begun| counters.since(begun));
     let DecodingCounts { wire, wire_jumps, wire_repeated, wire_v2, .. } = &now.decoding;
@@ -442,7 +457,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
     decoder.insert(recording::JUMPED_BEFORE.to_owned(), jumped);
     // Version 1 does not number datagrams: a recording with any of it cannot state that none is missing.
     let knows = now.decoding.wire_v2.intact > 0 && now.decoding.wire.bytes == 0;
-    recording::Counts {
+    recording::RecordingCounts {
         received: now.capture.datagrams,
         recorded: now.decoding.decoded,
         dropped_by_kernel: now.capture.dropped_by_kernel,
@@ -452,7 +467,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         steps_back: now.decoding.wire_steps.clone(),
         missing: missing.filter(|n| *n > 0 || knows),
         bridged: now.bridged.map(Box::new),
-        ..recording::Counts::default()
+        ..recording::RecordingCounts::default()
     }
 }
 

@@ -7,37 +7,37 @@ use std::sync::{Arc, Mutex, Weak};
 use crossbeam_channel as channel;
 use taxel_core::problem;
 
-use super::counters::{Counters, SourceCounts, Summary};
+use super::counters::{Counters, LiveSummary, SourceCounts};
 use super::options::{LiveOptions, Record};
-use super::recorder::{Host, Part, Recorder, losses};
-use super::shared::{Ended, Request, Shared};
-use super::sources::{Numbers, losses_of_lines};
+use super::recorder::{Host, Recorder, RecordingPart, losses};
+use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
+use super::sources::{NumberStream, losses_of_lines};
 use crate::capture::Origin;
 use crate::locked::lock;
-use crate::recording::{Counts, Verdict};
+use crate::recording::{RecordingCounts, Verdict};
 use crate::{Error, Result};
 
 /// Starts and ends the recordings of a pipeline.
 pub(super) struct Recordings {
-    shared: Arc<Shared>,
+    shared: Arc<PipelineShared>,
     /// The other sources of a recording, by name.
-    boards: Vec<(String, Arc<Shared>)>,
-    numbers: Vec<(String, Arc<Numbers>)>,
+    boards: Vec<(String, Arc<PipelineShared>)>,
+    numbers: Vec<(String, Arc<NumberStream>)>,
     /// Locked while one recording replaces another.
     replacing: Mutex<()>,
 }
 
 impl Recordings {
     pub(super) fn new(
-        shared: Arc<Shared>,
-        boards: Vec<(String, Arc<Shared>)>,
-        numbers: Vec<(String, Arc<Numbers>)>,
+        shared: Arc<PipelineShared>,
+        boards: Vec<(String, Arc<PipelineShared>)>,
+        numbers: Vec<(String, Arc<NumberStream>)>,
     ) -> Self {
         Self { shared, boards, numbers, replacing: Mutex::default() }
     }
 
     /// As [`Handle::record`](super::Handle::record).
-    pub(super) fn record(&self, record: &Record) -> Result<Option<Summary>> {
+    pub(super) fn record(&self, record: &Record) -> Result<Option<LiveSummary>> {
         if !self.shared.recording.runs.load(Ordering::Acquire) {
             // Returns an error that ended an earlier recording and that no call has returned yet.
             self.take_error()?;
@@ -49,13 +49,13 @@ impl Recordings {
     }
 
     /// As [`Handle::end_recording`](super::Handle::end_recording).
-    pub(super) fn end(&self) -> Result<Summary> {
+    pub(super) fn end(&self) -> Result<LiveSummary> {
         self.replace(None)?.ok_or_else(|| problem!("nothing is recorded").into())
     }
 
     /// As [`Handle::records`](super::Handle::records).
     pub(super) fn run(&self) -> bool {
-        let whole = |board: &Arc<Shared>| lock(&board.recording.broken).is_none();
+        let whole = |board: &Arc<PipelineShared>| lock(&board.recording.broken).is_none();
         self.shared.recording.runs.load(Ordering::Acquire) && self.boards.iter().all(|(_, board)| whole(board))
     }
 
@@ -67,13 +67,13 @@ impl Recordings {
     }
 
     /// Ends the running recording and starts the next one, if there is one; returns how the first ended.
-    fn replace(&self, next: Option<Recorder>) -> Result<Option<Summary>> {
+    fn replace(&self, next: Option<Recorder>) -> Result<Option<LiveSummary>> {
         let replacing = lock(&self.replacing);
         let mut sources = BTreeMap::new();
         let mut ended = vec![];
         for (name, board) in &self.boards {
-            let host: Weak<dyn Host> = Arc::<Shared>::downgrade(&self.shared);
-            let part = Part { host, name: name.clone() };
+            let host: Weak<dyn Host> = Arc::<PipelineShared>::downgrade(&self.shared);
+            let part = RecordingPart { host, name: name.clone() };
             let place = board.receiver.place();
             let part = next.as_ref().map(|next| next.part_of(part, &board.options, place)).transpose()?;
             let (recorder, counts) = replace_of(board, part)?;
@@ -101,16 +101,16 @@ impl Recordings {
         let verdict =
             verdict(&self.shared.options.name, self.shared.receiver.place(), &came, came.nothing_came(), &lost);
         let tare = self.shared.published().tare.clone();
-        Ok(Some(Summary { counters: came, verdict, path, tare }))
+        Ok(Some(LiveSummary { counters: came, verdict, path, tare }))
     }
 }
 
 /// Makes the decoding thread of one board record into `next`, or not at all; returns the previous recorder.
-fn replace_of(shared: &Shared, next: Option<Recorder>) -> Result<Ended> {
+fn replace_of(shared: &PipelineShared, next: Option<Recorder>) -> Result<EndedRecording> {
     // Set before the request, so that the recording runs for callers that ask after this call.
     shared.recording.runs.fetch_or(next.is_some(), Ordering::AcqRel);
     let (answer, ended) = channel::bounded(1);
-    shared.request(Request::Record(next.map(Box::new), answer));
+    shared.request(PipelineRequest::Record(next.map(Box::new), answer));
     let ended = shared.wait(&ended).and_then(std::convert::identity);
     if ended.is_err() {
         shared.recording.runs.store(lock(&shared.recording.recorder).is_some(), Ordering::Release);
@@ -119,8 +119,15 @@ fn replace_of(shared: &Shared, next: Option<Recorder>) -> Result<Ended> {
 }
 
 /// What was lost of each source, or that nothing arrived.
-pub(super) fn verdict(name: &str, place: &Origin, counters: &Counters, nothing: bool, lost: &Counts) -> Verdict {
-    let of_board = |counters: &Counters, lost: &Counts| lost.verdict().doubtful(counters.decoding.wire_doubtful_after);
+pub(super) fn verdict(
+    name: &str,
+    place: &Origin,
+    counters: &Counters,
+    nothing: bool,
+    lost: &RecordingCounts,
+) -> Verdict {
+    let of_board =
+        |counters: &Counters, lost: &RecordingCounts| lost.verdict().doubtful(counters.decoding.wire_doubtful_after);
     let verdict = if nothing {
         Verdict::nothing_arrived(nothing_arrived(place, counters.seconds))
     } else {
@@ -135,7 +142,7 @@ pub(super) fn verdict(name: &str, place: &Origin, counters: &Counters, nothing: 
         };
         (name.clone(), verdict)
     });
-    Verdict::together(std::iter::once((name.to_owned(), verdict)).chain(others).collect())
+    Verdict::combine(std::iter::once((name.to_owned(), verdict)).chain(others).collect())
 }
 
 /// What a user should check if nothing arrived.

@@ -6,23 +6,23 @@ use taxel_core::{Events, Intensities, Result};
 
 /// Gathers a tare from the first event on for an interval of the board's time, or until the board marks a start. For
 /// any duration, it stores only the last event of each taxel, that is, the taxel's value.
-pub(super) struct Rest {
+pub(super) struct TareMeasurement {
     stretch_us: i64,
     readout: Box<Detector>,
     builder: TareBuilder,
     first: Option<i64>,
-    last: Vec<Option<Last>>,
+    last: Vec<Option<LastEvent>>,
     array: taxel_core::Array,
 }
 
 #[derive(Clone, Copy)]
-struct Last {
+struct LastEvent {
     t: i64,
     p: bool,
     ticks: u16,
 }
 
-impl Rest {
+impl TareMeasurement {
     pub(super) fn new(stretch_us: i64, readout: Box<Detector>, array: &taxel_core::Array) -> Self {
         let builder = TareBuilder::new(array, None);
         Self { stretch_us, readout, builder, first: None, last: vec![None; array.len()], array: array.clone() }
@@ -44,7 +44,7 @@ impl Rest {
         }
         if let Some(intensity) = piece.intensity {
             for k in (0..inside).filter(|&k| intensity.present[k]) {
-                let last = Last { t: piece.t[k], p: piece.p[k], ticks: intensity.ticks[k] };
+                let last = LastEvent { t: piece.t[k], p: piece.p[k], ticks: intensity.ticks[k] };
                 self.last[self.array.index(piece.x[k], piece.y[k])] = Some(last);
             }
         }
@@ -56,7 +56,7 @@ impl Rest {
     pub(super) fn finish(self, stop: i64, frames: FrameTime) -> Result<(Tare, ReadoutStream)> {
         let tare = self.builder.finish(stop, "taken live")?;
         let mut stream = self.readout.stream(&self.array, frames, Some(&tare))?;
-        let mut held: Vec<(usize, Last)> =
+        let mut held: Vec<(usize, LastEvent)> =
             self.last.iter().enumerate().filter_map(|(taxel, last)| last.map(|last| (taxel, last))).collect();
         held.sort_by_key(|(_, last)| last.t);
         let columns = usize::from(self.array.columns);

@@ -5,12 +5,12 @@ use taxel_core::detect::{Detection, Detector, FrameTime, ReadoutStream};
 use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::problem;
 
-use super::ahead::Ahead;
+use super::ahead::SpeculativeReadout;
 use super::options::{LiveOptions, StatedTare};
 use super::output::DetectionOutput;
-use super::readout_queue::{BatchEnd, Quiet};
-use super::rest::Rest;
-use super::shared::Shared;
+use super::readout_queue::{BatchEnd, QuietUntil};
+use super::rest::TareMeasurement;
+use super::shared::PipelineShared;
 
 /// What is to read the events out.
 pub enum ReadoutSetup {
@@ -61,8 +61,8 @@ pub(super) struct RunningReadout {
 }
 
 enum Mode {
-    Reading(Ahead),
-    Taring(Box<Rest>),
+    Reading(SpeculativeReadout),
+    Taring(Box<TareMeasurement>),
     /// State during a change between the two, and after an error.
     Idle,
 }
@@ -72,22 +72,22 @@ impl RunningReadout {
         let events = Events::empty(options.array.clone());
         let mode = match readout {
             ReadoutSetup::None => Mode::Idle,
-            ReadoutSetup::Reading(stream) => Mode::Reading(Ahead::new(stream)),
+            ReadoutSetup::Reading(stream) => Mode::Reading(SpeculativeReadout::new(stream)),
             ReadoutSetup::Taring(stretch_us, readout) => {
-                Mode::Taring(Box::new(Rest::new(stretch_us, readout, &options.array)))
+                Mode::Taring(Box::new(TareMeasurement::new(stretch_us, readout, &options.array)))
             }
         };
         Self { mode, found: vec![], events, zeroings: vec![], frames: options.frames() }
     }
 
     /// Publishes whether it measures a tare, and the rest that it reads with, before the first events.
-    pub(super) fn begin(&self, shared: &Shared) {
+    pub(super) fn begin(&self, shared: &PipelineShared) {
         shared.published().counters.readout.taring = matches!(self.mode, Mode::Taring(_));
         self.publish_rest(shared);
     }
 
     /// Runs in a separate thread: processes the queue until its end, and passes detections to the output.
-    pub(super) fn run(mut self, shared: &Shared, output: &DetectionOutput) {
+    pub(super) fn run(mut self, shared: &PipelineShared, output: &DetectionOutput) {
         let mut last = false;
         loop {
             if !self.found.is_empty() {
@@ -104,14 +104,14 @@ impl RunningReadout {
     }
 
     /// In the thread that decodes: reads its events out, and leaves the memory of the last ones there.
-    pub(super) fn push(&mut self, shared: &Shared, events: &mut Events, end: BatchEnd) {
+    pub(super) fn push(&mut self, shared: &PipelineShared, events: &mut Events, end: BatchEnd) {
         std::mem::swap(&mut self.events, events);
         self.process(shared, end);
         self.events.clear();
     }
 
     /// Advances time without events.
-    pub(super) fn advance(&mut self, shared: &Shared, end: BatchEnd) {
+    pub(super) fn advance(&mut self, shared: &PipelineShared, end: BatchEnd) {
         self.events.clear();
         self.process(shared, end);
     }
@@ -121,27 +121,27 @@ impl RunningReadout {
         self.zeroings.extend_from_slice(zeroings);
     }
 
-    fn process(&mut self, shared: &Shared, end: BatchEnd) {
+    fn process(&mut self, shared: &PipelineShared, end: BatchEnd) {
         if let Err(error) = self.try_process(shared, end) {
             shared.fail(error);
             self.mode = Mode::Idle;
         }
     }
 
-    fn try_process(&mut self, shared: &Shared, end: BatchEnd) -> crate::Result<()> {
+    fn try_process(&mut self, shared: &PipelineShared, end: BatchEnd) -> crate::Result<()> {
         match &mut self.mode {
             Mode::Reading(readout) => {
                 self.zeroings.drain(..).try_for_each(|zeroing| readout.zero(&zeroing))?;
                 readout.push(self.events.view(), &mut self.found)?;
                 match end.quiet {
-                    Some(Quiet::Promised(t)) => readout.advance(t, &mut self.found)?,
-                    Some(Quiet::Believed(t)) if end.last => readout.advance(t, &mut self.found)?,
-                    Some(Quiet::Believed(t)) => readout.quiet(t, &mut self.found)?,
+                    Some(QuietUntil::ByBoard(t)) => readout.advance(t, &mut self.found)?,
+                    Some(QuietUntil::ByHostClock(t)) if end.last => readout.advance(t, &mut self.found)?,
+                    Some(QuietUntil::ByHostClock(t)) => readout.quiet(t, &mut self.found)?,
                     None => {}
                 }
             }
             Mode::Taring(rest) => {
-                if let Some((stop, inside)) = rest.push(&self.events, end.quiet.map(Quiet::certain))? {
+                if let Some((stop, inside)) = rest.push(&self.events, end.quiet.map(QuietUntil::certain))? {
                     self.begin_reading(shared, stop, inside)?;
                 }
             }
@@ -159,10 +159,10 @@ impl RunningReadout {
     }
 
     /// Ends the tare: runs the readout from the first event after it on.
-    fn begin_reading(&mut self, shared: &Shared, stop: i64, inside: usize) -> crate::Result<()> {
+    fn begin_reading(&mut self, shared: &PipelineShared, stop: i64, inside: usize) -> crate::Result<()> {
         let Mode::Taring(rest) = std::mem::replace(&mut self.mode, Mode::Idle) else { return Ok(()) };
         let (tare, stream) = rest.finish(stop, self.frames)?;
-        let mut readout = Ahead::new(Box::new(stream));
+        let mut readout = SpeculativeReadout::new(Box::new(stream));
         readout.push(self.events.view().piece(inside..self.events.len()), &mut self.found)?;
         self.mode = Mode::Reading(readout);
         self.publish_rest(shared);
@@ -173,7 +173,7 @@ impl RunningReadout {
     }
 
     /// Publishes the readout's current rest, if its encoder uses a tare.
-    fn publish_rest(&self, shared: &Shared) {
+    fn publish_rest(&self, shared: &PipelineShared) {
         if let Mode::Reading(readout) = &self.mode {
             let rest = readout.rest();
             shared.published().rest = if rest.iter().all(Option::is_none) { vec![] } else { rest };

@@ -95,12 +95,12 @@ pub struct Sent {
 
 /// Sends each detection to one destination.
 pub(super) struct Sending {
-    line: Arc<Line>,
+    line: Arc<SendingLine>,
     thread: Option<JoinHandle<()>>,
 }
 
 /// State shared by the thread that makes detections and the one that sends waiting lines.
-pub(super) struct Line {
+pub(super) struct SendingLine {
     to: Destination,
     state: Mutex<SendingState>,
     came: Condvar,
@@ -131,14 +131,14 @@ impl Sending {
         let device = Device::open(to)?;
         let counts = Sent { to: to.to_string(), ..Sent::default() };
         let state = SendingState { device, waiting: VecDeque::new(), gone: 0, counts, closed: false };
-        let line = Arc::new(Line { to: to.clone(), state: Mutex::new(state), came: Condvar::new() });
+        let line = Arc::new(SendingLine { to: to.clone(), state: Mutex::new(state), came: Condvar::new() });
         let theirs = Arc::clone(&line);
         let thread = std::thread::Builder::new().name("taxel-send".to_owned()).spawn(move || theirs.send_what_waits());
         Ok(Self { line, thread: Some(thread.map_err(Error::socket("thread"))?) })
     }
 
     /// The counts, readable while it runs and afterwards.
-    pub(super) fn line(&self) -> Arc<Line> {
+    pub(super) fn line(&self) -> Arc<SendingLine> {
         Arc::clone(&self.line)
     }
 }
@@ -175,7 +175,7 @@ impl Drop for Sending {
     }
 }
 
-impl Line {
+impl SendingLine {
     /// The counts of the destination so far.
     pub(super) fn counts(&self) -> Sent {
         let state = lock(&self.state);

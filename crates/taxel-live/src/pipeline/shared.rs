@@ -14,14 +14,14 @@ use super::counters::Counters;
 use super::options::LiveOptions;
 use super::readout_queue::ReadoutQueue;
 use super::recorder::{Host, Recorder};
-use super::sending::Line;
+use super::sending::SendingLine;
 use super::sink::OutputDetection;
-use super::source::Source;
+use super::source::FurtherSource;
 use super::viewer_queue::ViewerEvents;
 use crate::capture::Receiver;
 use crate::latency::Latencies;
 use crate::locked::lock;
-use crate::recording::Track;
+use crate::recording::SourceWriter;
 use crate::{Error, Result};
 
 /// Interval at which a wait for a reply checks whether the decoding thread has ended.
@@ -29,7 +29,7 @@ const ANSWER_EVERY: Duration = Duration::from_millis(50);
 
 /// The values that the threads publish: counts, the low-rate frame, the tare.
 #[derive(Debug, Default)]
-pub(super) struct Published {
+pub(super) struct PublishedState {
     pub(super) counters: Counters,
     pub(super) decode_latency: Latencies,
     pub(super) report_latency: Latencies,
@@ -58,22 +58,22 @@ pub(super) struct RecordingSlot {
 }
 
 /// State shared by all threads.
-pub(super) struct Shared {
+pub(super) struct PipelineShared {
     pub(super) options: LiveOptions,
     /// The other sources of the recording.
-    pub(super) sources: Vec<Source>,
+    pub(super) sources: Vec<FurtherSource>,
     pub(super) begun: Instant,
     pub(super) receiver: Receiver,
     pub(super) readout_queue: ReadoutQueue,
-    pub(super) published: Mutex<Published>,
+    pub(super) published: Mutex<PublishedState>,
     pub(super) recording: RecordingSlot,
     /// Requests to the decoding thread, which handles them between two batches.
-    pub(super) requests: Mutex<Vec<Request>>,
+    pub(super) requests: Mutex<Vec<PipelineRequest>>,
     pub(super) requested: AtomicBool,
     /// Further queues that get each detection; a slow one misses some.
     pub(super) subscribers: Mutex<Vec<channel::Sender<OutputDetection>>>,
     /// The destinations of detections.
-    pub(super) sending: Vec<Arc<Line>>,
+    pub(super) sending: Vec<Arc<SendingLine>>,
     /// The current registers.
     pub(super) registers: Mutex<Registers>,
     /// The version of the wire to which the board was newly set; 0 if it was not.
@@ -82,12 +82,12 @@ pub(super) struct Shared {
 }
 
 /// The recording that was running, if any, and the counters after its last datagram.
-pub(super) type Ended = (Option<Recorder>, Counters);
+pub(super) type EndedRecording = (Option<Recorder>, Counters);
 
 /// A request that the decoding thread handles between two batches.
-pub(super) enum Request {
+pub(super) enum PipelineRequest {
     /// Ends the running recording, and records into this one, if there is one, from the next datagram on.
-    Record(Option<Box<Recorder>>, channel::Sender<Result<Ended>>),
+    Record(Option<Box<Recorder>>, channel::Sender<Result<EndedRecording>>),
     /// Copies the events for a viewer.
     View(channel::Sender<ViewerEvents>),
     /// Copies the datagrams for another computer.
@@ -98,13 +98,13 @@ pub(super) enum Request {
     Zero(Vec<(u16, u16)>, channel::Sender<Result<Vec<Zeroing>>>),
 }
 
-impl Shared {
-    pub(super) fn published(&self) -> MutexGuard<'_, Published> {
+impl PipelineShared {
+    pub(super) fn published(&self) -> MutexGuard<'_, PublishedState> {
         lock(&self.published)
     }
 
     /// Adds a request to the decoding thread, which handles it within 20 ms, but not after its end.
-    pub(super) fn request(&self, request: Request) {
+    pub(super) fn request(&self, request: PipelineRequest) {
         lock(&self.requests).push(request);
         self.requested.store(true, Ordering::Release);
     }
@@ -171,8 +171,8 @@ impl Shared {
     }
 }
 
-impl Host for Shared {
-    fn part(&self, name: &str) -> Result<Track> {
+impl Host for PipelineShared {
+    fn part(&self, name: &str) -> Result<SourceWriter> {
         match &*lock(&self.recording.recorder) {
             Some(recorder) => recorder.track_of(name),
             None => Err(taxel_core::problem!("source {name}: nothing is recorded").into()),

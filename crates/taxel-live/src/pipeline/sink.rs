@@ -63,9 +63,9 @@ impl<F: FnMut(&OutputDetection) -> std::io::Result<()> + Send> Sink for F {
 
 /// Writes each detection as a line ([`OutputDetection::line`]).
 #[derive(Debug)]
-pub struct Lines<W>(pub W);
+pub struct LineSink<W>(pub W);
 
-impl<W: std::io::Write + Send> Sink for Lines<W> {
+impl<W: std::io::Write + Send> Sink for LineSink<W> {
     fn output(&mut self, detection: &OutputDetection) -> std::io::Result<()> {
         self.0.write_all(&detection.line()?)?;
         self.0.flush()

@@ -17,7 +17,7 @@ use taxel_core::{Array, problem};
 
 use super::sending::{BAUD, serial};
 use crate::locked::lock;
-use crate::recording::{Header, LeftOut, Stream, fields, now_ns};
+use crate::recording::{Header, LeftOut, StreamColumns, fields, now_ns};
 use crate::{Error, Result, address};
 
 /// Timeout for the first line of a source, which defines its columns, if they are not given.
@@ -31,7 +31,7 @@ const LONGEST: usize = 1 << 16;
 
 /// A further source of a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Source {
+pub struct FurtherSource {
     /// Name of the source.
     pub name: String,
     /// Kind of the source.
@@ -44,14 +44,14 @@ pub enum SourceKind {
     /// A board that sends to this local address.
     Board(SocketAddr, Box<Array>, Registers),
     /// Lines of numbers; already open if the columns were read from the first line.
-    Lines(Place, Stream, Opened),
+    Lines(LineInput, StreamColumns, Opened),
     /// Numbers that a program passes ([`Live::sample`](super::Live::sample)).
-    Given(Stream),
+    Given(StreamColumns),
 }
 
 /// The place from which lines of numbers are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub enum LineInput {
     /// A serial line and its speed, 8 data bits, no parity, 1 stop bit.
     Serial(PathBuf, u32),
     /// A named pipe, or any file that is read to its end and then watched for more; `-` is the standard input.
@@ -82,7 +82,7 @@ impl PartialEq for Opened {
     }
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for LineInput {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Serial(path, baud) => write!(f, "serial {}@{baud}", path.display()),
@@ -91,7 +91,7 @@ impl std::fmt::Display for Place {
     }
 }
 
-impl Source {
+impl FurtherSource {
     /// The source's header in the recording.
     pub(super) fn header(&self) -> taxel_core::Result<Header> {
         match &self.kind {
@@ -139,12 +139,12 @@ impl FromStr for SourceKind {
                         _ => return Err(problem!("source {text:?}: {baud:?} is no speed, as 115200").into()),
                     },
                 };
-                let place = Place::Serial(path.into(), baud);
+                let place = LineInput::Serial(path.into(), baud);
                 let (stream, opened) = named_or_read(stream_of(text, &mut options)?, &place)?;
                 Self::Lines(place, stream, opened)
             }
             Some(("pipe", place)) if !place.is_empty() => {
-                let place = Place::Pipe(place.into());
+                let place = LineInput::Pipe(place.into());
                 let (stream, opened) = named_or_read(stream_of(text, &mut options)?, &place)?;
                 Self::Lines(place, stream, opened)
             }
@@ -183,7 +183,7 @@ fn array_of(text: &str, size: &str) -> Result<Array> {
 }
 
 /// The columns that the options define, if any.
-fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<Stream>> {
+fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<StreamColumns>> {
     let columns = options.remove("columns").map(|names| names.split(':').map(str::to_owned).collect());
     let time = options.remove("time");
     let Some(columns) = columns else {
@@ -192,7 +192,7 @@ fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<St
         }
         return Ok(None);
     };
-    let mut stream = Stream::of_columns(columns);
+    let mut stream = StreamColumns::of_columns(columns);
     if let Some(time) = time {
         let (name, unit) = time.split_once(':').unwrap_or((time, "us"));
         let unit_us =
@@ -200,27 +200,27 @@ fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<St
         let Some((_, unit_us)) = unit_us else {
             return Err(problem!("source {text:?}: unit {unit:?} must be ns, us, ms or s").into());
         };
-        stream = Stream { time: Some(name.to_owned()), unit_us, ..stream };
+        stream = StreamColumns { time: Some(name.to_owned()), unit_us, ..stream };
     }
     Ok(Some(stream))
 }
 
 /// The given columns, or those of the first line.
-fn named_or_read(named: Option<Stream>, place: &Place) -> Result<(Stream, Opened)> {
+fn named_or_read(named: Option<StreamColumns>, place: &LineInput) -> Result<(StreamColumns, Opened)> {
     named.map_or_else(|| first_line(place), |stream| Ok((stream, Opened::default())))
 }
 
 /// Opens lines and waits for the first one that defines the columns: a line of names, or of numbers, whose columns are
 /// then named a, b, c and so on.
-fn first_line(place: &Place) -> Result<(Stream, Opened)> {
+fn first_line(place: &LineInput) -> Result<(StreamColumns, Opened)> {
     let mut reader = LineReader::open(place)?;
     let until = Instant::now() + FIRST_LINE;
     // After opening, a serial line may start in the middle of a line: the rest of that line is skipped.
-    let mut skip = matches!(place, Place::Serial(..));
+    let mut skip = matches!(place, LineInput::Serial(..));
     let mut numbers = None;
     while Instant::now() < until {
         let ended = reader.fill().map_err(|error| reader.broken(error))?;
-        while let Some(Line { text, bytes, cut }) = reader.line(ended) {
+        while let Some(TextLine { text, bytes, cut }) = reader.line(ended) {
             if std::mem::take(&mut skip) {
                 reader.left_out.unfinished += bytes;
                 continue;
@@ -240,7 +240,7 @@ fn first_line(place: &Place) -> Result<(Stream, Opened)> {
                 reader.bytes.splice(0..0, format!("{text}\n").into_bytes());
                 break;
             }
-            let stream = Stream::of_columns(found.into_iter().map(str::to_owned).collect());
+            let stream = StreamColumns::of_columns(found.into_iter().map(str::to_owned).collect());
             return Ok((stream, Opened(Arc::new(Mutex::new(Some(reader))))));
         }
         if numbers.is_some() || ended {
@@ -249,7 +249,7 @@ fn first_line(place: &Place) -> Result<(Stream, Opened)> {
     }
     match numbers {
         Some(n) => {
-            let stream = Stream::of_columns((0..n).map(|k| format!("column_{k}")).collect());
+            let stream = StreamColumns::of_columns((0..n).map(|k| format!("column_{k}")).collect());
             Ok((stream, Opened(Arc::new(Mutex::new(Some(reader))))))
         }
         None => {
@@ -265,7 +265,7 @@ fn first_line(place: &Place) -> Result<(Stream, Opened)> {
 
 /// Lines of text from a serial line, a pipe or the standard input, as they arrive.
 pub(super) struct LineReader {
-    place: Place,
+    place: LineInput,
     file: Option<Box<dyn ReadsAsItComes>>,
     /// What arrived after the last line: at most a line and what one read returns.
     bytes: Vec<u8>,
@@ -279,7 +279,7 @@ pub(super) struct LineReader {
 }
 
 /// A line of text, without its end.
-pub(super) struct Line {
+pub(super) struct TextLine {
     pub(super) text: String,
     /// Number of its bytes.
     pub(super) bytes: u64,
@@ -291,19 +291,19 @@ trait ReadsAsItComes: Read + AsRawFd + Send {}
 impl<T: Read + AsRawFd + Send> ReadsAsItComes for T {}
 
 impl LineReader {
-    pub(super) fn open(place: &Place) -> Result<Self> {
+    pub(super) fn open(place: &LineInput) -> Result<Self> {
         let file = Some(open(place)?);
         let left_out = LeftOut::default();
         Ok(Self { place: place.clone(), file, bytes: vec![], searched: 0, cut: false, left_out, came_ns: 0 })
     }
 
     pub(super) fn is_serial(&self) -> bool {
-        matches!(self.place, Place::Serial(..))
+        matches!(self.place, LineInput::Serial(..))
     }
 
     /// Waits briefly for more bytes; returns whether no more can arrive.
     pub(super) fn fill(&mut self) -> io::Result<bool> {
-        let is_input = self.place == Place::Pipe(PathBuf::from("-"));
+        let is_input = self.place == LineInput::Pipe(PathBuf::from("-"));
         let Some(file) = &mut self.file else {
             std::thread::sleep(LOOK_EVERY);
             return Ok(false);
@@ -315,7 +315,7 @@ impl LineReader {
         match file.read(&mut piece) {
             // A pipe without a writer, or the end of a file: a program may still write to it.
             Ok(0) if is_input => return Ok(true),
-            Ok(0) if matches!(self.place, Place::Serial(..)) => return Err(ErrorKind::BrokenPipe.into()),
+            Ok(0) if matches!(self.place, LineInput::Serial(..)) => return Err(ErrorKind::BrokenPipe.into()),
             Ok(0) => std::thread::sleep(LOOK_EVERY),
             Ok(n) => {
                 self.came_ns = now_ns();
@@ -330,7 +330,7 @@ impl LineReader {
 
     /// The next line, which a line feed or a carriage return ends; the last one may lack its end where no more can arrive
     /// (`ended`). Of a line that is too long the beginning is returned, and the rest is left out.
-    pub(super) fn line(&mut self, ended: bool) -> Option<Line> {
+    pub(super) fn line(&mut self, ended: bool) -> Option<TextLine> {
         loop {
             let end = self.bytes[self.searched..].iter().position(|byte| matches!(byte, b'\n' | b'\r'));
             let end = end.map(|place| self.searched + place);
@@ -353,7 +353,7 @@ impl LineReader {
             let text = String::from_utf8_lossy(&self.bytes[..length]).into_owned();
             self.cut = long;
             self.remove(if long { length } else { end.map_or(length, |end| end + 1) });
-            return Some(Line { text, bytes: length as u64, cut: long });
+            return Some(TextLine { text, bytes: length as u64, cut: long });
         }
     }
 
@@ -379,7 +379,7 @@ impl LineReader {
     }
 
     pub(super) fn broken(&self, error: io::Error) -> Error {
-        let (Place::Serial(path, _) | Place::Pipe(path)) = &self.place;
+        let (LineInput::Serial(path, _) | LineInput::Pipe(path)) = &self.place;
         Error::file(path)(error)
     }
 
@@ -394,15 +394,15 @@ impl LineReader {
     }
 }
 
-fn open(place: &Place) -> Result<Box<dyn ReadsAsItComes>> {
+fn open(place: &LineInput) -> Result<Box<dyn ReadsAsItComes>> {
     match place {
-        Place::Serial(path, baud) => Ok(Box::new(serial(path, *baud)?)),
-        Place::Pipe(path) if path == Path::new("-") => {
+        LineInput::Serial(path, baud) => Ok(Box::new(serial(path, *baud)?)),
+        LineInput::Pipe(path) if path == Path::new("-") => {
             // Bypasses the program's own buffer, whose content `poll` does not see.
             let input = io::stdin().as_fd().try_clone_to_owned().map_err(Error::file(path))?;
             Ok(Box::new(File::from(input)))
         }
-        Place::Pipe(path) => {
+        LineInput::Pipe(path) => {
             let file = File::options().read(true).custom_flags(libc::O_NONBLOCK).open(path);
             Ok(Box::new(file.map_err(Error::file(path))?))
         }
@@ -430,7 +430,7 @@ mod tests {
         let SourceKind::Board(address, array, _) = &board else { panic!("{board:?}") };
         assert_eq!((address.port(), array.rows, array.columns), (5209, 16, 8));
         let imu: SourceKind = "serial:/dev/ttyACM0@9600,columns=n:ax:ay,time=n:ms".parse().unwrap();
-        let SourceKind::Lines(Place::Serial(path, 9600), stream, _) = &imu else { panic!("{imu:?}") };
+        let SourceKind::Lines(LineInput::Serial(path, 9600), stream, _) = &imu else { panic!("{imu:?}") };
         assert_eq!(path, Path::new("/dev/ttyACM0"));
         assert_eq!((stream.time.as_deref(), stream.unit_us), (Some("n"), 1e3));
         for text in [
@@ -485,7 +485,7 @@ mod tests {
             }
             let path = folder.join(format!("{seed}"));
             std::fs::write(&path, &bytes).unwrap();
-            let mut reader = LineReader::open(&Place::Pipe(path)).unwrap();
+            let mut reader = LineReader::open(&LineInput::Pipe(path)).unwrap();
             let (mut lines, mut left_out, mut read) = (vec![], LeftOut::default(), 0);
             while read < bytes.len() {
                 read += (bytes.len() - read).min(4096);

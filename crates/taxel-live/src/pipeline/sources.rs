@@ -15,40 +15,40 @@ use taxel_core::problem;
 use super::counters::{Counters, SourceCounts};
 use super::options::LiveOptions;
 use super::record::COUNTS_EVERY;
-use super::recorder::{Host, Part};
-use super::shared::Shared;
-use super::source::{Line, LineReader, Place, Source, SourceKind};
+use super::recorder::{Host, RecordingPart};
+use super::shared::PipelineShared;
+use super::source::{FurtherSource, LineInput, LineReader, SourceKind, TextLine};
 use crate::locked::lock;
-use crate::recording::{self, Faults, Found, LeftOut, Stream, Track, fields, now_ns};
+use crate::recording::{self, DamageCounts, LeftOut, SourceWriter, StreamColumns, StreamFaults, fields, now_ns};
 use crate::{Error, Result};
 
 /// A running stream of numbers.
-pub(super) struct Numbers {
-    part: Part,
+pub(super) struct NumberStream {
+    part: RecordingPart,
     /// Whether lines are recorded from the first one on; otherwise only while a recording runs.
     always: bool,
     track: Mutex<NumbersTrack>,
-    stream: Stream,
+    stream: StreamColumns,
     trouble: Mutex<Option<String>>,
     ends: AtomicBool,
 }
 
 /// The part of a recording into which lines are written, if any.
 struct NumbersTrack {
-    track: Option<Track>,
+    track: Option<SourceWriter>,
     /// Number of all lines, and of those before this part.
     lines: u64,
     before: u64,
     /// What is wrong with the lines of this part, and of all.
-    faults: Faults,
-    all: Faults,
+    faults: StreamFaults,
+    all: StreamFaults,
     /// When the counts were last written.
     counted: Option<Instant>,
 }
 
-impl Numbers {
-    pub(super) fn new(part: Part, stream: Stream, always: bool) -> Self {
-        let faults = Faults::new(&stream);
+impl NumberStream {
+    pub(super) fn new(part: RecordingPart, stream: StreamColumns, always: bool) -> Self {
+        let faults = StreamFaults::new(&stream);
         let track = NumbersTrack { track: None, lines: 0, before: 0, all: faults.clone(), faults, counted: None };
         Self { part, always, track: Mutex::new(track), stream, trouble: Mutex::default(), ends: AtomicBool::new(false) }
     }
@@ -60,12 +60,16 @@ impl Numbers {
             let (name, n) = (&self.part.name, values.len());
             return Err(problem!("source {name}: {n} values; its columns are {columns}").into());
         }
-        let faults = |faults: &mut Faults| faults.line(&self.stream, values, arrived_ns);
+        let faults = |faults: &mut StreamFaults| faults.line(&self.stream, values, arrived_ns);
         self.record(faults, |track, number| track.sample(arrived_ns, number, values))
     }
 
     /// Counts a line with its faults, and records it if a recording runs. Each line belongs to one recording.
-    fn record(&self, count: impl Fn(&mut Faults), write: impl FnOnce(&Track, u64) -> Result<()>) -> Result<()> {
+    fn record(
+        &self,
+        count: impl Fn(&mut StreamFaults),
+        write: impl FnOnce(&SourceWriter, u64) -> Result<()>,
+    ) -> Result<()> {
         let mut current = lock(&self.track);
         if self.always && current.track.is_none() {
             current.track = Some(self.part.open()?);
@@ -78,7 +82,7 @@ impl Numbers {
     }
 
     /// Records a line of text.
-    fn line(&self, arrived_ns: i64, line: &Line) -> Result<()> {
+    fn line(&self, arrived_ns: i64, line: &TextLine) -> Result<()> {
         let text = &*line.text;
         match self.stream.parse(text) {
             Some(values) if !line.cut => self.sample(arrived_ns, &values),
@@ -88,7 +92,7 @@ impl Numbers {
             {
                 Ok(())
             }
-            _ => self.record(Faults::strange, |track, number| track.strange_line(arrived_ns, number, text)),
+            _ => self.record(StreamFaults::strange, |track, number| track.strange_line(arrived_ns, number, text)),
         }
     }
 
@@ -116,10 +120,10 @@ impl Numbers {
 
     /// Records into this part of a recording from now on, or not at all; ends the previous part with its counts, and
     /// returns them.
-    pub(super) fn record_into(&self, track: Option<Track>) -> SourceCounts {
+    pub(super) fn record_into(&self, track: Option<SourceWriter>) -> SourceCounts {
         let mut current = lock(&self.track);
         let ended = std::mem::replace(&mut current.track, track);
-        let faults = std::mem::replace(&mut current.faults, Faults::new(&self.stream)).found();
+        let faults = std::mem::replace(&mut current.faults, StreamFaults::new(&self.stream)).found();
         let lines = current.lines - current.before;
         current.before = current.lines;
         drop(current);
@@ -136,7 +140,7 @@ impl Numbers {
         self.counts_of(lines, faults)
     }
 
-    fn counts_of(&self, lines: u64, faults: Found) -> SourceCounts {
+    fn counts_of(&self, lines: u64, faults: DamageCounts) -> SourceCounts {
         let LeftOut { in_no_line, unfinished } = faults.left_out();
         SourceCounts::Numbers {
             lines,
@@ -156,7 +160,7 @@ impl Numbers {
 
     /// Reads lines until the end, in a separate thread; a failed line is opened again. `begun` is a reader that was
     /// opened before and has read up to the start of a line.
-    pub(super) fn read(self: &Arc<Self>, place: &Place, begun: Option<LineReader>) -> Result<JoinHandle<()>> {
+    pub(super) fn read(self: &Arc<Self>, place: &LineInput, begun: Option<LineReader>) -> Result<JoinHandle<()>> {
         let whole = begun.is_some();
         let (numbers, mut reader) = (Arc::clone(self), begun.map_or_else(|| LineReader::open(place), Ok)?);
         let thread = std::thread::Builder::new().name("taxel-lines".to_owned());
@@ -203,29 +207,29 @@ impl Numbers {
 }
 
 /// The losses of a stream of numbers, as recordings state them.
-pub(super) fn losses_of_lines(lines: u64, faults: &Found) -> recording::Counts {
+pub(super) fn losses_of_lines(lines: u64, faults: &DamageCounts) -> recording::RecordingCounts {
     let decoder = faults.damage.clone();
-    recording::Counts { received: lines, recorded: lines, decoder, ..recording::Counts::default() }
+    recording::RecordingCounts { received: lines, recorded: lines, decoder, ..recording::RecordingCounts::default() }
 }
 
 /// The running other sources of a pipeline.
 pub(super) struct Others<Board> {
     /// Other boards, each with its own pipeline.
     pub(super) boards: Vec<(String, Board)>,
-    pub(super) numbers: Vec<(String, Arc<Numbers>)>,
+    pub(super) numbers: Vec<(String, Arc<NumberStream>)>,
     pub(super) threads: Vec<JoinHandle<()>>,
 }
 
 impl<Board> Others<Board> {
     /// Starts the sources of a pipeline; `begin` starts a board.
     pub(super) fn start(
-        shared: &Arc<Shared>,
-        begin: impl Fn(SocketAddr, LiveOptions, Part) -> Result<Board>,
+        shared: &Arc<PipelineShared>,
+        begin: impl Fn(SocketAddr, LiveOptions, RecordingPart) -> Result<Board>,
     ) -> Result<Self> {
         let (mut others, options) = (Self { boards: vec![], numbers: vec![], threads: vec![] }, &shared.options);
-        for Source { name, kind } in &shared.sources {
-            let host: Weak<dyn Host> = Arc::<Shared>::downgrade(shared);
-            let part = Part { host, name: name.clone() };
+        for FurtherSource { name, kind } in &shared.sources {
+            let host: Weak<dyn Host> = Arc::<PipelineShared>::downgrade(shared);
+            let part = RecordingPart { host, name: name.clone() };
             let stream = match kind {
                 SourceKind::Board(address, array, registers) => {
                     let of_board = LiveOptions {
@@ -244,7 +248,7 @@ impl<Board> Others<Board> {
                 }
                 SourceKind::Lines(_, stream, _) | SourceKind::Given(stream) => stream,
             };
-            let numbers = Arc::new(Numbers::new(part, stream.clone(), options.record.is_some()));
+            let numbers = Arc::new(NumberStream::new(part, stream.clone(), options.record.is_some()));
             if let SourceKind::Lines(place, _, opened) = kind {
                 others.threads.push(numbers.read(place, opened.take())?);
             }

@@ -16,7 +16,7 @@ use super::receive::ReceiveStage;
 use super::record::RecordStage;
 use super::recorder::Recorder;
 use super::running_readout::RunningReadout;
-use super::shared::{Ended, Request, Shared};
+use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
 use crate::Result;
 use crate::capture::Batch;
 use crate::locked::lock;
@@ -26,20 +26,20 @@ use crate::recording::now_ns;
 const IDLE: Duration = Duration::from_millis(20);
 
 /// Number of events after which they are passed on, even in the middle of a large batch.
-const HAND_ON: usize = 1 << 14;
+const FLUSH_AFTER: usize = 1 << 14;
 
 /// Why [`Stages::run`] returned.
-pub(super) enum Next {
-    /// Detections wait for output ([`Stages::found`]).
+pub(super) enum StagesOutcome {
+    /// Detections wait for output ([`Stages::pending_detections`]).
     Output,
     /// The readout must move to its own thread.
-    Separate(Box<RunningReadout>),
+    MoveReadout(Box<RunningReadout>),
     /// No more data will arrive.
-    Over,
+    Finished,
 }
 
 pub(super) struct Stages {
-    shared: Arc<Shared>,
+    shared: Arc<PipelineShared>,
     receive: ReceiveStage,
     decode: DecodeStage,
     record: RecordStage,
@@ -49,7 +49,7 @@ pub(super) struct Stages {
 }
 
 impl Stages {
-    pub(super) fn new(shared: &Arc<Shared>, readout: Option<RunningReadout>) -> Self {
+    pub(super) fn new(shared: &Arc<PipelineShared>, readout: Option<RunningReadout>) -> Self {
         Self {
             shared: Arc::clone(shared),
             receive: ReceiveStage::new(Arc::clone(shared)),
@@ -62,57 +62,57 @@ impl Stages {
     }
 
     /// Detections that do not wait for output yet.
-    pub(super) fn found(&mut self) -> &mut Vec<Detection> {
-        self.read_out.found()
+    pub(super) fn pending_detections(&mut self) -> &mut Vec<Detection> {
+        self.read_out.pending_detections()
     }
 
     /// Runs until the caller has something to do; an error ends the pipeline.
-    pub(super) fn run(&mut self) -> Next {
-        self.rounds().unwrap_or_else(|error| {
+    pub(super) fn run(&mut self) -> StagesOutcome {
+        self.run_steps().unwrap_or_else(|error| {
             self.shared.fail(error);
             self.read_out.close(&self.shared, None);
-            Next::Over
+            StagesOutcome::Finished
         })
     }
 
-    fn rounds(&mut self) -> Result<Next> {
+    fn run_steps(&mut self) -> Result<StagesOutcome> {
         if !self.begun {
             self.begun = true;
             self.read_out.begin(&self.shared);
             if self.record.runs() {
-                self.separate()?;
+                self.move_to_threads()?;
             }
         }
         loop {
             if let Some(readout) = self.read_out.take_separated() {
-                return Ok(Next::Separate(readout));
+                return Ok(StagesOutcome::MoveReadout(readout));
             }
-            if !self.found().is_empty() {
-                return Ok(Next::Output);
+            if !self.pending_detections().is_empty() {
+                return Ok(StagesOutcome::Output);
             }
             if self.receive.is_done() {
                 self.finish()?;
-                return Ok(Next::Over);
+                return Ok(StagesOutcome::Finished);
             }
-            self.round()?;
+            self.step()?;
         }
     }
 
     /// Moves receiving and reading out to separate threads, because a disk may delay this one.
-    fn separate(&mut self) -> Result<()> {
-        self.receive.separate(self.read_out.is_on())?;
-        self.read_out.separate();
+    fn move_to_threads(&mut self) -> Result<()> {
+        self.receive.move_to_thread(self.read_out.is_on())?;
+        self.read_out.move_to_thread();
         Ok(())
     }
 
-    fn round(&mut self) -> Result<()> {
+    fn step(&mut self) -> Result<()> {
         let version = self.shared.expected.swap(0, Ordering::AcqRel);
         if version != 0 {
             self.expect_version(version)?;
         }
         let tick = if self.read_out.is_on() { self.decode.tick() } else { None };
-        let (batch, came) = self.receive.next(self.observers.longest_wait(tick.unwrap_or(IDLE)))?;
-        let silent_until = if came {
+        let (batch, received) = self.receive.next(self.observers.longest_wait(tick.unwrap_or(IDLE)))?;
+        let silent_until = if received {
             self.process(&batch)?;
             self.record.datagrams(&batch)?;
             None
@@ -141,7 +141,7 @@ impl Stages {
             let mut decoded = self.decode.push(datagram, bytes);
             if decoded.info.reset {
                 let later = self.decode.split_at_reset(&mut decoded);
-                self.hand_on()?;
+                self.flush_events()?;
                 self.decode.reset(&later);
                 self.observers.reset(self.decode.held());
                 if decoded.info.version == 2 {
@@ -150,20 +150,20 @@ impl Stages {
             }
             let now = now_ns();
             self.decode.note(&decoded, self.read_out.announced());
-            self.record.board(&decoded.info, decoded.arrived_ns)?;
+            self.record.record_board_change(&decoded.info, decoded.arrived_ns)?;
             self.record.find_origin(bytes, decoded.arrived_ns, self.decode.first_stamps(&decoded))?;
             self.shared.published().decode_latency.note(now - decoded.arrived_ns);
-            if self.decode.events().len() >= HAND_ON {
+            if self.decode.events().len() >= FLUSH_AFTER {
                 // A batch has this many events only if reading out is slower than they arrive.
-                self.read_out.separate();
-                self.hand_on()?;
+                self.read_out.move_to_thread();
+                self.flush_events()?;
             }
         }
-        self.hand_on()
+        self.flush_events()
     }
 
     /// Passes the decoded events to the other stages.
-    fn hand_on(&mut self) -> Result<()> {
+    fn flush_events(&mut self) -> Result<()> {
         self.decode.hold();
         self.observers.events(self.decode.events(), self.decode.held());
         self.record.markers(&self.decode.events().markers)?;
@@ -181,7 +181,7 @@ impl Stages {
     /// Ends the input: passes on what waits in each stage.
     fn finish(&mut self) -> Result<()> {
         self.decode.finish();
-        self.hand_on()?;
+        self.flush_events()?;
         self.record.pictures(self.decode.decoded(), self.decode.held(), true)?;
         let quiet = self.decode.quiet(self.receive.silent_until()).filter(|_| self.read_out.is_on());
         self.observers.finish(self.decode.held());
@@ -194,11 +194,11 @@ impl Stages {
         let requests = std::mem::take(&mut *lock(&self.shared.requests));
         for request in requests {
             match request {
-                Request::Record(next, answer) => drop(answer.send(self.switch_recording(next))),
-                Request::View(answer) => self.observers.add_viewer(&answer, self.decode.held()),
-                Request::Copy(answer) => self.observers.add_copier(&answer),
-                Request::Zero(taxels, answer) => drop(answer.send(self.zero(&taxels))),
-                Request::Registers(registers) => {
+                PipelineRequest::Record(next, answer) => drop(answer.send(self.switch_recording(next))),
+                PipelineRequest::View(answer) => self.observers.add_viewer(&answer, self.decode.held()),
+                PipelineRequest::Copy(answer) => self.observers.add_copier(&answer),
+                PipelineRequest::Zero(taxels, answer) => drop(answer.send(self.zero(&taxels))),
+                PipelineRequest::Registers(registers) => {
                     self.decode.set_frame_us(registers.frame_us());
                     self.expect_version(registers.wire_version)?;
                     self.record.registers(&registers)?;
@@ -208,10 +208,10 @@ impl Stages {
         Ok(())
     }
 
-    fn switch_recording(&mut self, next: Option<Box<Recorder>>) -> Result<Ended> {
+    fn switch_recording(&mut self, next: Option<Box<Recorder>>) -> Result<EndedRecording> {
         self.record.pictures(self.decode.decoded(), self.decode.held(), true)?;
         if next.is_some() {
-            self.separate()?;
+            self.move_to_threads()?;
         }
         let begins = next.is_some();
         let ended = self.record.switch(next, self.decode.held())?;
@@ -258,7 +258,7 @@ impl Stages {
         // Recorded first, so that every zeroing is in the recording.
         self.record.zeroings(&zeroings)?;
         let mut published = self.shared.published();
-        published.zeroed.extend(zeroings.iter().map(|one| (array.index(one.x, one.y), *one)));
+        published.zeroed.extend(zeroings.iter().map(|zeroing| (array.index(zeroing.x, zeroing.y), *zeroing)));
         published.zeroings += 1;
         drop(published);
         self.shared.picture_around([t]);

@@ -12,8 +12,8 @@ use std::time::Duration;
 
 use super::output::DetectionOutput;
 use super::running_readout::RunningReadout;
-use super::shared::Shared;
-use super::stages::{Next, Stages};
+use super::shared::PipelineShared;
+use super::stages::{Stages, StagesOutcome};
 use crate::locked::lock;
 
 /// Interval at which the follower checks whether the stages were released: a callback may delay receiving by this time.
@@ -21,12 +21,12 @@ const TAKE_OVER: Duration = Duration::from_millis(2);
 
 /// The stages and the output, which one thread at a time owns.
 pub(super) struct Threads {
-    turn: Mutex<Turn>,
+    turn: Mutex<StagesTurn>,
     changed: Condvar,
     output: DetectionOutput,
 }
 
-struct Turn {
+struct StagesTurn {
     /// `None` while a thread, the leader, owns the stages.
     stages: Option<Box<Stages>>,
     /// A readout that must move to its own thread.
@@ -38,15 +38,15 @@ struct Turn {
 
 impl Threads {
     pub(super) fn new(stages: Stages, output: DetectionOutput, threads: usize) -> Self {
-        let turn = Turn { stages: Some(Box::new(stages)), readout: None, over: false, left: threads };
+        let turn = StagesTurn { stages: Some(Box::new(stages)), readout: None, over: false, left: threads };
         Self { turn: Mutex::new(turn), changed: Condvar::new(), output }
     }
 
     /// The loop of each thread, until the end.
-    pub(super) fn run(&self, shared: &Arc<Shared>) {
-        let _leaving = Leaving { threads: self, shared };
+    pub(super) fn run(&self, shared: &Arc<PipelineShared>) {
+        let _leaving = ThreadEndGuard { threads: self, shared };
         loop {
-            let nothing = |turn: &mut Turn| turn.stages.is_none() && turn.readout.is_none() && !turn.over;
+            let nothing = |turn: &mut StagesTurn| turn.stages.is_none() && turn.readout.is_none() && !turn.over;
             let waited = self.changed.wait_timeout_while(lock(&self.turn), TAKE_OVER, nothing);
             let (mut turn, waited) = waited.unwrap_or_else(PoisonError::into_inner);
             if waited.timed_out() {
@@ -64,20 +64,20 @@ impl Threads {
     }
 
     /// Runs the stages until there are detections to output, or the pipeline has ended.
-    fn lead(&self, mut stages: Box<Stages>, shared: &Shared) {
+    fn lead(&self, mut stages: Box<Stages>, shared: &PipelineShared) {
         loop {
             let next = stages.run();
-            let alone = self.output.add(shared, stages.found());
+            let alone = self.output.add(shared, stages.pending_detections());
             match next {
-                Next::Output if !alone => continue,
+                StagesOutcome::Output if !alone => continue,
                 // The follower is not woken for this, because the callback would have to wait for the wake-up.
-                Next::Output => lock(&self.turn).stages = Some(stages),
-                Next::Separate(readout) => {
+                StagesOutcome::Output => lock(&self.turn).stages = Some(stages),
+                StagesOutcome::MoveReadout(readout) => {
                     lock(&self.turn).readout = Some(*readout);
                     self.changed.notify_one();
                     continue;
                 }
-                Next::Over => {
+                StagesOutcome::Finished => {
                     lock(&self.turn).over = true;
                     self.changed.notify_all();
                 }
@@ -89,12 +89,12 @@ impl Threads {
 }
 
 /// Ends the other thread's wait when this one ends, in whichever way.
-struct Leaving<'a> {
+struct ThreadEndGuard<'a> {
     threads: &'a Threads,
-    shared: &'a Shared,
+    shared: &'a PipelineShared,
 }
 
-impl Drop for Leaving<'_> {
+impl Drop for ThreadEndGuard<'_> {
     fn drop(&mut self) {
         let mut turn = lock(&self.threads.turn);
         turn.left -= 1;

@@ -31,7 +31,7 @@ const WAITING: usize = 16;
 
 /// A change at a taxel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Change {
+pub struct TaxelChange {
     /// Time, us.
     pub t: i64,
     /// Index of the taxel.
@@ -48,7 +48,7 @@ pub struct Change {
 #[derive(Debug, Clone, Default)]
 pub struct Piece {
     /// The changes.
-    pub changes: Vec<Change>,
+    pub changes: Vec<TaxelChange>,
     /// The taxels' values before the first change, in some pieces.
     pub held: Option<Vec<u16>>,
     /// The board's time before the first change; `None` before the first event.
@@ -138,7 +138,7 @@ impl ViewerQueue {
                 // A live array has at most 65 536 positions; files have up to 2^22.
                 #[allow(clippy::cast_possible_truncation)]
                 let taxel = taxel as u32;
-                self.piece.changes.push(Change {
+                self.piece.changes.push(TaxelChange {
                     t: events.t[k],
                     taxel,
                     ticks,

@@ -8,7 +8,7 @@ use taxel_core::wire::{self, SenderDecoder, StepBack};
 /// What decoding a file found.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Found {
+pub struct DamageCounts {
     /// What the decoder could not use, by cause.
     pub damage: BTreeMap<String, u64>,
     /// For version 2: sequence numbers that are missing.
@@ -21,7 +21,7 @@ pub struct Found {
     pub steps_back: Vec<StepBack>,
 }
 
-impl Found {
+impl DamageCounts {
     /// What a decoder found; `origin_us` is added to its times.
     #[must_use]
     pub fn of(sender: &SenderDecoder, origin_us: i64) -> Self {
@@ -79,7 +79,7 @@ pub(crate) fn add_order(causes: &mut BTreeMap<String, u64>, far: u64, overtaken:
     causes.insert(OVERTAKEN.to_owned(), overtaken);
 }
 
-/// The same of both versions, with the jumps of [`wire::Ahead`] and the datagrams of version 1 that came `again`; and the
+/// The same of both versions, with the jumps of [`wire::ClockJumps`] and the datagrams of version 1 that came `again`; and the
 /// number of missing datagrams of version 2, if the board sends it.
 #[must_use]
 pub fn damage(

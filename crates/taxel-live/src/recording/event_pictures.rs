@@ -15,12 +15,12 @@ const NEAR_US: i64 = 10_000;
 
 /// The sequence of pictures, in order of time.
 #[derive(Debug)]
-pub struct EventPictures {
+pub struct EventPreviews {
     times: std::vec::IntoIter<i64>,
     held: HeldOverTime<u16>,
 }
 
-impl EventPictures {
+impl EventPreviews {
     /// The pictures of events: at each multiple of 100 ms if an event occurred in the 100 ms up to it, and at the
     /// multiples of 10 ms before and after each of the times `around`, within the range of events. None if no event has
     /// an intensity.

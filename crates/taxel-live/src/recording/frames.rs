@@ -8,7 +8,7 @@ use taxel_core::problem;
 
 /// Properties of a source of frames, beside its array.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FrameSource {
+pub struct FrameProperties {
     /// Unit of the values.
     pub unit: String,
     /// Whether the frames have times; else they are numbered, one a us.
@@ -26,7 +26,7 @@ fn yes() -> bool {
     true
 }
 
-impl FrameSource {
+impl FrameProperties {
     pub(super) fn check(&self, name: &str, columns: u16) -> taxel_core::Result<()> {
         if self.unit.is_empty() {
             return Err(problem!("source {name}: the unit of its frames is empty"));
@@ -52,14 +52,14 @@ pub struct Frames {
 
 /// How the values of a frame are encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Encoding {
+pub enum FrameEncoding {
     /// `16UC1`: whole numbers from 0 to 65 535.
     Whole,
     /// `32FC1`: any number, and NaN.
     Float,
 }
 
-impl Encoding {
+impl FrameEncoding {
     /// The encoding that holds these values to the last bit.
     #[must_use]
     pub fn of(values: &[f32]) -> Self {
@@ -130,7 +130,7 @@ pub(super) fn write_message(
     t_us: i64,
     columns: usize,
     values: &[f32],
-    encoding: Encoding,
+    encoding: FrameEncoding,
 ) {
     out.clear();
     let (seconds, nanos) = (t_us.div_euclid(1_000_000), t_us.rem_euclid(1_000_000) * 1000);
@@ -147,8 +147,8 @@ pub(super) fn write_message(
     varint(field::DATA << 3 | BYTES, out);
     varint((values.len() * encoding.bytes()) as u64, out);
     match encoding {
-        Encoding::Whole => values.iter().for_each(|&value| out.extend_from_slice(&(value as u16).to_le_bytes())),
-        Encoding::Float => values.iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes())),
+        FrameEncoding::Whole => values.iter().for_each(|&value| out.extend_from_slice(&(value as u16).to_le_bytes())),
+        FrameEncoding::Float => values.iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes())),
     }
     bytes(field::FRAME_ID, source.as_bytes(), out);
 }
@@ -165,13 +165,13 @@ struct RawImage<'a> {
 }
 
 /// A field's value: a number, or bytes.
-enum Field<'a> {
+enum FieldValue<'a> {
     Number(u64),
     Bytes(&'a [u8]),
 }
 
 /// Takes the next field off a message; `None` at its end, and where it is no protobuf.
-fn next<'a>(message: &mut &'a [u8]) -> Option<(u64, Field<'a>)> {
+fn next<'a>(message: &mut &'a [u8]) -> Option<(u64, FieldValue<'a>)> {
     fn number(message: &mut &[u8]) -> Option<u64> {
         let mut value = 0;
         for k in 0..10 {
@@ -191,13 +191,13 @@ fn next<'a>(message: &mut &'a [u8]) -> Option<(u64, Field<'a>)> {
     }
     let key = number(message)?;
     let value = match key & 7 {
-        VARINT => Field::Number(number(message)?),
-        BITS_64 => Field::Bytes(taken(message, 8)?),
+        VARINT => FieldValue::Number(number(message)?),
+        BITS_64 => FieldValue::Bytes(taken(message, 8)?),
         BYTES => {
             let count = number(message)?;
-            Field::Bytes(taken(message, count)?)
+            FieldValue::Bytes(taken(message, count)?)
         }
-        BITS_32 => Field::Number(u32::from_le_bytes(taken(message, 4)?.try_into().ok()?).into()),
+        BITS_32 => FieldValue::Number(u32::from_le_bytes(taken(message, 4)?.try_into().ok()?).into()),
         _ => return None,
     };
     Some((key >> 3, value))
@@ -208,12 +208,12 @@ impl<'a> RawImage<'a> {
         let mut image = Self::default();
         while !message.is_empty() {
             match next(&mut message)? {
-                (field::TIMESTAMP, Field::Bytes(stamp)) => image.stamp = stamp,
-                (field::WIDTH, Field::Number(width)) => image.width = width,
-                (field::HEIGHT, Field::Number(height)) => image.height = height,
-                (field::ENCODING, Field::Bytes(encoding)) => image.encoding = encoding,
-                (field::STEP, Field::Number(step)) => image.step = step,
-                (field::DATA, Field::Bytes(data)) => image.data = data,
+                (field::TIMESTAMP, FieldValue::Bytes(stamp)) => image.stamp = stamp,
+                (field::WIDTH, FieldValue::Number(width)) => image.width = width,
+                (field::HEIGHT, FieldValue::Number(height)) => image.height = height,
+                (field::ENCODING, FieldValue::Bytes(encoding)) => image.encoding = encoding,
+                (field::STEP, FieldValue::Number(step)) => image.step = step,
+                (field::DATA, FieldValue::Bytes(data)) => image.data = data,
                 _ => {}
             }
         }
@@ -225,8 +225,8 @@ impl<'a> RawImage<'a> {
         let (mut stamp, mut seconds, mut nanos) = (self.stamp, 0_i64, 0_i64);
         while !stamp.is_empty() {
             match next(&mut stamp)? {
-                (field::SECONDS, Field::Number(value)) => seconds = value as i64,
-                (field::NANOS, Field::Number(value)) => nanos = value as i64,
+                (field::SECONDS, FieldValue::Number(value)) => seconds = value as i64,
+                (field::NANOS, FieldValue::Number(value)) => nanos = value as i64,
                 _ => {}
             }
         }
@@ -245,7 +245,7 @@ impl Frames {
     fn read(&mut self, message: &[u8], rows: u16, columns: u16) -> Option<()> {
         let image = RawImage::read(message)?;
         let encoding =
-            [Encoding::Whole, Encoding::Float].into_iter().find(|e| e.name().as_bytes() == image.encoding)?;
+            [FrameEncoding::Whole, FrameEncoding::Float].into_iter().find(|e| e.name().as_bytes() == image.encoding)?;
         let row = usize::from(columns) * encoding.bytes();
         let fits = (image.width, image.height, image.step) == (columns.into(), rows.into(), row as u64);
         if !fits || image.data.len() != row * usize::from(rows) {
@@ -253,11 +253,11 @@ impl Frames {
         }
         self.t.push(image.t_us()?);
         match encoding {
-            Encoding::Whole => {
+            FrameEncoding::Whole => {
                 let words = image.data.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]]));
                 self.values.extend(words.map(f32::from));
             }
-            Encoding::Float => {
+            FrameEncoding::Float => {
                 let words =
                     image.data.chunks_exact(4).map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]]));
                 self.values.extend(words);
@@ -274,15 +274,15 @@ mod tests {
     #[test]
     fn a_message_reads_back_to_the_last_bit() {
         let nan = f32::from_bits(0x7FC0_1234);
-        let cases: [(&[f32], Encoding); 5] = [
-            (&[0.0, 1.0, 65_535.0, 7.0], Encoding::Whole),
-            (&[0.0, 1.5, 2.0, 3.0], Encoding::Float),
-            (&[-0.0, 1.0, 2.0, 3.0], Encoding::Float),
-            (&[65_536.0, f32::INFINITY, -1.0, 0.0], Encoding::Float),
-            (&[nan, 1.0, 2.0, 3.0], Encoding::Float),
+        let cases: [(&[f32], FrameEncoding); 5] = [
+            (&[0.0, 1.0, 65_535.0, 7.0], FrameEncoding::Whole),
+            (&[0.0, 1.5, 2.0, 3.0], FrameEncoding::Float),
+            (&[-0.0, 1.0, 2.0, 3.0], FrameEncoding::Float),
+            (&[65_536.0, f32::INFINITY, -1.0, 0.0], FrameEncoding::Float),
+            (&[nan, 1.0, 2.0, 3.0], FrameEncoding::Float),
         ];
         for (values, encoding) in cases {
-            assert_eq!(Encoding::of(values), encoding, "{values:?}");
+            assert_eq!(FrameEncoding::of(values), encoding, "{values:?}");
             for t in [0, 1, -1, 1_234_567, -4_503_599_627_370_496, 4_503_599_627_370_496] {
                 let (mut message, mut back) = (vec![], Frames::default());
                 write_message(&mut message, "left", t, 2, values, encoding);
@@ -296,7 +296,7 @@ mod tests {
     #[test]
     fn what_is_no_frame_of_the_array_is_counted() {
         let mut message = vec![];
-        write_message(&mut message, "left", 5, 2, &[1.0; 4], Encoding::Whole);
+        write_message(&mut message, "left", 5, 2, &[1.0; 4], FrameEncoding::Whole);
         let mut frames = Frames::default();
         for cut in 0..message.len() {
             // The source's name comes last, and no part of it is needed.

@@ -31,7 +31,7 @@ pub(super) struct White {
 
 /// A picture, and the meaning of its grey values.
 #[derive(Debug, PartialEq)]
-pub(super) struct GreyPicture {
+pub(super) struct GreyPreview {
     /// 0 at rest, 255 at `full`, row by row.
     pub(super) bytes: Vec<u8>,
     /// The rest that was subtracted.
@@ -67,7 +67,7 @@ impl GreyScale {
     }
 
     /// The grey picture of the values at `t_us`; a value of 0 is also that of a taxel without any event so far.
-    pub(super) fn draw(&mut self, t_us: i64, columns: usize, held: &[u16]) -> GreyPicture {
+    pub(super) fn draw(&mut self, t_us: i64, columns: usize, held: &[u16]) -> GreyPreview {
         if self.rest.values().len() != held.len() {
             *self = Self::new(held.len());
         }
@@ -88,7 +88,7 @@ impl GreyScale {
         let rest = quiet.map_or("tare", |quiet| if quiet { "quiet stretch" } else { "first values" });
         // The scale is at least one tick, so that a sensor at rest stays black.
         let (bytes, full) = self.white.grey(t_us, &above, 1.0);
-        GreyPicture { bytes, rest, full }
+        GreyPreview { bytes, rest, full }
     }
 }
 
@@ -130,7 +130,7 @@ mod tests {
     fn rest_is_black_and_the_largest_of_the_last_ten_seconds_white() {
         let mut scale = tared(&[100.0, 50.0, 7.0]);
         let first = scale.draw(0, 3, &[100, 50, 0]);
-        assert_eq!(first, GreyPicture { bytes: vec![0, 0, 0], rest: "tare", full: 1.0 });
+        assert_eq!(first, GreyPreview { bytes: vec![0, 0, 0], rest: "tare", full: 1.0 });
         let pressed = scale.draw(100_000, 3, &[160, 80, 0]);
         assert_eq!((pressed.bytes, pressed.full), (vec![255, 128, 0], 60.0));
         // A weaker press next to a stronger one, then alone: it becomes white ten seconds later.
@@ -185,6 +185,6 @@ mod tests {
         scale.draw(0, 3, &[100, 50, 20]);
         scale.tare(&tare);
         let grey = scale.draw(100_000, 3, &[110, 39, 20]);
-        assert_eq!(grey, GreyPicture { bytes: vec![128, 255, 0], rest: "tare", full: 39.0 });
+        assert_eq!(grey, GreyPreview { bytes: vec![128, 255, 0], rest: "tare", full: 39.0 });
     }
 }

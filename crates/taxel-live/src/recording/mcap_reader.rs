@@ -19,14 +19,17 @@ use taxel_core::wire::{self, Decoder, Pairing};
 use taxel_core::{Events, Stop, problem};
 
 use super::stream::Sampling;
-use super::{BoardChange, Change, Condition, Counts, Ending, Found, Frames, Header, Rebuilt, Samples, Topic, limits};
+use super::{
+    BoardChange, BoardChangeKind, Condition, DamageCounts, FileEnding, Frames, Header, Rebuilt, RecordingCounts,
+    Samples, Topic, limits,
+};
 use crate::clock::leaves;
 use crate::regular_file::open_regular;
 use crate::{Error, Result};
-use blocks::{Blocks, Indexed};
+use blocks::{Blocks, IndexedChunks};
 pub use message::Message;
-pub use remarks::{Numbers, Remarks, begin_with};
-use walk::Walk;
+pub use remarks::{ArrivalNumbers, Remarks, begin_with};
+use walk::FileWalk;
 
 /// An open recording in the live format.
 #[derive(Debug, Clone)]
@@ -35,8 +38,8 @@ pub struct Reader {
     header: Arc<Header>,
     /// Index of the source that this reader reads.
     source: usize,
-    ending: Option<Ending>,
-    ends: Arc<BTreeMap<String, Counts>>,
+    ending: Option<FileEnding>,
+    ends: Arc<BTreeMap<String, RecordingCounts>>,
     rebuilt: Rebuilt,
     /// How many bytes of a source may be in memory at once.
     memory: u64,
@@ -46,14 +49,14 @@ pub struct Reader {
 
 /// State between blocks: the file's channels, and the last arrival number.
 #[derive(Debug, Clone, Default)]
-pub struct Place {
+pub struct ReadPosition {
     topics: BTreeMap<u16, Option<Topic>>,
     last: u64,
     in_datagrams: u64,
     bytes: Vec<u8>,
 }
 
-impl Place {
+impl ReadPosition {
     /// The same state without the reusable buffer.
     #[must_use]
     pub fn without_memory(&self) -> Self {
@@ -105,7 +108,7 @@ pub struct Datagrams {
 
 /// The events decoded from a recording, and the properties of each of its datagrams.
 #[derive(Debug, Clone)]
-pub struct Decoded {
+pub struct DecodedRecording {
     /// The decoded events.
     pub events: Events,
     /// Counts of the decoder of version 1.
@@ -117,13 +120,13 @@ pub struct Decoded {
     /// Earliest time at which each datagram could leave the board, us; `i64::MIN` if it is not known.
     pub left: Vec<i64>,
     /// What the decoder could not use, as a verdict states it.
-    pub found: Found,
+    pub found: DamageCounts,
 }
 
-impl Decoded {
+impl DecodedRecording {
     fn empty(events: Events) -> Self {
         let (counts, version_2) = (wire::Counts::default(), wire::v2::Counts::default());
-        Self { events, counts, version_2, arrived_ns: vec![], left: vec![], found: Found::default() }
+        Self { events, counts, version_2, arrived_ns: vec![], left: vec![], found: DamageCounts::default() }
     }
 }
 
@@ -160,10 +163,10 @@ impl Reader {
     pub fn open_within(path: &Path, memory: u64, allowed: bool) -> Result<Self> {
         let file = open_regular(path)?;
         let length = file.metadata().map_err(Error::file(path))?.len();
-        let mut walk = Walk::of(path, &file, length, memory);
+        let mut walk = FileWalk::of(path, &file, length, memory);
         walk.magic()?;
         walk.records()?;
-        let Walk { begin, end, ending, ends, blocks, skipped, summary, rebuilt, .. } = walk;
+        let FileWalk { begin, end, ending, ends, blocks, skipped, summary, rebuilt, .. } = walk;
         let blocks = Blocks { path: path.to_owned(), file, length, places: blocks, skipped, summary };
         // The copy of the header in the chunk of the datagrams' channel has a checksum; the other copies have none.
         let Some(header) = blocks.header()?.or(end).or(begin) else {
@@ -194,10 +197,10 @@ impl Reader {
             return Err(problem!("{path}: holds no source {name:?}; there are {}", known.join(", ")).into());
         };
         let ending = match &self.ending {
-            Some(Ending::Finished { .. }) if source != 0 => {
+            Some(FileEnding::Finished { .. }) if source != 0 => {
                 // A source of which nothing came has no counts.
-                let silent = self.is_silent(source).then(Counts::default);
-                self.ends.get(name).cloned().or(silent).map(|counts| Ending::Finished { counts })
+                let silent = self.is_silent(source).then(RecordingCounts::default);
+                self.ends.get(name).cloned().or(silent).map(|counts| FileEnding::Finished { counts })
             }
             whole => whole.clone(),
         };
@@ -230,7 +233,7 @@ impl Reader {
 
     /// How the recording ended, if the file states it.
     #[must_use]
-    pub fn ending(&self) -> Option<&Ending> {
+    pub fn ending(&self) -> Option<&FileEnding> {
         self.ending.as_ref()
     }
 
@@ -250,14 +253,14 @@ impl Reader {
         // counts say how many there were, the last ones before the end how many at least.
         let total = |topic: Topic| totals.and_then(|totals| topic.total(totals, self.source, name));
         let recorded = |topic: Topic| match &self.ending {
-            Some(Ending::Finished { counts }) if topic == data => Some(counts.recorded),
-            Some(Ending::Finished { counts }) => counts.messages.get(&topic).copied(),
+            Some(FileEnding::Finished { counts }) if topic == data => Some(counts.recorded),
+            Some(FileEnding::Finished { counts }) => counts.messages.get(&topic).copied(),
             _ => None,
         };
         let so_far = |topic: Topic| remarks.counts.as_ref().and_then(|counts| counts.messages.get(&topic)).copied();
         let mut unread = unread.clone();
         if let Some((0, indexed)) = self.blocks.skipped.first() {
-            unread.add(&self.listed(&Place::default(), indexed.as_ref(), &Indexed::new()));
+            unread.add(&self.unread_chunks(&ReadPosition::default(), indexed.as_ref(), &IndexedChunks::new()));
         }
         let (mut lost, mut repeated) = (BTreeMap::new(), 0);
         for topic in Topic::ALL.into_iter().filter(|topic| topic.lost_in_file().is_some()) {
@@ -278,7 +281,7 @@ impl Reader {
             lost.insert(topic, known.max(so_far(topic).map_or(0, |n| n.saturating_sub(read))));
         }
         let of_what_came = match &self.ending {
-            Some(Ending::Finished { counts }) => counts.sum,
+            Some(FileEnding::Finished { counts }) => counts.sum,
             _ => None,
         };
         let all_there = repeated == 0 && lost.values().all(|n| *n == 0);
@@ -302,7 +305,7 @@ impl Reader {
     }
 
     /// The messages of this source that message indexes list beyond those that were read; not known without such indexes.
-    fn listed(&self, place: &Place, indexed: Option<&Indexed>, read: &Indexed) -> Unread {
+    fn unread_chunks(&self, place: &ReadPosition, indexed: Option<&IndexedChunks>, read: &IndexedChunks) -> Unread {
         let mut unread = Unread { unknown: true, ..Unread::default() };
         for (channel, n) in indexed.into_iter().flatten() {
             let n = n.saturating_sub(read.get(channel).copied().unwrap_or(0));
@@ -315,7 +318,7 @@ impl Reader {
     }
 
     /// The topic of a channel, if it belongs to this source.
-    fn topic(&self, place: &Place, channel: u16) -> Option<Topic> {
+    fn topic(&self, place: &ReadPosition, channel: u16) -> Option<Topic> {
         place.topics.get(&channel).copied().unwrap_or_else(|| Topic::of_number(channel, self.source))
     }
 
@@ -325,7 +328,7 @@ impl Reader {
     ///
     /// `File` if the file cannot be read, `Core` if `take` returns it or the caller stops.
     pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<Unread> {
-        let (mut place, mut unread) = (Place::default(), Unread::default());
+        let (mut place, mut unread) = (ReadPosition::default(), Unread::default());
         for block in 0..self.blocks() {
             stop.check()?;
             unread.add(&self.block(block, &mut place, &mut take)?);
@@ -348,14 +351,14 @@ impl Reader {
     pub fn block(
         &self,
         block: usize,
-        place: &mut Place,
+        place: &mut ReadPosition,
         mut take: impl FnMut(Message<'_>) -> Result<()>,
     ) -> Result<Unread> {
         let skipped = self.blocks.skipped.binary_search_by_key(&(block + 1), |(before, _)| *before);
         let allowed = if self.allowed { self.memory } else { 0 };
         let (block, most) = (self.blocks.places[block], limits::datagrams(self.blocks.length).max(allowed));
-        let Place { topics, last, in_datagrams, bytes } = place;
-        let (mut wrong, mut read) = (None, Indexed::new());
+        let ReadPosition { topics, last, in_datagrams, bytes } = place;
+        let (mut wrong, mut read) = (None, IndexedChunks::new());
         let sound = self.blocks.records(block, bytes, |record| {
             match record {
                 Record::Channel(channel) => {
@@ -396,10 +399,10 @@ impl Reader {
             return Err(wrong);
         }
         let mut unread = match (skipped, sound) {
-            (Ok(k), _) => self.listed(place, self.blocks.skipped[k].1.as_ref(), &read),
+            (Ok(k), _) => self.unread_chunks(place, self.blocks.skipped[k].1.as_ref(), &read),
             (Err(_), true) => Unread::default(),
             (Err(_), false) => match self.blocks.indexed(block)? {
-                Some(indexed) => Unread { unknown: false, ..self.listed(place, Some(&indexed), &read) },
+                Some(indexed) => Unread { unknown: false, ..self.unread_chunks(place, Some(&indexed), &read) },
                 None => Unread { unknown: true, ..Unread::default() },
             },
         };
@@ -492,12 +495,12 @@ impl Reader {
     /// # Errors
     ///
     /// As [`Reader::messages`].
-    pub fn decode(&self, pairing: Pairing, stop: Stop<'_>) -> Result<Decoded> {
+    pub fn decode(&self, pairing: Pairing, stop: Stop<'_>) -> Result<DecodedRecording> {
         let header = self.header();
         let array = header.array.clone();
         let decoder = Decoder::new(array.clone()).pairing(pairing).differences(header.decoding.difference);
         let mut sender = wire::SenderDecoder::new(decoder, 1);
-        let mut decoded = Decoded::empty(Events::empty(array));
+        let mut decoded = DecodedRecording::empty(Events::empty(array));
         #[allow(clippy::cast_possible_truncation)]
         let frame_us = header.registers.map_or(0, |registers| registers.frame_us() as i64);
         self.messages(stop, |message| {
@@ -517,7 +520,7 @@ impl Reader {
             }
             // The datagrams do not show commands from the host to the board.
             if message.topic == Topic::Board
-                && let Ok(BoardChange { change: Change::Wire { version, asked: true }, .. }) =
+                && let Ok(BoardChange { change: BoardChangeKind::Wire { version, asked: true }, .. }) =
                     serde_json::from_slice(message.data)
             {
                 sender.expect(version, &mut decoded.events);
@@ -530,7 +533,7 @@ impl Reader {
         decoded.events.markers.iter_mut().for_each(|m| m.t += header.decoding.origin_us);
         decoded.counts = *sender.counts();
         decoded.version_2 = sender.version_2().counts();
-        decoded.found = Found::of(&sender, header.decoding.origin_us);
+        decoded.found = DamageCounts::of(&sender, header.decoding.origin_us);
         Ok(decoded)
     }
 }

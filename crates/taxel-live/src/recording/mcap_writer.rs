@@ -20,12 +20,12 @@ use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
-use super::frames::{Encoding, write_message};
+use super::frames::{FrameEncoding, write_message};
 use super::grey_picture::GreyScale;
-use super::{BoardChange, Compression, Counts, Header, OutputFile, Stream, Topic, WriterOptions};
+use super::{BoardChange, Compression, Header, OutputFile, RecordingCounts, StreamColumns, Topic, WriterOptions};
 use crate::Result;
 use crate::locked::lock;
-use write_queue::{Plan, WriteQueue};
+use write_queue::{ReservedFile, WriteQueue};
 
 /// Capacity of the queue while the disk stalls, bytes; callers wait while it is full (0.6 s of the sensor's worst
 /// case).
@@ -44,17 +44,17 @@ const DATAGRAM_BYTES: usize = 65_507;
 /// finished. If the file was not begun yet, an existing file is left unchanged.
 pub struct Writer {
     /// The first source.
-    track: Track,
+    track: SourceWriter,
     header: Header,
 }
 
 /// Writes one source of a recording; any thread may use it. A [`Writer`] is also the first source's.
-pub struct Track {
+pub struct SourceWriter {
     queue: Arc<WriteQueue>,
     /// Index of the source in the file.
     source: usize,
     name: String,
-    stream: Option<Stream>,
+    stream: Option<StreamColumns>,
     /// Number of columns of the array.
     columns: usize,
     /// Number of places in the array.
@@ -63,9 +63,9 @@ pub struct Track {
 }
 
 impl std::ops::Deref for Writer {
-    type Target = Track;
+    type Target = SourceWriter;
 
-    fn deref(&self) -> &Track {
+    fn deref(&self) -> &SourceWriter {
         &self.track
     }
 }
@@ -86,8 +86,8 @@ impl Writer {
     /// As [`Writer::create`], for a header that was checked and a file that is reserved. The file is first changed by
     /// the first datagram or sample or, with `for_clock`, by [`Writer::begin`]; data accepted before wait in memory.
     pub(crate) fn plan(file: OutputFile, header: &Header, compression: Compression, for_clock: bool) -> Self {
-        let queue = Arc::new(WriteQueue::new(Plan { file, header: header.clone(), compression }, for_clock));
-        Self { track: Track::new(queue, 0, header), header: header.clone() }
+        let queue = Arc::new(WriteQueue::new(ReservedFile { file, header: header.clone(), compression }, for_clock));
+        Self { track: SourceWriter::new(queue, 0, header), header: header.clone() }
     }
 
     /// Begins the file of `Writer::plan` with the offset of decoded times, us ([`Decoding::origin_us`](super::Decoding::origin_us)); returns whether
@@ -118,12 +118,12 @@ impl Writer {
     /// # Errors
     ///
     /// `Core(Problem)` if the header contains no source of that name.
-    pub fn track(&self, name: &str) -> Result<Track> {
+    pub fn track(&self, name: &str) -> Result<SourceWriter> {
         let mut sources = std::iter::once(&self.header).chain(&self.header.sources).enumerate();
         let Some((k, source)) = sources.find(|(_, source)| source.name == name) else {
             return Err(problem!("source {name:?}: the recording has none of that name").into());
         };
-        Ok(Track::new(Arc::clone(&self.track.queue), k, source))
+        Ok(SourceWriter::new(Arc::clone(&self.track.queue), k, source))
     }
 
     /// Whether any source has passed data, or bytes that are in no line.
@@ -133,7 +133,7 @@ impl Writer {
     }
 
     /// Ends the recording with the counts of the first source and the verdict; returns the final counts. The other
-    /// sources must have ended before ([`Track::end`]).
+    /// sources must have ended before ([`SourceWriter::end`]).
     ///
     /// The file is synced to the disk when this returns.
     ///
@@ -141,7 +141,7 @@ impl Writer {
     ///
     /// `File` if the disk is full or not available, in which case the file keeps everything that was written before; or
     /// if the file was removed, renamed or replaced while it was written, with a description of what is lost.
-    pub fn finish(self, counts: Counts) -> Result<Counts> {
+    pub fn finish(self, counts: RecordingCounts) -> Result<RecordingCounts> {
         self.begin(self.header.decoding.origin_us)?;
         self.track.queue.finish(Some(counts.clone()))?;
         Ok(self.track.queue.lock().written[0].at_end(counts))
@@ -157,7 +157,7 @@ impl Writer {
     }
 }
 
-impl Track {
+impl SourceWriter {
     /// The writer of the source with this index in the file.
     fn new(queue: Arc<WriteQueue>, source: usize, header: &Header) -> Self {
         Self {
@@ -176,8 +176,15 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where the columns do not fit each other or the array; else as [`Track::datagram`].
-    pub fn frames(&self, first: u64, at_ns: &[i64], t_us: &[i64], values: &[f32], encoding: Encoding) -> Result<()> {
+    /// `Core(Problem)` where the columns do not fit each other or the array; else as [`SourceWriter::datagram`].
+    pub fn frames(
+        &self,
+        first: u64,
+        at_ns: &[i64],
+        t_us: &[i64],
+        values: &[f32],
+        encoding: FrameEncoding,
+    ) -> Result<()> {
         if at_ns.len() != t_us.len() || values.len() != t_us.len() * self.taxels {
             let (n, taxels) = (values.len(), self.taxels);
             return Err(problem!("{} frames of {taxels} taxels: {n} values", t_us.len()).into());
@@ -196,7 +203,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` if the source is not a stream, or has other columns; otherwise as [`Track::datagram`].
+    /// `Core(Problem)` if the source is not a stream, or has other columns; otherwise as [`SourceWriter::datagram`].
     pub fn sample(&self, arrived_ns: i64, number: u64, values: &[f64]) -> Result<()> {
         let Some(stream) = self.stream.as_ref().filter(|stream| stream.fits(values)) else {
             let n = self.stream.as_ref().map_or(0, |stream| stream.columns.len());
@@ -209,7 +216,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`].
+    /// As [`SourceWriter::datagram`].
     pub fn strange_line(&self, arrived_ns: i64, number: u64, line: &str) -> Result<()> {
         self.push(Topic::Samples, arrived_ns, number, json!({ "line": line }).to_string().as_bytes())
     }
@@ -220,7 +227,7 @@ impl Track {
     }
 
     /// Ends this source with the counts of what was received and lost; it must not be used afterwards.
-    pub fn end(&self, name: &str, counts: Counts) {
+    pub fn end(&self, name: &str, counts: RecordingCounts) {
         let mut state = self.queue.lock();
         let counts = state.written[self.source].at_end(counts);
         state.ends.insert(name.to_owned(), counts);
@@ -247,7 +254,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where columns differ in length or name bytes that are not there; else as [`Track::datagram`].
+    /// `Core(Problem)` where columns differ in length or name bytes that are not there; else as [`SourceWriter::datagram`].
     pub fn datagrams(&self, arrived_ns: &[i64], number: &[u64], offsets: &[i64], bytes: &[u8]) -> Result<()> {
         if number.len() != arrived_ns.len() || offsets.len() != arrived_ns.len() + 1 {
             let n = arrived_ns.len();
@@ -267,7 +274,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`]; the same applies to the methods below.
+    /// As [`SourceWriter::datagram`]; the same applies to the methods below.
     pub fn registers(&self, at_ns: i64, registers: &Registers) -> Result<()> {
         self.push_json(Topic::Registers, at_ns, &json!(registers))
     }
@@ -276,7 +283,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`].
+    /// As [`SourceWriter::datagram`].
     pub fn marker(&self, at_ns: i64, marker: Marker) -> Result<()> {
         self.push_json(Topic::Markers, at_ns, &json!({ "t_us": marker.t, "start": marker.start }))
     }
@@ -285,7 +292,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`].
+    /// As [`SourceWriter::datagram`].
     pub fn note(&self, at_ns: i64, t_us: Option<i64>, text: &str) -> Result<()> {
         self.push_json(Topic::Notes, at_ns, &log(at_ns, t_us, text))
     }
@@ -294,7 +301,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`].
+    /// As [`SourceWriter::datagram`].
     pub fn zeroing(&self, at_ns: i64, zeroing: &Zeroing) -> Result<()> {
         let Zeroing { t, x, y, rest, before } = *zeroing;
         let before_text = before.map_or_else(|| "unknown".to_owned(), |before| format!("{before:.1}"));
@@ -309,7 +316,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`].
+    /// As [`SourceWriter::datagram`].
     pub fn board_change(&self, change: &BoardChange) -> Result<()> {
         let value = serde_json::to_value(change).unwrap_or_default();
         self.push_json(Topic::Board, change.at_ns, &value)
@@ -319,7 +326,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`].
+    /// As [`SourceWriter::datagram`].
     pub fn detection(&self, at_ns: i64, detection: &Detection) -> Result<()> {
         let Detection { label, t, known, slope, repaired } = detection;
         let value = json!({ "label": label, "t_us": t, "known_us": known, "slope": slope, "repaired": repaired });
@@ -330,8 +337,8 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`].
-    pub fn counts(&self, at_ns: i64, counts: &Counts) -> Result<()> {
+    /// As [`SourceWriter::datagram`].
+    pub fn counts(&self, at_ns: i64, counts: &RecordingCounts) -> Result<()> {
         let counts = self.queue.lock().written[self.source].so_far(counts.clone());
         self.push_json(Topic::Counts, at_ns, &json!(counts))
     }
@@ -351,7 +358,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`]; `Core` if the number of `ticks` is not a multiple of `columns`.
+    /// As [`SourceWriter::datagram`]; `Core` if the number of `ticks` is not a multiple of `columns`.
     pub fn picture(&self, at_ns: i64, t_us: i64, columns: u16, ticks: &[u16]) -> Result<()> {
         let columns = usize::from(columns);
         if columns == 0 || ticks.is_empty() || !ticks.len().is_multiple_of(columns) {
@@ -363,13 +370,13 @@ impl Track {
         self.push_grey((at_ns, t_us), columns, &grey.bytes, about)
     }
 
-    /// Writes a picture for viewers of values that are above rest already, in a unit: as [`Track::picture`]; white is at
+    /// Writes a picture for viewers of values that are above rest already, in a unit: as [`SourceWriter::picture`]; white is at
     /// least `least`, and the message states it in the unit (`full`, `unit`). Values that are not finite
     /// or below 0 are black.
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`]; `Core(Problem)` if there is no value for each taxel.
+    /// As [`SourceWriter::datagram`]; `Core(Problem)` if there is no value for each taxel.
     pub fn picture_above(&self, at: (i64, i64), above: &[f32], least: f64, rest: &str, unit: &str) -> Result<()> {
         if above.len() != self.taxels {
             return Err(problem!("picture of {} values: the array has {} taxels", above.len(), self.taxels).into());
@@ -397,7 +404,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`].
+    /// As [`SourceWriter::datagram`].
     pub fn held(&self, at_ns: i64, t_us: Option<i64>, ticks: &[u16]) -> Result<()> {
         let bytes: Vec<u8> = ticks.iter().flat_map(|value| value.to_le_bytes()).collect();
         let held = json!({ "t_us": t_us, "encoding": "uint16, little-endian", "ticks": STANDARD.encode(&bytes) });

@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use taxel_core::problem;
 
-use super::damage::{Found, IN_NO_LINE, LeftOut, MISSING, STRANGE, UNFINISHED_LINES};
+use super::damage::{DamageCounts, IN_NO_LINE, LeftOut, MISSING, STRANGE, UNFINISHED_LINES};
 use super::limits;
 use clock::StreamClock;
 
 /// The columns of a source's lines.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Stream {
+pub struct StreamColumns {
     /// The names of all columns.
     pub columns: Vec<String>,
     /// The column of the source's own clock; without one a line's time is its arrival time.
@@ -27,7 +27,7 @@ fn one() -> f64 {
     1.0
 }
 
-impl Stream {
+impl StreamColumns {
     /// Defines the columns by name. A name `t`, `time`, `stamp` or `timestamp` with the ending `_ns`, `_us`, `_ms` or
     /// `_s` is the clock.
     #[must_use]
@@ -120,20 +120,20 @@ pub struct Samples {
     /// The values without the clock column, line by line.
     pub values: Vec<f64>,
     /// What could not be read, and what is wrong with the stamps, as a verdict states it.
-    pub found: Found,
+    pub found: DamageCounts,
 }
 
 /// Decodes a stream's messages.
 #[derive(Debug)]
 pub(super) struct Sampling<'a> {
-    stream: &'a Stream,
+    stream: &'a StreamColumns,
     samples: Samples,
-    faults: Faults,
+    faults: StreamFaults,
 }
 
 impl<'a> Sampling<'a> {
-    pub(super) fn new(stream: &'a Stream) -> Self {
-        Self { stream, samples: Samples::default(), faults: Faults::new(stream) }
+    pub(super) fn new(stream: &'a StreamColumns) -> Self {
+        Self { stream, samples: Samples::default(), faults: StreamFaults::new(stream) }
     }
 
     pub(super) fn push(&mut self, at_ns: i64, number: u64, data: &[u8]) {
@@ -174,17 +174,17 @@ impl<'a> Sampling<'a> {
 
 /// Counts what could not be read of a stream, and what is wrong with its stamps: while it is recorded as in its file.
 #[derive(Debug, Clone)]
-pub struct Faults {
+pub struct StreamFaults {
     strange: u64,
     missing: u64,
     left_out: LeftOut,
     clock: StreamClock,
 }
 
-impl Faults {
+impl StreamFaults {
     /// None so far.
     #[must_use]
-    pub fn new(stream: &Stream) -> Self {
+    pub fn new(stream: &StreamColumns) -> Self {
         let clock = StreamClock::new(stream.unit_us);
         Self { strange: 0, missing: 0, left_out: LeftOut::default(), clock }
     }
@@ -214,7 +214,7 @@ impl Faults {
     }
 
     /// Counts a line of values, with the clock's stamp among them.
-    pub fn line(&mut self, stream: &Stream, values: &[f64], at_ns: i64) {
+    pub fn line(&mut self, stream: &StreamColumns, values: &[f64], at_ns: i64) {
         let clock = stream.columns.iter().position(|name| Some(name) == stream.time.as_ref());
         match self.time(clock.map(|column| values[column]), at_ns) {
             Some(_) => self.missing(values),
@@ -224,7 +224,7 @@ impl Faults {
 
     /// What was found so far, as a verdict states it.
     #[must_use]
-    pub fn found(&self) -> Found {
+    pub fn found(&self) -> DamageCounts {
         let mut found = self.clock.found();
         let LeftOut { in_no_line, unfinished } = self.left_out;
         let counts = [
@@ -244,18 +244,18 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
-    fn stream(columns: &[&str]) -> Stream {
-        Stream::of_columns(columns.iter().map(ToString::to_string).collect())
+    fn stream(columns: &[&str]) -> StreamColumns {
+        StreamColumns::of_columns(columns.iter().map(ToString::to_string).collect())
     }
 
-    fn times(stream: &Stream, stamps: &[(f64, i64)]) -> (Vec<i64>, Counted) {
+    fn times(stream: &StreamColumns, stamps: &[(f64, i64)]) -> (Vec<i64>, Counted) {
         let mut sampling = Sampling::new(stream);
         for (k, &(stamp, at_ns)) in stamps.iter().enumerate() {
             let message = stream.message(&[stamp, k as f64]).to_string();
             sampling.push(at_ns, k as u64, message.as_bytes());
         }
         let samples = sampling.finish();
-        let Found { mut damage, doubtful_after_us, .. } = samples.found;
+        let DamageCounts { mut damage, doubtful_after_us, .. } = samples.found;
         for none in [STRANGE, IN_NO_LINE, UNFINISHED_LINES] {
             assert_eq!(damage.remove(none), Some(0));
         }
@@ -407,7 +407,7 @@ mod tests {
     fn a_stamp_that_is_no_time_counts_as_a_line_that_could_not_be_read() {
         let stream = stream(&["t_us", "a"]);
         let mut sampling = Sampling::new(&stream);
-        let mut live = Faults::new(&stream);
+        let mut live = StreamFaults::new(&stream);
         for (k, stamp) in [1.0, f64::NAN, 1e300, 4_503_599_627_370_497.0, -5e15, 2.0].into_iter().enumerate() {
             sampling.push(k as i64, k as u64, stream.message(&[stamp, 1.0]).to_string().as_bytes());
             live.line(&stream, &[stamp, 1.0], k as i64);
@@ -420,7 +420,7 @@ mod tests {
     #[test]
     fn a_missing_value_is_counted_live_and_in_the_file_and_is_no_damage() {
         let stream = stream(&["t_us", "a", "b"]);
-        let (mut sampling, mut live) = (Sampling::new(&stream), Faults::new(&stream));
+        let (mut sampling, mut live) = (Sampling::new(&stream), StreamFaults::new(&stream));
         for (k, line) in ["1,nan,2", "2,3,4", "3,NaN,nan", "nan,nan,1"].into_iter().enumerate() {
             let values = stream.parse(line).unwrap();
             sampling.push(k as i64 * 1000, k as u64, stream.message(&values).to_string().as_bytes());
@@ -462,9 +462,9 @@ mod tests {
             stream(&["t_us"]),
             stream(&["a", "a"]),
             stream(&["a", ""]),
-            Stream { time: Some("b".to_owned()), ..good.clone() },
-            Stream { unit_us: 0.0, ..good.clone() },
-            Stream { unit_us: f64::NAN, ..good.clone() },
+            StreamColumns { time: Some("b".to_owned()), ..good.clone() },
+            StreamColumns { unit_us: 0.0, ..good.clone() },
+            StreamColumns { unit_us: f64::NAN, ..good.clone() },
         ] {
             assert!(bad.check("imu").is_err(), "{bad:?}");
         }

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 use taxel_core::wire::StepBack;
 
 use super::damage::{
-    ADDRESS, ANEW, BOARD_DROPPED, BOARD_RESET, EVENTS_DROPPED, Found, IN_NO_LINE, MISSING, OTHER_BOARD, OVERTAKEN,
-    REPAIRED, REPEATED, UNFINISHED_LINES,
+    ADDRESS, ANEW, BOARD_DROPPED, BOARD_RESET, DamageCounts, EVENTS_DROPPED, IN_NO_LINE, MISSING, OTHER_BOARD,
+    OVERTAKEN, REPAIRED, REPEATED, UNFINISHED_LINES,
 };
 use super::topic::Topic;
 use crate::bridged::Bridged;
@@ -28,7 +28,7 @@ const NO_END: &str = "the final counts are damaged: what was lost since the last
 /// How much of a recording is there, from the best to the worst; of several parts the worst counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Status {
+pub enum RecordingStatus {
     /// Everything that the board sent between the first and the last datagram.
     Complete,
     /// Everything that arrived; what was lost before cannot be known.
@@ -52,7 +52,7 @@ pub enum Status {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Verdict {
     /// How much is there.
-    pub status: Status,
+    pub status: RecordingStatus,
     /// All of it in one line.
     pub text: String,
     /// What was lost, by cause.
@@ -74,7 +74,7 @@ pub struct Verdict {
 /// Counts of datagrams and bytes, by what happened to them; the sums of the causes equal the totals.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Counts {
+pub struct RecordingCounts {
     /// Datagrams received from the socket.
     pub received: u64,
     /// Datagrams in this recording.
@@ -116,11 +116,11 @@ pub struct Counts {
 /// How a recording ended, as the file states.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Ending {
+pub enum FileEnding {
     /// As planned.
     Finished {
         /// Counts of what was received and lost.
-        counts: Counts,
+        counts: RecordingCounts,
     },
     /// Stopped because writing failed, with the operating system's error.
     Stopped(String),
@@ -153,7 +153,7 @@ pub struct Rebuilt {
 #[serde(rename_all = "snake_case")]
 pub enum Basis {
     /// The counts of what was received and lost.
-    Counts(Counts),
+    Counts(RecordingCounts),
     /// A recording of the live format.
     File(Box<Condition>),
     /// Raw bytes: the name of the missing `.lss`, and what the decoder could not use.
@@ -175,7 +175,7 @@ pub enum Basis {
 #[serde(default)]
 pub struct Condition {
     /// How the recording ended.
-    pub ending: Option<Ending>,
+    pub ending: Option<FileEnding>,
     /// Damage found at opening.
     pub rebuilt: Rebuilt,
     /// Number of chunks that could not be used.
@@ -195,18 +195,18 @@ pub struct Condition {
     /// Whether the datagrams or lines, of which none is missing, are not those that were recorded.
     pub changed: bool,
     /// The last counts before the end.
-    pub so_far: Option<Counts>,
+    pub so_far: Option<RecordingCounts>,
     /// The verdict of the recording that this one was converted from, as the header states it.
     pub converted: Option<Box<Verdict>>,
     /// What decoding found, if the file was decoded.
-    pub decoded: Option<Found>,
+    pub decoded: Option<DamageCounts>,
     /// Whether the source is a stream of numbers.
     pub lines: bool,
     /// The board's time at which the recording begins, us.
     pub origin_us: i64,
 }
 
-impl Counts {
+impl RecordingCounts {
     /// The verdict: nothing lost after arrival, or what was lost where.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
@@ -224,9 +224,9 @@ impl Verdict {
             Basis::Raw(unmarked, damage) => Self::of_raw(unmarked, &damage),
             Basis::Silent(kind) => {
                 let text = format!("the {kind} does not say what was lost");
-                Self { status: Status::Unknown, text, ..Self::default() }
+                Self { status: RecordingStatus::Unknown, text, ..Self::default() }
             }
-            Basis::Together(parts) => Self::together(parts),
+            Basis::Together(parts) => Self::combine(parts),
             Basis::Sources(parts) => Self::of_sources(parts),
             Basis::Stretches(parts) => Self::of_stretches(parts),
             Basis::Later(us, verdict) => verdict.later(us),
@@ -235,16 +235,16 @@ impl Verdict {
 
     /// The verdict if nothing arrived at all.
     pub(crate) fn nothing_arrived(text: String) -> Self {
-        Self { status: Status::NothingArrived, text, ..Self::default() }
+        Self { status: RecordingStatus::NothingArrived, text, ..Self::default() }
     }
 
     /// The verdict on a stream of numbers.
-    pub(crate) fn of_lines(counts: &Counts) -> Self {
+    pub(crate) fn of_lines(counts: &RecordingCounts) -> Self {
         Self::of_counts(counts, NO_LINE_LOST)
     }
 
     /// The verdict on counts; `nothing_lost` is the line if they show no loss and do not count what was sent.
-    pub(crate) fn of_counts(counts: &Counts, nothing_lost: &str) -> Self {
+    pub(crate) fn of_counts(counts: &RecordingCounts, nothing_lost: &str) -> Self {
         let bridged = counts.bridged.as_deref().copied().unwrap_or_default();
         let of_board = |cause: &str| counts.decoder.get(cause).copied().unwrap_or(0);
         let dropped = [
@@ -296,9 +296,9 @@ impl Verdict {
         // After a reset the board's numbers begin anew: what was lost just before or after it they do not show.
         let knows = counts.missing.is_some() && of_board(BOARD_RESET) == 0;
         verdict.status = match (&words[..], knows) {
-            ([], true) => Status::Complete,
-            ([], false) => Status::CompleteAfterArrival,
-            _ => Status::Lost,
+            ([], true) => RecordingStatus::Complete,
+            ([], false) => RecordingStatus::CompleteAfterArrival,
+            _ => RecordingStatus::Lost,
         };
         let hidden = counts.missing.is_some() && !knows;
         let mut pieces = vec![if !words.is_empty() {
@@ -370,7 +370,7 @@ impl Verdict {
             place.insert(cause.clone(), *n);
         }
         if !self.damaged.is_empty() {
-            self.status = self.status.max(Status::Damaged);
+            self.status = self.status.max(RecordingStatus::Damaged);
         }
         let words: Vec<String> = found().map(|(cause, n)| numbered(*n, &cause.replace('_', " "))).collect();
         (!words.is_empty()).then(|| format!("in the bytes that came: {}", words.join(", ")))
@@ -379,7 +379,7 @@ impl Verdict {
     /// The verdict where times after this one are doubtful too, if any, us.
     pub(crate) fn doubtful(mut self, after: Option<i64>) -> Self {
         if after.is_some() {
-            self.status = self.status.max(Status::Damaged);
+            self.status = self.status.max(RecordingStatus::Damaged);
             self.change(|verdict| verdict.doubtful_after_us = verdict.doubtful_after_us.into_iter().chain(after).min());
         }
         self
@@ -387,10 +387,10 @@ impl Verdict {
 
     /// The verdict on raw bytes.
     fn of_raw(unmarked: Option<String>, damage: &BTreeMap<String, u64>) -> Self {
-        let mut verdict = Self { status: Status::Unknown, ..Self::default() };
+        let mut verdict = Self { status: RecordingStatus::Unknown, ..Self::default() };
         let damage = verdict.damage_of(damage);
         if unmarked.is_some() {
-            verdict.status = verdict.status.max(Status::Unfinished);
+            verdict.status = verdict.status.max(RecordingStatus::Unfinished);
         }
         let unmarked = unmarked.map(|name| format!("not finished, as {name} is not there"));
         let silent = "the .lsa does not say what was lost".to_owned();
@@ -401,18 +401,18 @@ impl Verdict {
     /// The verdict on several recordings or sources: the worst status, and the sums of their numbers.
     ///
     /// Equal verdicts without numbers are one.
-    pub(crate) fn together(parts: Vec<(String, Self)>) -> Self {
-        Self::joined(parts, |_, sum, n| sum + n)
+    pub(crate) fn combine(parts: Vec<(String, Self)>) -> Self {
+        Self::combine_with(parts, |_, sum, n| sum + n)
     }
 
-    /// As [`Self::together`], of the sources of one file, whose damage each of them has: it counts once.
+    /// As [`Self::combine`], of the sources of one file, whose damage each of them has: it counts once.
     fn of_sources(parts: Vec<(String, Self)>) -> Self {
-        Self::joined(parts, |cause, sum, n| if OF_THE_FILE.contains(&cause) { sum.max(n) } else { sum + n })
+        Self::combine_with(parts, |cause, sum, n| if OF_THE_FILE.contains(&cause) { sum.max(n) } else { sum + n })
     }
 
-    /// As [`Self::together`], of stretches of one recording: what all of them lost is what the whole lost, and counts once.
+    /// As [`Self::combine`], of stretches of one recording: what all of them lost is what the whole lost, and counts once.
     fn of_stretches(parts: Vec<(String, Self)>) -> Self {
-        let mut whole = Self::together(parts.clone());
+        let mut whole = Self::combine(parts.clone());
         let all = parts.iter().map(|(_, part)| [&part.lost, &part.damaged, &part.noted]);
         for (k, sums) in [&mut whole.lost, &mut whole.damaged, &mut whole.noted].into_iter().enumerate() {
             for (cause, sum) in sums {
@@ -429,14 +429,14 @@ impl Verdict {
         whole
     }
 
-    fn joined(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
+    fn combine_with(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
         let numbers = |one: &Self| !(one.lost.is_empty() && one.damaged.is_empty() && one.noted.is_empty());
         if let [(_, first), others @ ..] = &parts[..]
             && (others.is_empty() || (others.iter().all(|(_, one)| one == first) && !numbers(first)))
         {
             return first.clone();
         }
-        let mut whole = Self { status: Status::Complete, ..Self::default() };
+        let mut whole = Self { status: RecordingStatus::Complete, ..Self::default() };
         let mut named: Vec<(String, Self)> = vec![];
         for (name, part) in parts {
             whole.status = whole.status.max(part.status);

@@ -4,7 +4,7 @@ use taxel_core::Array;
 use taxel_core::held::UNKNOWN;
 use taxel_core::rest::Value;
 use taxel_core::touch_counts::TouchCounts;
-use taxel_live::pipeline::Change;
+use taxel_live::pipeline::TaxelChange;
 
 /// Events and held values of each taxel so far.
 #[derive(Debug, Clone)]
@@ -40,7 +40,7 @@ impl Activity {
     }
 
     /// Counts a change. A repaired one only updates the held value: states of version 2 also report dead taxels.
-    pub fn count(&mut self, change: &Change) {
+    pub fn count(&mut self, change: &TaxelChange) {
         let taxel = change.taxel as usize;
         self.set_held(taxel, change.ticks);
         self.touches.event(change.t, taxel, change.ticks, change.up, !change.repaired);

@@ -11,10 +11,10 @@ use taxel_core::held::UNKNOWN;
 use taxel_core::rest::{NOISE_FLOOR, above_noise};
 use taxel_core::tracked_rest::TrackedRest;
 use taxel_live::Result;
-use taxel_live::pipeline::Change;
+use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::Remarks;
 
-use super::{ChangeReader, FrameSources, KeyframeIndex, Read};
+use super::{ChangeReader, FrameSources, KeyframeIndex, ReadOutcome};
 use crate::array_state::{Keyframe, RestSource};
 use crate::centre::Coordinates;
 use crate::load::Load;
@@ -87,7 +87,7 @@ pub struct FrameSource<'a> {
 impl FrameSource<'_> {
     /// The rest of the cells in steps, each from the frame of this number on: once where it is fixed, else where it moved.
     #[allow(clippy::cast_possible_truncation)]
-    fn rests(&self, steps: Steps) -> Vec<(usize, Vec<u16>)> {
+    fn rests(&self, steps: ValueSteps) -> Vec<(usize, Vec<u16>)> {
         let FrameRest { source, values, ticks_by_unit, falls, .. } = &self.rest;
         let fixed = |values: &[f64]| values.iter().map(|&value| steps.of_rest(value)).collect();
         match source {
@@ -119,14 +119,14 @@ impl FrameSource<'_> {
 
     /// The noise floor in steps: values further above the rest count as loaded.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn floor(&self, steps: Steps) -> u16 {
+    fn floor(&self, steps: ValueSteps) -> u16 {
         (self.rest.loaded_from / steps.size) as u16
     }
 }
 
 /// The frames of a source, in steps.
 #[derive(Debug, Clone)]
-struct Source {
+struct SteppedFrames {
     place: FramePlace,
     t: Vec<i64>,
     /// Row by row, frame after frame; [`UNKNOWN`] where a value is missing.
@@ -139,8 +139,8 @@ struct Source {
     rests: Vec<(usize, Vec<u16>)>,
 }
 
-impl Source {
-    fn new(from: FrameSource<'_>, steps: Steps) -> Self {
+impl SteppedFrames {
+    fn new(from: FrameSource<'_>, steps: ValueSteps) -> Self {
         let (ticks, mut rests) = (steps.ticks(from.values), from.rests(steps));
         let FrameRest { source: rest_source, falls, flickering, preload_at, .. } = from.rest;
         for (_, rest) in &mut rests {
@@ -183,12 +183,12 @@ impl Source {
 
 /// The steps in which values are shown: a value is `(ticks - zero) * size`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Steps {
+struct ValueSteps {
     size: f64,
     zero: u16,
 }
 
-impl Steps {
+impl ValueSteps {
     /// Steps for these values: of 1 where all are whole and not too far apart, else as small as 16 bits allow.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     fn of<'a>(values: impl Iterator<Item = &'a [f32]>, taxels: usize) -> Self {
@@ -259,7 +259,7 @@ pub struct FrameIndex {
     pub newtons: Option<f64>,
     weights: Weights,
     array: Array,
-    sources: Vec<Source>,
+    sources: Vec<SteppedFrames>,
     time_columns: Option<TimeColumns>,
     range: Option<(i64, i64)>,
 }
@@ -271,9 +271,9 @@ impl FrameIndex {
     /// Indexes frames of sources that have places in `array`.
     #[must_use]
     pub fn new(array: Array, file: FrameFile, sources: Vec<FrameSource<'_>>) -> Self {
-        let steps = Steps::of(sources.iter().map(|source| source.values), array.len());
+        let steps = ValueSteps::of(sources.iter().map(|source| source.values), array.len());
         let floor = sources.iter().map(|source| source.floor(steps)).max().unwrap_or(0);
-        let sources: Vec<Source> = sources.into_iter().map(|source| Source::new(source, steps)).collect();
+        let sources: Vec<SteppedFrames> = sources.into_iter().map(|source| SteppedFrames::new(source, steps)).collect();
         let first = sources.iter().filter_map(|source| source.t.first()).min();
         let last = sources.iter().filter_map(|source| source.t.last()).max();
         let (weights, newtons) = Weights::of(&array, &file.unit);
@@ -302,7 +302,7 @@ impl FrameIndex {
     /// Column and row of the taxels that flicker, which never count as above rest.
     pub fn flickering(&self) -> impl Iterator<Item = (usize, usize)> {
         let columns = usize::from(self.array.columns);
-        let of = move |source: &Source| {
+        let of = move |source: &SteppedFrames| {
             let taxels: Vec<usize> = source.taxels(self.array.columns).collect();
             let places = source.flickering.iter().map(|&cell| (taxels[cell] % columns, taxels[cell] / columns));
             places.collect::<Vec<_>>()
@@ -326,7 +326,7 @@ impl FrameIndex {
     /// Mean time from one frame of a source to the next, us; 0 where there is one alone.
     #[must_use]
     pub fn frame_us(&self) -> i64 {
-        let mean = |source: &Source| {
+        let mean = |source: &SteppedFrames| {
             let (first, last) = source.t.first().zip(source.t.last())?;
             Some((last - first) / i64::try_from(source.t.len()).ok()?.saturating_sub(1).max(1))
         };
@@ -348,7 +348,7 @@ impl FrameIndex {
         let mut values = vec![0; columns.value_count()];
         let channels = columns.channel_count();
         values[channels..].fill(MISSING_SUM);
-        let mut noise = vec![Noise::default(); self.sources.len()];
+        let mut noise = vec![LeastNoise::default(); self.sources.len()];
         let mut cursor = vec![0; self.sources.len()];
         let mut loads = vec![None; self.sources.len()];
         let at = Coordinates::new(&self.array);
@@ -376,7 +376,7 @@ impl FrameIndex {
         }
         let whole = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
         // Noise is what is above a rest that was found: above a given one any value is load.
-        let most = |(source, noise): (&Source, Noise)| match source.rest_source {
+        let most = |(source, noise): (&SteppedFrames, LeastNoise)| match source.rest_source {
             RestSource::Quiet => noise.most(self.floor),
             RestSource::Given | RestSource::None => 0,
         };
@@ -390,7 +390,7 @@ impl FrameIndex {
     }
 
     /// The taxels of a source's frame, each with its steps above rest as they count in the sums.
-    fn above<'a>(&'a self, source: &'a Source, k: usize) -> impl Iterator<Item = (usize, u16)> + 'a {
+    fn above<'a>(&'a self, source: &'a SteppedFrames, k: usize) -> impl Iterator<Item = (usize, u16)> + 'a {
         let values = source.frame(k).iter().zip(source.rest(k));
         let floor = self.sum_floor();
         let above = move |(&ticks, &rest): (&u16, &u16)| above_noise(ticks, rest, floor);
@@ -398,7 +398,7 @@ impl FrameIndex {
     }
 
     /// The load of a source's frame.
-    fn load(&self, source: &Source, k: usize, at: &Coordinates) -> Load {
+    fn load(&self, source: &SteppedFrames, k: usize, at: &Coordinates) -> Load {
         let mut load = Load::default();
         for (taxel, above) in self.above(source, k) {
             load.change(taxel, (0, above), self.floor, at, &self.weights);
@@ -414,13 +414,13 @@ const NOISY_TAXELS: u32 = 4;
 
 /// What the noise of a source adds up to: the greatest sum of the stretch in which it is least.
 #[derive(Debug, Clone, Copy, Default)]
-struct Noise {
+struct LeastNoise {
     stretch: i64,
     greatest: u32,
     least: Option<u32>,
 }
 
-impl Noise {
+impl LeastNoise {
     /// Takes the sum of a frame, whose time counts from the first one.
     fn take(&mut self, t: i64, sum: u32) {
         let stretch = t / STRETCH_US;
@@ -448,9 +448,9 @@ struct FrameChanges {
 }
 
 impl ChangeReader for FrameChanges {
-    fn read(&mut self, out: &mut Vec<Change>) -> Result<Read> {
+    fn read(&mut self, out: &mut Vec<TaxelChange>) -> Result<ReadOutcome> {
         if std::mem::take(&mut self.rest_moved) {
-            return Ok(Read::Rest(self.rest.clone()));
+            return Ok(ReadOutcome::Rest(self.rest.clone()));
         }
         let begun = out.len();
         while out.len() - begun < AT_ONCE && !self.rest_moved {
@@ -460,7 +460,7 @@ impl ChangeReader for FrameChanges {
             let mut put = |taxel: usize, ticks: u16, up: bool| {
                 // A sensor has 2^22 taxels at most (the limits of recordings).
                 #[allow(clippy::cast_possible_truncation)]
-                out.push(Change { t, taxel: taxel as u32, ticks, up, repaired: false });
+                out.push(TaxelChange { t, taxel: taxel as u32, ticks, up, repaired: false });
             };
             for (taxel, &ticks) in source.taxels(self.index.array.columns).zip(source.frame(k)) {
                 let held = std::mem::replace(&mut self.held[taxel], ticks);
@@ -473,7 +473,7 @@ impl ChangeReader for FrameChanges {
                 let same = source.taxels(self.index.array.columns).zip(source.frame(k)).next();
                 out.extend(same.map(|(taxel, &ticks)| {
                     #[allow(clippy::cast_possible_truncation)]
-                    Change { t, taxel: taxel as u32, ticks, up: true, repaired: false }
+                    TaxelChange { t, taxel: taxel as u32, ticks, up: true, repaired: false }
                 }));
             }
             if source.rest_moves(k) {
@@ -484,7 +484,7 @@ impl ChangeReader for FrameChanges {
                     .for_each(|(of, &rest)| self.rest[of] = rest);
             }
         }
-        Ok(if out.len() == begun { Read::End } else { Read::Changes })
+        Ok(if out.len() == begun { ReadOutcome::End } else { ReadOutcome::Changes })
     }
 }
 
@@ -523,7 +523,7 @@ impl FrameSources for FrameIndex {
     }
 
     fn sensors(&self) -> Vec<Array> {
-        let sensor = |source: &Source| {
+        let sensor = |source: &SteppedFrames| {
             let taxels: Vec<usize> = source.taxels(self.array.columns).collect();
             let of = |all: &[f64]| taxels.iter().map(|&taxel| all[taxel]).collect::<Vec<f64>>();
             let place = &source.place;
@@ -603,7 +603,7 @@ impl KeyframeIndex for Arc<FrameIndex> {
     }
 
     fn keyframe_before(&self, t: i64) -> Option<i64> {
-        let before = |source: &Source| source.until(t.saturating_sub(1)).checked_sub(1).map(|k| source.t[k]);
+        let before = |source: &SteppedFrames| source.until(t.saturating_sub(1)).checked_sub(1).map(|k| source.t[k]);
         self.sources.iter().filter_map(before).max()
     }
 

@@ -6,14 +6,14 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use taxel_core::{Array, problem};
 
 use super::event_rate::EventRate;
-use super::{ChangeReader, KeyframeIndex, Read};
+use super::{ChangeReader, KeyframeIndex, ReadOutcome};
 use crate::array_state::{ArrayState, Keyframe};
 use crate::taxel_history::TaxelHistory;
 use crate::time_columns::{SPAN, TimeColumns};
 use taxel_core::held::UNKNOWN;
 use taxel_live::Result;
 use taxel_live::locked::lock;
-use taxel_live::pipeline::{Change, Piece};
+use taxel_live::pipeline::{Piece, TaxelChange};
 
 /// How far back a live source can be viewed, us ...
 pub(crate) const REACH_US: i64 = 60_000_000;
@@ -22,7 +22,7 @@ const REACH_BYTES: usize = 512 << 20;
 
 /// A stored piece.
 #[derive(Debug)]
-pub struct Stored {
+pub struct StoredPiece {
     /// The piece.
     pub piece: Piece,
     rest: Option<Arc<Vec<u16>>>,
@@ -32,7 +32,7 @@ pub struct Stored {
 /// The stored pieces, oldest first.
 #[derive(Debug)]
 struct Ring {
-    pieces: VecDeque<Arc<Stored>>,
+    pieces: VecDeque<Arc<StoredPiece>>,
     /// Sequence number of the first piece.
     first: u64,
     bytes: usize,
@@ -61,7 +61,7 @@ impl LiveIndex {
     }
 
     /// Stores a piece; `state` is the state of the array before it.
-    pub fn push(&self, piece: Piece, state: &ArrayState) -> Arc<Stored> {
+    pub fn push(&self, piece: Piece, state: &ArrayState) -> Arc<StoredPiece> {
         let mut ring = self.ring();
         let rest = piece.held.is_some().then(|| {
             if ring.rest.as_ref().is_none_or(|(rests, _)| *rests != state.rests()) {
@@ -70,10 +70,10 @@ impl LiveIndex {
             Arc::clone(&ring.rest.as_ref().expect("it was stored above").1)
         });
         let held = piece.held.as_ref().map_or(0, Vec::len);
-        let bytes = piece.changes.len() * size_of::<Change>() + 4 * held + size_of::<Stored>();
+        let bytes = piece.changes.len() * size_of::<TaxelChange>() + 4 * held + size_of::<StoredPiece>();
         ring.latest = ring.latest.max(piece.changes.iter().map(|c| c.t).max());
         ring.bytes += bytes;
-        let stored = Arc::new(Stored { piece, rest, bytes });
+        let stored = Arc::new(StoredPiece { piece, rest, bytes });
         ring.pieces.push_back(Arc::clone(&stored));
         let latest = ring.latest;
         // Pieces are dropped up to the next keyframe, so that the first piece always has one.
@@ -101,7 +101,7 @@ impl LiveIndex {
     }
 
     /// Calls `apply` with the changes of every piece from a sequence number on; returns the next number.
-    pub fn changes_from(&self, number: u64, mut apply: impl FnMut(&[Change])) -> u64 {
+    pub fn changes_from(&self, number: u64, mut apply: impl FnMut(&[TaxelChange])) -> u64 {
         let mut number = number;
         loop {
             let stored = {
@@ -155,7 +155,7 @@ impl LiveIndex {
 impl Ring {
     /// Index of the last piece with a keyframe at or before `t`, or of the first one.
     fn keyframe_at(&self, t: i64) -> Option<usize> {
-        let whole = |stored: &Arc<Stored>| stored.piece.held.is_some();
+        let whole = |stored: &Arc<StoredPiece>| stored.piece.held.is_some();
         let last =
             self.pieces.iter().rposition(|stored| whole(stored) && stored.piece.since.is_none_or(|since| since <= t));
         last.or_else(|| self.pieces.iter().position(whole))
@@ -170,23 +170,25 @@ struct LiveChanges {
 }
 
 impl ChangeReader for LiveChanges {
-    fn read(&mut self, out: &mut Vec<Change>) -> Result<Read> {
+    fn read(&mut self, out: &mut Vec<TaxelChange>) -> Result<ReadOutcome> {
         let ring = self.index.ring();
         let lost = self.number < ring.first;
         self.number = self.number.max(ring.first);
         #[allow(clippy::cast_possible_truncation)]
-        let Some(stored) = ring.pieces.get((self.number - ring.first) as usize).cloned() else { return Ok(Read::End) };
+        let Some(stored) = ring.pieces.get((self.number - ring.first) as usize).cloned() else {
+            return Ok(ReadOutcome::End);
+        };
         drop(ring);
         if (lost || stored.piece.missing > 0 || stored.piece.reset)
             && self.held_returned != Some(self.number)
             && let Some(held) = &stored.piece.held
         {
             self.held_returned = Some(self.number);
-            return Ok(Read::Held(held.clone(), stored.piece.before));
+            return Ok(ReadOutcome::Held(held.clone(), stored.piece.before));
         }
         out.extend_from_slice(&stored.piece.changes);
         self.number += 1;
-        Ok(Read::Changes)
+        Ok(ReadOutcome::Changes)
     }
 }
 
@@ -203,7 +205,7 @@ impl KeyframeIndex for LiveIndex {
         let ring = self.ring();
         let latest = ring.latest?;
         // Pieces from before the first event have no time.
-        let begin = |stored: &Arc<Stored>| stored.piece.since.or(stored.piece.changes.first().map(|c| c.t));
+        let begin = |stored: &Arc<StoredPiece>| stored.piece.since.or(stored.piece.changes.first().map(|c| c.t));
         Some((ring.pieces.iter().find_map(begin).unwrap_or(latest), latest))
     }
 
@@ -259,14 +261,14 @@ mod tests {
         assert_eq!(index.range(), None);
         index.push(
             Piece {
-                changes: vec![Change { t: 5, taxel: 0, ticks: 50, up: true, repaired: false }],
+                changes: vec![TaxelChange { t: 5, taxel: 0, ticks: 50, up: true, repaired: false }],
                 ..Piece::default()
             },
             &state,
         );
         index.push(
             Piece {
-                changes: vec![Change { t: 9, taxel: 0, ticks: 51, up: true, repaired: false }],
+                changes: vec![TaxelChange { t: 9, taxel: 0, ticks: 51, up: true, repaired: false }],
                 ..Piece::default()
             },
             &state,
@@ -275,8 +277,8 @@ mod tests {
         let index = LiveIndex::new(array.clone(), 3);
         let (mut held, mut all, mut random) = (blank, vec![], StdRng::seed_from_u64(9));
         for n in 0..900_i64 {
-            let changes: Vec<Change> = (0..40)
-                .map(|k| Change {
+            let changes: Vec<TaxelChange> = (0..40)
+                .map(|k| TaxelChange {
                     t: n * 100_000 + k * 2000,
                     taxel: random.random_range(0..4096),
                     ticks: random.random_range(20..140),
@@ -284,7 +286,7 @@ mod tests {
                     repaired: false,
                 })
                 .collect();
-            let since = all.last().map(|change: &Change| change.t);
+            let since = all.last().map(|change: &TaxelChange| change.t);
             let piece = Piece {
                 held: Some(held.clone()),
                 since,

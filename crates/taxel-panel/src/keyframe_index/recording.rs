@@ -13,15 +13,16 @@ use taxel_core::wire::{self, Decoder};
 use taxel_core::{Array, Events, problem};
 
 use super::event_rate::EventRate;
-use super::{Activity, ChangeReader, KeyframeIndex, Read};
+use super::{Activity, ChangeReader, KeyframeIndex, ReadOutcome};
 use crate::array_state::{ArrayState, Keyframe};
 use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
 use taxel_core::preload::{LOADED_TICKS, place, preload};
 use taxel_live::clock::{BoardClock, Pace, leaves};
-use taxel_live::pipeline::Change;
+use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::{
-    Basis, Condition, Found, Header, Place, Reader, Remarks, Topic, Unread, Verdict, begin_with, damage_of_version_1,
+    Basis, Condition, DamageCounts, Header, ReadPosition, Reader, Remarks, Topic, Unread, Verdict, begin_with,
+    damage_of_version_1,
 };
 use taxel_live::{Error, Result, open_regular};
 
@@ -40,14 +41,14 @@ const AHEAD: usize = 4;
 const LSA_PIECE: u64 = 1 << 16;
 
 #[derive(Debug)]
-enum Source {
+enum OpenedFile {
     Mcap(Box<Reader>),
     Lsa(File, u64),
 }
 
 /// The decoder of a recording.
 #[derive(Debug, Clone)]
-enum Decoding {
+enum RecordingDecoder {
     Datagrams(Box<wire::SenderDecoder>),
     Bytes(Box<Decoder>),
 }
@@ -56,8 +57,8 @@ enum Decoding {
 #[derive(Debug)]
 struct Key {
     block: usize,
-    place: Place,
-    decoding: Decoding,
+    place: ReadPosition,
+    decoding: RecordingDecoder,
     keyframe: Keyframe,
 }
 
@@ -65,7 +66,7 @@ struct Key {
 #[derive(Debug)]
 pub struct RecordingIndex {
     path: PathBuf,
-    source: Source,
+    source: OpenedFile,
     header: Header,
     keys: Vec<Key>,
     time_columns: Option<TimeColumns>,
@@ -100,12 +101,12 @@ impl RecordingIndex {
             Some("mcap") => {
                 let reader = Reader::open(path)?;
                 let (header, unfinished) = (reader.header().clone(), reader.rebuilt().unfinished);
-                (Source::Mcap(Box::new(reader)), header, unfinished)
+                (OpenedFile::Mcap(Box::new(reader)), header, unfinished)
             }
             Some("lsa") => {
                 let file = open_regular(path)?;
                 let header = Header::of_board(Array::thesis(), None, path.display().to_string(), 0);
-                (Source::Lsa(file, bytes), header, !path.with_extension("lss").exists())
+                (OpenedFile::Lsa(file, bytes), header, !path.with_extension("lss").exists())
             }
             _ => {
                 let name = path.display();
@@ -145,16 +146,16 @@ impl RecordingIndex {
 
     fn blocks(&self) -> usize {
         match &self.source {
-            Source::Mcap(reader) => reader.blocks(),
-            Source::Lsa(_, length) => usize::try_from(length.div_ceil(LSA_PIECE)).unwrap_or(usize::MAX),
+            OpenedFile::Mcap(reader) => reader.blocks(),
+            OpenedFile::Lsa(_, length) => usize::try_from(length.div_ceil(LSA_PIECE)).unwrap_or(usize::MAX),
         }
     }
 
-    fn decoding(&self) -> Decoding {
+    fn decoding(&self) -> RecordingDecoder {
         let decoder = Decoder::new(self.header.array.clone()).differences(self.header.decoding.difference);
         match &self.source {
-            Source::Mcap(_) => Decoding::Datagrams(Box::new(wire::SenderDecoder::new(decoder, 1))),
-            Source::Lsa(..) => Decoding::Bytes(Box::new(decoder)),
+            OpenedFile::Mcap(_) => RecordingDecoder::Datagrams(Box::new(wire::SenderDecoder::new(decoder, 1))),
+            OpenedFile::Lsa(..) => RecordingDecoder::Bytes(Box::new(decoder)),
         }
     }
 
@@ -163,8 +164,8 @@ impl RecordingIndex {
     fn block(
         &self,
         k: usize,
-        place: &mut Place,
-        decoding: &mut Decoding,
+        place: &mut ReadPosition,
+        decoding: &mut RecordingDecoder,
         events: &mut Events,
         mut beside: Option<&mut Contents>,
     ) -> Result<u64> {
@@ -173,7 +174,7 @@ impl RecordingIndex {
         #[allow(clippy::cast_possible_truncation)]
         let frame_us = self.header.registers.map_or(0, |registers| registers.frame_us() as i64);
         match (&self.source, &mut *decoding) {
-            (Source::Mcap(reader), Decoding::Datagrams(decoder)) => {
+            (OpenedFile::Mcap(reader), RecordingDecoder::Datagrams(decoder)) => {
                 let unread = reader.block(k, place, |message| {
                     if message.topic == Topic::Datagrams {
                         let before = events.len();
@@ -198,7 +199,7 @@ impl RecordingIndex {
                     contents.unread.add(&unread);
                 }
             }
-            (Source::Lsa(file, length), Decoding::Bytes(decoder)) => {
+            (OpenedFile::Lsa(file, length), RecordingDecoder::Bytes(decoder)) => {
                 let offset = k as u64 * LSA_PIECE;
                 bytes = LSA_PIECE.min(length - offset);
                 let mut piece = vec![0; usize::try_from(bytes).unwrap_or(0)];
@@ -209,14 +210,14 @@ impl RecordingIndex {
         }
         if k + 1 == self.blocks() {
             match decoding {
-                Decoding::Datagrams(decoder) => decoder.finish_into(events),
-                Decoding::Bytes(decoder) => decoder.finish_into(events),
+                RecordingDecoder::Datagrams(decoder) => decoder.finish_into(events),
+                RecordingDecoder::Bytes(decoder) => decoder.finish_into(events),
             }
         }
         Ok(bytes)
     }
 
-    fn changes(&self, events: &Events, out: &mut Vec<Change>) {
+    fn changes(&self, events: &Events, out: &mut Vec<TaxelChange>) {
         let columns = usize::from(self.header.array.columns);
         out.extend((0..events.len()).map(|k| {
             let ticks = match &events.intensity {
@@ -226,7 +227,7 @@ impl RecordingIndex {
             // A sensor has 2^22 taxels at most (recording's limits).
             #[allow(clippy::cast_possible_truncation)]
             let taxel = (usize::from(events.y[k]) * columns + usize::from(events.x[k])) as u32;
-            Change {
+            TaxelChange {
                 t: events.t[k] + self.header.decoding.origin_us,
                 taxel,
                 ticks,
@@ -251,7 +252,7 @@ impl RecordingIndex {
         let index = &*self;
         let contents = std::thread::scope(|scope| {
             let decoding = scope.spawn(move || index.decode_all(&decoded));
-            for Decoded { key, thin, held, changes } in blocks {
+            for DecodedBlock { key, thin, held, changes } in blocks {
                 keys.extend(key.map(|(block, place, decoding)| Key {
                     block,
                     place,
@@ -295,9 +296,9 @@ impl RecordingIndex {
     }
 
     /// Decodes the whole file, block by block.
-    fn decode_all(&self, to: &channel::Sender<Decoded>) -> Result<Contents> {
+    fn decode_all(&self, to: &channel::Sender<DecodedBlock>) -> Result<Contents> {
         let taxels = self.header.array.len();
-        let (mut decoding, mut place) = (self.decoding(), Place::default());
+        let (mut decoding, mut place) = (self.decoding(), ReadPosition::default());
         // Beside the held values and how the rest is tracked, a decoder of version 2 stores the last 65 536 sequence
         // numbers.
         let each = 64 * taxels + (80 << 10);
@@ -313,7 +314,7 @@ impl RecordingIndex {
             verdict: String::new(),
         };
         for k in 0..self.blocks() {
-            let mut piece = Decoded { key: None, thin: false, held: None, changes: vec![] };
+            let mut piece = DecodedBlock { key: None, thin: false, held: None, changes: vec![] };
             if since >= spacing {
                 (since, keys) = (0, keys + 1);
                 piece.key = Some((k, place.without_memory(), decoding.clone()));
@@ -348,21 +349,21 @@ impl RecordingIndex {
     }
 
     /// What was lost, as `Recording.verdict` states it in Python.
-    fn verdict_on(&self, contents: &Contents, decoding: &Decoding) -> Verdict {
+    fn verdict_on(&self, contents: &Contents, decoding: &RecordingDecoder) -> Verdict {
         let reader = match (&self.source, decoding) {
-            (Source::Mcap(reader), _) => reader,
-            (Source::Lsa(..), Decoding::Bytes(decoder)) => {
+            (OpenedFile::Mcap(reader), _) => reader,
+            (OpenedFile::Lsa(..), RecordingDecoder::Bytes(decoder)) => {
                 let name = self.path.with_extension("lss").file_name().map(|name| name.to_string_lossy().into_owned());
                 return Verdict::of(Basis::Raw(
                     name.filter(|_| self.unfinished),
                     damage_of_version_1(decoder.counts()),
                 ));
             }
-            (Source::Lsa(..), Decoding::Datagrams(_)) => return Verdict::default(),
+            (OpenedFile::Lsa(..), RecordingDecoder::Datagrams(_)) => return Verdict::default(),
         };
         let decoded = match decoding {
-            Decoding::Datagrams(sender) => Some(Found::of(sender, self.header.decoding.origin_us)),
-            Decoding::Bytes(_) => None,
+            RecordingDecoder::Datagrams(sender) => Some(DamageCounts::of(sender, self.header.decoding.origin_us)),
+            RecordingDecoder::Bytes(_) => None,
         };
         let condition = reader.condition(&contents.remarks, &contents.unread);
         Verdict::of(Basis::File(Box::new(Condition { decoded, ..condition })))
@@ -370,14 +371,14 @@ impl RecordingIndex {
 }
 
 /// A decoded block.
-struct Decoded {
+struct DecodedBlock {
     /// Where decoding can begin again: the block, and the reader and decoder before it.
-    key: Option<(usize, Place, Decoding)>,
+    key: Option<(usize, ReadPosition, RecordingDecoder)>,
     /// The keyframes take too much memory: every second one is to be dropped.
     thin: bool,
     /// Held values at the start of the recording.
     held: Option<Vec<u16>>,
-    changes: Vec<Change>,
+    changes: Vec<TaxelChange>,
 }
 
 /// Contents of a whole recording beside its changes.
@@ -394,21 +395,21 @@ struct Contents {
 struct RecordingChanges {
     index: Arc<RecordingIndex>,
     block: usize,
-    place: Place,
-    decoding: Decoding,
+    place: ReadPosition,
+    decoding: RecordingDecoder,
     events: Events,
 }
 
 impl ChangeReader for RecordingChanges {
-    fn read(&mut self, out: &mut Vec<Change>) -> Result<Read> {
+    fn read(&mut self, out: &mut Vec<TaxelChange>) -> Result<ReadOutcome> {
         if self.block >= self.index.blocks() {
-            return Ok(Read::End);
+            return Ok(ReadOutcome::End);
         }
         self.events.clear();
         self.index.block(self.block, &mut self.place, &mut self.decoding, &mut self.events, None)?;
         self.block += 1;
         self.index.changes(&self.events, out);
-        Ok(Read::Changes)
+        Ok(ReadOutcome::Changes)
     }
 }
 

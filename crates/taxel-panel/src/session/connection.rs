@@ -36,7 +36,7 @@ pub(super) enum Incoming {
     SignOfLife,
 }
 
-/// See the module.
+/// A client's web socket.
 pub(super) struct Connection {
     socket: WebSocket,
     received: Instant,

@@ -7,7 +7,7 @@ use crate::time_columns::LATE_US;
 /// Minimum time from one rest to the next, while the view moves.
 const REST_EVERY: Duration = Duration::from_millis(500);
 
-/// See the module.
+/// What a client has received, so that a frame contains only what the client lacks.
 pub(super) struct Delivered {
     /// The next frame replaces all columns of time that the client has.
     restart: bool,

@@ -10,7 +10,7 @@ pub(super) const FRAME_TIME: Duration = Duration::from_micros(16_000);
 /// Counter messages per second; each states how many frames were sent since the one before.
 const COUNTERS_PER_S: f64 = 4.0;
 
-/// See the module.
+/// Decides by a client's credits and the frame rate when the next frame is sent.
 pub(super) struct FlowControl {
     credits: u32,
     /// Number of the next frame.

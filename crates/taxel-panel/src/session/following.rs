@@ -17,7 +17,7 @@ use crate::time_columns::{COLUMN_US, column_of};
 /// Narrow columns that lag this far behind restart from the last keyframe, which is less to decode, us.
 const NARROW_LAG_US: i64 = 1_000_000;
 
-/// See the module.
+/// What a client that follows a live source needs beside the shared state.
 #[derive(Default)]
 pub(super) struct Following {
     /// History of the watched taxel, and the next piece to apply.

@@ -27,7 +27,7 @@ const PART: usize = 1 << 16;
 /// Answers that may wait to be sent.
 const MOST_ANSWERS: usize = 64;
 
-/// See the module.
+/// A client's long requests that are carried out now.
 pub(super) struct PendingRequests {
     answers: mpsc::Sender<Message>,
     permits: Arc<Semaphore>,

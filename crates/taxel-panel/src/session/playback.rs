@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-/// See the module.
+/// The speed and the present time of a recording that is played.
 pub(super) struct Playback {
     /// Board time over real time.
     speed: f64,

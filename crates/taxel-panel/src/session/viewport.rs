@@ -31,17 +31,17 @@ enum Position {
     /// At the newest state of the live source.
     Following,
     /// At a time of a recording or of the live source; empty while another thread works on it.
-    At(Option<Box<Place>>),
+    At(Option<Box<SourcePosition>>),
 }
 
 /// A time of a source, and the columns of time beside it.
-struct Place {
+struct SourcePosition {
     player: Player,
     /// The columns of the window that the client chose; `None`: those up to the time.
     window: Option<Player>,
 }
 
-/// See the module.
+/// The source, the time and the options of what a client sees.
 pub(super) struct Viewport {
     live: Option<Arc<LiveSource>>,
     /// The recording that is shown, in place of the live source.
@@ -217,7 +217,7 @@ impl Viewport {
         let (bytes, last, rests) = match &mut self.position {
             Position::Following => self.following.frame(self.live.as_ref()?, about, needs_rest),
             Position::At(place) => {
-                let Place { player, window } = &mut **place.as_mut()?;
+                let SourcePosition { player, window } = &mut **place.as_mut()?;
                 let rests = Some(player.state().rests()).filter(|rests| needs_rest(*rests));
                 let about = About { with_rest: rests.is_some(), ..about };
                 let (bytes, last) = frame::of_player(player, window.as_mut(), about);
@@ -252,7 +252,7 @@ impl Viewport {
     /// Works on the place in another thread: a disk may be slow.
     async fn with_place<T: Send + 'static>(
         &mut self,
-        work: impl FnOnce(&mut Place) -> taxel_live::Result<T> + Send + 'static,
+        work: impl FnOnce(&mut SourcePosition) -> taxel_live::Result<T> + Send + 'static,
     ) -> Answer<T> {
         let Position::At(place) = &mut self.position else { return Err("the view follows the newest".into()) };
         let Some(mut place) = place.take() else { return Err("the view is gone: open it again".into()) };
@@ -296,11 +296,13 @@ impl Viewport {
         if end.is_none() || same.is_none() {
             self.restart();
         }
-        let opened = tokio::task::spawn_blocking(move || -> taxel_live::Result<Place> {
-            let Some(end) = end else { return Ok(Place { player: Player::open(index, t, options)?, window: None }) };
+        let opened = tokio::task::spawn_blocking(move || -> taxel_live::Result<SourcePosition> {
+            let Some(end) = end else {
+                return Ok(SourcePosition { player: Player::open(index, t, options)?, window: None });
+            };
             let player = Player::open(Arc::clone(&index), t, ViewOptions::plain(COLUMN_US))?;
             let window = same.map_or_else(|| Player::open(index, end, options), Ok)?;
-            Ok(Place { player, window: Some(window) })
+            Ok(SourcePosition { player, window: Some(window) })
         });
         let place = opened.await.map_err(|_| Refusal::bug("the view")).and_then(|opened| Ok(opened?));
         if place.is_err() {

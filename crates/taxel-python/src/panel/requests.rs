@@ -19,10 +19,10 @@ use taxel_panel::{
     UnhealthyTaxels, UserPreset, UserPresets,
 };
 
-use crate::convert::{ArrayParts, array, from_array, slice, to_array};
-use crate::enter::enter;
-use crate::errors::ProblemError;
 use crate::held::from_touches;
+use taxel_border::convert::{ArrayParts, array, from_array, slice, to_array};
+use taxel_border::enter::enter;
+use taxel_border::errors::ProblemError;
 
 /// Calls the methods of a Python object; the text of an exception is the reason of a refusal.
 struct PythonHandler(Py<PyAny>);

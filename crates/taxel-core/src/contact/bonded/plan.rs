@@ -13,7 +13,7 @@ const LONGEST: usize = 1024;
 const MOST_PER_PITCH: u16 = 16;
 const LARGEST: usize = 4_000_000;
 /// The plane's size in cells, and the taxels that it covers.
-pub(super) struct Plan {
+pub(super) struct CellPlane {
     /// Cells along a pitch of taxels.
     pub per_pitch: usize,
     /// How far the influence reaches, taxels.
@@ -26,7 +26,7 @@ pub(super) struct Plan {
     pub wide: usize,
 }
 
-impl Plan {
+impl CellPlane {
     pub fn of(foam: &Foam, array: &Array, pitch_mm: f64, per_pitch: usize) -> Self {
         let reach = (REACH * foam.thickness_mm / pitch_mm).ceil().max(1.0) as usize;
         let margin = reach.min(usize::from(array.rows.max(array.columns)));
@@ -69,5 +69,5 @@ pub fn check_cells(foam: &Foam, array: &Array, cells_per_pitch: u16) -> Result<(
 /// `Scene` if the pitch of the array is not known.
 pub fn most_cells(foam: &Foam, array: &Array) -> Result<u16> {
     let pitch_mm = pitch_of(array)?;
-    Ok((2..=MOST_PER_PITCH).rev().find(|n| Plan::of(foam, array, pitch_mm, usize::from(*n)).fits()).unwrap_or(1))
+    Ok((2..=MOST_PER_PITCH).rev().find(|n| CellPlane::of(foam, array, pitch_mm, usize::from(*n)).fits()).unwrap_or(1))
 }

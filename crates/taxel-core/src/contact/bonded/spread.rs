@@ -5,7 +5,7 @@ use crate::vectors::wide;
 
 /// How a cell's pressure spreads over the taxels below; reach and margin in taxels.
 #[derive(Clone, Copy)]
-pub(super) struct Spread<'a> {
+pub(super) struct PressureSpread<'a> {
     pub table: &'a [f32],
     pub per_pitch: usize,
     pub reach: usize,
@@ -13,14 +13,14 @@ pub(super) struct Spread<'a> {
     pub array: (usize, usize),
 }
 
-impl Spread<'_> {
+impl PressureSpread<'_> {
     pub fn add(self, out: &mut [f32], cell: Cell, pressure: f32) {
         add(self, out, cell, pressure);
     }
 }
 
 wide! {
-    fn add(spread: Spread<'_>, out: &mut [f32], cell: Cell, pressure: f32) {
+    fn add(spread: PressureSpread<'_>, out: &mut [f32], cell: Cell, pressure: f32) {
         let ((rows, columns), n) = (spread.array, spread.per_pitch);
         let side = 2 * spread.reach + 1;
         // The cell's taxel, and which of its cells it is. Taxel (x, y) of the array is (x + margin, y + margin); a table's

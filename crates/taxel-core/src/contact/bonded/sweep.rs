@@ -8,14 +8,14 @@ use crate::{Result, Stop};
 const RELAXATION: f64 = 1.2;
 /// Neighbouring cells of one row.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Run {
+pub(super) struct CellRun {
     pub first: usize,
     pub count: usize,
     pub x: usize,
     pub y: usize,
 }
 
-impl Run {
+impl CellRun {
     /// The runs of cells that are ordered by rows, then columns.
     fn find(cells: &[Cell], runs: &mut Vec<Self>) {
         runs.clear();
@@ -33,7 +33,7 @@ impl Run {
 #[derive(Debug, Default)]
 pub(super) struct Sweep {
     pushed: Vec<f64>,
-    runs: Vec<Run>,
+    runs: Vec<CellRun>,
 }
 
 impl Sweep {
@@ -53,7 +53,7 @@ impl Sweep {
         stop: Stop<'_>,
     ) -> Result<()> {
         let Self { pushed, runs } = self;
-        Run::find(cells, runs);
+        CellRun::find(cells, runs);
         pushed.clear();
         pushed.resize(cells.len(), 0.0);
         for (cell, pressure) in cells.iter().zip(pressure.iter()) {
@@ -83,14 +83,14 @@ pub(super) struct Influence<'a> {
 
 impl Influence<'_> {
     #[inline(always)]
-    fn row(&self, run: Run, cell: Cell) -> &[f64] {
+    fn row(&self, run: CellRun, cell: Cell) -> &[f64] {
         let (down, across) = (self.rows - 1 + run.y - cell.y as usize, self.columns - 1 + run.x - cell.x as usize);
         let from = down * (2 * self.columns - 1) + across;
         &self.table[from..from + run.count]
     }
 
     #[inline(always)]
-    pub fn push(&self, pushed: &mut [f64], runs: &[Run], cell: Cell, by: f64) {
+    pub fn push(&self, pushed: &mut [f64], runs: &[CellRun], cell: Cell, by: f64) {
         for run in runs {
             let row = self.row(*run, cell);
             for (pushed, influence) in pushed[run.first..run.first + run.count].iter_mut().zip(row) {
@@ -103,7 +103,7 @@ impl Influence<'_> {
     fn turn(
         self,
         cells: &[Cell],
-        runs: &[Run],
+        runs: &[CellRun],
         wanted: &[f64],
         pressure: &mut [f64],
         pushed: &mut [f64],
@@ -113,7 +113,7 @@ impl Influence<'_> {
 }
 
 wide! {
-    fn turn(grid: Influence<'_>, cells: &[Cell], runs: &[Run], wanted: &[f64], pressure: &mut [f64], pushed: &mut [f64]) -> (f64, f64) {
+    fn turn(grid: Influence<'_>, cells: &[Cell], runs: &[CellRun], wanted: &[f64], pressure: &mut [f64], pushed: &mut [f64]) -> (f64, f64) {
         let self_influence = grid.table[grid.table.len() / 2];
         let (mut moved, mut largest) = (0.0_f64, 0.0_f64);
         for k in 0..cells.len() {

@@ -1,6 +1,6 @@
 //! Against closed forms, and the two ways of solving against each other.
 
-use super::sweep::Run;
+use super::sweep::CellRun;
 use super::*;
 use crate::Error;
 use rand::rngs::StdRng;
@@ -89,8 +89,8 @@ fn sweeps_and_gradients_agree_and_meet_the_conditions_of_contact() {
         }
         // Gaps of every cell of the grid, those that were no candidates too.
         let grid = Influence { table: &swept.influence, rows: swept.rows, columns: swept.columns };
-        let all: Vec<Run> =
-            (0..swept.rows).map(|y| Run { first: y * swept.columns, count: swept.columns, x: 0, y }).collect();
+        let all: Vec<CellRun> =
+            (0..swept.rows).map(|y| CellRun { first: y * swept.columns, count: swept.columns, x: 0, y }).collect();
         let mut pushed = vec![0.0; swept.rows * swept.columns];
         for (cell, p) in found.iter().zip(&pressure) {
             grid.push(&mut pushed, &all, *cell, *p);

@@ -1,12 +1,12 @@
 //! One ball that moves straight up and down on columns, as the taxels sense it.
 
-use super::super::{Footprint, Scene, Shape, Taxels, Track, pitch_of};
+use super::super::{BodyShape, Footprint, Scene, Taxels, Track, pitch_of};
 use super::groups::{GROUPS, place};
 use crate::{Array, Result};
 
 /// The ball's track, where its force arrives, and which taxels it can reach, by group of lines.
 #[derive(Debug)]
-pub(super) struct Columns {
+pub(super) struct BallOnColumns {
     pub track: Track,
     footprint: Footprint,
     reach: [Vec<Reached>; GROUPS],
@@ -23,7 +23,7 @@ struct Reached {
     share: f32,
 }
 
-impl Columns {
+impl BallOnColumns {
     /// Works out the footprint, some milliseconds, and the taxels that the ball can reach.
     ///
     /// # Errors
@@ -32,7 +32,7 @@ impl Columns {
     pub fn new(scene: &Scene, track: Track, array: &Array) -> Result<Self> {
         let body = &scene.bodies[0];
         let (x_mm, y_mm) = (body.x_mm, body.y_mm);
-        let Shape::Sphere { radius_mm } = body.shape else {
+        let BodyShape::Sphere { radius_mm } = body.shape else {
             return Err(super::super::scene::columns_take_one_ball());
         };
         let footprint = Footprint::new(&scene.foam, radius_mm)?;

@@ -2,7 +2,7 @@
 
 use super::super::bonded::MOST_SWEPT;
 use super::super::push::Sinking;
-use super::super::{Bonded, Motion, Scene, Shape, Taxels};
+use super::super::{BodyShape, Bonded, Motion, Scene, Taxels};
 use super::groups::{GROUPS, place};
 use crate::{Array, Result, Stop};
 
@@ -14,9 +14,9 @@ const FAINT_MPA: f32 = 2e-7;
 /// The layer is solved at even steps, one a frame for a ball or two, fewer where more taxels are touched than sweeps
 /// solve in time; between them stress follows straight lines.
 #[derive(Debug)]
-pub(super) struct Layer {
+pub(super) struct LayerScene {
     layer: Bonded,
-    shapes: Vec<Shape>,
+    shapes: Vec<BodyShape>,
     pub motion: Motion,
     sinking: Sinking,
     /// From one solution to the next, in steps of the motion.
@@ -39,10 +39,10 @@ struct Solved {
 /// So many frames lie between two solutions where a whole array is touched.
 const SELDOM: usize = 4;
 
-impl Layer {
+impl LayerScene {
     /// Finds how many cells the bodies touch at most, and so how often the layer is solved.
     pub fn new(scene: &Scene, layer: Bonded, motion: Motion, array: &Array) -> Self {
-        let shapes: Vec<Shape> = scene.bodies.iter().map(|body| body.shape.clone()).collect();
+        let shapes: Vec<BodyShape> = scene.bodies.iter().map(|body| body.shape.clone()).collect();
         let mut stress = Self {
             layer,
             shapes,
@@ -64,7 +64,7 @@ impl Layer {
 
     /// Finds the cells that are touched after `k` steps; how many there are.
     fn sink(&mut self, k: usize) -> usize {
-        let bodies: Vec<(&Shape, (f64, f64), f64)> = self
+        let bodies: Vec<(&BodyShape, (f64, f64), f64)> = self
             .shapes
             .iter()
             .zip(&self.motion.tracks)

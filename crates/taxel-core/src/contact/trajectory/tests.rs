@@ -1,12 +1,12 @@
 //! Against energy, momentum, Coulomb's law and the ranges of the model.
 
 use super::super::shape::turned;
-use super::super::{Foam, Motion, Shape, Surface};
+use super::super::{BodyShape, Foam, Motion, Surface};
 use super::*;
 
 const QUARTER_US: f64 = 48.0;
 
-fn body(shape: Shape, mass_g: f64, motion: Move) -> Body {
+fn body(shape: BodyShape, mass_g: f64, motion: Move) -> Body {
     Body {
         shape,
         x_mm: 80.0,
@@ -29,7 +29,7 @@ fn alone(surface: Surface, foam: Foam, body: Body) -> Scene {
 fn dropped(foam: Foam, radius_mm: f64, height_mm: f64, after: u32) -> Scene {
     let press = Press { peak_n: Some(1.0), depth_mm: None, speed_mm_s: 50.0, hold_ms: 100.0, wait_ms: 50.0 };
     let motion = Move::Dropped { height_mm, ending: Ending::Caught { after, press } };
-    alone(Surface::Columns, foam, body(Shape::Sphere { radius_mm }, 36.0, motion))
+    alone(Surface::Columns, foam, body(BodyShape::Sphere { radius_mm }, 36.0, motion))
 }
 
 fn play(scene: &Scene, step_us: f64) -> Result<Motion> {
@@ -175,13 +175,13 @@ fn a_course_that_leads_off_the_array_and_a_lift_before_the_landing_are_said() {
     let scene = alone(Surface::Layer, Foam::default(), ball(Move::Dropped { height_mm: 120.0, ending: early.clone() }));
     let text = play(&scene, QUARTER_US).unwrap_err().to_string();
     assert!(text.contains("lifted 150 ms after") && text.contains("falls for 156 ms"), "{text}");
-    let heavy = body(Shape::Sphere { radius_mm: 20.0 }, 1e300, Move::Dropped { height_mm: 50.0, ending: early });
+    let heavy = body(BodyShape::Sphere { radius_mm: 20.0 }, 1e300, Move::Dropped { height_mm: 50.0, ending: early });
     let text = play(&alone(Surface::Columns, Foam::default(), heavy), QUARTER_US).unwrap_err().to_string();
     assert!(text.contains("the body bottoms out: 1e300 g"), "{text}");
 }
 
 fn ball(motion: Move) -> Body {
-    body(Shape::Sphere { radius_mm: 20.0 }, 36.0, motion)
+    body(BodyShape::Sphere { radius_mm: 20.0 }, 36.0, motion)
 }
 
 fn along(for_ms: f64) -> Along {
@@ -211,7 +211,7 @@ fn a_ball_that_slides_ends_rolling_at_five_sevenths_of_its_speed() {
 
 #[test]
 fn a_block_that_slides_stops_where_coulomb_says() {
-    let flat = Shape::HeightMap { heights_mm: vec![vec![0.0; 2]; 2], pitch_mm: 20.0 };
+    let flat = BodyShape::HeightMap { heights_mm: vec![vec![0.0; 2]; 2], pitch_mm: 20.0 };
     let mut scene = alone(Surface::Layer, Foam::default(), body(flat, 80.0, Move::Slid(along(200.0))));
     scene.bodies[0].friction = 0.3;
     let motion = play(&scene, QUARTER_US).unwrap();
@@ -237,7 +237,7 @@ fn a_ball_rolls_down_a_slant_at_five_sevenths_of_gravity_and_slides_down_a_slipp
 
 #[test]
 fn a_cylinder_rolls_across_its_axis_and_slides_along_it() {
-    let shape = Shape::Cylinder { radius_mm: 15.0, length_mm: 30.0, axis_deg: 120.0 };
+    let shape = BodyShape::Cylinder { radius_mm: 15.0, length_mm: 30.0, axis_deg: 120.0 };
     let scene = |toward_deg| {
         let along = Along { toward_deg, ..along(120.0) };
         alone(Surface::Layer, Foam::default(), body(shape.clone(), 60.0, Move::Rolled(along)))
@@ -250,7 +250,7 @@ fn a_cylinder_rolls_across_its_axis_and_slides_along_it() {
 fn friction_acts_against_the_slip_of_a_cylinder_that_slides_aslant() {
     // Along the axis friction only brakes, across it it also turns: slip there is lost three times as fast.
     let (friction, steps, dt) = (0.3, 1_400, 1e-3 * QUARTER_US);
-    let shape = Shape::Cylinder { radius_mm: 10.0, length_mm: 30.0, axis_deg: 45.0 };
+    let shape = BodyShape::Cylinder { radius_mm: 10.0, length_mm: 30.0, axis_deg: 45.0 };
     let course = Along { speed_mm_s: 500.0, toward_deg: 0.0, for_ms: 80.0, press_n: None };
     let mut scene = alone(Surface::Layer, Foam::default(), body(shape, 100.0, Move::Slid(course)));
     (scene.bodies[0].friction, scene.bodies[0].x_mm) = (friction, 60.0);
@@ -289,7 +289,7 @@ fn a_fall_on_a_slant_meets_it_where_it_should() {
 fn a_ball_that_gives_is_off_sooner_and_without_bottoming_out() {
     // A tennis ball: 56 g from 0.6 m. A rigid one would press the solid.
     let motion = Move::Dropped { height_mm: 600.0, ending: Ending::LeftToRest { rest_ms: 420.0, lift_mm_s: 50.0 } };
-    let mut scene = alone(Surface::Layer, Foam::default(), body(Shape::Sphere { radius_mm: 33.0 }, 56.0, motion));
+    let mut scene = alone(Surface::Layer, Foam::default(), body(BodyShape::Sphere { radius_mm: 33.0 }, 56.0, motion));
     let rigid = play(&scene, QUARTER_US).unwrap().contacts[0].peak_n;
     scene.bodies[0].stiffness_n_mm = Some(25.0);
     let motion = play(&scene, QUARTER_US).unwrap();
@@ -303,10 +303,10 @@ fn a_ball_that_gives_is_off_sooner_and_without_bottoming_out() {
 fn a_touch_that_is_too_narrow_is_told_how_many_cells_would_do() {
     // A touch that needs more cells than allowed is reported with the most there may be; a wide touch is not.
     let press = Press { peak_n: None, depth_mm: Some(0.05), speed_mm_s: 50.0, hold_ms: 2.0, wait_ms: 0.0 };
-    let shape = Shape::Edge { slope_deg: 45.0, length_mm: 20.0, axis_deg: 0.0 };
+    let shape = BodyShape::Edge { slope_deg: 45.0, length_mm: 20.0, axis_deg: 0.0 };
     let mut scene = alone(Surface::Layer, undamped(), body(shape, 36.0, Move::Pressed(press)));
     assert!(play(&scene, 200.0).unwrap().narrow.unwrap().to_string().contains("16 is the most"));
-    scene.bodies[0].shape = Shape::Sphere { radius_mm: 60.0 };
+    scene.bodies[0].shape = BodyShape::Sphere { radius_mm: 60.0 };
     assert_eq!(play(&scene, 200.0).unwrap().narrow, None);
 }
 

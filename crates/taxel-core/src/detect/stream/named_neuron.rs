@@ -7,12 +7,12 @@ use crate::{Result, Spike};
 
 /// Which of the encoder's trains a neuron receives.
 #[derive(Clone)]
-pub(in crate::detect) struct Inputs {
+pub(in crate::detect) struct ReceivedTrains {
     /// The number of the input that each train is, for all delays; `None`: each train is the input of its own number.
     of_trains: Option<Vec<Option<u32>>>,
 }
 
-impl Inputs {
+impl ReceivedTrains {
     /// Those of the trains marked `received`, or all, each at so many delays.
     pub fn new(received: Option<Vec<bool>>, delays: usize) -> Self {
         let number = |received: Vec<bool>| {
@@ -39,7 +39,7 @@ impl Inputs {
 #[derive(Clone)]
 pub(in crate::detect) struct NamedNeuron {
     pub label: String,
-    inputs: Inputs,
+    inputs: ReceivedTrains,
     neuron: Neuron,
     weights: Vec<f64>,
     threshold: f64,
@@ -56,7 +56,7 @@ pub(in crate::detect) struct NamedNeuron {
 }
 
 /// A crossing of a neuron, and what it rests on.
-pub(in crate::detect) struct Crossing {
+pub(in crate::detect) struct NeuronCrossing {
     pub spike: OutputSpike,
     /// The neuron's number.
     pub neuron: usize,
@@ -68,7 +68,7 @@ pub(in crate::detect) struct Crossing {
 
 impl NamedNeuron {
     /// A trained neuron before its first spike.
-    pub fn new(label: &str, cell: &TrainedNeuron, threshold: f64, latency_ms: f64, inputs: Inputs) -> Self {
+    pub fn new(label: &str, cell: &TrainedNeuron, threshold: f64, latency_ms: f64, inputs: ReceivedTrains) -> Self {
         Self {
             label: label.to_owned(),
             inputs,
@@ -95,7 +95,7 @@ impl NamedNeuron {
     /// # Errors
     ///
     /// Those of [`NeuronStream::push`].
-    pub fn push(&mut self, spike: Spike, repaired: bool, k: usize, out: &mut Vec<Crossing>) -> Result<()> {
+    pub fn push(&mut self, spike: Spike, repaired: bool, k: usize, out: &mut Vec<NeuronCrossing>) -> Result<()> {
         let Some(input) = self.inputs.of(spike.train) else { return Ok(()) };
         let spike = Spike { train: input, ..spike };
         let stream = match &mut self.stream {
@@ -120,7 +120,7 @@ impl NamedNeuron {
     }
 
     /// Advances to `until_ms`, before which every spike is known; adds the crossings to `out`.
-    pub fn advance(&mut self, until_ms: f64, k: usize, out: &mut Vec<Crossing>) {
+    pub fn advance(&mut self, until_ms: f64, k: usize, out: &mut Vec<NeuronCrossing>) {
         if let Some(stream) = &mut self.stream {
             stream.advance(until_ms, &mut self.crossings);
         }
@@ -128,9 +128,9 @@ impl NamedNeuron {
     }
 
     /// Moves the crossings so far to `out`.
-    fn drain_crossings(&mut self, k: usize, out: &mut Vec<Crossing>) {
+    fn drain_crossings(&mut self, k: usize, out: &mut Vec<NeuronCrossing>) {
         let rests = |on: Option<f64>, t: f64| on.is_some_and(|at| at <= t && t - at <= self.neuron.memory_ms());
-        out.extend(self.crossings.drain(..).map(|spike| Crossing {
+        out.extend(self.crossings.drain(..).map(|spike| NeuronCrossing {
             repaired: rests(self.repaired, spike.t),
             outside: rests(self.outside, spike.t),
             spike,

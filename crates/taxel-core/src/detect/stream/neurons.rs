@@ -1,6 +1,6 @@
 //! The neurons of a readout in a stream, and the spikes that wait for them.
 
-use super::named_neuron::{Crossing, NamedNeuron};
+use super::named_neuron::{NamedNeuron, NeuronCrossing};
 use crate::detect::{Detection, FrameClock};
 use crate::neuron::NeuronStream;
 use crate::spikes::us;
@@ -8,7 +8,7 @@ use crate::{Result, Spike, SpikeKind};
 
 /// Neurons with the delays at which they receive the encoder's trains.
 #[derive(Clone)]
-pub(in crate::detect) struct Neurons {
+pub(in crate::detect) struct DelayedNeurons {
     neurons: Vec<NamedNeuron>,
     /// The delays at which each train enters the neurons, ms.
     delays_ms: Vec<f64>,
@@ -18,7 +18,7 @@ pub(in crate::detect) struct Neurons {
     outside: u64,
 }
 
-impl Neurons {
+impl DelayedNeurons {
     pub fn new(neurons: Vec<NamedNeuron>, delays_ms: Vec<f64>) -> Self {
         Self { neurons, delays_ms, waiting: vec![], outside: 0 }
     }
@@ -57,7 +57,7 @@ impl Neurons {
     pub fn settle(&mut self, until_ms: f64, clock: &FrameClock, begin: i64, out: &mut Vec<Detection>) -> Result<()> {
         self.waiting.sort_by(|(a, _), (b, _)| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
         let certain = self.waiting.partition_point(|(spike, _)| spike.t < until_ms);
-        let mut crossings: Vec<Crossing> = Vec::new();
+        let mut crossings: Vec<NeuronCrossing> = Vec::new();
         for (k, neuron) in self.neurons.iter_mut().enumerate() {
             for (spike, repaired) in &self.waiting[..certain] {
                 neuron.push(*spike, *repaired, k, &mut crossings)?;
@@ -65,7 +65,8 @@ impl Neurons {
             neuron.advance(until_ms, k, &mut crossings);
         }
         self.waiting.drain(..certain);
-        let t_of = |crossing: &Crossing| us(crossing.spike.t - self.neurons[crossing.neuron].offset_ms).round() as i64;
+        let t_of =
+            |crossing: &NeuronCrossing| us(crossing.spike.t - self.neurons[crossing.neuron].offset_ms).round() as i64;
         crossings.retain(|crossing| t_of(crossing) >= begin);
         crossings.sort_by(|a, b| a.spike.t.total_cmp(&b.spike.t));
         self.outside += crossings.iter().filter(|crossing| crossing.outside).count() as u64;

@@ -58,13 +58,13 @@ fn stream(neuron: &Neuron, latency_ms: f64, period_us: f64) -> ReadoutStream {
     let off = vec![-0.4, 0.0, -0.2, 0.0, 0.8, 0.6, 0.4, 0.3];
     let neurons = [("contact", on, 0.2), ("lift", off, 0.5)].into_iter().map(|(label, weights, delay_ms)| {
         let one = TrainedNeuron { neuron: neuron.clone(), inputs: vec![], weights, delay_ms };
-        NamedNeuron::new(label, &one, 0.9, latency_ms, Inputs::new(None, 1))
+        NamedNeuron::new(label, &one, 0.9, latency_ms, ReceivedTrains::new(None, 1))
     });
     ReadoutStream::new(
         Box::new(Plain { latency_ms }),
         array(),
         FrameClock::new(period_us).unwrap(),
-        Neurons::new(neurons.collect(), vec![0.0]),
+        DelayedNeurons::new(neurons.collect(), vec![0.0]),
     )
 }
 

@@ -3,10 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::{Range, one_weight_a_train};
-use crate::learn::engines::Start;
+use crate::learn::engines::WarmStart;
 use crate::learn::fit::{Engine, Fit, Left, Round, Status};
 use crate::learn::statement::{
-    Bound, Choice, Divisor, DivisorC, DivisorD, Margin, Norm, Objective, Proof, Relaxed, Row, Sides, Statement,
+    Bound, Choice, Divisor, DivisorC, DivisorD, Margin, Norm, Objective, Relaxed, RelaxedProof, Row, Sides, Statement,
     bounds_of, check_bounds, check_examples, check_silence, check_trains, end_of,
 };
 use crate::neuron::{Neuron, Time};
@@ -140,7 +140,7 @@ pub struct ConeRFit {
 
 /// What is asked of a pattern.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Asked<'a> {
+pub(crate) struct PatternDemand<'a> {
     /// The times at which the neuron shall fire, ms.
     pub(crate) targets: &'a [f64],
     /// The windows in which it shall not, ms; `None`: everywhere else.
@@ -192,26 +192,31 @@ impl ConeRProblem {
         }
         neuron.check_rows(points)?;
         let asked = targets.iter().zip(silence).zip(ends);
-        let asked = asked.map(|((targets, silence), end)| Asked { targets, silence: silence.as_deref(), end });
-        Self::laid_out(parameters, patterns, asked, stop)
+        let asked = asked.map(|((targets, silence), end)| PatternDemand { targets, silence: silence.as_deref(), end });
+        Self::lay_out(parameters, patterns, asked, stop)
     }
 
     /// Computes the rows of a first pattern, which the caller has checked; `push` adds the others.
-    pub(crate) fn of_one(parameters: &ConeR, pattern: &SpikeTrains, asked: Asked<'_>, stop: Stop<'_>) -> Result<Self> {
-        Self::laid_out(parameters, std::slice::from_ref(pattern), [asked].into_iter(), stop)
+    pub(crate) fn of_one(
+        parameters: &ConeR,
+        pattern: &SpikeTrains,
+        asked: PatternDemand<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Self> {
+        Self::lay_out(parameters, std::slice::from_ref(pattern), [asked].into_iter(), stop)
     }
 
-    fn laid_out<'a>(
+    fn lay_out<'a>(
         parameters: &ConeR,
         patterns: &[SpikeTrains],
-        asked: impl Iterator<Item = Asked<'a>>,
+        asked: impl Iterator<Item = PatternDemand<'a>>,
         stop: Stop<'_>,
     ) -> Result<Self> {
         let unit = parameters.neuron.unit();
         let base = parameters.in_units(unit);
         let margin = Margin { height: base.margin, slope: 0.0 };
         let mut statement = Statement::new(&base.neuron, margin, unit, patterns[0].len());
-        for (pattern, Asked { targets, silence, end }) in patterns.iter().zip(asked) {
+        for (pattern, PatternDemand { targets, silence, end }) in patterns.iter().zip(asked) {
             statement.push(pattern, targets, silence, end, stop)?;
         }
         let rows = Relaxed::new(&statement, base.delta_t(), stop)?;
@@ -219,7 +224,7 @@ impl ConeRProblem {
     }
 
     /// Adds a pattern, which the caller has checked; if the caller stops it, nothing changes.
-    pub(crate) fn push(&mut self, pattern: &SpikeTrains, asked: Asked<'_>, stop: Stop<'_>) -> Result<()> {
+    pub(crate) fn push(&mut self, pattern: &SpikeTrains, asked: PatternDemand<'_>, stop: Stop<'_>) -> Result<()> {
         self.statement.push(pattern, asked.targets, asked.silence, asked.end, stop)?;
         if let Err(error) = self.rows.push(&self.statement, self.base.delta_t(), stop) {
             self.statement.drop_last();
@@ -345,7 +350,7 @@ impl ConeRProblem {
     }
 
     /// The nonzero multipliers of a proof, by the names of their rows.
-    fn named(&self, mut proof: Proof) -> GapMultipliers {
+    fn named(&self, mut proof: RelaxedProof) -> GapMultipliers {
         proof.divide(1.0, self.statement.unit);
         let (silent, targets) = proof.multipliers.split_at(self.rows.silent.len());
         let names = || self.rows.targets.names.iter().copied();
@@ -362,12 +367,12 @@ impl ConeRProblem {
         }
     }
 
-    fn start_from(&self, objective: &Objective, start: Option<(&[f64], Option<&Shares>)>) -> Result<Start> {
-        let Some((weights, multipliers)) = start else { return Ok(Start::default()) };
+    fn start_from(&self, objective: &Objective, start: Option<(&[f64], Option<&Shares>)>) -> Result<WarmStart> {
+        let Some((weights, multipliers)) = start else { return Ok(WarmStart::default()) };
         one_weight_a_train(weights, self.rows.trains)?;
         let within = weights.iter().zip(objective.bounds.lower.iter().zip(&objective.bounds.upper));
         let weights = Some(within.map(|(w, (&low, &high))| (w / self.statement.unit).clamp(low, high)).collect());
-        let Some(multipliers) = multipliers else { return Ok(Start { weights, shares: None }) };
+        let Some(multipliers) = multipliers else { return Ok(WarmStart { weights, shares: None }) };
         let (silent, all) = (self.rows.silent.len(), self.rows());
         let mut shares = vec![0.0; all];
         for (&row, &share) in multipliers.rows.iter().zip(&multipliers.values) {
@@ -383,7 +388,7 @@ impl ConeRProblem {
             }
             *place = share;
         }
-        Ok(Start { weights, shares: Some(shares) })
+        Ok(WarmStart { weights, shares: Some(shares) })
     }
 
     fn check_same_rows(&self, parameters: &ConeR) -> Result<()> {

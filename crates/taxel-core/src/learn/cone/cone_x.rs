@@ -8,13 +8,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::cone_r::GapMultipliers;
-use super::exact::{Best, Exact};
-use super::shortest::{End, Shortest};
-use crate::allowed::{Numbers, Range};
+use super::exact::{BestWeights, Exact};
+use super::shortest::{RowGenerationEnd, Shortest};
+use crate::allowed::{ParameterNumbers, Range};
 use crate::learn::fit::{Engine, Fit, Round, Status};
 use crate::learn::statement::{
     Bound, Bounds, Certificate, Choice, Divisor, DivisorC, DivisorD, Margin, NOTHING, Norm, Objective, Parts, Row,
-    Sides, Stated, Statement, bounds_of, check_bounds, check_examples, check_some_target, end_of, largest,
+    Sides, StatedRow, Statement, bounds_of, check_bounds, check_examples, check_some_target, end_of, largest,
     relative_gap,
 };
 use crate::neuron::{Neuron, Time};
@@ -76,7 +76,7 @@ pub enum Horizon {
     Each(Vec<f64>),
 }
 
-impl Numbers for Horizon {
+impl ParameterNumbers for Horizon {
     fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
         match self {
             Self::All(value) => value.each(look),
@@ -266,7 +266,7 @@ impl ConeXProblem {
     /// # Errors
     ///
     /// `Problem` if there is no such row.
-    pub fn row(&self, row: Row, margin: bool) -> Result<Stated> {
+    pub fn row(&self, row: Row, margin: bool) -> Result<StatedRow> {
         let mut stated = self.exact.statement.state(row)?;
         stated.limit += if margin { 0.0 } else { self.exact.statement.margin_of(row) };
         stated.limit *= self.unit();
@@ -286,7 +286,7 @@ impl ConeXProblem {
     /// # Errors
     ///
     /// `Problem` if there is no such target.
-    pub fn behind(&self, pattern: usize, target: usize) -> Result<Stated> {
+    pub fn behind(&self, pattern: usize, target: usize) -> Result<StatedRow> {
         let mut stated = self.exact.statement.behind(pattern, target, self.parameters.delta_t())?;
         stated.limit *= self.parameters.kappa * self.unit();
         Ok(stated)
@@ -367,16 +367,16 @@ impl Exact {
         let Shortest { weights, held, rounds, end } = self.shortest(start, progress, stop)?;
         // The other terms are at least 0, so a bound on the l2 term bounds the objective.
         let (least, proof) = self.bound_of_length(&held)?;
-        let best = Best { weights, least, proof, held, engine: Engine::Native, rounds };
+        let best = BestWeights { weights, least, proof, held, engine: Engine::Native, rounds };
         Ok(match end {
-            End::Infeasible(certificate) => self.refuted(certificate, rounds),
-            End::Met if self.objective.l1 > 0.0 || self.objective.b > 0.0 => {
+            RowGenerationEnd::Infeasible(certificate) => self.refuted(certificate, rounds),
+            RowGenerationEnd::Met if self.objective.l1 > 0.0 || self.objective.b > 0.0 => {
                 let best = self.mix(best, start, progress, stop)?;
                 self.report(best, stop.asked().then_some(ASKED), stop)?
             }
-            End::Met => self.report(best, None, stop)?,
-            End::Stopped if stop.asked() => self.report(best, Some(ASKED), stop)?,
-            End::Stopped => self.report(best, Some(UNDECIDED), stop)?,
+            RowGenerationEnd::Met => self.report(best, None, stop)?,
+            RowGenerationEnd::Stopped if stop.asked() => self.report(best, Some(ASKED), stop)?,
+            RowGenerationEnd::Stopped => self.report(best, Some(UNDECIDED), stop)?,
         })
     }
 
@@ -403,8 +403,8 @@ impl Exact {
     }
 
     /// Evaluates the weights over all rows, whichever engine found them.
-    fn report(&self, best: Best, cut_short: Option<&str>, stop: Stop<'_>) -> Result<ConeXFit> {
-        let Best { mut weights, least, proof, held, engine, rounds } = best;
+    fn report(&self, best: BestWeights, cut_short: Option<&str>, stop: Stop<'_>) -> Result<ConeXFit> {
+        let BestWeights { mut weights, least, proof, held, engine, rounds } = best;
         let Bounds { lower, upper } = &self.objective.bounds;
         // Rounding can move a weight across its bound.
         for ((w, &l), &u) in weights.iter_mut().zip(lower).zip(upper) {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::cone_r::GapMultipliers;
 use crate::learn::fit::Engine;
 use crate::learn::statement::{
-    Margin, Objective, Parts, Peak, Row, Silence, Stated, Statement, Targets, exceeds, largest,
+    Margin, Objective, Parts, Row, Silence, SilencePeak, StatedRow, Statement, Targets, exceeds, largest,
 };
 use crate::neuron::{AT_EDGE, Grid, Time};
 use crate::vectors::dot;
@@ -36,7 +36,7 @@ pub(super) struct Exact {
 }
 
 /// The best weights so far, with a lower bound on their objective.
-pub(super) struct Best {
+pub(super) struct BestWeights {
     pub(super) weights: Vec<f64>,
     /// A lower bound on the objective of any weights, and the multipliers that prove it.
     pub(super) least: f64,
@@ -81,7 +81,7 @@ impl Exact {
     }
 
     /// The instants at which silence with this share of the margin is violated by more than `tolerance`.
-    pub(super) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
+    pub(super) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<SilencePeak> {
         self.silence.broken(weights, share, tolerance)
     }
 
@@ -105,7 +105,7 @@ impl Exact {
     pub(super) fn unmet(&self, weights: &[f64]) -> Result<Option<String>> {
         let unit = self.statement.unit;
         let worst = self.silence.broken(weights, KEPT_SHARE, self.rounding(weights)).into_iter();
-        if let Some(Peak { pattern, t, excess }) = worst.max_by(|a, b| a.excess.total_cmp(&b.excess)) {
+        if let Some(SilencePeak { pattern, t, excess }) = worst.max_by(|a, b| a.excess.total_cmp(&b.excess)) {
             let excess = excess * unit;
             return Ok(Some(format!("pattern {pattern}: silence is broken by {excess:.1e} mV at {t} ms")));
         }
@@ -190,7 +190,7 @@ impl Exact {
 
 /// The slope rows, which the sweep over silence does not evaluate.
 #[derive(Debug)]
-pub(super) struct Slopes(pub(super) Vec<(Row, Stated)>);
+pub(super) struct Slopes(pub(super) Vec<(Row, StatedRow)>);
 
 impl Slopes {
     pub(super) fn new(statement: &Statement) -> Result<Self> {
@@ -203,7 +203,7 @@ impl Slopes {
 
     /// The slope rows that are violated even when their limit is relaxed by `left_out`.
     pub(super) fn broken(&self, weights: &[f64], left_out: f64) -> Vec<usize> {
-        let kept = |row: &Stated| dot(&row.coefficients, weights) <= row.limit + left_out;
+        let kept = |row: &StatedRow| dot(&row.coefficients, weights) <= row.limit + left_out;
         (0..self.0.len()).filter(|&k| !kept(&self.0[k].1)).collect()
     }
 }

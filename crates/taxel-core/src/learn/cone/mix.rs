@@ -5,11 +5,11 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::cone_r::GapMultipliers;
-use super::exact::{Best, Exact, MET, MOST_ROUNDS, Slopes};
-use crate::learn::engines::mixed::{self, Proof, Terms};
+use super::exact::{BestWeights, Exact, MET, MOST_ROUNDS, Slopes};
+use crate::learn::engines::mixed::{self, MixedProof, Terms};
 use crate::learn::engines::{HardRows, nearest};
 use crate::learn::fit::{Left, Round};
-use crate::learn::statement::{Bounds, Peak, Row, Stated, Targets, largest};
+use crate::learn::statement::{Bounds, Row, SilencePeak, StatedRow, Targets, largest};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
@@ -30,11 +30,11 @@ impl Exact {
     /// Continues from weights that satisfy every row.
     pub(super) fn mix(
         &self,
-        mut best: Best,
+        mut best: BestWeights,
         start: &[(Row, f64)],
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
-    ) -> Result<Best> {
+    ) -> Result<BestWeights> {
         let objective = &self.objective;
         let wanted: Vec<f64> = self.targets.thresholds.iter().map(|threshold| objective.kappa * threshold).collect();
         let terms = Terms {
@@ -154,7 +154,7 @@ impl Dense {
     fn add_silence(&mut self, problem: &Exact, pattern: usize, t: f64) -> Result<()> {
         if self.there.insert((pattern, t.to_bits())) {
             let row = Row::Silence { pattern, t };
-            let Stated { mut coefficients, mut limit } = problem.statement.state(row)?;
+            let StatedRow { mut coefficients, mut limit } = problem.statement.state(row)?;
             // Near a target the two rows are parallel to within rounding. Their difference divided by the time between
             // them limits the slope instead and is as long as the other rows; it is equivalent because the target's row
             // holds with equality.
@@ -186,7 +186,7 @@ impl Dense {
     }
 
     /// Adds the violated rows; returns whether any row is new.
-    fn add(&mut self, problem: &Exact, weights: &[f64], broken: &[Peak]) -> Result<bool> {
+    fn add(&mut self, problem: &Exact, weights: &[f64], broken: &[SilencePeak]) -> Result<bool> {
         let before = self.names.len();
         for peak in broken {
             self.add_silence(problem, peak.pattern, peak.t)?;
@@ -216,8 +216,8 @@ impl Dense {
     }
 
     /// The nonzero multipliers of a proof, by the names of their rows; those of a difference go to both of its rows.
-    fn named(&self, proof: Proof) -> GapMultipliers {
-        let Proof { mut equality, inequality, behind, pull } = proof;
+    fn named(&self, proof: MixedProof) -> GapMultipliers {
+        let MixedProof { mut equality, inequality, behind, pull } = proof;
         let mut rows = vec![];
         for ((&row, beside), z) in self.names.iter().zip(&self.beside).zip(inequality) {
             let (target, steep) = beside.map_or((None, 1.0), |(k, steep)| (Some(k), steep));

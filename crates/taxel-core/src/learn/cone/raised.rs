@@ -15,7 +15,7 @@ use crate::{Result, Stop};
 const MOST_PARTS: usize = 16;
 
 /// A target's row that is to be raised: its place among the targets, the potential wanted there, and the rise to it, mV.
-struct Raise {
+struct RaisedRow {
     target: usize,
     wanted: f64,
     rise: f64,
@@ -23,7 +23,7 @@ struct Raise {
 
 /// Rows that the weights meet and must go on meeting: coefficients, one row after the other, and limits.
 #[derive(Default)]
-struct Kept {
+struct KeptRows {
     below: Vec<f64>,
     limit: Vec<f64>,
 }
@@ -41,8 +41,8 @@ impl Exact {
             return Ok(None);
         }
         wanted.sort_by(|a, b| a.rise.total_cmp(&b.rise));
-        let every: Vec<&Raise> = wanted.iter().collect();
-        let all = self.solution_with(weights, &every, &Kept::default())?;
+        let every: Vec<&RaisedRow> = wanted.iter().collect();
+        let all = self.solution_with(weights, &every, &KeptRows::default())?;
         // Weights that are no solution themselves would need more than a rise by a rounding error.
         if all.is_some() || self.unmet(weights)?.is_some() {
             return Ok(all);
@@ -56,7 +56,7 @@ impl Exact {
         let (mut raised, mut best, mut untried) = (vec![], None, vec![larger, smaller]);
         for _ in 0..MOST_PARTS {
             let Some(part) = untried.pop().filter(|_| !stop.asked()) else { break };
-            let with: Vec<&Raise> = raised.iter().chain(part).copied().collect();
+            let with: Vec<&RaisedRow> = raised.iter().chain(part).copied().collect();
             match self.solution_with(weights, &with, &kept)? {
                 Some(found) => (raised, best) = (with, Some(found)),
                 None if part.len() > 1 => {
@@ -70,7 +70,7 @@ impl Exact {
     }
 
     /// The rows whose potential may lie below the threshold by a rounding error that no rise makes up for.
-    fn to_be_raised(&self, weights: &[f64]) -> Result<Vec<Raise>> {
+    fn to_be_raised(&self, weights: &[f64]) -> Result<Vec<RaisedRow>> {
         let statement = &self.statement;
         let (mut found, mut silent) = (vec![], vec![0.0; weights.len()]);
         let targets = self.targets.iter().zip(&self.targets.names).zip(&self.targets.times);
@@ -92,14 +92,14 @@ impl Exact {
                     continue;
                 }
             }
-            found.push(Raise { target, wanted, rise });
+            found.push(RaisedRow { target, wanted, rise });
         }
         Ok(found)
     }
 
     /// The rows of all targets, and of the ends of silence before them with the margin that a solution must keep.
-    fn kept(&self, weights: &[f64]) -> Result<Kept> {
-        let (mut kept, mut silent) = (Kept::default(), vec![0.0; weights.len()]);
+    fn kept(&self, weights: &[f64]) -> Result<KeptRows> {
+        let (mut kept, mut silent) = (KeptRows::default(), vec![0.0; weights.len()]);
         for ((row, name), &t) in self.targets.iter().zip(&self.targets.names).zip(&self.targets.times) {
             kept.below.extend(row.at.iter().map(|a| -a));
             kept.limit.push(-row.threshold.min(dot(row.at, weights)));
@@ -115,9 +115,9 @@ impl Exact {
     }
 
     /// The nearest weights with these rows raised and those kept, if they are a solution.
-    fn solution_with(&self, weights: &[f64], raise: &[&Raise], kept: &Kept) -> Result<Option<Vec<f64>>> {
+    fn solution_with(&self, weights: &[f64], raise: &[&RaisedRow], kept: &KeptRows) -> Result<Option<Vec<f64>>> {
         let (mut below, mut limit) = (vec![], vec![]);
-        for Raise { target, wanted, .. } in raise {
+        for RaisedRow { target, wanted, .. } in raise {
             below.extend(self.targets.row(*target).at.iter().map(|a| -a));
             limit.push(-wanted);
         }

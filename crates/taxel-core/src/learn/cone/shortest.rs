@@ -4,9 +4,9 @@ use std::collections::HashSet;
 
 use super::cone_r::GapMultipliers;
 use super::exact::{Exact, MOST_ROUNDS, Slopes};
-use crate::learn::engines::{DualActiveSet, Multipliers, Outcome, RowId};
+use crate::learn::engines::{DualActiveSet, Multipliers, RowId, SolveOutcome};
 use crate::learn::fit::{Left, Round};
-use crate::learn::statement::{Bounds, Certificate, Norm, Peak, Row, Statement};
+use crate::learn::statement::{Bounds, Certificate, Norm, Row, SilencePeak, Statement};
 use crate::vectors::dot;
 use crate::{Result, Stop, problem};
 
@@ -21,7 +21,7 @@ const ENTER_LEAST: usize = 100;
 const FEW: usize = 60;
 
 /// How row generation for the shortest weights ended.
-pub(super) enum End {
+pub(super) enum RowGenerationEnd {
     Met,
     Infeasible(Certificate),
     Stopped,
@@ -32,7 +32,7 @@ pub(super) struct Shortest {
     pub(super) weights: Vec<f64>,
     pub(super) held: Vec<(Row, f64)>,
     pub(super) rounds: usize,
-    pub(super) end: End,
+    pub(super) end: RowGenerationEnd,
 }
 
 impl Exact {
@@ -50,11 +50,11 @@ impl Exact {
             let verdict = working.engine.solve(stop)?;
             let before = std::mem::replace(&mut weights, working.engine.weights().to_vec());
             let end = match verdict {
-                Outcome::Infeasible(ray) => {
-                    self.refutation(working.named(&ray.multipliers), stop)?.map_or(End::Stopped, End::Infeasible)
-                }
-                Outcome::Stopped => End::Stopped,
-                Outcome::Optimal => {
+                SolveOutcome::Infeasible(ray) => self
+                    .refutation(working.named(&ray.multipliers), stop)?
+                    .map_or(RowGenerationEnd::Stopped, RowGenerationEnd::Infeasible),
+                SolveOutcome::Stopped => RowGenerationEnd::Stopped,
+                SolveOutcome::Optimal => {
                     let broken = self.broken(&weights, ASKED_SHARE, self.rounding(&weights));
                     let rows = working.rows();
                     let objective = self.parts(&weights).sum();
@@ -66,7 +66,11 @@ impl Exact {
                     }
                     // Row generation ends once rounds no longer change the weights; `report` checks whether the rows
                     // are satisfied.
-                    if !ended || (broken.is_empty() && flat.is_empty()) { End::Met } else { End::Stopped }
+                    if !ended || (broken.is_empty() && flat.is_empty()) {
+                        RowGenerationEnd::Met
+                    } else {
+                        RowGenerationEnd::Stopped
+                    }
                 }
             };
             let held = working.named(&working.engine.multipliers());
@@ -120,7 +124,7 @@ impl Exact {
                 others.push(row);
             }
         }
-        let Outcome::Infeasible(ray) = engine.solve(stop)? else { return Ok(None) };
+        let SolveOutcome::Infeasible(ray) = engine.solve(stop)? else { return Ok(None) };
         Certificate::check(&self.statement, &self.objective.bounds, named(&targets, &others, &ray.multipliers))
     }
 
@@ -241,8 +245,9 @@ impl Working {
     }
 
     /// Drops rows that are not binding and adds the worst of the violated ones; returns whether any row is new.
-    fn cut(&mut self, statement: &Statement, broken: &[Peak], flat: &[usize]) -> Result<bool> {
-        let mut new: Vec<&Peak> = broken.iter().filter(|p| !self.there.contains(&(p.pattern, p.t.to_bits()))).collect();
+    fn cut(&mut self, statement: &Statement, broken: &[SilencePeak], flat: &[usize]) -> Result<bool> {
+        let mut new: Vec<&SilencePeak> =
+            broken.iter().filter(|p| !self.there.contains(&(p.pattern, p.t.to_bits()))).collect();
         new.sort_by(|a, b| b.excess.total_cmp(&a.excess));
         new.truncate(((ENTER_SHARE * new.len() as f64) as usize).max(ENTER_LEAST));
         if new.is_empty() && flat.is_empty() {

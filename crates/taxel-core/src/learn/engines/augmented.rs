@@ -16,7 +16,7 @@ use faer::linalg::cholesky::llt::factor::cholesky_in_place_scratch;
 
 use super::rounds::Rounds;
 use crate::Stop;
-use crate::learn::statement::{Norm, Objective, Point, Relaxed};
+use crate::learn::statement::{Norm, Objective, Relaxed, RelaxedPoint};
 use crate::vectors::{add, dot};
 
 /// The initial smoothing of the kinks in thresholds: for targets all of them are smooth at weights of 0; less for
@@ -38,7 +38,7 @@ const FAR: f64 = 30.0;
 
 /// A start: the weights of a similar fit, and its multipliers as shares of their range.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Start {
+pub(crate) struct WarmStart {
     pub(crate) weights: Option<Vec<f64>>,
     pub(crate) shares: Option<Vec<f64>>,
 }
@@ -81,7 +81,7 @@ impl Relaxed {
         &self,
         objective: &Objective,
         tolerance: f64,
-        start: Start,
+        start: WarmStart,
         progress: &mut dyn FnMut(usize, usize, f64, f64),
         stop: Stop<'_>,
     ) -> Rounds {
@@ -145,7 +145,7 @@ impl Relaxed {
 }
 
 impl<'a> Lagrangian<'a> {
-    fn new(problem: &'a Relaxed, objective: &'a Objective, start: Start, zero: &Point) -> Self {
+    fn new(problem: &'a Relaxed, objective: &'a Objective, start: WarmStart, zero: &RelaxedPoint) -> Self {
         let n = problem.trains;
         let silent = problem.silent.len();
         let total = silent + problem.targets.len();

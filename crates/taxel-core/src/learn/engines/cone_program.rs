@@ -72,13 +72,13 @@ pub(crate) struct Answer {
 const NOTHING: f64 = 1e-14;
 
 /// A sparse matrix, filled column after column.
-struct Columns {
+struct SparseMatrix {
     pointers: Vec<usize>,
     rows: Vec<usize>,
     values: Vec<f64>,
 }
 
-impl Columns {
+impl SparseMatrix {
     fn new() -> Self {
         Self { pointers: vec![0], rows: vec![], values: vec![] }
     }
@@ -150,7 +150,7 @@ impl ConeProgram<'_> {
         }
 
         let ridge = if self.norm == Norm::Square { 2.0 * scale * self.l2 } else { 0.0 };
-        let mut p = Columns::new();
+        let mut p = SparseMatrix::new();
         for j in 0..n {
             if dense {
                 for i in 0..=j {
@@ -169,7 +169,7 @@ impl ConeProgram<'_> {
             p.end();
         }
 
-        let mut a = Columns::new();
+        let mut a = SparseMatrix::new();
         let mut next = 0;
         for j in 0..n {
             if factored {

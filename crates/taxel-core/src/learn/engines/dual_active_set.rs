@@ -20,8 +20,8 @@ mod tests;
 mod weights;
 mod working_set;
 
-use self::factor::Factor;
-use self::rows::{Kind, Row};
+use self::factor::CholeskyFactor;
+use self::rows::{ConstraintKind, WorkingRow};
 pub use self::rows::{Multipliers, Ray, RowId};
 use crate::vectors::{Aligned, LANES, dot};
 use crate::{Result, Stop, problem};
@@ -46,7 +46,7 @@ const MOST_FALLS: usize = 3;
 
 /// How a call of [`DualActiveSet::solve`] ended.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
+pub enum SolveOutcome {
     /// The weights satisfy all rows and bounds, and no shorter weights do.
     Optimal,
     /// No weights within the bounds satisfy all rows; the proof has been checked.
@@ -62,7 +62,7 @@ pub struct DualActiveSet {
     lower: Vec<f64>,
     upper: Vec<f64>,
     /// The rows by slot; slots of dropped rows are reused.
-    rows: Vec<Row>,
+    rows: Vec<WorkingRow>,
     /// Coefficients by slot, `stride` numbers each.
     coefficients: Aligned,
     stride: usize,
@@ -77,7 +77,7 @@ pub struct DualActiveSet {
     /// The slots of the active rows in the order of the factor, and the place of each slot in that order.
     active: Vec<usize>,
     place: Vec<Option<usize>>,
-    factor: Factor,
+    factor: CholeskyFactor,
     /// Multipliers by slot, 0 where not active.
     multipliers: Vec<f64>,
     weights: Vec<f64>,
@@ -119,7 +119,7 @@ impl DualActiveSet {
             gram_stride: 0,
             active: Vec::new(),
             place: Vec::new(),
-            factor: Factor::default(),
+            factor: CholeskyFactor::default(),
             multipliers: Vec::new(),
             weights: vec![0.0; stride],
             excess: Vec::new(),
@@ -136,7 +136,7 @@ impl DualActiveSet {
     ///
     /// `Problem` if the number of coefficients is wrong or one is not finite.
     pub fn equality(&mut self, coefficients: &[f64], value: f64) -> Result<()> {
-        let slot = self.add(Kind::Equality(self.equalities.len()), coefficients, value)?;
+        let slot = self.add(ConstraintKind::Equality(self.equalities.len()), coefficients, value)?;
         self.equalities.push(slot);
         Ok(())
     }
@@ -148,7 +148,7 @@ impl DualActiveSet {
     /// `Problem` if the number of coefficients is wrong or one is not finite.
     pub fn inequality(&mut self, coefficients: &[f64], limit: f64) -> Result<RowId> {
         let id = RowId(self.inequalities);
-        self.add(Kind::Inequality(id), coefficients, limit)?;
+        self.add(ConstraintKind::Inequality(id), coefficients, limit)?;
         self.inequalities += 1;
         Ok(id)
     }
@@ -172,16 +172,16 @@ impl DualActiveSet {
             let slot = self.live[at];
             match self.rows[slot].kind {
                 _ if self.place[slot].is_some() => continue,
-                Kind::Inequality(id) => dropped.push(id),
-                Kind::Lower(n) => self.bounds[n][0] = None,
-                Kind::Upper(n) => self.bounds[n][1] = None,
-                Kind::Equality(_) | Kind::Free => continue,
+                ConstraintKind::Inequality(id) => dropped.push(id),
+                ConstraintKind::Lower(n) => self.bounds[n][0] = None,
+                ConstraintKind::Upper(n) => self.bounds[n][1] = None,
+                ConstraintKind::Equality(_) | ConstraintKind::Free => continue,
             }
-            self.rows[slot].kind = Kind::Free;
+            self.rows[slot].kind = ConstraintKind::Free;
             self.live.remove(at);
             self.free.push(slot);
         }
-        self.fresh.retain(|&slot| self.rows[slot].kind != Kind::Free);
+        self.fresh.retain(|&slot| self.rows[slot].kind != ConstraintKind::Free);
         dropped.reverse();
         dropped
     }
@@ -202,7 +202,7 @@ impl DualActiveSet {
         let mut wanted = self.equalities.clone();
         let mut slots = vec![None; self.inequalities];
         for &slot in &self.live {
-            if let Kind::Inequality(id) = self.rows[slot].kind {
+            if let ConstraintKind::Inequality(id) = self.rows[slot].kind {
                 slots[id.0] = Some(slot);
             }
         }
@@ -223,8 +223,10 @@ impl DualActiveSet {
         for k in 0..self.active.len() {
             let slot = self.active[k];
             let u = match self.rows[slot].kind {
-                Kind::Equality(k) => from.equalities[k],
-                Kind::Inequality(id) => from.inequalities.iter().find(|(i, _)| *i == id).map_or(0.0, |(_, z)| *z),
+                ConstraintKind::Equality(k) => from.equalities[k],
+                ConstraintKind::Inequality(id) => {
+                    from.inequalities.iter().find(|(i, _)| *i == id).map_or(0.0, |(_, z)| *z)
+                }
                 _ => 0.0,
             };
             self.multipliers[slot] = u * self.rows[slot].length;
@@ -238,7 +240,7 @@ impl DualActiveSet {
     /// # Errors
     ///
     /// None at present; a stop is a verdict.
-    pub fn solve(&mut self, stop: Stop<'_>) -> Result<Outcome> {
+    pub fn solve(&mut self, stop: Stop<'_>) -> Result<SolveOutcome> {
         let fresh = self.extend_gram();
         self.replace_similar(&fresh);
         let (mut exchanges, mut falls_left) = (EXCHANGES, MOST_FALLS);
@@ -247,7 +249,7 @@ impl DualActiveSet {
         let mut rounds = MOST_ROUNDS * (self.live.len() + self.lower.len());
         loop {
             if stop.asked() || rounds == 0 {
-                return Ok(Outcome::Stopped);
+                return Ok(SolveOutcome::Stopped);
             }
             rounds -= 1;
             self.update_weights(false);
@@ -256,13 +258,13 @@ impl DualActiveSet {
             if candidates.is_empty() {
                 self.update_weights(true);
                 return Ok(if undecided.iter().any(|&slot| !self.is_met(slot)) {
-                    Outcome::Stopped
+                    SolveOutcome::Stopped
                 } else {
-                    Outcome::Optimal
+                    SolveOutcome::Optimal
                 });
             }
             if let Some(ray) = self.proof(self.multipliers.clone()) {
-                return Ok(Outcome::Infeasible(ray));
+                return Ok(SolveOutcome::Infeasible(ray));
             }
             if exchanges > 0 && candidates.len() > 1 {
                 exchanges -= 1;
@@ -305,7 +307,7 @@ impl DualActiveSet {
                 let products = &self.gram[slot * self.gram_stride..][..moved.len()];
                 let since = violation - dot(products, &moved);
                 let (sign, violation) = match self.rows[slot].kind {
-                    Kind::Equality(_) if since < 0.0 => (-1.0, -since),
+                    ConstraintKind::Equality(_) if since < 0.0 => (-1.0, -since),
                     _ => (1.0, since),
                 };
                 if self.place[slot].is_some() || violation <= self.rows[slot].tolerance() {
@@ -313,7 +315,7 @@ impl DualActiveSet {
                 }
                 if let Some(ray) = self.step(slot, sign, violation) {
                     if let Some(ray) = self.proof(ray) {
-                        return Ok(Outcome::Infeasible(ray));
+                        return Ok(SolveOutcome::Infeasible(ray));
                     }
                     if self.dependent + 1 < DEPENDENT.len() {
                         self.dependent += 1;

@@ -1,9 +1,9 @@
 //! Minimises 6.14: by the augmented Lagrangian, and by the cone solver if the former's result cannot be proven.
 
-use super::augmented::Start;
+use super::augmented::WarmStart;
 use super::rounds::Rounds;
 use crate::learn::fit::{Engine, Left, Round};
-use crate::learn::statement::{Objective, Parts, Point, Proof, Relaxed, Tangents};
+use crate::learn::statement::{Objective, Parts, Relaxed, RelaxedPoint, RelaxedProof, Tangents};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
@@ -17,7 +17,7 @@ pub(crate) struct Minimum {
     pub(crate) rows: usize,
     pub(crate) engine: Engine,
     pub(crate) shares: Vec<f64>,
-    pub(crate) proof: Proof,
+    pub(crate) proof: RelaxedProof,
 }
 
 impl Relaxed {
@@ -33,7 +33,7 @@ impl Relaxed {
         objective: &Objective,
         tolerance: f64,
         engine: Engine,
-        start: Start,
+        start: WarmStart,
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
     ) -> Result<Minimum> {
@@ -87,7 +87,7 @@ impl Relaxed {
     }
 
     /// The lower bound that these shares of the multipliers' ranges prove, together with the weights they belong to.
-    fn proven_by(&self, objective: &Objective, point: &Point, shares: &[f64]) -> Proof {
+    fn proven_by(&self, objective: &Objective, point: &RelaxedPoint, shares: &[f64]) -> RelaxedProof {
         let times = |(row, share): (usize, &f64)| share * self.hinge_weight(objective, row);
         let length = dot(&point.weights, &point.weights).sqrt();
         let pull = if length > 0.0 { objective.l2 / length } else { 0.0 };
@@ -109,10 +109,10 @@ impl Relaxed {
         &self,
         objective: &Objective,
         tolerance: f64,
-        start: Start,
+        start: WarmStart,
         progress: &mut dyn FnMut(usize, usize, f64, f64),
         stop: Stop<'_>,
-    ) -> std::result::Result<Rounds, Start> {
+    ) -> std::result::Result<Rounds, WarmStart> {
         let (Some(weights), Some(mut shares)) = (start.weights.clone(), start.shares.clone()) else {
             return Err(start);
         };
@@ -135,7 +135,7 @@ impl Relaxed {
             }
             let small = self.of_rows(&live);
             let begin = live.iter().map(|&row| shares[row]).chain(shares[silent..].iter().copied());
-            let from = Start { weights: Some(best.weights.clone()), shares: Some(begin.collect()) };
+            let from = WarmStart { weights: Some(best.weights.clone()), shares: Some(begin.collect()) };
             let mut report =
                 |round, rows, _, _| progress(rounds + round, rows, best.parts.sum(), best.gap(proof.bound));
             let found = small.augmented(objective, 0.3 * tolerance, from, &mut report, stop);
@@ -148,7 +148,7 @@ impl Relaxed {
             for (k, &multiplier) in found.proof.multipliers.iter().enumerate() {
                 multipliers[place(k)] = multiplier;
             }
-            proof.improve(Proof { multipliers, ..found.proof });
+            proof.improve(RelaxedProof { multipliers, ..found.proof });
             let point = self.point(objective, found.best.weights);
             at.clone_from(&point.excess);
             if point.parts.sum() < best.parts.sum() {
@@ -160,7 +160,7 @@ impl Relaxed {
                 return Ok(Rounds { best, proof, rounds, rows: found.rows, shares, stopped: found.stopped });
             }
         }
-        Err(Start { weights: Some(best.weights), shares: Some(shares) })
+        Err(WarmStart { weights: Some(best.weights), shares: Some(shares) })
     }
 }
 

@@ -18,10 +18,10 @@ use super::cone_program::HardRows;
 use crate::learn::fit::Engine;
 use crate::learn::statement::Bounds;
 use crate::{Error, Result, Stop};
-use best::{Best, MixedMinimum, Start};
+use best::{BestPoint, MixedMinimum, ResumeState};
 use interior::Interior;
+pub(crate) use program::MixedProof;
 use program::Program;
-pub(crate) use program::Proof;
 pub(crate) use program::Terms;
 
 /// At looser tolerances the interior point is returned as it is: the caller then needs violated rows, not exact
@@ -45,14 +45,14 @@ pub(crate) fn minimise(
     rows: &HardRows<'_>,
     bounds: &Bounds,
     size: f64,
-    start: Option<&Start>,
+    start: Option<&ResumeState>,
     tolerance: f64,
     stop: Stop<'_>,
 ) -> Result<MixedMinimum> {
     let program = Program::new(terms, rows, bounds, size);
     let interior = Interior::new(&program);
-    let mut best = Best::new(&program);
-    if let Some(Start { state, exact: Some((point, guess)) }) = start
+    let mut best = BestPoint::new(&program);
+    if let Some(ResumeState { state, exact: Some((point, guess)) }) = start
         && tolerance <= LOOSE
     {
         // After a few new rows, a few exchanges are often enough.

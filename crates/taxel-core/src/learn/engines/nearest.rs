@@ -1,7 +1,7 @@
 //! The final projection: the nearest weights that satisfy hard rows to rounding.
 
 use super::cone_program::HardRows;
-use super::dual_active_set::{DualActiveSet, Outcome};
+use super::dual_active_set::{DualActiveSet, SolveOutcome};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
@@ -31,7 +31,7 @@ pub(crate) fn nearest(
     for (row, left) in rows.below.chunks_exact(width).zip(below) {
         engine.inequality(row, left / unit)?;
     }
-    if engine.solve(stop)? != Outcome::Optimal {
+    if engine.solve(stop)? != SolveOutcome::Optimal {
         return Ok(None);
     }
     let moved = weights.iter().zip(engine.weights()).map(|(w, step)| w + unit * step);

@@ -7,7 +7,7 @@
 //! decreases 6.14. An exact line search on 6.14 keeps the step from overshooting where hinges change their state.
 
 use super::cone_program::{ConeProgram, HardRows, Hinges};
-use crate::learn::statement::{Norm, Objective, Point, Proof, Relaxed, Tangents};
+use crate::learn::statement::{Norm, Objective, Relaxed, RelaxedPoint, RelaxedProof, Tangents};
 use crate::vectors::add;
 use crate::{Error, Result, Stop};
 
@@ -29,8 +29,8 @@ const MOST_ROUNDS: usize = 500;
 
 /// The result of the rounds, proven or not.
 pub(crate) struct Rounds {
-    pub(crate) best: Point,
-    pub(crate) proof: Proof,
+    pub(crate) best: RelaxedPoint,
+    pub(crate) proof: RelaxedProof,
     pub(crate) rounds: usize,
     pub(crate) rows: usize,
     /// The multiplier of each row as a share: of D's weight from 0 to 1, of the kink of C from its lower slope up to 1
@@ -48,7 +48,7 @@ enum HingeState {
 }
 
 /// The hinges that enter the cone program.
-struct Kept {
+struct KeptHinges {
     /// The numbers of their rows: silent rows, then targets.
     rows: Vec<usize>,
     hinges: Hinges,
@@ -67,7 +67,7 @@ impl Relaxed {
         &self,
         objective: &Objective,
         tolerance: f64,
-        start: (Point, Proof, bool),
+        start: (RelaxedPoint, RelaxedProof, bool),
         progress: &mut dyn FnMut(usize, usize, f64, f64),
         stop: Stop<'_>,
     ) -> Result<Rounds> {
@@ -76,7 +76,7 @@ impl Relaxed {
         let objective = &objective.within_reach(best.parts.sum());
         let (mut rounds, mut rows, near) = (0, 0, NEAR * self.theta_0);
         let mut shares = vec![0.0; best.excess.len()];
-        let solve = |kept: &Kept, accuracy| match self.program(objective, kept).solve(1.0, accuracy, stop) {
+        let solve = |kept: &KeptHinges, accuracy| match self.program(objective, kept).solve(1.0, accuracy, stop) {
             Err(Error::Interrupted) => Ok(None),
             answer => answer.map(Some),
         };
@@ -127,7 +127,7 @@ impl Relaxed {
     }
 
     /// The best point on the line from `from` to `to`.
-    fn better(&self, objective: &Objective, from: Point, to: Vec<f64>) -> Point {
+    fn better(&self, objective: &Objective, from: RelaxedPoint, to: Vec<f64>) -> RelaxedPoint {
         let end = self.point(objective, to);
         let silent = self.silent.len();
         let above = objective.kink_of_c().0 - objective.c;
@@ -183,7 +183,7 @@ impl Relaxed {
     }
 
     /// The state of each hinge at these weights.
-    fn states(&self, point: &Point, near: f64) -> Vec<HingeState> {
+    fn states(&self, point: &RelaxedPoint, near: f64) -> Vec<HingeState> {
         let mut distances: Vec<f64> = point.excess.iter().map(|x| x.abs()).filter(|&x| x <= near).collect();
         let near = if distances.len() > MOST_ROWS {
             *distances.select_nth_unstable_by(MOST_ROWS, f64::total_cmp).1
@@ -209,7 +209,7 @@ impl Relaxed {
         if row < self.silent.len() { objective.d } else { objective.kink_of_c().0 }
     }
 
-    fn kept(&self, objective: &Objective, states: &[HingeState]) -> Kept {
+    fn kept(&self, objective: &Objective, states: &[HingeState]) -> KeptHinges {
         let rows: Vec<usize> = (0..states.len()).filter(|&row| states[row] == HingeState::Kept).collect();
         let slopes = self.slopes(objective, states);
         let mixed = objective.mixed_of_b();
@@ -220,7 +220,7 @@ impl Relaxed {
             add(&mut linear, mixed * target.threshold, target.behind);
         }
         let weight = rows.iter().map(|&row| self.hinge_weight(objective, row)).collect();
-        Kept { hinges: self.hinges(&rows, weight), rows, linear }
+        KeptHinges { hinges: self.hinges(&rows, weight), rows, linear }
     }
 
     fn hinges(&self, rows: &[usize], weight: Vec<f64>) -> Hinges {
@@ -234,7 +234,7 @@ impl Relaxed {
 
     /// The first program: some targets, evenly chosen, and every 4th ms before them; each row is weighted for those
     /// left out.
-    fn start(&self, objective: &Objective) -> Kept {
+    fn start(&self, objective: &Objective) -> KeptHinges {
         let stride = (START_STRIDE_MS / self.silent.step_ms).round().max(1.0) as usize;
         let targets = self.targets.names.iter().zip(&self.targets.times);
         let near: Vec<_> = targets.map(|(name, &t)| self.silent.before(name.0, t, START_NEAR_MS)).collect();
@@ -257,10 +257,10 @@ impl Relaxed {
             }
             add(&mut linear, mixed * target.threshold, target.behind);
         }
-        Kept { hinges: self.hinges(&rows, weight), rows, linear }
+        KeptHinges { hinges: self.hinges(&rows, weight), rows, linear }
     }
 
-    fn program<'a>(&'a self, objective: &'a Objective, kept: &'a Kept) -> ConeProgram<'a> {
+    fn program<'a>(&'a self, objective: &'a Objective, kept: &'a KeptHinges) -> ConeProgram<'a> {
         ConeProgram {
             linear: &kept.linear,
             l1: objective.l1,

@@ -5,7 +5,7 @@
 //! scratch.
 
 use crate::allowed::{Parameter, Range};
-use crate::learn::cone::{Asked, ConeR, ConeRFit, ConeRProblem, Shares};
+use crate::learn::cone::{ConeR, ConeRFit, ConeRProblem, PatternDemand, Shares};
 use crate::learn::fit::Round;
 use crate::learn::statement::{check_example, check_silence};
 use crate::parameters::Described;
@@ -73,7 +73,7 @@ impl OnlineConeR {
         check_example(&parameters.neuron, self.seen, pattern, targets)?;
         check_silence(self.seen, silence)?;
         let (end, points) = parameters.end_of(self.seen, pattern, targets)?;
-        let asked = Asked { targets, silence, end };
+        let asked = PatternDemand { targets, silence, end };
         let rows = self.problem.as_ref().map_or(0, ConeRProblem::silent_and_free_rows);
         parameters.neuron.check_rows(rows as f64 + points)?;
         if let Some(problem) = &mut self.problem {

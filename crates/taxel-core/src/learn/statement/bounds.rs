@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::{Numbers, is_weight};
+use crate::allowed::{ParameterNumbers, is_weight};
 use crate::{Result, problem};
 
 /// A lower or an upper bound on the weights, mV.
@@ -15,7 +15,7 @@ pub enum Bound {
     Each(Vec<f64>),
 }
 
-impl Numbers for Bound {
+impl ParameterNumbers for Bound {
     fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
         match self {
             Self::All(value) => value.each(look),

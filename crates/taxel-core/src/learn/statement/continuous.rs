@@ -5,7 +5,7 @@
 //! above the recovering threshold is computed exactly; intervals are split at inputs, targets, ends of refractory times
 //! and starts of tapers. An upper bound that needs no exponential excludes nearly all of them.
 
-use super::peak::{Peak, exceeds};
+use super::peak::{SilencePeak, exceeds};
 use super::rows::{Example, Statement, lost, until};
 use crate::Spike;
 use crate::neuron::{AfterSpike, FirstThreshold, KernelSum, Shape, Step, peak, rounding_ms};
@@ -27,7 +27,7 @@ struct Node {
 
 /// The limit of silence between two nodes.
 #[derive(Debug, Clone, Copy)]
-struct Asked {
+struct SilenceLimit {
     t: f64,
     /// The time of the next node.
     to: f64,
@@ -42,7 +42,7 @@ struct Asked {
 #[derive(Debug, Clone)]
 struct Strip {
     nodes: Vec<Node>,
-    asked: Vec<Asked>,
+    asked: Vec<SilenceLimit>,
     /// The inputs that have an effect, in order of time.
     inputs: Vec<Spike>,
 }
@@ -63,12 +63,12 @@ impl SilentTimes {
 
     /// Finds the worst instant of each interval in which the potential plus `share` of the margin exceeds the threshold
     /// by more than `tolerance`.
-    pub(crate) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
+    pub(crate) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<SilencePeak> {
         let mut found = Vec::new();
         let unit = self.shape.input();
         for (pattern, strip) in self.strips.iter().enumerate() {
             let (mut state, mut next) = (KernelSum::default(), 0);
-            let mut worst: Option<Peak> = None;
+            let mut worst: Option<SilencePeak> = None;
             for (node, asked) in strip.nodes.iter().zip(&strip.asked) {
                 state = if node.reset { KernelSum::default() } else { node.step.apply(state) };
                 let inputs = &strip.inputs[next..node.inputs as usize];
@@ -85,7 +85,7 @@ impl SilentTimes {
                 }
                 let (t, excess, last) = self.largest(asked, state, share);
                 if exceeds(excess, tolerance) && worst.is_none_or(|w| exceeds(excess, w.excess)) {
-                    worst = Some(Peak { pattern, t, excess });
+                    worst = Some(SilencePeak { pattern, t, excess });
                 }
                 if last <= tolerance {
                     found.extend(worst.take());
@@ -97,7 +97,7 @@ impl SilentTimes {
     }
 
     /// The time and value of the largest excess between a node and the next, and the excess at the next node.
-    fn largest(&self, asked: &Asked, state: KernelSum, share: f64) -> (f64, f64, f64) {
+    fn largest(&self, asked: &SilenceLimit, state: KernelSum, share: f64) -> (f64, f64, f64) {
         let KernelSum { a, b } = asked.taper;
         let state = KernelSum { a: state.a + share * a, b: state.b + share * b };
         let limit = asked.theta - share * asked.height;
@@ -153,7 +153,8 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
         }
         next += counted[next..].iter().take_while(|i| i.t <= t).count();
         let reset = neuron.after_spike == AfterSpike::Reset && example.next(t) == Some(t);
-        let mut here = Asked { t, to: t, theta: neuron.theta_0, rise: 0.0, taper: KernelSum::default(), height: 0.0 };
+        let mut here =
+            SilenceLimit { t, to: t, theta: neuron.theta_0, rise: 0.0, taper: KernelSum::default(), height: 0.0 };
         let (mut reach, mut least) = (0.0, f64::INFINITY);
         if let Some(to) = times.get(k + 1).copied().filter(|&to| asks(statement, example, t, to)) {
             here.to = to;

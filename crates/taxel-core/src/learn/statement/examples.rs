@@ -9,7 +9,7 @@ use crate::{Result, SpikeKind, SpikeTrains, problem};
 /// # Errors
 ///
 /// `Problem`, naming pattern and target.
-pub(crate) fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<f64>]) -> Result<()> {
+pub fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<f64>]) -> Result<()> {
     if patterns.is_empty() {
         return Err(problem!("patterns"; ": there is none, at least one is needed"));
     }
@@ -28,7 +28,11 @@ pub(crate) fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets:
 }
 
 /// Checks that some pattern has a target, for learners that learn nothing from silence alone.
-pub(crate) fn check_some_target(targets: &[Vec<f64>]) -> Result<()> {
+///
+/// # Errors
+///
+/// `Problem` where none has one.
+pub fn check_some_target(targets: &[Vec<f64>]) -> Result<()> {
     if targets.iter().all(Vec::is_empty) {
         return Err(problem!("targets"; ": no pattern has one, so nothing is to be learnt"));
     }
@@ -94,7 +98,11 @@ pub(crate) fn check_silence(p: usize, windows: Option<&[[f64; 2]]>) -> Result<()
 }
 
 /// Checks pattern number `p`.
-pub(crate) fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
+///
+/// # Errors
+///
+/// `Problem`, naming the pattern.
+pub fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
     pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;
     if pattern.is_empty() {
         return Err(problem!("pattern {p}: has no train"));
@@ -105,20 +113,12 @@ pub(crate) fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
     Ok(())
 }
 
-/// Checks a pattern without targets.
-pub(crate) fn check_untargeted(pattern: &SpikeTrains) -> Result<()> {
-    pattern.check()?;
-    if pattern.kind == SpikeKind::Signed {
-        return Err(problem!("pattern: spikes are signed, split them into ON and OFF trains first"));
-    }
-    if pattern.is_empty() {
-        return Err(problem!("pattern: has no train"));
-    }
-    Ok(())
-}
-
 /// Checks that a pattern has the trains that pattern 0 has.
-pub(crate) fn check_trains(p: usize, pattern: &SpikeTrains, trains: usize) -> Result<()> {
+///
+/// # Errors
+///
+/// `Problem`, naming the pattern.
+pub fn check_trains(p: usize, pattern: &SpikeTrains, trains: usize) -> Result<()> {
     if pattern.len() == trains {
         Ok(())
     } else {

@@ -6,7 +6,7 @@
 
 use std::borrow::Cow;
 
-use super::peak::{Peak, exceeds};
+use super::peak::{SilencePeak, exceeds};
 use super::rows::{Example, Statement, lost};
 use crate::neuron::{AfterSpike, Grid, GridTime, KernelSum, Shape, Step};
 use crate::vectors::{add, dot};
@@ -257,20 +257,20 @@ impl SilentRows {
     }
 
     /// Finds the worst point of each interval in which the potential exceeds its limit by more than `tolerance`.
-    pub(crate) fn broken(&self, weights: &[f64], tolerance: f64) -> Vec<Peak> {
+    pub(crate) fn broken(&self, weights: &[f64], tolerance: f64) -> Vec<SilencePeak> {
         let (mut found, mut potential) = (vec![], vec![]);
         for (pattern, lane) in self.lanes.iter().enumerate() {
             potential.clear();
             potential.resize(lane.points, 0.0);
             self.potential_of(lane, weights, &mut potential);
             let limits = &self.limit[lane.first..lane.first + lane.points];
-            let mut worst: Option<Peak> = None;
+            let mut worst: Option<SilencePeak> = None;
             for (k, (u, limit)) in potential.iter().zip(limits).enumerate() {
                 let excess = u - limit;
                 if excess <= tolerance {
                     found.extend(worst.take());
                 } else if worst.is_none_or(|w| exceeds(excess, w.excess)) {
-                    worst = Some(Peak { pattern, t: lane.grid.time(k as f64), excess });
+                    worst = Some(SilencePeak { pattern, t: lane.grid.time(k as f64), excess });
                 }
             }
             found.extend(worst);

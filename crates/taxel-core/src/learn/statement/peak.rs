@@ -4,7 +4,7 @@ use super::rows::Row;
 
 /// The worst instant of an interval in which silence is violated.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Peak {
+pub(crate) struct SilencePeak {
     pub(crate) pattern: usize,
     /// The time, ms.
     pub(crate) t: f64,
@@ -12,7 +12,7 @@ pub(crate) struct Peak {
     pub(crate) excess: f64,
 }
 
-impl Peak {
+impl SilencePeak {
     pub(crate) fn row(&self) -> Row {
         Row::Silence { pattern: self.pattern, t: self.t }
     }

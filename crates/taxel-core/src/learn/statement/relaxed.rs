@@ -104,7 +104,7 @@ impl Relaxed {
 
 /// Weights, and their potentials relative to the limits.
 #[derive(Debug, Clone)]
-pub(crate) struct Point {
+pub(crate) struct RelaxedPoint {
     pub(crate) weights: Vec<f64>,
     /// Potential minus limit at the silent rows, then potential minus threshold at the targets, mV.
     pub(crate) excess: Vec<f64>,
@@ -115,7 +115,7 @@ pub(crate) struct Point {
 
 impl Relaxed {
     /// The weights with their potentials and the terms of 6.14.
-    pub(crate) fn point(&self, objective: &Objective, weights: Vec<f64>) -> Point {
+    pub(crate) fn point(&self, objective: &Objective, weights: Vec<f64>) -> RelaxedPoint {
         let mut excess = Vec::with_capacity(self.silent.len() + self.targets.len());
         self.silent.potential(&weights, &mut excess);
         excess.iter_mut().zip(&self.silent.limit).for_each(|(u, limit)| *u -= limit);
@@ -131,13 +131,13 @@ impl Relaxed {
             C: objective.c * targets.iter().map(|&x| objective.missed(x)).sum::<f64>(),
             D: objective.d * silent.iter().map(|x| x.max(0.0)).sum::<f64>(),
         };
-        Point { weights, excess, behind, parts }
+        RelaxedPoint { weights, excess, behind, parts }
     }
 
     /// The proof of a lower bound on 6.14 by these tangents, given that its least value is at most `most`.
-    pub(crate) fn proof(&self, objective: &Objective, at: &Tangents<'_>, most: f64) -> Proof {
+    pub(crate) fn proof(&self, objective: &Objective, at: &Tangents<'_>, most: f64) -> RelaxedProof {
         let squares = at.behind.iter().map(|&x| 2.0 * objective.b * objective.counts_in_b(x));
-        Proof {
+        RelaxedProof {
             bound: self.bound(objective, at, most),
             multipliers: at.multipliers.to_vec(),
             behind: squares.collect(),
@@ -149,8 +149,8 @@ impl Relaxed {
     }
 
     /// The proof that 6.14 is at least 0.
-    pub(crate) fn no_proof(&self) -> Proof {
-        Proof {
+    pub(crate) fn no_proof(&self) -> RelaxedProof {
+        RelaxedProof {
             bound: 0.0,
             multipliers: vec![0.0; self.silent.len() + self.targets.len()],
             behind: vec![0.0; self.targets.len()],
@@ -201,7 +201,7 @@ impl Relaxed {
     }
 }
 
-impl Point {
+impl RelaxedPoint {
     /// The relative gap to a lower bound; 0 if the objective is 0.
     pub(crate) fn gap(&self, bound: f64) -> f64 {
         match self.parts.sum() {
@@ -222,7 +222,7 @@ pub(crate) struct Tangents<'a> {
 
 /// A lower bound on 6.14, and the slopes of the tangents that prove it.
 #[derive(Debug, Clone)]
-pub(crate) struct Proof {
+pub(crate) struct RelaxedProof {
     pub(crate) bound: f64,
     /// One per row, of C and D.
     pub(crate) multipliers: Vec<f64>,
@@ -232,7 +232,7 @@ pub(crate) struct Proof {
     pub(crate) pull: Vec<f64>,
 }
 
-impl Proof {
+impl RelaxedProof {
     /// Takes another proof if that proves more.
     pub(crate) fn improve(&mut self, other: Self) {
         if other.bound > self.bound {

@@ -47,7 +47,7 @@ pub enum Row {
 
 /// A computed row: `coefficients.w = limit` at a target, `<= limit` otherwise.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stated {
+pub struct StatedRow {
     /// One per train: those of the potential at targets and in silence, those of its negated slope in a slope row.
     pub coefficients: Vec<f64>,
     /// The limit, mV; mV/ms in a slope row.
@@ -278,10 +278,10 @@ impl Statement {
     /// # Errors
     ///
     /// `Problem` if the problem has no such row.
-    pub fn state(&self, row: Row) -> Result<Stated> {
+    pub fn state(&self, row: Row) -> Result<StatedRow> {
         let mut coefficients = vec![0.0; self.trains];
         let limit = self.state_into(row, &mut coefficients)?;
-        Ok(Stated { coefficients, limit })
+        Ok(StatedRow { coefficients, limit })
     }
 
     /// Computes a row's `coefficients`, one per train, and returns its limit.
@@ -343,10 +343,10 @@ impl Statement {
     /// # Errors
     ///
     /// `Problem` if the problem has no such target.
-    pub fn behind(&self, pattern: usize, target: usize, delta_t: f64) -> Result<Stated> {
+    pub fn behind(&self, pattern: usize, target: usize, delta_t: f64) -> Result<StatedRow> {
         let mut coefficients = vec![0.0; self.trains];
         let limit = self.behind_into(pattern, target, delta_t, &mut coefficients)?;
-        Ok(Stated { coefficients, limit })
+        Ok(StatedRow { coefficients, limit })
     }
 
     /// Computes the row of B in `coefficients`, one per train, and returns the threshold.

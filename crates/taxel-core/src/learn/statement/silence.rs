@@ -2,7 +2,7 @@
 
 use super::continuous::SilentTimes;
 use super::grid::SilentRows;
-use super::peak::{Peak, largest};
+use super::peak::{SilencePeak, largest};
 use super::rows::Statement;
 use crate::neuron::Time;
 use crate::{Result, Stop};
@@ -26,7 +26,7 @@ impl Silence {
 
     /// The worst instant of each interval in which the potential plus `share` of the margin exceeds the threshold by
     /// more than `tolerance`. On the grid the whole margin counts, as its rows are isolated points.
-    pub(crate) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
+    pub(crate) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<SilencePeak> {
         match self {
             Self::Grid(rows) => rows.broken(weights, tolerance),
             Self::Continuous(times) => times.broken(weights, share, tolerance),

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use super::{NEAR, VanRossum};
 use crate::metrics::distance::{Pattern, Ready, summed};
-use crate::metrics::pairwise::Matrix;
+use crate::metrics::pairwise::DistanceMatrix;
 use crate::metrics::stored::{Entries, Frame, Query};
 use crate::metrics::{Patterns, Work};
 use crate::{Result, Stop};
@@ -18,7 +18,7 @@ impl Ready for &VanRossum {
     }
 
     /// Fills a matrix with the sums of distances over trains.
-    fn fill(&self, matrix: &Matrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
+    fn fill(&self, matrix: &DistanceMatrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
         let others = b.unwrap_or(a);
         let pairs = matrix.pairs();
         for n in 0..a.trains {

@@ -4,9 +4,9 @@
 //! the overlap of the taxels' spatial kernels. For each row and taxel n, the row's whole pattern is stored with the
 //! weights of taxel n; then each column's spikes at n are looked up once.
 
-use super::{Kernel, Smoothed, VanRossumSpatial};
+use super::{SmoothingKernel, SmoothedDistance, VanRossumSpatial};
 use crate::metrics::distance::{Pattern, Ready};
-use crate::metrics::pairwise::Matrix;
+use crate::metrics::pairwise::DistanceMatrix;
 use crate::metrics::stored::{Entries, Frame, Query};
 use crate::metrics::van_rossum::NEAR;
 use crate::metrics::{Patterns, Work};
@@ -18,13 +18,13 @@ const HELD: usize = 1 << 24;
 /// The cost of a look-up, in steps of a traversal of both patterns.
 const LOOK_UP: usize = 8;
 
-impl Ready for Smoothed<'_> {
+impl Ready for SmoothedDistance<'_> {
     fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         self.0.between(&self.1, a, b, stop)
     }
 
     /// Fills a matrix by stored exponentials, if that is faster.
-    fn fill(&self, matrix: &Matrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
+    fn fill(&self, matrix: &DistanceMatrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
         let Self(metric, kernel) = self;
         let others = b.unwrap_or(a);
         let spikes = (a.times.len() / a.count.max(1)).max(others.times.len() / others.count.max(1));
@@ -36,12 +36,12 @@ impl Ready for Smoothed<'_> {
         let frame = Frame::around(metric.smoothing.tau, &[a, others], None);
         let Some(frame) = frame.filter(|_| storing < walking) else { return Ok(false) };
         let weights = kernel.common(&active);
-        Stored { metric, kernel, frame, active, weights, rows: a, columns: others }.fill(matrix, b.is_none(), work)?;
+        MatrixState { metric, kernel, frame, active, weights, rows: a, columns: others }.fill(matrix, b.is_none(), work)?;
         Ok(true)
     }
 }
 
-impl Kernel {
+impl SmoothingKernel {
     /// The taxels with a spike in any pattern, in any layer.
     fn active(&self, a: &Patterns<'_>, b: &Patterns<'_>) -> Vec<usize> {
         let mut active = vec![false; self.taxels()];
@@ -78,9 +78,9 @@ impl Kernel {
 }
 
 /// The state of a matrix computation.
-struct Stored<'s> {
+struct MatrixState<'s> {
     metric: &'s VanRossumSpatial,
-    kernel: &'s Kernel,
+    kernel: &'s SmoothingKernel,
     frame: Frame,
     /// The taxels with spikes, and the overlap of each two of them.
     active: Vec<usize>,
@@ -89,8 +89,8 @@ struct Stored<'s> {
     columns: &'s Patterns<'s>,
 }
 
-impl Stored<'_> {
-    fn fill(&self, matrix: &Matrix, symmetric: bool, work: &mut Work<'_>) -> Result<()> {
+impl MatrixState<'_> {
+    fn fill(&self, matrix: &DistanceMatrix, symmetric: bool, work: &mut Work<'_>) -> Result<()> {
         let rows = self.squares(self.rows, work)?;
         let columns = if symmetric { rows.clone() } else { self.squares(self.columns, work)? };
         let spikes = (self.columns.times.len() / self.columns.count.max(1)).max(1);
@@ -169,7 +169,7 @@ impl Stored<'_> {
     fn squares(&self, patterns: &Patterns<'_>, work: &mut Work<'_>) -> Result<Vec<f64>> {
         let offsets = vec![0; patterns.trains + 1];
         let none = Patterns { count: 1, times: &[], offsets: &offsets, ..patterns.clone() };
-        let found = Matrix::new(patterns.count, Some(1));
+        let found = DistanceMatrix::new(patterns.count, Some(1));
         work.quietly(patterns.count, |i, stop| {
             found.add(i, 0, self.metric.square(self.kernel, (patterns, i), (&none, 0), stop)?);
             Ok(())

@@ -16,7 +16,7 @@ pub(super) fn lanes(set: Instructions) -> usize {
 }
 
 /// Trains stored side by side: spike j of each, then spike j + 1.
-pub(super) struct Block {
+pub(super) struct TrainBlock {
     lanes: usize,
     /// The times by spike and lane, padded with infinity after a lane's last spike.
     times: Vec<f64>,
@@ -26,7 +26,7 @@ pub(super) struct Block {
     lengths: Vec<usize>,
 }
 
-impl Block {
+impl TrainBlock {
     /// Stores `trains`, at least one and at most one per lane; the last one also fills the remaining lanes.
     pub(super) fn new(lanes: usize, trains: &[&[f64]]) -> Self {
         let lane = |l: usize| trains[l.min(trains.len() - 1)];
@@ -71,13 +71,13 @@ impl Block {
 }
 
 kernel! {
-    fn against_16<V>(on set; block: &Block, a: &[f64], q: f64, reach: f64, cost: &mut [f64], stop: Stop<'_>) -> Result<usize> {
+    fn against_16<V>(on set; block: &TrainBlock, a: &[f64], q: f64, reach: f64, cost: &mut [f64], stop: Stop<'_>) -> Result<usize> {
         against::<V, 2>(block, a, q, reach, cost, stop)
     }
 }
 
 kernel! {
-    fn against_32<V>(on set; block: &Block, a: &[f64], q: f64, reach: f64, cost: &mut [f64], stop: Stop<'_>) -> Result<usize> {
+    fn against_32<V>(on set; block: &TrainBlock, a: &[f64], q: f64, reach: f64, cost: &mut [f64], stop: Stop<'_>) -> Result<usize> {
         against::<V, 4>(block, a, q, reach, cost, stop)
     }
 }
@@ -86,7 +86,7 @@ kernel! {
 /// returned; see [`super::VictorPurpura::between`] for the costs that are left out.
 #[inline(always)]
 fn against<V: Vector, const SIDE: usize>(
-    block: &Block,
+    block: &TrainBlock,
     a: &[f64],
     q: f64,
     reach: f64,

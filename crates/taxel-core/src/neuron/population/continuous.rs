@@ -1,6 +1,6 @@
 //! A block of neurons in continuous time: advances exactly from one input time to the next.
 
-use super::lanes::{FADED, LANES, LOOK, Lanes, Weight, slack};
+use super::lanes::{FADED, LANES, LOOK, NeuronLanes, Weight, slack};
 use crate::neuron::continuous::ContinuousStream;
 use crate::neuron::kernel::{KernelSum, Step};
 use crate::neuron::model::{AT_EDGE, AfterSpike, Neuron};
@@ -95,7 +95,7 @@ pub(super) fn run<W: Weight>(
     stop: Stop<'_>,
 ) -> Result<()> {
     let mut streams: Vec<ContinuousStream> = vec![script.begin.clone(); LANES];
-    let mut lanes = Lanes::new(script.begin.edge());
+    let mut lanes = NeuronLanes::new(script.begin.edge());
     let mut perhaps = [false; LANES];
     let mut found: Vec<OutputSpike> = vec![];
     let mut k = 0;
@@ -149,7 +149,7 @@ fn may_matter(a: f64, b: f64, rise: f64, edge: f64, script: &Script, interval: &
 /// Decays the states through the preceding interval, adds an input, and returns whether any neuron may fire.
 #[inline(always)]
 fn one_input<W: Weight>(
-    lanes: &mut Lanes,
+    lanes: &mut NeuronLanes,
     script: &Script,
     interval: &Interval,
     (step, fade): (Step, f64),
@@ -169,7 +169,7 @@ fn one_input<W: Weight>(
 
 wide! {
     /// Decays the states of a block through an interval without spikes.
-    fn pass(lanes: &mut Lanes, interval: &Interval) {
+    fn pass(lanes: &mut NeuronLanes, interval: &Interval) {
         let Step { aa, ba, bb } = interval.step;
         for l in 0..LANES {
             let (a, b) = (lanes.a[l], lanes.b[l]);
@@ -185,7 +185,7 @@ wide! {
     /// neuron may fire or leave its refractory time, or at which Ctrl-C is checked. Returns that interval's index with
     /// its inputs added, and marks in `perhaps` the neurons that may fire in it.
     fn quiet<W: Weight>(
-        lanes: &mut Lanes,
+        lanes: &mut NeuronLanes,
         script: &Script,
         block: &[[W; LANES]],
         from: usize,

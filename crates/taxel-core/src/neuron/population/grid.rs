@@ -1,6 +1,6 @@
 //! A block of neurons on a grid: advances from point to point.
 
-use super::lanes::{FADED, LANES, LOOK, Lanes, Weight, slack};
+use super::lanes::{FADED, LANES, LOOK, NeuronLanes, Weight, slack};
 use crate::neuron::kernel::{KernelSum, Step};
 use crate::neuron::model::{AfterSpike, Neuron};
 use crate::neuron::points::{Grid, GridTime};
@@ -15,7 +15,7 @@ pub(super) struct Script {
     grid: Grid,
     /// The base of the threshold minus the rounding error of the bound, mV.
     floor: f64,
-    points: Vec<Point>,
+    points: Vec<GridInputs>,
     inputs: Vec<Input>,
     step: Step,
     /// The share of a threshold rise that remains after one step.
@@ -23,7 +23,7 @@ pub(super) struct Script {
     loses_none: bool,
 }
 
-struct Point {
+struct GridInputs {
     t: f64,
     /// The inputs after the preceding point and before this one end before this index.
     aged_end: usize,
@@ -38,7 +38,7 @@ struct Input {
     unit_state: KernelSum,
 }
 
-impl Lanes {
+impl NeuronLanes {
     /// Starts the decay of the threshold rise if the refractory time has ended by `t`.
     fn recover(&mut self, lane: usize, threshold: &Threshold, t: f64) {
         if self.edge[lane] <= t + rounding_ms(t) {
@@ -111,7 +111,7 @@ impl Script {
             }
             let aged_end = inputs.len();
             inputs.append(&mut arriving);
-            points.push(Point { t, aged_end, arriving_end: inputs.len() });
+            points.push(GridInputs { t, aged_end, arriving_end: inputs.len() });
             point += 1.0;
         }
         let far = grid.rounding_ms(trains.stop);
@@ -138,7 +138,7 @@ pub(super) fn run<W: Weight>(
     stop: Stop<'_>,
 ) -> Result<()> {
     let mut thresholds: Vec<Threshold> = vec![script.threshold.clone(); LANES];
-    let mut lanes = Lanes::new(script.threshold.edge());
+    let mut lanes = NeuronLanes::new(script.threshold.edge());
     let shape = neuron.shape();
     let mut perhaps = [false; LANES];
     let mut from = None;
@@ -175,7 +175,7 @@ pub(super) fn run<W: Weight>(
 }
 
 #[inline(always)]
-fn may_matter(lanes: &Lanes, l: usize, t: f64, floor: f64) -> bool {
+fn may_matter(lanes: &NeuronLanes, l: usize, t: f64, floor: f64) -> bool {
     (lanes.b[l] >= floor + lanes.rise[l] * FADED) | (lanes.edge[l] <= t + rounding_ms(t))
 }
 
@@ -184,7 +184,7 @@ wide! {
     /// to the next point at which a neuron may fire or leave its refractory time, or Ctrl-C is checked. Returns that
     /// point, and marks in `perhaps` the neurons that may fire there.
     fn quiet<W: Weight>(
-        lanes: &mut Lanes,
+        lanes: &mut NeuronLanes,
         script: &Script,
         block: &[[W; LANES]],
         from: Option<usize>,

@@ -25,7 +25,7 @@ impl Weight for f32 {}
 impl Weight for f64 {}
 
 /// The states of a block's neurons.
-pub(super) struct Lanes {
+pub(super) struct NeuronLanes {
     pub(super) a: [f64; LANES],
     pub(super) b: [f64; LANES],
     /// The remaining threshold rise, mV; infinite in the refractory time.
@@ -37,7 +37,7 @@ pub(super) struct Lanes {
     pub(super) ignored_until: [f64; LANES],
 }
 
-impl Lanes {
+impl NeuronLanes {
     /// Neurons at rest; `edge` is the start of the printed first rise, if any.
     pub(super) fn new(edge: Option<f64>) -> Self {
         Self {

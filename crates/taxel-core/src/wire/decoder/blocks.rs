@@ -13,7 +13,7 @@ mod scalar;
 
 pub(super) use carried::Carried;
 
-use super::filling::{Filling, STREAMED};
+use super::filling::{FilledColumns, STREAMED};
 use crate::vectors::Instructions;
 use crate::wire::v1::WORD_BYTES;
 
@@ -31,7 +31,7 @@ pub(super) fn plain(
     columns: u16,
     rows: u16,
     state: &mut Carried,
-    filling: &mut Filling<'_>,
+    filling: &mut FilledColumns<'_>,
 ) -> usize {
     let mut done = 0;
     if bytes.len() >= STREAMED {
@@ -63,7 +63,7 @@ fn blocks(
     columns: u16,
     rows: u16,
     state: &mut Carried,
-    filling: &mut Filling<'_>,
+    filling: &mut FilledColumns<'_>,
 ) -> usize {
     let room = &filling.room;
     let most = filling.rows + bytes.len() / WORD_BYTES;

@@ -13,7 +13,7 @@ pub(super) const TURN: i64 = 65_536;
 
 /// Unwraps stamps into 64 bits.
 #[derive(Debug, Clone, Copy, Default)]
-pub(in crate::wire) struct Clock {
+pub(in crate::wire) struct StampClock {
     /// The latest time, in stamps.
     pub(super) latest: Option<i64>,
     /// The time of the last stamp if it was a step back, in stamps.
@@ -22,7 +22,7 @@ pub(in crate::wire) struct Clock {
     pub(super) arrived: Option<i64>,
 }
 
-impl Clock {
+impl StampClock {
     /// Returns the unwrapped time in stamps, and whether it is a step back.
     pub(in crate::wire) fn unwrap(&mut self, stamp: u16, arrived: Option<i64>) -> (i64, bool) {
         let Some(latest) = self.latest else {

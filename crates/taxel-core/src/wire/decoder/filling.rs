@@ -8,7 +8,7 @@ pub(super) const STREAMED: usize = 4 << 20;
 
 /// A change whose intensity may be the next word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Change {
+pub(super) struct PendingChange {
     pub(super) t: i64,
     pub(super) x: u16,
     pub(super) y: u16,
@@ -17,7 +17,7 @@ pub(super) struct Change {
 
 /// Columns being filled: the first `rows` entries of t, x, y, p are written, and with `paired` those of ticks and
 /// present.
-pub(super) struct Filling<'a> {
+pub(super) struct FilledColumns<'a> {
     pub(super) room: Room<'a>,
     pub(super) rows: usize,
     pub(super) paired: bool,
@@ -25,9 +25,9 @@ pub(super) struct Filling<'a> {
     pub(super) open: bool,
 }
 
-impl Filling<'_> {
+impl FilledColumns<'_> {
     #[inline]
-    pub(super) fn change(&mut self, change: Change) {
+    pub(super) fn change(&mut self, change: PendingChange) {
         let k = self.rows;
         self.room.t[k].write(change.t);
         self.room.x[k].write(change.x);
@@ -77,11 +77,13 @@ impl Filling<'_> {
         }
     }
 
-    pub(super) fn take_last(&mut self) -> Change {
+    pub(super) fn take_last(&mut self) -> PendingChange {
         self.rows -= 1;
         let k = self.rows;
         let Room { t, x, y, p, .. } = &self.room;
         // SAFETY: the row was written; its entries may be overwritten from here on.
-        unsafe { Change { t: t[k].assume_init(), x: x[k].assume_init(), y: y[k].assume_init(), p: p[k].assume_init() } }
+        unsafe {
+            PendingChange { t: t[k].assume_init(), x: x[k].assume_init(), y: y[k].assume_init(), p: p[k].assume_init() }
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::filling::Change;
+use super::filling::PendingChange;
 use crate::{Array, Events, Intensities};
 
 /// Which change an intensity belongs to.
@@ -20,8 +20,8 @@ pub enum Pairing {
 
 /// Changes that wait for an intensity from anywhere later in the stream.
 #[derive(Debug, Clone)]
-pub(super) struct ByTaxel {
-    changes: Vec<Change>,
+pub(super) struct UnpairedChanges {
+    changes: Vec<PendingChange>,
     ticks: Vec<Option<u16>>,
     /// For each change, the previous unpaired change of its taxel.
     before: Vec<Option<usize>>,
@@ -30,7 +30,7 @@ pub(super) struct ByTaxel {
     columns: usize,
 }
 
-impl ByTaxel {
+impl UnpairedChanges {
     pub(super) fn new(array: &Array) -> Self {
         Self {
             changes: vec![],
@@ -41,7 +41,7 @@ impl ByTaxel {
         }
     }
 
-    pub(super) fn change(&mut self, change: Change) {
+    pub(super) fn change(&mut self, change: PendingChange) {
         let latest = &mut self.latest[usize::from(change.y) * self.columns + usize::from(change.x)];
         self.before.push(latest.replace(self.changes.len()));
         self.changes.push(change);
@@ -66,7 +66,7 @@ impl ByTaxel {
 }
 
 /// Appends a change to events, with its intensity if it has one.
-pub(super) fn append(out: &mut Events, change: Change, ticks: Option<u16>) {
+pub(super) fn append(out: &mut Events, change: PendingChange, ticks: Option<u16>) {
     out.t.push(change.t);
     out.x.push(change.x);
     out.y.push(change.y);

@@ -1,7 +1,7 @@
 //! Decodes streams and datagrams into columns that the caller allocated.
 
 use super::Decoder;
-use super::filling::Filling;
+use super::filling::FilledColumns;
 use crate::wire::columns::{Columns, Filled, Room};
 use crate::{Marker, Result, Stop, problem};
 
@@ -99,7 +99,7 @@ impl Decoder {
     /// Writes the change that still waits for its intensity, if there is one, without an intensity.
     fn release(&mut self, room: &mut Room<'_>, done: &mut Filled) {
         if let Some(change) = self.waiting.take() {
-            let mut filling = Filling { room: room.behind(done.rows), rows: 0, paired: done.paired, open: false };
+            let mut filling = FilledColumns { room: room.behind(done.rows), rows: 0, paired: done.paired, open: false };
             filling.change(change);
             done.rows += filling.rows;
         }

@@ -15,7 +15,7 @@ const DRIFT: i64 = 1000;
 ///
 /// Compared are datagrams: how far the last stamp of each is ahead of its arrival, against the most before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Ahead {
+pub struct ClockJumps {
     /// Number of jumps.
     pub jumps: u64,
     /// The newest time before the first jump, us; times after it are doubtful.
@@ -27,7 +27,7 @@ pub struct Ahead {
     rose: Option<(i64, i64)>,
 }
 
-impl Ahead {
+impl ClockJumps {
     /// Notes a datagram: the newest time before it, the times of its first and its last stamp, and its arrival, us.
     pub(super) fn note(&mut self, newest: Option<i64>, first: i64, last: i64, arrived: i64) {
         let ahead = |t: i64| t.saturating_sub(arrived);

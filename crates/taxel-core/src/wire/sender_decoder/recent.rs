@@ -20,9 +20,9 @@ const WITHIN_US: i64 = 3_000_000;
 
 /// The last datagrams, the latest first, each with the time of its arrival.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Recent(VecDeque<(Vec<u8>, Option<i64>)>);
+pub(super) struct RecentDatagrams(VecDeque<(Vec<u8>, Option<i64>)>);
 
-impl Recent {
+impl RecentDatagrams {
     /// Adds a datagram; returns whether it was received before. `values`: intensities are values, not differences.
     pub(super) fn repeats(&mut self, datagram: &[u8], arrived: Option<i64>, array: &Array, values: bool) -> bool {
         let before = self.0.iter().position(|(known, then)| {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// The board's own totals since reset, as its status datagrams report them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Status {
+pub struct BoardTotals {
     /// Number of scanned frames.
     pub frames: u64,
     /// Number of events sent in datagrams.

@@ -5,23 +5,23 @@ mod body;
 mod held;
 #[cfg(target_arch = "x86_64")]
 mod run;
+mod run_totals;
 mod session;
-mod taken;
 mod words;
 
 use super::checksum::split;
-use super::counts::{Counts, Status};
-use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Refused};
+use super::counts::{BoardTotals, Counts};
+use super::{DIFFERENCES, DROPPED, DatagramHeader, FRAME_SYNC, Refused};
 use crate::events::FARTHEST_BACK_US;
 use crate::vectors::Instructions;
 use crate::wire::columns::{Columns, Laid, Room, Table};
 use crate::wire::silence;
 use crate::{Array, Events, Result, problem};
-use held::Held;
+use held::ValuesByLine;
 #[cfg(target_arch = "x86_64")]
-use run::Run;
-use session::{Noted, Session, WINDOW};
-use taken::Taken;
+use run::RunDecoder;
+use run_totals::RunTotals;
+use session::{BoardSession, Noted, WINDOW};
 pub use words::stream_rows;
 
 /// Number of repeated datagrams in turn, or of ones with other contents, after which a session has begun again.
@@ -36,7 +36,7 @@ const SESSIONS: usize = 4;
 
 /// The outcome of decoding one datagram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub enum DatagramOutcome {
     /// Decoded.
     Intact {
         /// No datagram with a higher number has an event before this time, us; none if nothing is promised.
@@ -62,7 +62,7 @@ pub struct Decoder {
     array: Array,
     instructions: Instructions,
     board: Option<u16>,
-    sessions: Vec<Session>,
+    sessions: Vec<BoardSession>,
     /// Missing sequence numbers of sessions that are no longer kept.
     missed_before: u64,
     /// Of these sessions, by how much fewer numbers were missing when they were dropped than when a recording began.
@@ -72,8 +72,8 @@ pub struct Decoder {
     latest: i64,
     /// Whether events were received by other means before the first session.
     goes_on: bool,
-    held: Held,
-    status: Option<Status>,
+    held: ValuesByLine,
+    status: Option<BoardTotals>,
     /// Sequence number of the datagram with the latest status, in the latest session.
     status_number: i64,
     /// Events that the board had dropped in its last totals, 0 at its reset; none if it is not known.
@@ -87,7 +87,7 @@ impl Decoder {
     /// A decoder for the given array; it is bound to the first board from which it receives a datagram.
     #[must_use]
     pub fn new(array: Array) -> Self {
-        let held = Held::new(&array);
+        let held = ValuesByLine::new(&array);
         Self {
             array,
             instructions: Instructions::best(),
@@ -126,7 +126,7 @@ impl Decoder {
     /// What was received and missed so far.
     #[must_use]
     pub fn counts(&self) -> Counts {
-        let missing = self.missed_before + self.sessions.iter().map(Session::missing).sum::<u64>();
+        let missing = self.missed_before + self.sessions.iter().map(BoardSession::missing).sum::<u64>();
         let filled = self.filled_before + self.sessions.iter().map(|session| session.filled).sum::<i64>();
         Counts { missing, filled, ..self.counts }
     }
@@ -143,7 +143,7 @@ impl Decoder {
 
     /// The totals in the board's last status datagram.
     #[must_use]
-    pub fn status(&self) -> Option<&Status> {
+    pub fn status(&self) -> Option<&BoardTotals> {
         self.status.as_ref()
     }
 
@@ -177,7 +177,7 @@ impl Decoder {
     /// `arrived` is the host's clock in us. After a reset it shows how much time has passed; without it, time continues
     /// from the latest received time.
     #[inline]
-    pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Outcome {
+    pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> DatagramOutcome {
         self.push_table(datagram, arrived, out)
     }
 
@@ -186,29 +186,34 @@ impl Decoder {
     /// # Errors
     ///
     /// `Problem` if a column has fewer entries than [`stream_rows`] returns; nothing is read then.
-    pub fn fill(&mut self, datagram: &[u8], arrived: Option<i64>, room: Room<'_>) -> Result<(Columns, Outcome)> {
+    pub fn fill(
+        &mut self,
+        datagram: &[u8],
+        arrived: Option<i64>,
+        room: Room<'_>,
+    ) -> Result<(Columns, DatagramOutcome)> {
         let mut laid = Laid::new(check_room(room, datagram.len())?);
         let received = self.push_table(datagram, arrived, &mut laid);
         Ok((laid.end(), received))
     }
 
     #[inline]
-    fn push_table(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> Outcome {
+    fn push_table(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> DatagramOutcome {
         let latest = self.latest;
         let taken = self.plain(std::iter::once(datagram), stream_rows(datagram.len()), out);
         match self.sessions.last() {
             Some(session) if taken.datagrams > 0 => {
-                let Taken { base, span, .. } = taken;
+                let RunTotals { base, span, .. } = taken;
                 self.last_arrival = arrived.map(|now| (now, latest.max(base))).or(self.last_arrival);
                 let until = (span > 0).then(|| base + i64::from(span));
-                Outcome::Intact { until, missing: session.missing(), reset: false }
+                DatagramOutcome::Intact { until, missing: session.missing(), reset: false }
             }
             _ => self.push_any(datagram, arrived, out),
         }
     }
 
-    fn push_any(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> Outcome {
-        match Header::read(datagram) {
+    fn push_any(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> DatagramOutcome {
+        match DatagramHeader::read(datagram) {
             Ok((header, body)) => self.push_read(datagram, &header, body, arrived, out),
             Err(refused) => {
                 self.counts.datagrams += 1;
@@ -218,7 +223,7 @@ impl Decoder {
                     Refused::Foreign => &mut self.counts.foreign,
                     Refused::Checksum => &mut self.counts.checksum,
                 } += 1;
-                Outcome::Refused(refused)
+                DatagramOutcome::Refused(refused)
             }
         }
     }
@@ -227,11 +232,11 @@ impl Decoder {
     pub(in crate::wire) fn push_read(
         &mut self,
         datagram: &[u8],
-        header: &Header,
+        header: &DatagramHeader,
         body: &[u8],
         arrived: Option<i64>,
         out: &mut impl Table,
-    ) -> Outcome {
+    ) -> DatagramOutcome {
         self.counts.datagrams += 1;
         if *self.board.get_or_insert(header.board) != header.board {
             return self.other_board();
@@ -248,7 +253,7 @@ impl Decoder {
         match session.note(number, sum) {
             Noted::Old => {
                 self.counts.old += 1;
-                return Outcome::Repeated;
+                return DatagramOutcome::Repeated;
             }
             noted @ (Noted::Again | Noted::Unlike) => {
                 let in_turn = if number == self.again.0 { self.again.1 + 1 } else { 1 };
@@ -258,7 +263,7 @@ impl Decoder {
                     return self.other_board();
                 }
                 self.counts.repeated += 1;
-                return Outcome::Repeated;
+                return DatagramOutcome::Repeated;
             }
             Noted::New => self.again.1 = 0,
         }
@@ -285,14 +290,14 @@ impl Decoder {
         }
         let until = (header.span > 0).then(|| base + i64::from(header.span));
         self.latest = self.latest.max(until.unwrap_or(i64::MIN));
-        Outcome::Intact { until, missing, reset }
+        DatagramOutcome::Intact { until, missing, reset }
     }
 
     /// Leaves out an intact datagram of another board.
-    fn other_board(&mut self) -> Outcome {
+    fn other_board(&mut self) -> DatagramOutcome {
         self.counts.foreign += 1;
         self.counts.other_board += 1;
-        Outcome::Refused(Refused::Foreign)
+        DatagramOutcome::Refused(Refused::Foreign)
     }
 
     /// Decodes datagrams while they are plain and short, if the machine has the instructions; `out` has room for `most`
@@ -304,14 +309,14 @@ impl Decoder {
         datagrams: impl Iterator<Item = &'d [u8]> + Clone,
         most: usize,
         out: &mut impl Table,
-    ) -> Taken {
+    ) -> RunTotals {
         #[cfg(target_arch = "x86_64")]
         if self.instructions >= Instructions::Avx2
             && let (Some(first), Some(board), Some(session)) =
                 (datagrams.clone().next(), self.board, self.sessions.last_mut())
             && session.unlike == 0
             && let Self { held, counts, latest, again, .. } = self
-            && let Some((mut run, value)) = Run::new(first, board, session, held, latest, counts)
+            && let Some((mut run, value)) = RunDecoder::new(first, board, session, held, latest, counts)
             && (value == 0 || out.paired())
         {
             // SAFETY: `instructions` and `best` select a set only if the machine has it. A run writes each row that it
@@ -328,11 +333,11 @@ impl Decoder {
             }
             return run.taken;
         }
-        Taken::default()
+        RunTotals::default()
     }
 
     /// The session of a datagram with this sum, and whether the datagram begins it.
-    fn session(&mut self, header: &Header, sum: u32, arrived: Option<i64>) -> (usize, bool) {
+    fn session(&mut self, header: &DatagramHeader, sum: u32, arrived: Option<i64>) -> (usize, bool) {
         // The latest session with this number, in case two resets drew the same one.
         if let Some(which) = self.sessions.iter().rposition(|session| session.number == header.session) {
             if !self.begins_again(&self.sessions[which], header, sum, arrived) {
@@ -370,11 +375,11 @@ impl Decoder {
             self.missed_before += session.missing();
             self.filled_before += session.filled;
         }
-        self.sessions.push(Session::new(header, offset, !began));
+        self.sessions.push(BoardSession::new(header, offset, !began));
         (self.sessions.len() - 1, !began)
     }
     /// Whether a datagram of a session's number begins another session, as two successive resets drew the same number.
-    fn begins_again(&self, session: &Session, header: &Header, sum: u32, arrived: Option<i64>) -> bool {
+    fn begins_again(&self, session: &BoardSession, header: &DatagramHeader, sum: u32, arrived: Option<i64>) -> bool {
         let number = session.number_of(header.sequence);
         let behind = session.highest - number;
         let known = arrived.zip(self.last_arrival).map(|(now, (then, _))| silence(then, now) >= SILENT_US);

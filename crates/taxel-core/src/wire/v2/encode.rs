@@ -5,7 +5,7 @@
 
 use super::packer::{add, first_line, put, steps};
 use super::{
-    BASE_BITS, BODY_BYTES, DATAGRAM_BYTES, Header, Kind, LATEST_OFFSET, Layout, NEVER, START, STOP, before,
+    BASE_BITS, BODY_BYTES, BodyKind, DATAGRAM_BYTES, DatagramHeader, LATEST_OFFSET, Layout, NEVER, START, STOP, before,
     checked_stride,
 };
 use crate::events::EventsView;
@@ -81,7 +81,7 @@ struct Writing<'a> {
     stride: u8,
     /// Whether every value fits in 8 bits.
     small: bool,
-    kind: Kind,
+    kind: BodyKind,
     body: Vec<u8>,
     base: i64,
     at: i64,
@@ -104,7 +104,7 @@ impl<'a> Writing<'a> {
             sequence: FIRST_SEQUENCE,
             stride,
             small,
-            kind: Kind::Changes,
+            kind: BodyKind::Changes,
             body: vec![],
             base: 0,
             at: 0,
@@ -125,7 +125,7 @@ impl<'a> Writing<'a> {
         let kind = self.kind_of(k, index, value);
         let position = i64::from(x) << self.stride | i64::from(y);
         let Some(word) = kind.layout() else { return };
-        let states = matches!(kind, Kind::SmallStates | Kind::LargeStates);
+        let states = matches!(kind, BodyKind::SmallStates | BodyKind::LargeStates);
         let offset = t.checked_sub(self.base).and_then(|us| u64::try_from(us).ok());
         // A state has the time of its datagram, and positions of states ascend.
         let goes_on = !self.body.is_empty()
@@ -153,11 +153,11 @@ impl<'a> Writing<'a> {
     }
 
     /// The kind as which an event is written; a state only if a decoder decodes the same event from it.
-    fn kind_of(&mut self, k: usize, index: usize, value: Option<u16>) -> Kind {
+    fn kind_of(&mut self, k: usize, index: usize, value: Option<u16>) -> BodyKind {
         let repaired = self.events.is_repaired(k);
         let Some(value) = value else {
             self.out.unmarked.extend(repaired.then_some(k as i64));
-            return Kind::Changes;
+            return BodyKind::Changes;
         };
         let (before, known) = (self.values[index], self.since[index] != NEVER);
         let same = !(known && before == value)
@@ -165,10 +165,10 @@ impl<'a> Writing<'a> {
             && self.events.p[k] == (!known || value > before);
         self.out.unmarked.extend((repaired && !same).then_some(k as i64));
         match (repaired && same, self.small) {
-            (false, true) => Kind::Small,
-            (false, false) => Kind::Large,
-            (true, true) => Kind::SmallStates,
-            (true, false) => Kind::LargeStates,
+            (false, true) => BodyKind::Small,
+            (false, false) => BodyKind::Large,
+            (true, true) => BodyKind::SmallStates,
+            (true, false) => BodyKind::LargeStates,
         }
     }
 
@@ -198,11 +198,11 @@ impl<'a> Writing<'a> {
         let mut body = vec![0; 4];
         body.extend((if start { START } else { STOP }).to_le_bytes());
         body.extend([0, 0]);
-        self.write(Kind::Markers, (t, 0, 0), &body, t);
+        self.write(BodyKind::Markers, (t, 0, 0), &body, t);
     }
 
-    fn write(&mut self, kind: Kind, (base, line, span): (i64, u8, u16), body: &[u8], time: i64) {
-        let header = Header {
+    fn write(&mut self, kind: BodyKind, (base, line, span): (i64, u8, u16), body: &[u8], time: i64) {
+        let header = DatagramHeader {
             kind: kind.number(),
             board: 0,
             sequence: self.sequence,
@@ -298,7 +298,7 @@ mod tests {
         let encoded = encode(events.view(), None, true).unwrap();
         let mut earliest = i64::MAX;
         for pair in encoded.offsets.windows(2).rev() {
-            let (header, _) = Header::read(&encoded.bytes[pair[0] as usize..pair[1] as usize]).unwrap();
+            let (header, _) = DatagramHeader::read(&encoded.bytes[pair[0] as usize..pair[1] as usize]).unwrap();
             // A span of 0 promises nothing.
             assert!(header.span == 0 || header.base as i64 + i64::from(header.span) <= earliest);
             earliest = earliest.min(header.base as i64);

@@ -1,8 +1,8 @@
 //! Encodes events as datagrams of version 2, as the board sends them.
 
 use super::{
-    BODY_BYTES, DATAGRAM_BYTES, DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, LAST_LINE, LATEST_OFFSET, Layout,
-    START, STOP, Status, before, checked_stride,
+    BODY_BYTES, BoardTotals, BodyKind, DATAGRAM_BYTES, DIFFERENCES, DROPPED, DatagramHeader, FRAME_SYNC, LAST_LINE,
+    LATEST_OFFSET, Layout, START, STOP, before, checked_stride,
 };
 use crate::{Array, Result, problem};
 
@@ -17,7 +17,7 @@ pub struct Settings {
     /// Random number drawn at each reset.
     pub session: u16,
     /// The kind in which its events are sent: changes without values, with small or with large values.
-    pub kind: Kind,
+    pub kind: BodyKind,
     /// All events of a frame carry its time.
     pub frame_sync: bool,
     /// Values are differences.
@@ -156,16 +156,16 @@ impl Packer {
         body.extend((if start { START } else { STOP }).to_le_bytes());
         body.extend([0, 0]);
         self.base = t;
-        self.write(Kind::Markers, &body, (0, 0), 0, sink);
+        self.write(BodyKind::Markers, &body, (0, 0), 0, sink);
     }
 
     /// Sends the board's totals; the packer itself fills in the number of datagrams.
-    pub fn status(&mut self, t: u64, status: &Status, sink: &mut impl FnMut(&[u8], usize)) {
+    pub fn status(&mut self, t: u64, status: &BoardTotals, sink: &mut impl FnMut(&[u8], usize)) {
         self.flush(t, sink);
         let totals = [status.frames, status.events, status.dropped, self.sequence.into(), status.faults];
         let body: Vec<u8> = totals.iter().flat_map(|total| total.to_le_bytes()).collect();
         self.base = t;
-        self.write(Kind::Status, &body, (0, 0), 0, sink);
+        self.write(BodyKind::Status, &body, (0, 0), 0, sink);
     }
 
     /// Sends values again as states: taxels by ascending position, each with the value that the board compares with.
@@ -177,8 +177,8 @@ impl Packer {
     ) {
         self.flush(t, sink);
         let (kind, word) = match self.settings.kind {
-            Kind::Small => (Kind::SmallStates, Layout { bytes: 2, skip: 7, value: 8 }),
-            _ => (Kind::LargeStates, Layout { bytes: 4, skip: 15, value: 16 }),
+            BodyKind::Small => (BodyKind::SmallStates, Layout { bytes: 2, skip: 7, value: 8 }),
+            _ => (BodyKind::LargeStates, Layout { bytes: 4, skip: 15, value: 16 }),
         };
         let (mut body, mut line, mut last) = (Vec::with_capacity(BODY_BYTES), 0, -1);
         self.base = t;
@@ -228,7 +228,7 @@ impl Packer {
     /// Sends a body whose positions count from a line, with its span.
     fn write(
         &mut self,
-        kind: Kind,
+        kind: BodyKind,
         body: &[u8],
         (line, span): (u8, u16),
         events: usize,
@@ -237,8 +237,8 @@ impl Packer {
         let Settings { board, session, frame_sync, differences, .. } = self.settings;
         let flag = |on: bool, bit: u8| if on { bit } else { 0 };
         let after_loss = if events > 0 { self.after_loss } else { std::mem::take(&mut self.dropped) };
-        let states = matches!(kind, Kind::SmallStates | Kind::LargeStates);
-        let header = Header {
+        let states = matches!(kind, BodyKind::SmallStates | BodyKind::LargeStates);
+        let header = DatagramHeader {
             kind: kind.number(),
             board,
             sequence: self.sequence,
@@ -261,9 +261,9 @@ pub(super) fn first_line(x: u16) -> u8 {
 }
 
 /// The layout of the words of a kind of events.
-fn layout(kind: Kind) -> Result<Layout> {
+fn layout(kind: BodyKind) -> Result<Layout> {
     match kind {
-        Kind::Changes | Kind::Small | Kind::Large => kind.layout(),
+        BodyKind::Changes | BodyKind::Small | BodyKind::Large => kind.layout(),
         _ => None,
     }
     .ok_or_else(|| problem!("events are sent as changes, small or large ones"))

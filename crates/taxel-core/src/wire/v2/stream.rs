@@ -2,7 +2,7 @@
 
 use super::counts::Counts;
 use super::decoder::{Decoder, check_room, stream_rows};
-use super::{DATAGRAM_BYTES, HEADER_BYTES, Header, LENGTH_BYTES, TRAILER_BYTES};
+use super::{DATAGRAM_BYTES, DatagramHeader, HEADER_BYTES, LENGTH_BYTES, TRAILER_BYTES};
 use crate::wire::columns::{Columns, Laid, Room};
 use crate::{Array, Result, Stop};
 
@@ -37,40 +37,42 @@ impl StreamReader {
 }
 
 /// The destination of a stream's datagrams.
-trait Sink {
+trait DatagramSink {
     /// Consumes any number of the datagrams ahead; returns the number of their bytes, with their lengths.
     fn run(&mut self, ahead: &[u8]) -> usize;
 
     /// Consumes one intact datagram.
-    fn take(&mut self, datagram: &[u8], header: &Header, body: &[u8]);
+    fn take(&mut self, datagram: &[u8], header: &DatagramHeader, body: &[u8]);
 }
 
-impl<F: FnMut(&[u8])> Sink for F {
+impl<F: FnMut(&[u8])> DatagramSink for F {
     fn run(&mut self, _: &[u8]) -> usize {
         0
     }
 
-    fn take(&mut self, datagram: &[u8], _: &Header, _: &[u8]) {
+    fn take(&mut self, datagram: &[u8], _: &DatagramHeader, _: &[u8]) {
         self(datagram);
     }
 }
 
 /// Passes each whole datagram that begins in `bytes` to a sink; returns the number of bytes consumed: all of them if
 /// the stream ends there.
-fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, sink: &mut impl Sink) -> usize {
+fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, sink: &mut impl DatagramSink) -> usize {
     let mut at = 0;
     loop {
         at += sink.run(&bytes[at..]);
         let Some(rest) = bytes.get(at..).filter(|rest| rest.len() >= LENGTH_BYTES + 2) else { break };
         let length = usize::from(u16::from_le_bytes([rest[0], rest[1]]));
-        let likely =
-            (HEADER_BYTES + TRAILER_BYTES..=DATAGRAM_BYTES).contains(&length) && Header::likely(&rest[LENGTH_BYTES..]);
+        let likely = (HEADER_BYTES + TRAILER_BYTES..=DATAGRAM_BYTES).contains(&length)
+            && DatagramHeader::likely(&rest[LENGTH_BYTES..]);
         if likely {
             let whole = rest.get(LENGTH_BYTES..LENGTH_BYTES + length);
             if whole.is_none() && !ends {
                 return at;
             }
-            if let Some((datagram, (header, body))) = whole.and_then(|bytes| Some((bytes, Header::read(bytes).ok()?))) {
+            if let Some((datagram, (header, body))) =
+                whole.and_then(|bytes| Some((bytes, DatagramHeader::read(bytes).ok()?)))
+            {
                 sink.take(datagram, &header, body);
                 at += LENGTH_BYTES + length;
                 continue;
@@ -88,7 +90,7 @@ fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, sink: &mut impl Sink) -> usi
 
 /// The result of decoding a whole stream, apart from the rows themselves.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Decoded {
+pub struct DecodedStream {
     /// Description of the filled columns.
     pub columns: Columns,
     /// Counts of what was received and missed.
@@ -108,15 +110,15 @@ fn ahead(mut bytes: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
 }
 
 /// A decoder, and the columns that it fills.
-struct Filling<'a>(Decoder, Laid<'a>);
+struct StreamDecoder<'a>(Decoder, Laid<'a>);
 
-impl Sink for Filling<'_> {
+impl DatagramSink for StreamDecoder<'_> {
     fn run(&mut self, bytes: &[u8]) -> usize {
         let taken = self.0.plain(ahead(bytes), stream_rows(bytes.len()), &mut self.1);
         taken.bytes + LENGTH_BYTES * taken.datagrams
     }
 
-    fn take(&mut self, datagram: &[u8], header: &Header, body: &[u8]) {
+    fn take(&mut self, datagram: &[u8], header: &DatagramHeader, body: &[u8]) {
         self.0.push_read(datagram, header, body, None, &mut self.1);
     }
 }
@@ -127,17 +129,17 @@ impl Sink for Filling<'_> {
 ///
 /// `Problem` if a column has fewer entries than [`stream_rows`] returns, in which case nothing is read; `Interrupted`
 /// if asked to stop.
-pub fn decode(bytes: &[u8], array: Array, room: Room<'_>, stop: Stop<'_>) -> Result<Decoded> {
+pub fn decode(bytes: &[u8], array: Array, room: Room<'_>, stop: Stop<'_>) -> Result<DecodedStream> {
     /// Bytes between two checks of `stop`: some milliseconds of work, and more than a datagram.
     const PIECE: usize = 1 << 20;
     let laid = Laid::new(check_room(room, bytes.len())?);
-    let (mut filling, mut skipped, mut rest) = (Filling(Decoder::new(array), laid), 0, bytes);
+    let (mut filling, mut skipped, mut rest) = (StreamDecoder(Decoder::new(array), laid), 0, bytes);
     while !rest.is_empty() {
         stop.check()?;
         let piece = &rest[..rest.len().min(PIECE)];
         let done = cut(piece, piece.len() == rest.len(), &mut skipped, &mut filling);
         rest = &rest[done..];
     }
-    let Filling(decoder, laid) = filling;
-    Ok(Decoded { columns: laid.end(), counts: decoder.counts(), skipped })
+    let StreamDecoder(decoder, laid) = filling;
+    Ok(DecodedStream { columns: laid.end(), counts: decoder.counts(), skipped })
 }

@@ -9,20 +9,20 @@ use mcap::parse_record;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::summary::Summary;
+use super::summary::FileSummary;
 use crate::recording::{Header, limits};
 use crate::{Error, Result};
 
 /// A chunk, or a sequence of records outside chunks (as other tools may write them).
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Block {
+pub(super) struct FileBlock {
     pub(super) offset: u64,
     pub(super) length: u64,
     pub(super) bare: bool,
 }
 
 /// Numbers of messages by the number of their channel, as the message indexes behind a chunk list them.
-pub(super) type Indexed = BTreeMap<u16, u64>;
+pub(super) type IndexedChunks = BTreeMap<u16, u64>;
 
 /// The channel and the number of messages that a message index lists, from its first 15 bytes.
 pub(super) fn indexed(head: &[u8]) -> Option<(u16, u64)> {
@@ -37,10 +37,10 @@ pub(super) struct Blocks {
     pub(super) path: PathBuf,
     pub(super) file: File,
     pub(super) length: u64,
-    pub(super) places: Vec<Block>,
+    pub(super) places: Vec<FileBlock>,
     /// Of each place where something was skipped, the number of blocks before it and what the message indexes around it list.
-    pub(super) skipped: Vec<(usize, Option<Indexed>)>,
-    pub(super) summary: Option<Summary>,
+    pub(super) skipped: Vec<(usize, Option<IndexedChunks>)>,
+    pub(super) summary: Option<FileSummary>,
 }
 
 impl Blocks {
@@ -62,7 +62,7 @@ impl Blocks {
     }
 
     /// What the message indexes behind a block list; none if there are none, though the block had messages.
-    pub(super) fn indexed(&self, block: Block) -> Result<Option<Indexed>> {
+    pub(super) fn indexed(&self, block: FileBlock) -> Result<Option<IndexedChunks>> {
         // Times of the first and the last message, both 0 in a chunk without messages.
         let mut times = [0; 16];
         self.file.read_exact_at(&mut times, block.offset + 9).map_err(Error::file(&self.path))?;
@@ -73,7 +73,7 @@ impl Blocks {
     /// As [`records`].
     pub(super) fn records(
         &self,
-        block: Block,
+        block: FileBlock,
         bytes: &mut Vec<u8>,
         take: impl FnMut(Record<'_>) -> bool,
     ) -> Result<bool> {
@@ -85,7 +85,7 @@ impl Blocks {
 pub(super) fn records(
     path: &Path,
     file: &File,
-    block: Block,
+    block: FileBlock,
     bytes: &mut Vec<u8>,
     mut take: impl FnMut(Record<'_>) -> bool,
 ) -> Result<bool> {
@@ -127,8 +127,8 @@ pub(super) fn records(
 }
 
 /// What the message indexes from `at` on list, up to the next other record.
-pub(super) fn indexed_from(path: &Path, file: &File, length: u64, mut at: u64) -> Result<Indexed> {
-    let (mut all, mut head) = (Indexed::new(), [0; 15]);
+pub(super) fn indexed_from(path: &Path, file: &File, length: u64, mut at: u64) -> Result<IndexedChunks> {
+    let (mut all, mut head) = (IndexedChunks::new(), [0; 15]);
     while at.checked_add(15).is_some_and(|end| end <= length) {
         file.read_exact_at(&mut head, at).map_err(Error::file(path))?;
         let Some((channel, messages)) = indexed(&head).filter(|_| head[0] == op::MESSAGE_INDEX) else { break };

@@ -12,7 +12,7 @@ use taxel_core::held::UNKNOWN;
 use taxel_core::wire::{self, Registers};
 
 use super::message::Message;
-use crate::recording::{BoardChange, Counts, Note, Topic};
+use crate::recording::{BoardChange, Note, RecordingCounts, Topic};
 
 /// All small messages of a recording.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -28,7 +28,7 @@ pub struct Remarks {
     /// Detections, with the host's time at which they were recorded, ns.
     pub detections: Vec<(i64, Detection)>,
     /// The last counts before the end of the recording.
-    pub counts: Option<Counts>,
+    pub counts: Option<RecordingCounts>,
     /// Number of datagrams.
     pub datagrams: u64,
     /// Number of bytes in the datagrams.
@@ -36,7 +36,7 @@ pub struct Remarks {
     /// Times of the first and the last arrival, ns since 1970.
     pub arrivals: Option<(i64, i64)>,
     /// Arrival numbers of the datagrams or lines.
-    pub numbers: Numbers,
+    pub numbers: ArrivalNumbers,
     /// Sum of the CRC-32 of the datagrams or lines, modulo 2^32.
     pub sum: u32,
     /// Number of messages of each channel.
@@ -52,13 +52,13 @@ pub struct Remarks {
 
 /// Arrival numbers that were read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Numbers {
+pub struct ArrivalNumbers {
     /// The last number of each run of successive ones, by the first.
     runs: BTreeMap<u64, u64>,
     repeated: u64,
 }
 
-impl Numbers {
+impl ArrivalNumbers {
     fn add(&mut self, number: u64) {
         match self.runs.range_mut(..=number).next_back() {
             Some((_, last)) if number <= *last => {

@@ -13,7 +13,7 @@ use crate::recording::metadata::END;
 
 /// What an undamaged summary states.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Summary {
+pub(super) struct FileSummary {
     /// Number of messages of each channel, by its name; none if the file has no statistics.
     pub(super) messages: Option<BTreeMap<String, u64>>,
     /// Whether the file had the record that ends a recording.
@@ -22,7 +22,7 @@ pub(super) struct Summary {
     pub(super) end: u64,
 }
 
-impl Summary {
+impl FileSummary {
     /// Reads what follows the data, from their end at byte `at` on; none if any of it is missing or damaged.
     pub(super) fn read(file: &File, mut at: u64, length: u64) -> Option<Self> {
         let options = LinearReaderOptions::default()

@@ -8,10 +8,10 @@ use std::path::Path;
 use mcap::records::{Record, op};
 use mcap::{MAGIC, parse_record};
 
-use super::blocks::{Block, Indexed, indexed, indexed_from, records};
-use super::summary::Summary;
+use super::blocks::{FileBlock, IndexedChunks, indexed, indexed_from, records};
+use super::summary::FileSummary;
 use crate::recording::metadata::{BEGIN, CHECK, END, check};
-use crate::recording::{Counts, Ending, Header, Rebuilt, limits};
+use crate::recording::{FileEnding, Header, Rebuilt, RecordingCounts, limits};
 use crate::{Error, Result};
 
 /// Size of a record's opcode and length, bytes.
@@ -32,7 +32,7 @@ enum Skipped {
 }
 
 /// The state of the walk.
-pub(super) struct Walk<'a> {
+pub(super) struct FileWalk<'a> {
     path: &'a Path,
     file: &'a File,
     length: u64,
@@ -40,22 +40,22 @@ pub(super) struct Walk<'a> {
     memory: u64,
     pub(super) begin: Option<Header>,
     pub(super) end: Option<Header>,
-    pub(super) ending: Option<Ending>,
+    pub(super) ending: Option<FileEnding>,
     /// The final counts of the other sources.
-    pub(super) ends: BTreeMap<String, Counts>,
-    pub(super) blocks: Vec<Block>,
+    pub(super) ends: BTreeMap<String, RecordingCounts>,
+    pub(super) blocks: Vec<FileBlock>,
     /// Of each place where something was skipped, the number of blocks before it and what the message indexes between these
     /// blocks and the next one list; none where bytes are missing or too many, as these indexes may be of other chunks.
-    pub(super) skipped: Vec<(usize, Option<Indexed>)>,
+    pub(super) skipped: Vec<(usize, Option<IndexedChunks>)>,
     /// What message indexes list since the last block, and what was skipped since.
-    since: (Indexed, Skipped),
-    pub(super) summary: Option<Summary>,
+    since: (IndexedChunks, Skipped),
+    pub(super) summary: Option<FileSummary>,
     /// Unpacked size of the chunks so far, as they state it, bytes.
     unpacked: u64,
     pub(super) rebuilt: Rebuilt,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> FileWalk<'a> {
     pub(super) fn of(path: &'a Path, file: &'a File, length: u64, memory: u64) -> Self {
         let rebuilt = Rebuilt { unfinished: true, ..Rebuilt::default() };
         Self {
@@ -69,7 +69,7 @@ impl<'a> Walk<'a> {
             ends: BTreeMap::new(),
             blocks: vec![],
             skipped: vec![],
-            since: (Indexed::new(), Skipped::Nothing),
+            since: (IndexedChunks::new(), Skipped::Nothing),
             summary: None,
             unpacked: 0,
             rebuilt,
@@ -107,7 +107,7 @@ impl<'a> Walk<'a> {
         self.data()?;
         self.next_block();
         // The record that ends a recording is written after all data.
-        let ended = matches!(self.ending, Some(Ending::Finished { .. }));
+        let ended = matches!(self.ending, Some(FileEnding::Finished { .. }));
         self.rebuilt.no_summary = self.summary.is_none() && (ended || !self.rebuilt.unfinished);
         if ended {
             (self.rebuilt.unfinished, self.rebuilt.torn_bytes) = (false, 0);
@@ -147,7 +147,7 @@ impl<'a> Walk<'a> {
                 let indexed = indexed_from(self.path, self.file, self.length, block.offset + block.length)?;
                 (indexed, Skipped::Nothing)
             }
-            (None, None) => (Indexed::new(), Skipped::Nothing),
+            (None, None) => (IndexedChunks::new(), Skipped::Nothing),
         };
         Ok(block.offset)
     }
@@ -175,7 +175,7 @@ impl<'a> Walk<'a> {
             match opcode {
                 op::DATA_END => {
                     self.rebuilt.unfinished = false;
-                    self.summary = Summary::read(self.file, at, self.length);
+                    self.summary = FileSummary::read(self.file, at, self.length);
                     let end = self.summary.as_ref().map_or(self.length, |summary| summary.end);
                     self.rebuilt.bytes_after_end = self.length - end;
                     return Ok(());
@@ -202,7 +202,7 @@ impl<'a> Walk<'a> {
                             &format!("{claim} bytes; at most {most} are read {right}"),
                         ));
                     }
-                    self.blocks.push(Block { offset: at, length: RECORD_HEAD + length, bare: false });
+                    self.blocks.push(FileBlock { offset: at, length: RECORD_HEAD + length, bare: false });
                 }
                 // Next to chunks such a record is another one, damaged.
                 op::SCHEMA | op::CHANNEL | op::MESSAGE => match self.blocks.last_mut() {
@@ -211,7 +211,7 @@ impl<'a> Walk<'a> {
                     }
                     _ => {
                         self.next_block();
-                        self.blocks.push(Block { offset: at, length: RECORD_HEAD + length, bare: true });
+                        self.blocks.push(FileBlock { offset: at, length: RECORD_HEAD + length, bare: true });
                     }
                 },
                 _ => {}
@@ -322,11 +322,11 @@ impl<'a> Walk<'a> {
                 });
                 self.ends = ends.collect();
                 self.ending = match record.metadata.get("stopped") {
-                    Some(why) => Some(Ending::Stopped(why.clone())),
+                    Some(why) => Some(FileEnding::Stopped(why.clone())),
                     None if record.metadata.get(CHECK) != Some(&check(&record.metadata)) => None,
                     None => {
                         let counts = record.metadata.get("counts").and_then(|text| serde_json::from_str(text).ok());
-                        counts.map(|counts| Ending::Finished { counts })
+                        counts.map(|counts| FileEnding::Finished { counts })
                     }
                 };
             }

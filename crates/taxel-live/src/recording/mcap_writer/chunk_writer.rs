@@ -12,10 +12,10 @@ use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions};
 use serde_json::json;
 
-use super::queue::Queue;
+use super::queue::MessageQueue;
 use super::record_file::RecordFile;
 use crate::recording::metadata::{BEGIN, CHECK, END, check};
-use crate::recording::{Compression, Counts, Header, OutputFile, Topic, now_ns};
+use crate::recording::{Compression, Header, OutputFile, RecordingCounts, Topic, now_ns};
 
 /// Size at which a chunk is closed, bytes; it is closed earlier if the queue is empty.
 pub(super) const CHUNK_BYTES: usize = 1 << 20;
@@ -28,7 +28,7 @@ pub(super) struct ChunkWriter {
     mcap: mcap::Writer<NoSeek<RecordFile>>,
     header: Header,
     /// The messages being written; the buffer is then swapped with the queue's.
-    pub(super) batch: Queue,
+    pub(super) batch: MessageQueue,
 }
 
 impl ChunkWriter {
@@ -53,7 +53,7 @@ impl ChunkWriter {
             .disable_seeking(true)
             .chunk_size(Some(2 * CHUNK_BYTES as u64));
         let mcap = options.create(NoSeek::new(RecordFile::new(file, at_disk)))?;
-        let mut writer = Self { mcap, header: header.clone(), batch: Queue::default() };
+        let mut writer = Self { mcap, header: header.clone(), batch: MessageQueue::default() };
         let opening = BTreeMap::from([("header".to_owned(), json!(header).to_string())]);
         writer.mcap.write_metadata(&Metadata { name: BEGIN.to_owned(), metadata: opening.clone() })?;
         for (k, source) in std::iter::once(header).chain(&header.sources).enumerate() {
@@ -107,8 +107,8 @@ impl ChunkWriter {
     /// Writes the counts and the summary, and waits until everything is on the disk.
     pub(super) fn end(
         &mut self,
-        counts: Option<&Counts>,
-        others: &BTreeMap<String, Counts>,
+        counts: Option<&RecordingCounts>,
+        others: &BTreeMap<String, RecordingCounts>,
     ) -> std::result::Result<(), McapError> {
         if let Some(counts) = counts {
             let mut end = BTreeMap::from([

@@ -6,22 +6,22 @@ use crate::recording::LATE;
 
 /// Messages in the order in which they were added.
 #[derive(Default)]
-pub(super) struct Queue {
-    pub(super) messages: Vec<Queued>,
+pub(super) struct MessageQueue {
+    pub(super) messages: Vec<QueuedMessage>,
     pub(super) bytes: Vec<u8>,
     /// Time when the first of them was added.
     pub(super) since: Option<Instant>,
 }
 
 /// A message whose content is the next `bytes` bytes of the queue.
-pub(super) struct Queued {
+pub(super) struct QueuedMessage {
     pub(super) channel: u16,
     pub(super) number: u32,
     pub(super) at_ns: u64,
     pub(super) bytes: usize,
 }
 
-impl Queue {
+impl MessageQueue {
     pub(super) fn is_empty(&self) -> bool {
         self.messages.is_empty()
     }

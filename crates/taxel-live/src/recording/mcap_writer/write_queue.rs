@@ -17,10 +17,10 @@ use mcap::McapError;
 use taxel_core::problem;
 
 use super::chunk_writer::{CHUNK_BYTES, ChunkWriter};
-use super::queue::{Queue, Queued};
+use super::queue::{MessageQueue, QueuedMessage};
 use super::record_file::RecordFile;
 use crate::locked::lock;
-use crate::recording::{Compression, Counts, FLUSH_EVERY, Header, OutputFile, Topic};
+use crate::recording::{Compression, FLUSH_EVERY, Header, OutputFile, RecordingCounts, Topic};
 use crate::{Error, Result};
 
 /// Capacity of the queue while a recording whose file is not begun yet waits for the board's clock, bytes: enough for
@@ -31,7 +31,7 @@ const WAITING_BYTES: usize = 1 << 22;
 pub(super) struct WriteQueue {
     path: PathBuf,
     /// The parameters with which the file will be begun; `None` once it was.
-    pub(super) plan: Mutex<Option<Plan>>,
+    pub(super) plan: Mutex<Option<ReservedFile>>,
     /// Locked by the thread that writes; if both locks are needed, before `state`. `None` before the file is begun and
     /// after its end.
     pub(super) writer: Mutex<Option<ChunkWriter>>,
@@ -46,7 +46,7 @@ pub(super) struct WriteQueue {
 }
 
 /// A file that is reserved but not begun yet.
-pub(super) struct Plan {
+pub(super) struct ReservedFile {
     pub(super) file: OutputFile,
     pub(super) header: Header,
     pub(super) compression: Compression,
@@ -54,7 +54,7 @@ pub(super) struct Plan {
 
 #[derive(Default)]
 pub(super) struct Pending {
-    pub(super) queue: Queue,
+    pub(super) queue: MessageQueue,
     /// Whether the file is begun; until then all messages wait.
     pub(super) begun: bool,
     /// Whether the file waits for the board's clock ([`Writer::begin`](super::Writer::begin)), not only for the first data.
@@ -62,9 +62,9 @@ pub(super) struct Pending {
     /// What was written of each source.
     pub(super) written: Vec<Written>,
     /// The final counts of each source except the first.
-    pub(super) ends: BTreeMap<String, Counts>,
+    pub(super) ends: BTreeMap<String, RecordingCounts>,
     /// How the recording ends; set once. The inner `None` is an end without finishing.
-    end: Option<Option<Counts>>,
+    end: Option<Option<RecordingCounts>>,
     /// Why writing failed; nothing is queued after it.
     failure: Option<WriteFailure>,
 }
@@ -96,13 +96,13 @@ impl Written {
     }
 
     /// Counts that state what a reader must find: all but the number of datagrams, which a caller counts while it records.
-    pub(super) fn so_far(&self, counts: Counts) -> Counts {
-        Counts { first: self.first, messages: self.others.clone(), ..counts }
+    pub(super) fn so_far(&self, counts: RecordingCounts) -> RecordingCounts {
+        RecordingCounts { first: self.first, messages: self.others.clone(), ..counts }
     }
 
     /// The same at the end.
-    pub(super) fn at_end(&self, counts: Counts) -> Counts {
-        Counts { recorded: self.data, sum: Some(self.sum), ..self.so_far(counts) }
+    pub(super) fn at_end(&self, counts: RecordingCounts) -> RecordingCounts {
+        RecordingCounts { recorded: self.data, sum: Some(self.sum), ..self.so_far(counts) }
     }
 }
 
@@ -114,7 +114,7 @@ struct WriteFailure {
 }
 
 impl WriteQueue {
-    pub(super) fn new(plan: Plan, for_clock: bool) -> Self {
+    pub(super) fn new(plan: ReservedFile, for_clock: bool) -> Self {
         let written = vec![Written::default(); plan.header.sources.len() + 1];
         Self {
             path: plan.file.path().to_owned(),
@@ -163,7 +163,7 @@ impl WriteQueue {
         #[allow(clippy::cast_possible_truncation)]
         let number = number as u32;
         let at_ns = u64::try_from(at_ns).unwrap_or(0);
-        state.queue.messages.push(Queued { channel: topic.channel(source), number, at_ns, bytes: bytes.len() });
+        state.queue.messages.push(QueuedMessage { channel: topic.channel(source), number, at_ns, bytes: bytes.len() });
         state.queue.since.get_or_insert_with(Instant::now);
         if !state.begun {
             if topic.is_data() && (!state.for_clock || state.queue.bytes.len() > WAITING_BYTES) {
@@ -195,7 +195,7 @@ impl WriteQueue {
         begun.map(|()| true)
     }
 
-    fn start(self: &Arc<Self>, plan: Plan) -> Result<()> {
+    fn start(self: &Arc<Self>, plan: ReservedFile) -> Result<()> {
         self.open(plan)?;
         let queue = Arc::clone(self);
         let thread = std::thread::Builder::new().name("taxel-record".to_owned()).spawn(move || queue.run());
@@ -204,7 +204,7 @@ impl WriteQueue {
     }
 
     /// Begins the file without the thread that writes it.
-    pub(super) fn open(&self, Plan { file, header, compression }: Plan) -> Result<()> {
+    pub(super) fn open(&self, ReservedFile { file, header, compression }: ReservedFile) -> Result<()> {
         file.begin()?;
         let writer = ChunkWriter::begin(file, &header, compression, &self.at_disk);
         *lock(&self.writer) = Some(writer.map_err(|error| WriteFailure::of(error).of_file(&self.path))?);
@@ -219,7 +219,7 @@ impl WriteQueue {
 
     /// Ends the recording, with the counts of its first source if it is finished, and waits for the thread; the file is
     /// then on the disk.
-    pub(super) fn finish(&self, counts: Option<Counts>) -> Result<()> {
+    pub(super) fn finish(&self, counts: Option<RecordingCounts>) -> Result<()> {
         {
             let mut state = self.lock();
             let counts = counts.map(|counts| state.written[0].at_end(counts));
@@ -268,7 +268,7 @@ impl WriteQueue {
             // Writing has failed meanwhile, with the error in the queue; or the file was abandoned, and what still waits
             // for it is not written.
             let mut state = self.lock();
-            state.queue = Queue::default();
+            state.queue = MessageQueue::default();
             return state.failure.clone().map_or(Ok(()), |failure| Err(failure.of_file(&self.path)));
         };
         std::mem::swap(&mut self.lock().queue, &mut writer.batch);
@@ -280,7 +280,7 @@ impl WriteQueue {
     }
 
     /// Writes the end, waits for the disk, and checks that the file still exists under its name.
-    fn close(&self, counts: Option<&Counts>) -> Result<()> {
+    fn close(&self, counts: Option<&RecordingCounts>) -> Result<()> {
         let Some(mut writer) = lock(&self.writer).take() else { return Ok(()) };
         let ends = std::mem::take(&mut self.lock().ends);
         if let Err(error) = writer.end(counts, &ends) {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::super::damage::{ANEW, BACK, DRIFTS, Found, JUMPS};
+use super::super::damage::{ANEW, BACK, DRIFTS, DamageCounts, JUMPS};
 
 /// Range of a counter: whole numbers are assumed to have 32 bits.
 const TURN: f64 = 4_294_967_296.0;
@@ -89,7 +89,7 @@ impl Anchor {
 }
 
 /// How a stamp follows the one before.
-enum Step {
+enum StampStep {
     /// As arrival has it, after so many us of turns of the counter.
     Fits(f64),
     /// Behind it, by less than a restart.
@@ -103,8 +103,8 @@ enum Step {
 impl State {
     /// How a stamp, us, follows.
     #[allow(clippy::cast_precision_loss)]
-    fn step(&self, stamp_us: f64, at_ns: i64, unit_us: f64) -> Step {
-        let Some((last, last_ns)) = self.last else { return Step::Fits(0.0) };
+    fn step(&self, stamp_us: f64, at_ns: i64, unit_us: f64) -> StampStep {
+        let Some((last, last_ns)) = self.last else { return StampStep::Fits(0.0) };
         let passed = at_ns.saturating_sub(last_ns) as f64 * 1e-3;
         let t = stamp_us + self.added;
         let lacks = passed - (t - last);
@@ -113,21 +113,21 @@ impl State {
         // Arrival times determine the elapsed time within a second, or within a hundredth of a pause if that is longer.
         let near = STEP_US.max(passed.abs() * DRIFT);
         if self.whole && turns >= 1.0 && (lacks - turns * turn).abs() <= near {
-            Step::Fits(turns * turn)
+            StampStep::Fits(turns * turn)
         } else if t < last - STEP_US && lacks > near {
-            Step::Anew(lacks)
+            StampStep::Anew(lacks)
         } else if lacks < -near && passed >= 0.0 {
-            Step::Ahead
+            StampStep::Ahead
         } else if t < last {
-            Step::Back
+            StampStep::Back
         } else {
-            Step::Fits(0.0)
+            StampStep::Fits(0.0)
         }
     }
 
     /// Whether a stamp follows as if the one between were damaged.
     fn fits(&self, stamp_us: f64, at_ns: i64, unit_us: f64) -> bool {
-        self.last.is_some() && matches!(self.step(stamp_us, at_ns, unit_us), Step::Fits(_))
+        self.last.is_some() && matches!(self.step(stamp_us, at_ns, unit_us), StampStep::Fits(_))
     }
 }
 
@@ -146,7 +146,7 @@ impl StreamClock {
             return None;
         }
         let mut step = self.state.step(stamp_us, at_ns, self.unit_us);
-        let unlike = !matches!(step, Step::Fits(turns) if turns == 0.0);
+        let unlike = !matches!(step, StampStep::Fits(turns) if turns == 0.0);
         if let Some((state, anew)) = self.before.take()
             && unlike
             && state.fits(stamp_us, at_ns, self.unit_us)
@@ -160,19 +160,19 @@ impl StreamClock {
             self.state = state;
         }
         let state = self.state;
-        let anew = matches!(step, Step::Anew(_) | Step::Ahead);
+        let anew = matches!(step, StampStep::Anew(_) | StampStep::Ahead);
         match step {
-            Step::Fits(turns) => self.state.added += turns,
-            Step::Back => {
+            StampStep::Fits(turns) => self.state.added += turns,
+            StampStep::Back => {
                 self.back += 1;
                 self.doubt(stamp_us + state.added - 1.0);
             }
-            Step::Anew(lacks) => {
+            StampStep::Anew(lacks) => {
                 self.before = Some((state, true));
                 self.state.added += lacks;
                 self.resets += 1;
             }
-            Step::Ahead => {
+            StampStep::Ahead => {
                 self.before = Some((state, false));
                 self.jumped(state.last);
             }
@@ -212,9 +212,9 @@ impl StreamClock {
     }
 
     /// What is wrong with the stamps so far.
-    pub fn found(&self) -> Found {
+    pub fn found(&self) -> DamageCounts {
         let damage = [(ANEW, self.resets), (BACK, self.back), (JUMPS, self.jumps), (DRIFTS, self.drifts)];
         let damage: BTreeMap<String, u64> = damage.into_iter().map(|(cause, n)| (cause.to_owned(), n)).collect();
-        Found { damage, doubtful_after_us: self.after, ..Found::default() }
+        DamageCounts { damage, doubtful_after_us: self.after, ..DamageCounts::default() }
     }
 }

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::{
-    Condition, Counts, Ending, Found, JUMPED_BEFORE, NO_END, NO_LINE_LOST, NOTHING_LOST, Status, Verdict, counted,
+    Condition, DamageCounts, FileEnding, JUMPED_BEFORE, NO_END, NO_LINE_LOST, NOTHING_LOST, RecordingCounts,
+    RecordingStatus, Verdict, counted,
 };
 use crate::recording::Topic;
 use crate::recording::damage::{BACK, DRIFTS, JUMPS};
 
-impl Counts {
+impl RecordingCounts {
     /// What the decoder could not use, by cause, with what reading the file found.
     fn decoder_with(&self, found: &BTreeMap<String, u64>) -> BTreeMap<String, u64> {
         let mut all = self.decoder.clone();
@@ -32,7 +33,7 @@ impl Verdict {
         let skipped = rebuilt.gaps + bad_chunks + rebuilt.large_chunks > 0;
         let mut no_counts = false;
         let (mut verdict, why) = match ending {
-            Some(Ending::Finished { mut counts }) => {
+            Some(FileEnding::Finished { mut counts }) => {
                 if changed && !skipped {
                     // What reading lacks beside what had been missing when it was recorded was lost with the change.
                     let before = counts.missing.unwrap_or(0);
@@ -44,7 +45,7 @@ impl Verdict {
             }
             ending => {
                 let why = match ending {
-                    Some(Ending::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
+                    Some(FileEnding::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
                     _ if rebuilt.no_end => NO_END.to_owned(),
                     _ => "not finished: what came last is missing".to_owned(),
                 };
@@ -52,8 +53,9 @@ impl Verdict {
                 no_counts = counts.is_none() && converted.is_none();
                 // The file may hold more than its counts, which are saved now and then; where parts were skipped,
                 // decoding finds faults that never came.
-                let counts = counts.unwrap_or_else(|| Counts { recorded: messages, ..Counts::default() });
-                let found = if skipped { Found::default() } else { decoded.clone() };
+                let counts =
+                    counts.unwrap_or_else(|| RecordingCounts { recorded: messages, ..RecordingCounts::default() });
+                let found = if skipped { DamageCounts::default() } else { decoded.clone() };
                 let (inner, before) = if skipped { (0, 0) } else { (skipped_numbers, before_first) };
                 let counted = || Self::of_counts(&so_far_with(counts, found, inner, before), nothing_lost);
                 (converted.unwrap_or_else(counted), Some(why))
@@ -117,18 +119,18 @@ impl Verdict {
             bad.push("what else was there is not known".to_owned());
         }
         let whole = why.is_none() || rebuilt.no_end;
-        if (why.is_some() || lost_here) && verdict.status == Status::NothingArrived {
+        if (why.is_some() || lost_here) && verdict.status == RecordingStatus::NothingArrived {
             // It may have come after what is left of the file, or is lost there.
-            verdict.status = Status::Complete;
+            verdict.status = RecordingStatus::Complete;
         }
         if !bad.is_empty() || rebuilt.no_end {
-            verdict.status = verdict.status.max(Status::Damaged);
+            verdict.status = verdict.status.max(RecordingStatus::Damaged);
         }
         if !whole || rebuilt.torn_bytes > 0 {
-            verdict.status = verdict.status.max(Status::Unfinished);
+            verdict.status = verdict.status.max(RecordingStatus::Unfinished);
         }
         if lost_here {
-            verdict.status = verdict.status.max(Status::Lost);
+            verdict.status = verdict.status.max(RecordingStatus::Lost);
         }
         let damage = if lost_here { "LOST" } else { "damage" };
         let damaged_file = (!bad.is_empty()).then(|| format!("{damage} in the file: {}", bad.join(", ")));
@@ -163,7 +165,12 @@ impl Verdict {
 
 /// The last counts of an unfinished recording, with what decoding found since. The arrival numbers that the file skips, and
 /// those before its first, were dropped by the queue, or another program left their datagrams out.
-fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64, before_first: u64) -> Counts {
+fn so_far_with(
+    mut counts: RecordingCounts,
+    found: DamageCounts,
+    skipped_numbers: u64,
+    before_first: u64,
+) -> RecordingCounts {
     // If more was received than the file holds, the difference is in its unfinished end.
     counts.received = 0;
     counts.left_out = (skipped_numbers + before_first).saturating_sub(counts.dropped_by_queue);

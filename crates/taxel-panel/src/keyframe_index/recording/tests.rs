@@ -54,14 +54,14 @@ fn recorded(name: &str, ending: &str, seed: u64) -> PathBuf {
         }
     }
     match writer {
-        Some(writer) => drop(writer.finish(taxel_live::recording::Counts::default()).unwrap()),
+        Some(writer) => drop(writer.finish(taxel_live::recording::RecordingCounts::default()).unwrap()),
         None => std::fs::write(&path, bytes).unwrap(),
     }
     path
 }
 
 /// Held values at a time, computed from the changes alone, without state or keyframe.
-pub(in crate::keyframe_index) fn held_at(changes: &[Change], t: i64, taxels: usize) -> (Vec<u16>, u64) {
+pub(in crate::keyframe_index) fn held_at(changes: &[TaxelChange], t: i64, taxels: usize) -> (Vec<u16>, u64) {
     let (mut held, mut events) = (vec![UNKNOWN; taxels], 0);
     for change in changes.iter().take_while(|change| change.t <= t) {
         if change.ticks != UNKNOWN {
@@ -72,13 +72,13 @@ pub(in crate::keyframe_index) fn held_at(changes: &[Change], t: i64, taxels: usi
     (held, events)
 }
 
-fn decode_all(index: &Arc<RecordingIndex>) -> Vec<Change> {
+fn decode_all(index: &Arc<RecordingIndex>) -> Vec<TaxelChange> {
     let mut events = Events::empty(index.header.array.clone());
     match &index.source {
-        Source::Mcap(reader) => {
+        OpenedFile::Mcap(reader) => {
             events = reader.decode(wire::Pairing::Direct, taxel_core::Stop::never()).unwrap().events;
         }
-        Source::Lsa(..) => {
+        OpenedFile::Lsa(..) => {
             let bytes = std::fs::read(&index.path).unwrap();
             let mut decoder = Decoder::new(index.header.array.clone());
             decoder.push_into(&bytes, None, &mut events);
@@ -102,7 +102,7 @@ fn shown(player: &mut Player, us: i64) -> (std::ops::Range<i64>, Vec<u8>, Vec<u8
 }
 
 /// The same computed from the changes alone: each change up to `t` counts in its column, at most 15 per row.
-fn counted(changes: &[Change], columns: std::ops::Range<i64>, us: i64, t: i64, array: &Array) -> Vec<u8> {
+fn counted(changes: &[TaxelChange], columns: std::ops::Range<i64>, us: i64, t: i64, array: &Array) -> Vec<u8> {
     let rows = usize::from(array.rows);
     let mut raster = vec![0_u8; (columns.end - columns.start) as usize * rows];
     for change in changes.iter().filter(|c| c.t <= t && columns.contains(&column_of(c.t, us))) {
@@ -183,7 +183,7 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             let edges = [begin * us, t];
             let at_edge = |t: i64| edges.iter().any(|edge| (t - edge).abs() <= 100);
             for row in 0..rows {
-                let of = |change: &&Change| change.taxel as usize / usize::from(index.header.array.columns) == row;
+                let of = |change: &&TaxelChange| change.taxel as usize / usize::from(index.header.array.columns) == row;
                 let may = changes.iter().filter(|change| at_edge(change.t)).filter(of).count() as i64;
                 let differ = (of_row(&spikes, row) - of_row(&all, row)).abs();
                 assert!(differ <= may, "{ending}: spikes of row {row} at {t} us by {us} us: {differ}, not {may}");

@@ -1,12 +1,12 @@
 //! Lower bounds on 6.14.
 
 use super::Lagrangian;
-use crate::learn::statement::{Norm, Point, Proof, Tangents};
+use crate::learn::statement::{Norm, RelaxedPoint, RelaxedProof, Tangents};
 use crate::vectors::{add, dot};
 
 impl Lagrangian<'_> {
     /// The lower bound that the present multipliers prove.
-    pub(super) fn proof(&mut self) -> Proof {
+    pub(super) fn proof(&mut self) -> RelaxedProof {
         self.multipliers();
         let at = Tangents {
             weights: &self.weights,
@@ -20,7 +20,7 @@ impl Lagrangian<'_> {
 
     /// The lower bound at weights of 0, with the subgradient of the norm nearest to the sum of all other slopes
     /// there.
-    pub(super) fn proof_at_zero(&self, zero: &Point) -> Proof {
+    pub(super) fn proof_at_zero(&self, zero: &RelaxedPoint) -> RelaxedProof {
         let (problem, o) = (self.problem, self.objective);
         let silent = problem.silent.len();
         let slope = |(k, &x): (usize, &f64)| match k < silent {

@@ -10,7 +10,7 @@ const WHOLE: f64 = 0.05;
 const EXACT: f64 = 1e-3;
 
 /// A kink on the searched line: its share at the start, the share's change, and its part of the slope.
-struct Passing {
+struct PassedKink {
     share: f64,
     change: f64,
     lean: f64,
@@ -86,7 +86,7 @@ impl Lagrangian<'_> {
     }
 
     /// The kinks that a step of length `end` crosses, and the slope of all rows that stay beyond their kinks.
-    fn passing(&self, rise: &[f64], end: f64) -> (Vec<Passing>, f64) {
+    fn passing(&self, rise: &[f64], end: f64) -> (Vec<PassedKink>, f64) {
         let silent = self.problem.silent.len();
         let (d, (c, lower)) = (self.objective.d, self.objective.kink_of_c());
         let [one, other] = self.delta.map(|delta| 1.0 / delta);
@@ -102,7 +102,7 @@ impl Lagrangian<'_> {
             } else if from.min(to) >= low + 1.0 {
                 steady += (low + 1.0) * weight * r;
             } else {
-                passing.push(Passing { share: from, change, lean: weight * r, low });
+                passing.push(PassedKink { share: from, change, lean: weight * r, low });
             }
         }
         (passing, steady)
@@ -114,7 +114,7 @@ impl Lagrangian<'_> {
         direction: &[f64],
         smooth: (f64, f64),
         steady: f64,
-        passing: &[Passing],
+        passing: &[PassedKink],
         lift: &[f64],
     ) -> f64 {
         let mut sum = smooth.0 + t * smooth.1 + steady;

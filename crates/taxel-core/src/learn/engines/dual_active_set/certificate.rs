@@ -2,7 +2,7 @@
 
 use super::DualActiveSet;
 use super::kernels::add_rows;
-use super::rows::{Kind, Multipliers, Ray};
+use super::rows::{ConstraintKind, Multipliers, Ray};
 
 impl DualActiveSet {
     /// Converts multipliers by slot to multipliers of the rows as stated.
@@ -11,8 +11,8 @@ impl DualActiveSet {
         for &slot in &self.live {
             let u = by_slot[slot] / self.rows[slot].length;
             match self.rows[slot].kind {
-                Kind::Equality(k) => out.equalities[k] = u,
-                Kind::Inequality(id) if u > 0.0 => out.inequalities.push((id, u)),
+                ConstraintKind::Equality(k) => out.equalities[k] = u,
+                ConstraintKind::Inequality(id) if u > 0.0 => out.inequalities.push((id, u)),
                 _ => {}
             }
         }
@@ -23,7 +23,7 @@ impl DualActiveSet {
     /// The ray as a proof, if it is one: the multipliers of bounds are left out, and the gap must exceed
     /// rounding.
     pub(super) fn proof(&self, by_slot: Vec<f64>) -> Option<Ray> {
-        let bounds = |slot: usize| matches!(self.rows[slot].kind, Kind::Lower(_) | Kind::Upper(_));
+        let bounds = |slot: usize| matches!(self.rows[slot].kind, ConstraintKind::Lower(_) | ConstraintKind::Upper(_));
         let slots: Vec<usize> = self.live.iter().copied().filter(|&s| by_slot[s] != 0.0 && !bounds(s)).collect();
         let by: Vec<f64> =
             slots.iter().map(|&s| if self.is_equality(s) { by_slot[s] } else { by_slot[s].max(0.0) }).collect();

@@ -5,7 +5,7 @@ use crate::vectors::{Aligned, LANES, dot};
 
 /// L with `L L' = G` over the active rows, in the order of their activation.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Factor {
+pub(super) struct CholeskyFactor {
     /// L by columns; entries above the diagonal are undefined, those below the last row are 0 to the end of the line.
     l: Aligned,
     stride: usize,
@@ -15,7 +15,7 @@ pub(super) struct Factor {
     limits: Vec<f64>,
 }
 
-impl Factor {
+impl CholeskyFactor {
     /// The number of rows in the factor.
     pub(super) fn len(&self) -> usize {
         self.inverse.len()

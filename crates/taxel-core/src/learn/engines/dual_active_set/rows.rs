@@ -18,7 +18,7 @@ impl RowId {
 
 /// What a row of the working set constrains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ConstraintKind {
     Free,
     Equality(usize),
     Inequality(RowId),
@@ -28,13 +28,13 @@ pub(super) enum Kind {
 
 /// A row of the working set, scaled to length 1.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Row {
-    pub(super) kind: Kind,
+pub(super) struct WorkingRow {
+    pub(super) kind: ConstraintKind,
     pub(super) length: f64,
     pub(super) limit: f64,
 }
 
-impl Row {
+impl WorkingRow {
     /// The violation up to which the row counts as satisfied.
     pub(super) fn tolerance(&self) -> f64 {
         (TOLERANCE / self.length).clamp(FINEST, TOLERANCE)

@@ -35,7 +35,7 @@ impl Stated {
         solver
     }
 
-    fn solve(&self) -> (DualActiveSet, Outcome) {
+    fn solve(&self) -> (DualActiveSet, SolveOutcome) {
         let mut solver = self.solver();
         for (a, limit) in &self.inequalities {
             solver.inequality(a, *limit).unwrap();
@@ -101,11 +101,11 @@ fn random_problems_end_optimal_or_refuted() {
         let bound = [0.1, 0.5, 5.0][trial % 3];
         let stated = Stated::random(&mut random, n, equalities, inequalities, bound);
         match stated.solve() {
-            (solver, Outcome::Optimal) => stated.assert_optimal(&solver),
-            (_, Outcome::Infeasible(ray)) => stated.assert_refuted(&ray),
-            (_, Outcome::Stopped) => panic!("problem {trial} is undecided"),
+            (solver, SolveOutcome::Optimal) => stated.assert_optimal(&solver),
+            (_, SolveOutcome::Infeasible(ray)) => stated.assert_refuted(&ray),
+            (_, SolveOutcome::Stopped) => panic!("problem {trial} is undecided"),
         }
-        counts[usize::from(matches!(stated.solve().1, Outcome::Optimal))] += 1;
+        counts[usize::from(matches!(stated.solve().1, SolveOutcome::Optimal))] += 1;
     }
     assert!(counts[0] > 100 && counts[1] > 100, "{counts:?}");
 }
@@ -120,15 +120,15 @@ fn equalities_that_repeat_others_are_met_or_refuted() {
         stated.equalities.truncate(4);
         stated.equalities.push((sum.clone(), value + off));
         match (stated.solve(), off == 0.0) {
-            ((solver, Outcome::Optimal), true) => stated.assert_optimal(&solver),
-            ((_, Outcome::Infeasible(ray)), false) => stated.assert_refuted(&ray),
+            ((solver, SolveOutcome::Optimal), true) => stated.assert_optimal(&solver),
+            ((_, SolveOutcome::Infeasible(ray)), false) => stated.assert_refuted(&ray),
             ((_, verdict), _) => panic!("off by {off}: {verdict:?}"),
         }
     }
     stated.equalities.truncate(4);
     stated.equalities.push((vec![0.0; 12], 0.3));
     match stated.solve().1 {
-        Outcome::Infeasible(ray) => stated.assert_refuted(&ray),
+        SolveOutcome::Infeasible(ray) => stated.assert_refuted(&ray),
         verdict => panic!("a target without inputs: {verdict:?}"),
     }
 }
@@ -145,7 +145,7 @@ fn cuts_that_are_nearly_parallel_are_told_apart() {
             stated.inequalities.push((near, limit - 0.01 * apart * length));
         }
         match stated.solve() {
-            (solver, Outcome::Optimal) => stated.assert_optimal(&solver),
+            (solver, SolveOutcome::Optimal) => stated.assert_optimal(&solver),
             (_, verdict) => panic!("{apart} apart: {verdict:?}"),
         }
     }
@@ -162,7 +162,7 @@ fn a_cut_takes_the_place_of_one_that_it_hardly_differs_from() {
     let mut random = StdRng::seed_from_u64(6);
     let mut stated = Stated::random(&mut random, 20, 3, 0, 9.0);
     let mut solver = stated.solver();
-    assert_eq!(solver.solve(Stop::never()).unwrap(), Outcome::Optimal);
+    assert_eq!(solver.solve(Stop::never()).unwrap(), SolveOutcome::Optimal);
     let a: Vec<f64> = (0..20).map(|_| random.random_range(0.0..1.0)).collect();
     let limit = dot(&a, solver.weights()) - 0.3;
     let near = beside(&mut random, &a);
@@ -174,7 +174,7 @@ fn a_cut_takes_the_place_of_one_that_it_hardly_differs_from() {
         solver.replace_similar(&fresh);
         assert_eq!(solver.place[fresh[0]].is_some(), exchanged, "it is held at once where one is near");
         assert_eq!(solver.active.len(), 3 + usize::from(exchanged), "in the place of that");
-        assert_eq!(solver.solve(Stop::never()).unwrap(), Outcome::Optimal);
+        assert_eq!(solver.solve(Stop::never()).unwrap(), SolveOutcome::Optimal);
     }
     assert_eq!(solver.multipliers().inequalities.iter().map(|(id, _)| *id).collect::<Vec<_>>(), held[1..]);
     stated.assert_optimal(&solver);
@@ -209,19 +209,19 @@ fn rows_in_rounds_give_what_all_rows_at_once_give() {
                 }
             }
             round += 1;
-            if !added || verdict != Outcome::Optimal {
+            if !added || verdict != SolveOutcome::Optimal {
                 break verdict;
             }
             assert!(round < 100);
         };
         match verdict {
-            Outcome::Optimal => {
-                assert_eq!(last, Outcome::Optimal);
+            SolveOutcome::Optimal => {
+                assert_eq!(last, SolveOutcome::Optimal);
                 for (a, b) in whole.weights().iter().zip(solver.weights()) {
                     assert!((a - b).abs() < 1e-9);
                 }
             }
-            _ => assert!(matches!(last, Outcome::Infeasible(_))),
+            _ => assert!(matches!(last, SolveOutcome::Infeasible(_))),
         }
     }
 }
@@ -231,7 +231,7 @@ fn a_start_from_multipliers_ends_where_a_cold_one_does() {
     let mut random = StdRng::seed_from_u64(5);
     let mut stated = Stated::random(&mut random, 30, 5, 40, 3.0);
     let (cold, verdict) = stated.solve();
-    assert_eq!(verdict, Outcome::Optimal);
+    assert_eq!(verdict, SolveOutcome::Optimal);
     let mut warm = stated.solver();
     for (a, limit) in &stated.inequalities {
         warm.inequality(a, *limit).unwrap();
@@ -248,7 +248,7 @@ fn a_start_from_multipliers_ends_where_a_cold_one_does() {
         warm.inequality(a, *limit).unwrap();
     }
     warm.start(&cold.multipliers()).unwrap();
-    assert_eq!(warm.solve(Stop::never()).unwrap(), Outcome::Optimal);
+    assert_eq!(warm.solve(Stop::never()).unwrap(), SolveOutcome::Optimal);
     stated.assert_optimal(&warm);
 }
 
@@ -266,5 +266,5 @@ fn nonsense_is_refused() {
     assert!(solver.start(&start(vec![1.0], 1.0)).is_err());
     assert!(solver.start(&start(vec![], -1.0)).is_err());
     assert!(solver.start(&start(vec![], 1.0)).is_ok());
-    assert_eq!(solver.solve(Stop::when(&|| true)).unwrap(), Outcome::Stopped);
+    assert_eq!(solver.solve(Stop::when(&|| true)).unwrap(), SolveOutcome::Stopped);
 }

@@ -2,14 +2,14 @@
 
 use super::DualActiveSet;
 use super::kernels::{add_rows, rows_times};
-use super::rows::{Kind, TOLERANCE};
+use super::rows::{ConstraintKind, TOLERANCE};
 
 /// Active rows are refined until they are satisfied to this, as stated or scaled to length 1.
 const REFINED: f64 = 2e-14;
 
 impl DualActiveSet {
     pub(super) fn is_equality(&self, slot: usize) -> bool {
-        matches!(self.rows[slot].kind, Kind::Equality(_))
+        matches!(self.rows[slot].kind, ConstraintKind::Equality(_))
     }
 
     pub(super) fn violation(&self, slot: usize) -> f64 {

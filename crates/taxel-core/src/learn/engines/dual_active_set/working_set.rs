@@ -1,7 +1,7 @@
 //! The working set: its rows by slot, and their Gram matrix (the products of all pairs).
 
 use super::kernels::products;
-use super::rows::{Kind, Row};
+use super::rows::{ConstraintKind, WorkingRow};
 use super::{BLOCK, DualActiveSet};
 use crate::vectors::{Aligned, LANES, dot};
 use crate::{Result, problem};
@@ -11,7 +11,7 @@ use crate::{Result, problem};
 const AT_FIRST: usize = 1024;
 
 impl DualActiveSet {
-    pub(super) fn add(&mut self, kind: Kind, coefficients: &[f64], limit: f64) -> Result<usize> {
+    pub(super) fn add(&mut self, kind: ConstraintKind, coefficients: &[f64], limit: f64) -> Result<usize> {
         if coefficients.len() != self.lower.len() {
             return Err(problem!("row: {} coefficients for {} weights", coefficients.len(), self.lower.len()));
         }
@@ -20,7 +20,7 @@ impl DualActiveSet {
         }
         let length = dot(coefficients, coefficients).sqrt();
         let length = if length > 0.0 { length } else { 1.0 };
-        let slot = self.slot(Row { kind, length, limit: limit / length });
+        let slot = self.slot(WorkingRow { kind, length, limit: limit / length });
         for (to, a) in self.coefficients[slot * self.stride..].iter_mut().zip(coefficients) {
             *to = a / length;
         }
@@ -29,7 +29,7 @@ impl DualActiveSet {
     }
 
     /// Puts a row into a free slot, with coefficients of 0.
-    pub(super) fn slot(&mut self, row: Row) -> usize {
+    pub(super) fn slot(&mut self, row: WorkingRow) -> usize {
         let slot = self.free.pop().unwrap_or(self.rows.len());
         if slot == self.rows.len() {
             self.rows.push(row);
@@ -99,9 +99,12 @@ impl DualActiveSet {
         if let Some(slot) = self.bounds[n][usize::from(upper)] {
             return slot;
         }
-        let (kind, sign, limit) =
-            if upper { (Kind::Upper(n), 1.0, self.upper[n]) } else { (Kind::Lower(n), -1.0, -self.lower[n]) };
-        let slot = self.slot(Row { kind, length: 1.0, limit });
+        let (kind, sign, limit) = if upper {
+            (ConstraintKind::Upper(n), 1.0, self.upper[n])
+        } else {
+            (ConstraintKind::Lower(n), -1.0, -self.lower[n])
+        };
+        let slot = self.slot(WorkingRow { kind, length: 1.0, limit });
         self.bounds[n][usize::from(upper)] = Some(slot);
         self.coefficients[slot * self.stride + n] = sign;
         self.enlarge_gram();

@@ -3,7 +3,7 @@
 use super::dense::times;
 use super::interior::PrimalDual;
 use super::polish::polish;
-use super::program::{Guess, Point, Program, Proof, retain};
+use super::program::{Guess, MixedProof, PrimalDualPoint, Program, retain};
 use crate::learn::engines::nearest;
 use crate::learn::fit::Engine;
 use crate::learn::statement::{NOTHING, relative_gap};
@@ -11,13 +11,13 @@ use crate::{Result, Stop};
 
 /// The state from which a later call with more rows can continue.
 #[derive(Debug, Clone)]
-pub(crate) struct Start {
+pub(crate) struct ResumeState {
     pub(super) state: PrimalDual,
     /// The last polished point, in the program's units, and its binding rows and bounds.
-    pub(super) exact: Option<(Point, Guess)>,
+    pub(super) exact: Option<(PrimalDualPoint, Guess)>,
 }
 
-impl Start {
+impl ResumeState {
     /// Removes the inequality rows that the caller removes; rows added since the call that made this start come
     /// last.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
@@ -37,28 +37,28 @@ pub(crate) struct MixedMinimum {
     pub(crate) inequality: Vec<f64>,
     /// A lower bound on the objective over these rows, and therefore over these and more.
     pub(crate) bound: f64,
-    pub(crate) proof: Proof,
+    pub(crate) proof: MixedProof,
     pub(crate) engine: Engine,
     pub(crate) stopped: bool,
-    pub(crate) start: Start,
+    pub(crate) start: ResumeState,
 }
 
 /// The best point so far and the best bound.
-pub(super) struct Best<'a> {
+pub(super) struct BestPoint<'a> {
     pub(super) program: &'a Program,
-    pub(super) point: Point,
+    pub(super) point: PrimalDualPoint,
     pub(super) guess: Option<Guess>,
     pub(super) met: bool,
     pub(super) objective: f64,
     pub(super) bound: f64,
     /// The point whose multipliers prove the bound.
-    proof: Point,
+    proof: PrimalDualPoint,
 }
 
-impl<'a> Best<'a> {
+impl<'a> BestPoint<'a> {
     pub(super) fn new(program: &'a Program) -> Self {
         let weights = program.lower.iter().zip(&program.upper).map(|(l, u)| 0.0_f64.clamp(*l, *u)).collect();
-        let point = Point {
+        let point = PrimalDualPoint {
             weights,
             equality: vec![0.0; program.equal_to.len()],
             inequality: vec![0.0; program.limit.len()],
@@ -69,7 +69,7 @@ impl<'a> Best<'a> {
         Self { program, point, guess: None, met: false, objective: f64::INFINITY, bound: 0.0, proof }
     }
 
-    pub(super) fn offer(&mut self, point: Point, guess: Option<Guess>) {
+    pub(super) fn offer(&mut self, point: PrimalDualPoint, guess: Option<Guess>) {
         let objective = self.program.objective(&point.weights);
         let met = self.program.met(&point.weights);
         let bound = self.program.bound(&point);
@@ -81,7 +81,13 @@ impl<'a> Best<'a> {
         }
     }
 
-    pub(super) fn improve(&mut self, near: &Point, guess: Guess, tolerance: f64, stop: Stop<'_>) -> Result<()> {
+    pub(super) fn improve(
+        &mut self,
+        near: &PrimalDualPoint,
+        guess: Guess,
+        tolerance: f64,
+        stop: Stop<'_>,
+    ) -> Result<()> {
         let program = self.program;
         if let Some((point, guess)) = polish(program, near, guess, tolerance, stop) {
             self.offer(point, Some(guess));
@@ -94,13 +100,13 @@ impl<'a> Best<'a> {
         if program.gap(near) <= tolerance
             && let Some(weights) = nearest(&near.weights, &program.hard(), &program.lower, &program.upper, stop)?
         {
-            self.offer(Point { weights, ..near.clone() }, None);
+            self.offer(PrimalDualPoint { weights, ..near.clone() }, None);
         }
         Ok(())
     }
 
     /// Continues from a polished point after rows were added.
-    pub(super) fn exchange(&mut self, point: &Point, guess: &Guess, tolerance: f64, stop: Stop<'_>) {
+    pub(super) fn exchange(&mut self, point: &PrimalDualPoint, guess: &Guess, tolerance: f64, stop: Stop<'_>) {
         let (mut point, mut guess) = (point.clone(), guess.clone());
         let below = times(&self.program.below, &point.weights);
         let added = below.iter().zip(&self.program.limit).skip(guess.binding.len());
@@ -131,7 +137,7 @@ impl<'a> Best<'a> {
             proof: program.proof(&self.proof),
             engine,
             stopped,
-            start: Start { state, exact: self.guess.map(|guess| (self.point, guess)) },
+            start: ResumeState { state, exact: self.guess.map(|guess| (self.point, guess)) },
         }
     }
 }

@@ -15,7 +15,7 @@ use faer::Mat;
 
 use self::cone::cone_step;
 pub(super) use self::variables::PrimalDual;
-use self::variables::{Part, Residual, Room, Step};
+use self::variables::{Direction, Residual, WeightPart, Workspace};
 use super::dense::{add_gram, times};
 use super::program::{Iterate, Program};
 use crate::Stop;
@@ -42,7 +42,7 @@ fn wall(v: &[f64], d: &[f64]) -> f64 {
 /// The interior-point solver of one program.
 pub(super) struct Interior<'a> {
     program: &'a Program,
-    parts: Vec<Part>,
+    parts: Vec<WeightPart>,
     base: Vec<f64>,
     /// `2 lift B'B` plus the curvature of a squared l2 term, lower triangle.
     curvature: Mat<f64>,
@@ -55,13 +55,13 @@ impl<'a> Interior<'a> {
         let (mut parts, mut base) = (Vec::new(), vec![0.0; n]);
         for (synapse, (&lower, &upper)) in program.lower.iter().zip(&program.upper).enumerate() {
             if program.l1 > 0.0 && lower < 0.0 && upper > 0.0 {
-                parts.push(Part { synapse, sign: 1.0, range: upper, cost: program.l1 });
-                parts.push(Part { synapse, sign: -1.0, range: -lower, cost: program.l1 });
+                parts.push(WeightPart { synapse, sign: 1.0, range: upper, cost: program.l1 });
+                parts.push(WeightPart { synapse, sign: -1.0, range: -lower, cost: program.l1 });
             } else {
                 base[synapse] = lower;
                 let cost = if lower >= 0.0 { program.l1 } else { -program.l1 };
                 if upper > lower {
-                    parts.push(Part { synapse, sign: 1.0, range: upper - lower, cost });
+                    parts.push(WeightPart { synapse, sign: 1.0, range: upper - lower, cost });
                 }
             }
         }
@@ -80,7 +80,7 @@ impl<'a> Interior<'a> {
     /// 1.
     pub(super) fn start(&self) -> PrimalDual {
         let (n, program) = (self.program.width(), self.program);
-        let split = |p: &Part| self.base[p.synapse] == 0.0;
+        let split = |p: &WeightPart| self.base[p.synapse] == 0.0;
         let x: Vec<f64> =
             self.parts.iter().map(|p| if split(p) { (0.5 * p.range).min(1.0) } else { 0.5 * p.range }).collect();
         let w = self.weights(&x);
@@ -151,7 +151,7 @@ impl<'a> Interior<'a> {
         let (mut best, mut merit, mut least) = (state.clone(), f64::INFINITY, f64::INFINITY);
         let (mut idle, mut iterations) = (0, 0);
         let n = program.width();
-        let mut room = Room { matrix: Mat::zeros(n, n), scaled: Vec::new() };
+        let mut room = Workspace { matrix: Mat::zeros(n, n), scaled: Vec::new() };
         loop {
             let r = self.residual(state);
             let mu = self.complementarity(state, &r.w);
@@ -211,7 +211,7 @@ impl<'a> Interior<'a> {
         sum - program.tangent(&r.w)
     }
 
-    fn reach(&self, state: &PrimalDual, w: &[f64], step: &Step) -> f64 {
+    fn reach(&self, state: &PrimalDual, w: &[f64], step: &Direction) -> f64 {
         let mut most = wall(&state.x, &step.x).min(wall(&state.low, &step.low)).min(wall(&state.high, &step.high));
         for ((p, x), dx) in self.parts.iter().zip(&state.x).zip(&step.x) {
             if *dx > 0.0 {

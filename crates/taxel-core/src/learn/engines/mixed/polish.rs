@@ -7,7 +7,7 @@
 use faer::Mat;
 
 use super::dense::{Lu, add_gram, add_sum, times};
-use super::program::{Guess, MET, Point, Program, WeightState};
+use super::program::{Guess, MET, PrimalDualPoint, Program, WeightState};
 use crate::Stop;
 use crate::learn::statement::Norm;
 use crate::vectors::dot;
@@ -28,13 +28,13 @@ const WRONG: f64 = 1e-11;
 /// guess.
 pub(super) fn polish(
     program: &Program,
-    near: &Point,
+    near: &PrimalDualPoint,
     guess: Guess,
     tolerance: f64,
     stop: Stop<'_>,
-) -> Option<(Point, Guess)> {
+) -> Option<(PrimalDualPoint, Guess)> {
     let mut polish = Polish::new(program, near, guess);
-    let mut best: Option<(f64, Point, Guess)> = None;
+    let mut best: Option<(f64, PrimalDualPoint, Guess)> = None;
     let mut most = usize::MAX;
     for _ in 0..MOST_GUESSES {
         if stop.asked() {
@@ -72,7 +72,7 @@ struct Polish<'a> {
 }
 
 impl<'a> Polish<'a> {
-    fn new(program: &'a Program, near: &Point, guess: Guess) -> Self {
+    fn new(program: &'a Program, near: &PrimalDualPoint, guess: Guess) -> Self {
         let w = near.weights.clone();
         let mut out = Self {
             program,
@@ -116,9 +116,9 @@ impl<'a> Polish<'a> {
         gradient
     }
 
-    fn point(&self) -> Point {
+    fn point(&self) -> PrimalDualPoint {
         let program = self.program;
-        Point {
+        PrimalDualPoint {
             weights: self
                 .w
                 .iter()

@@ -23,7 +23,7 @@ pub(crate) struct Terms<'a> {
 
 /// Weights and multipliers; `pull` represents the gradient of `l2 |w|_2` and is no longer than `l2`.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Point {
+pub(crate) struct PrimalDualPoint {
     pub(crate) weights: Vec<f64>,
     pub(crate) equality: Vec<f64>,
     pub(crate) inequality: Vec<f64>,
@@ -41,7 +41,7 @@ pub(super) enum WeightState {
 
 /// The final state of an interior-point run.
 pub(super) struct Iterate {
-    pub(super) point: Point,
+    pub(super) point: PrimalDualPoint,
     /// The rows and bounds that appear to bind.
     pub(super) guess: Guess,
 }
@@ -78,7 +78,7 @@ pub(super) struct Program {
 
 /// The multipliers that prove a bound, in the caller's units: of the rows, of B, and the slope of the l2 term's tangent.
 #[derive(Debug, Clone)]
-pub(crate) struct Proof {
+pub(crate) struct MixedProof {
     pub(crate) equality: Vec<f64>,
     pub(crate) inequality: Vec<f64>,
     pub(crate) behind: Vec<f64>,
@@ -230,7 +230,7 @@ impl Program {
     }
 
     /// Solves the same program with Clarabel, as far as Clarabel gets.
-    pub(super) fn clarabel(&self, stop: Stop<'_>) -> Result<Point> {
+    pub(super) fn clarabel(&self, stop: Stop<'_>) -> Result<PrimalDualPoint> {
         let n = self.width();
         let mut gram = vec![0.0; n * n];
         let mut linear = vec![0.0; n];
@@ -257,7 +257,7 @@ impl Program {
             hard: self.hard(),
         };
         let answer = program.solve(1.0, 1e-11, stop)?;
-        Ok(Point {
+        Ok(PrimalDualPoint {
             weights: answer.weights,
             equality: answer.equality,
             inequality: answer.inequality,
@@ -266,7 +266,7 @@ impl Program {
     }
 
     /// The rows and bounds that appear to bind at the weights and multipliers of any solver.
-    pub(super) fn guess(&self, point: &Point) -> Guess {
+    pub(super) fn guess(&self, point: &PrimalDualPoint) -> Guess {
         const NEAR: f64 = 1e-7;
         let place = |(w, (l, u)): (&f64, (&f64, &f64))| match *w {
             w if w - l <= NEAR => WeightState::Lower,
@@ -283,19 +283,19 @@ impl Program {
     }
 
     /// The relative distance between the objective and the bound that these multipliers prove.
-    pub(super) fn gap(&self, point: &Point) -> f64 {
+    pub(super) fn gap(&self, point: &PrimalDualPoint) -> f64 {
         relative_gap(self.objective(&point.weights), self.bound(point))
     }
 
     /// The multipliers of a point that prove its bound, in the caller's units.
-    pub(super) fn proof(&self, point: &Point) -> Proof {
-        let Point { weights, equality, inequality, pull } = point;
+    pub(super) fn proof(&self, point: &PrimalDualPoint) -> MixedProof {
+        let PrimalDualPoint { weights, equality, inequality, pull } = point;
         let lifted = |missed: f64| 2.0 * self.lift * missed * self.cost;
         let pulled = |(pull, w): (&f64, &f64)| match self.norm {
             Norm::Norm => pull * self.cost / self.weight,
             Norm::Square => 2.0 * self.l2 * w * self.cost / self.weight,
         };
-        Proof {
+        MixedProof {
             equality: equality.iter().zip(&self.of_equal).map(|(y, scale)| y * self.cost / scale).collect(),
             inequality: inequality
                 .iter()
@@ -312,7 +312,7 @@ impl Program {
     /// Every term is replaced by a tangent below it: the norm by a `pull` no longer than its factor, a square by its
     /// slope at the weights, rows by their multipliers. The remaining function, linear plus l1 over the box, is
     /// minimised synapse by synapse. The largest rounding error of all these sums is subtracted.
-    pub(super) fn bound(&self, point: &Point) -> f64 {
+    pub(super) fn bound(&self, point: &PrimalDualPoint) -> f64 {
         let n = self.width();
         let w = &point.weights;
         let mut slope = vec![0.0; n];

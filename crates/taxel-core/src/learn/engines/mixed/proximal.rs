@@ -6,9 +6,9 @@
 //! dual active set. The centre c then moves to that minimum; as c converges, the multipliers become those of B alone
 //! (Rockafellar 1976, SIAM J. Control 14:877).
 
-use super::best::Best;
-use super::program::{Point, Program, power_of_2};
-use crate::learn::engines::{DualActiveSet, Outcome};
+use super::best::BestPoint;
+use super::program::{PrimalDualPoint, Program, power_of_2};
+use crate::learn::engines::{DualActiveSet, SolveOutcome};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
@@ -19,7 +19,7 @@ const CURVATURE: f64 = 1e-8;
 const SMALLER: f64 = 0.01;
 const LEAST_CURVATURE: f64 = 1e-16;
 
-impl Best<'_> {
+impl BestPoint<'_> {
     /// Proximal steps from these weights until the gap is at most `tolerance`, or the weights no longer change.
     pub(super) fn proximal(&mut self, from: &[f64], tolerance: f64, stop: Stop<'_>) -> Result<()> {
         let (mut centre, mut curvature) = (from.to_vec(), CURVATURE);
@@ -45,7 +45,7 @@ impl Best<'_> {
 impl Program {
     /// The minimum of B with this relative curvature around a centre; `None` on a stop, or if rounding prevents a
     /// solution.
-    fn step(&self, centre: &[f64], curvature: f64, stop: Stop<'_>) -> Result<Option<Point>> {
+    fn step(&self, centre: &[f64], curvature: f64, stop: Stop<'_>) -> Result<Option<PrimalDualPoint>> {
         let (n, targets) = (self.width(), self.wanted.len());
         let steepest = self.behind.chunks_exact(n).map(|row| dot(row, row)).fold(0.0, f64::max);
         // In units of the rows: rho = 2 lift scale^2.
@@ -77,7 +77,7 @@ impl Program {
             let (row, left) = state(coefficients, limit, None);
             engine.inequality(&row, left)?;
         }
-        if engine.solve(stop)? != Outcome::Optimal {
+        if engine.solve(stop)? != SolveOutcome::Optimal {
             return Ok(None);
         }
         let moved = centre.iter().zip(engine.weights()).map(|(w, step)| w + step);
@@ -88,6 +88,6 @@ impl Program {
             inequality[id.index()] = rho * z;
         }
         let equality = multipliers.equalities[..self.equal_to.len()].iter().map(|y| rho * y).collect();
-        Ok(Some(Point { weights, equality, inequality, pull: vec![0.0; n] }))
+        Ok(Some(PrimalDualPoint { weights, equality, inequality, pull: vec![0.0; n] }))
     }
 }

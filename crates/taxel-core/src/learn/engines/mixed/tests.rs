@@ -1,4 +1,4 @@
-use super::program::Point;
+use super::program::PrimalDualPoint;
 use super::*;
 use crate::learn::engines::nearest;
 use crate::learn::statement::{Norm, relative_gap};
@@ -77,7 +77,7 @@ impl Problem {
         self.go_on(None, 1e-8)
     }
 
-    fn go_on(&self, start: Option<&Start>, tolerance: f64) -> MixedMinimum {
+    fn go_on(&self, start: Option<&ResumeState>, tolerance: f64) -> MixedMinimum {
         minimise(&self.terms(), &self.rows(), &self.bounds(), SIZE, start, tolerance, Stop::never()).unwrap()
     }
 
@@ -257,7 +257,7 @@ fn the_bound_holds_for_any_multipliers() {
             let objective = problem.objective(&found.weights);
             for size in [0.0, 0.01, 0.1, 1.0] {
                 let mut near = |v: &[f64]| v.iter().map(|x| x + size * (random.random::<f64>() - 0.5)).collect();
-                let point = Point {
+                let point = PrimalDualPoint {
                     weights: near(&exact.weights),
                     equality: near(&exact.equality),
                     inequality: near(&exact.inequality),
@@ -303,7 +303,7 @@ fn from_what_clarabel_finds_the_same_objective_is_reached() {
         let problem = Problem::drawn(30, 3, 6, &mut random).with(l1, l2, lift);
         let program = problem.program();
         let point = program.clarabel(Stop::never()).unwrap();
-        let mut best = Best::new(&program);
+        let mut best = BestPoint::new(&program);
         best.improve(&point, program.guess(&point), 1e-8, Stop::never()).unwrap();
         assert!(best.met && best.gap() <= 1e-8);
         let native = problem.solve();

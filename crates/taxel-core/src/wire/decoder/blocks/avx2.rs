@@ -4,7 +4,7 @@ use std::arch::x86_64::*;
 
 use super::carried::{Carried, indices, value};
 use crate::vectors::TO_FRONT;
-use crate::wire::decoder::filling::Filling;
+use crate::wire::decoder::filling::FilledColumns;
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
 
 const WORDS: usize = 16;
@@ -45,13 +45,13 @@ const ALTERNATE: u32 = FIRSTS & 0xcccc_cccc;
 const SPLIT_PAIRS: u32 = 0x5555;
 
 /// Selected 16-bit lanes of a block, moved to the front of each half, and the number of lanes selected in each half.
-struct Chosen {
+struct SelectedLanes {
     early: usize,
     late: usize,
     shuffle: __m256i,
 }
 
-impl Chosen {
+impl SelectedLanes {
     /// Selects the lanes of a 16-bit mask.
     #[inline]
     #[target_feature(enable = "avx2,popcnt")]
@@ -107,7 +107,7 @@ pub(super) unsafe fn blocks(
     columns: u16,
     rows: u16,
     state: &mut Carried,
-    filling: &mut Filling<'_>,
+    filling: &mut FilledColumns<'_>,
 ) -> usize {
     // SAFETY: each table is 16 bytes long.
     let table = |t: &[u8; 16]| unsafe { _mm256_broadcastsi128_si256(_mm_loadu_si128(t.as_ptr().cast())) };
@@ -254,7 +254,7 @@ pub(super) unsafe fn blocks(
             if found != 0 && !filling.paired {
                 filling.begin_pairs();
             }
-            let rows = Chosen::new(changes);
+            let rows = SelectedLanes::new(changes);
             let ([t_early, t_late], [early, late]) = (rows.of(ahead), rows.of(place));
             let [p_early, p_late] = rows.of(polarity);
             let (columns, row_bits) = (_mm_set1_epi16(0x3f), |place| _mm_srli_epi16::<8>(place));
@@ -277,7 +277,7 @@ pub(super) unsafe fn blocks(
             }
             if filling.paired {
                 // For each change, from the open one before the block on, the lane after it: its intensity, or none.
-                let behind = Chosen::new(changes << 1 | open);
+                let behind = SelectedLanes::new(changes << 1 | open);
                 let [ticks_early, ticks_late] = behind.of(_mm256_and_si256(values, pair));
                 let [there_early, there_late] = behind.of(_mm256_srli_epi16::<15>(pair));
                 // SAFETY: as above; if a change is open, a row precedes `first`.

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::carried::{Carried, indices, value};
-use crate::wire::decoder::filling::{Filling, STREAMED};
+use crate::wire::decoder::filling::{FilledColumns, STREAMED};
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
 
 const WORDS: usize = 32;
@@ -69,7 +69,7 @@ pub(super) unsafe fn blocks(
     columns: u16,
     rows: u16,
     state: &mut Carried,
-    filling: &mut Filling<'_>,
+    filling: &mut FilledColumns<'_>,
 ) -> usize {
     // Each index table fills one register.
     // SAFETY: each is 64 bytes long.

@@ -1,7 +1,7 @@
 //! Decodes plain words one by one, on any machine.
 
 use super::carried::{Carried, value};
-use crate::wire::decoder::filling::Filling;
+use crate::wire::decoder::filling::FilledColumns;
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES};
 
 /// See [`super::blocks`]; decodes at most `most` words. The first pair of a filling counts as not plain.
@@ -10,7 +10,7 @@ pub(super) fn words(
     columns: u16,
     rows: u16,
     state: &mut Carried,
-    filling: &mut Filling<'_>,
+    filling: &mut FilledColumns<'_>,
     most: usize,
 ) -> usize {
     let words = most.min(bytes.len() / WORD_BYTES);

@@ -1,33 +1,40 @@
 //! Decodes a datagram's body, by its kind.
 
 use super::Decoder;
-use super::words::{self, Body, Meaning};
+use super::words::{self, BodyReader, Meaning};
 use crate::Marker;
 use crate::wire::columns::Table;
-use crate::wire::v2::{DIFFERENCES, Header, Kind, START, STOP, Status};
+use crate::wire::v2::{BoardTotals, BodyKind, DIFFERENCES, DatagramHeader, START, STOP};
 
 /// Five totals of 64 bits.
 const STATUS_BYTES: usize = 40;
 
 impl Decoder {
     /// `number` is the datagram's sequence number if it belongs to the latest session.
-    pub(super) fn body(&mut self, header: &Header, body: &[u8], base: i64, number: Option<i64>, out: &mut impl Table) {
-        let Some(kind) = Kind::of(header.kind) else {
+    pub(super) fn body(
+        &mut self,
+        header: &DatagramHeader,
+        body: &[u8],
+        base: i64,
+        number: Option<i64>,
+        out: &mut impl Table,
+    ) {
+        let Some(kind) = BodyKind::of(header.kind) else {
             self.counts.unknown_kind += 1;
             return;
         };
         match kind {
-            Kind::Changes | Kind::Small | Kind::Large | Kind::SmallStates | Kind::LargeStates => {
+            BodyKind::Changes | BodyKind::Small | BodyKind::Large | BodyKind::SmallStates | BodyKind::LargeStates => {
                 let Some(word) = kind.layout() else { return };
                 let meaning = match kind {
-                    Kind::SmallStates | Kind::LargeStates if number.is_none() => Meaning::StaleStates,
-                    Kind::SmallStates | Kind::LargeStates => Meaning::States,
+                    BodyKind::SmallStates | BodyKind::LargeStates if number.is_none() => Meaning::StaleStates,
+                    BodyKind::SmallStates | BodyKind::LargeStates => Meaning::States,
                     _ if header.flags & DIFFERENCES != 0 && word.value > 0 => Meaning::Differences,
                     _ => Meaning::Changes,
                 };
-                self.words(Body::new(word, meaning, header, base, body), out);
+                self.words(BodyReader::new(word, meaning, header, base, body), out);
             }
-            Kind::Markers => {
+            BodyKind::Markers => {
                 self.counts.malformed += u64::from(!body.len().is_multiple_of(8));
                 for marker in body.chunks_exact(8) {
                     let offset = u32::from_le_bytes([marker[0], marker[1], marker[2], marker[3]]);
@@ -42,8 +49,8 @@ impl Decoder {
                     out.mark(Marker { t, start: code == START });
                 }
             }
-            Kind::Status if body.len() < STATUS_BYTES => self.counts.malformed += 1,
-            Kind::Status => {
+            BodyKind::Status if body.len() < STATUS_BYTES => self.counts.malformed += 1,
+            BodyKind::Status => {
                 let Some(number) = number.filter(|number| *number > self.status_number) else { return };
                 self.status_number = number;
                 let mut totals =
@@ -52,12 +59,12 @@ impl Decoder {
                 let (frames, events, dropped, datagrams, faults) = (next(), next(), next(), next(), next());
                 self.counts.events_dropped += dropped.saturating_sub(self.dropped_before.unwrap_or(dropped));
                 self.dropped_before = Some(dropped);
-                self.status = Some(Status { frames, events, dropped, datagrams, faults });
+                self.status = Some(BoardTotals { frames, events, dropped, datagrams, faults });
             }
         }
     }
 
-    fn words(&mut self, mut body: Body<'_>, out: &mut impl Table) {
+    fn words(&mut self, mut body: BodyReader<'_>, out: &mut impl Table) {
         let states = matches!(body.meaning, Meaning::States | Meaning::StaleStates);
         let valued = body.layout.value > 0;
         let Self { instructions, held, counts, latest, .. } = self;

@@ -6,7 +6,7 @@ use crate::wire::v2::{NEVER, stride};
 /// Stored by position on the wire (line << stride | row, with the array's own stride), so that the entries of one line
 /// are contiguous.
 #[derive(Debug, Clone)]
-pub(super) struct Held {
+pub(super) struct ValuesByLine {
     pub(super) columns: u16,
     pub(super) rows: u16,
     /// Bits that name a row.
@@ -23,7 +23,7 @@ pub(super) struct Held {
 /// Time of a value that is known from elsewhere: earlier than anything received.
 const BEFORE: i64 = NEVER + 1;
 
-impl Held {
+impl ValuesByLine {
     pub(super) fn new(array: &Array) -> Self {
         let stride = stride(array.rows);
         let places = usize::from(array.columns) << stride;

@@ -4,14 +4,14 @@
 //! none earlier than the stored values and all on the array. Any other datagram ends the run, and the decoder decodes
 //! it alone; only the decoder defines a datagram's meaning. So both ways return the same rows, values and counts.
 
-use super::held::Held;
-use super::session::Session;
-use super::taken::Taken;
+use super::held::ValuesByLine;
+use super::run_totals::RunTotals;
+use super::session::BoardSession;
 use super::words::{EIGHT, Eight, FULL};
 use crate::wire::columns::Room;
 use crate::wire::v2::checksum::{EVEN, even, split};
 use crate::wire::v2::counts::Counts;
-use crate::wire::v2::{HEADER_BYTES, Header, Kind, TRAILER_BYTES};
+use crate::wire::v2::{BodyKind, DatagramHeader, HEADER_BYTES, TRAILER_BYTES};
 
 /// Longest datagram of a run, bytes: all but the checksum fits the buffer of [`EVEN`] bytes.
 const LONGEST: usize = EVEN + 4;
@@ -20,15 +20,15 @@ const LONGEST: usize = EVEN + 4;
 const ROWS: usize = ((LONGEST - HEADER_BYTES - TRAILER_BYTES) / 2).next_multiple_of(EIGHT);
 
 /// The state of a decoder during a run.
-pub(super) struct Run<'a> {
-    /// The part that is equal for all datagrams of the run: [`Header::common`] of plain changes.
+pub(super) struct RunDecoder<'a> {
+    /// The part that is equal for all datagrams of the run: [`DatagramHeader::common`] of plain changes.
     common: u64,
     /// The latest session.
-    session: &'a mut Session,
-    held: &'a mut Held,
+    session: &'a mut BoardSession,
+    held: &'a mut ValuesByLine,
     latest: &'a mut i64,
     counts: &'a mut Counts,
-    pub(super) taken: Taken,
+    pub(super) taken: RunTotals,
 }
 
 /// Whether a datagram of this length can belong to a run.
@@ -37,19 +37,19 @@ fn short(datagram: &[u8]) -> bool {
     (HEADER_BYTES + TRAILER_BYTES..=LONGEST).contains(&datagram.len())
 }
 
-impl<'a> Run<'a> {
+impl<'a> RunDecoder<'a> {
     /// A run that may begin with a datagram, and the number of value bits of its words; none if no run can begin there.
     #[inline]
     pub(super) fn new(
         datagram: &[u8],
         board: u16,
-        session: &'a mut Session,
-        held: &'a mut Held,
+        session: &'a mut BoardSession,
+        held: &'a mut ValuesByLine,
         latest: &'a mut i64,
         counts: &'a mut Counts,
     ) -> Option<(Self, u32)> {
-        let kind = Kind::of(short(datagram).then(|| Header::fields(datagram).0.kind)?)?;
-        if !matches!(kind, Kind::Changes | Kind::Small | Kind::Large) {
+        let kind = BodyKind::of(short(datagram).then(|| DatagramHeader::fields(datagram).0.kind)?)?;
+        if !matches!(kind, BodyKind::Changes | BodyKind::Small | BodyKind::Large) {
             return None;
         }
         let value = kind.layout()?.value;
@@ -57,8 +57,8 @@ impl<'a> Run<'a> {
         if held.values.len() >= usize::from(FULL) {
             return None;
         }
-        let common = Header::common_of(kind, board, session.number, held.stride);
-        Some((Self { common, session, held, latest, counts, taken: Taken::default() }, value))
+        let common = DatagramHeader::common_of(kind, board, session.number, held.stride);
+        Some((Self { common, session, held, latest, counts, taken: RunTotals::default() }, value))
     }
 
     /// Decodes datagrams whose words have `VALUE` bits of value into `room`, from a row on, while they are plain;
@@ -76,12 +76,12 @@ impl<'a> Run<'a> {
         first: usize,
         paired: bool,
     ) -> usize {
-        let (mut row, mut taken) = (first, Taken::default());
+        let (mut row, mut taken) = (first, RunTotals::default());
         for datagram in datagrams {
-            if !short(datagram) || Header::common(datagram) != self.common {
+            if !short(datagram) || DatagramHeader::common(datagram) != self.common {
                 break;
             }
-            let (header, body) = Header::fields(datagram);
+            let (header, body) = DatagramHeader::fields(datagram);
             let number = self.session.number_of(header.sequence);
             let t = self.session.offset + header.base as i64;
             let start = u32::from(header.line) << header.stride;
@@ -105,7 +105,7 @@ impl<'a> Run<'a> {
             *self.latest = (*self.latest).max(t + i64::from(header.span));
             row += rows;
             let (datagrams, bytes) = (taken.datagrams + 1, taken.bytes + datagram.len());
-            taken = Taken { datagrams, bytes, base: t, span: header.span };
+            taken = RunTotals { datagrams, bytes, base: t, span: header.span };
         }
         self.counts.datagrams += taken.datagrams as u64;
         self.counts.intact += taken.datagrams as u64;

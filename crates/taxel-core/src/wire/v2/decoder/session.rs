@@ -1,6 +1,6 @@
 //! Tracks which sequence numbers of a board's session have arrived.
 
-use crate::wire::v2::Header;
+use crate::wire::v2::DatagramHeader;
 
 /// How far a datagram may be behind the highest sequence number and still be distinguished from a repeated one.
 pub(super) const WINDOW: usize = 65_536;
@@ -23,7 +23,7 @@ pub(super) enum Noted {
 
 /// The state of one session: the datagrams between two resets.
 #[derive(Debug, Clone)]
-pub(super) struct Session {
+pub(super) struct BoardSession {
     pub(super) number: u16,
     lowest: i64,
     pub(super) highest: i64,
@@ -45,9 +45,9 @@ pub(super) struct Session {
     pub(super) unlike: u32,
 }
 
-impl Session {
+impl BoardSession {
     /// The session of a datagram; with `reset` the board was reset before it, so that the numbers from 0 on are missing.
-    pub(super) fn new(header: &Header, offset: i64, reset: bool) -> Self {
+    pub(super) fn new(header: &DatagramHeader, offset: i64, reset: bool) -> Self {
         let first = i64::from(header.sequence);
         // Numbers count modulo 2^32: in the upper half 0 may have come after this one.
         let from_0 = reset && header.sequence < 1 << 31;
@@ -73,7 +73,7 @@ impl Session {
 
     /// Whether a datagram is the next one in the sequence.
     #[inline]
-    pub(super) fn is_next(&self, header: &Header) -> bool {
+    pub(super) fn is_next(&self, header: &DatagramHeader) -> bool {
         self.number == header.session && header.sequence == (self.highest as u32).wrapping_add(1)
     }
 
@@ -199,7 +199,7 @@ mod tests {
         let mut random = StdRng::seed_from_u64(1);
         for begin in [0, 7, u32::MAX - 40_000] {
             let mut bytes = vec![];
-            let header = Header {
+            let header = DatagramHeader {
                 kind: 1,
                 board: 0,
                 sequence: begin,
@@ -211,7 +211,7 @@ mod tests {
                 span: 0,
             };
             header.write(&[], &mut bytes);
-            let mut session = Session::new(&header, 0, false);
+            let mut session = BoardSession::new(&header, 0, false);
             let (mut seen, mut highest) = (BTreeSet::from([i64::from(begin)]), i64::from(begin));
             let mut sums = BTreeMap::from([(highest, 7)]);
             assert_eq!(session.note(highest, 7), Noted::New);

@@ -6,12 +6,12 @@ use super::session::LEAST_UNLIKE;
 use super::*;
 use crate::board::Board;
 use crate::wire::Registers;
-use crate::wire::v2::Kind;
+use crate::wire::v2::BodyKind;
 
 /// A datagram with its checksum.
-fn datagram(kind: Kind, session: u16, sequence: u32, base: u64, body: &[u8]) -> Vec<u8> {
+fn datagram(kind: BodyKind, session: u16, sequence: u32, base: u64, body: &[u8]) -> Vec<u8> {
     let (kind, stride) = (kind as u8, crate::wire::v2::stride(64));
-    let header = Header { kind, board: 0, sequence, base, session, stride, line: 0, flags: 0, span: 0 };
+    let header = DatagramHeader { kind, board: 0, sequence, base, session, stride, line: 0, flags: 0, span: 0 };
     let mut bytes = vec![];
     header.write(body, &mut bytes);
     bytes
@@ -21,25 +21,25 @@ fn datagram(kind: Kind, session: u16, sequence: u32, base: u64, body: &[u8]) -> 
 fn changes_as_they_are_go_the_short_way_where_the_machine_has_it() {
     let short = usize::from(Instructions::best() >= Instructions::Avx2);
     for (kind, body, flags, taken) in [
-        (Kind::Small, vec![], 0, short),
-        (Kind::Small, vec![5, 0x80, 7, 0x03], FRAME_SYNC, short),
+        (BodyKind::Small, vec![], 0, short),
+        (BodyKind::Small, vec![5, 0x80, 7, 0x03], FRAME_SYNC, short),
         // Advances, and more than eight words.
-        (Kind::Small, [1, 0x7f, 5, 0x83].repeat(6), 0, short),
-        (Kind::Changes, vec![5, 0x80], 0, short),
-        (Kind::Large, vec![5, 1, 0, 0x80], 0, short),
+        (BodyKind::Small, [1, 0x7f, 5, 0x83].repeat(6), 0, short),
+        (BodyKind::Changes, vec![5, 0x80], 0, short),
+        (BodyKind::Large, vec![5, 1, 0, 0x80], 0, short),
         // Datagrams that are not plain: a word of time, differences, dropped events, states, part of a word, a position
         // outside the array, too long.
-        (Kind::Small, vec![0, 0xff, 9, 0, 5, 0x83], 0, 0),
-        (Kind::Small, vec![5, 0x80], DIFFERENCES, 0),
-        (Kind::Small, vec![5, 0x80], DROPPED, 0),
-        (Kind::SmallStates, vec![5, 0x80], 0, 0),
-        (Kind::Small, vec![5, 0x80, 7], 0, 0),
-        (Kind::Small, vec![63, 0x7f, 0, 0], 0, 0),
-        (Kind::Small, [5, 0x80].repeat(30), 0, 0),
+        (BodyKind::Small, vec![0, 0xff, 9, 0, 5, 0x83], 0, 0),
+        (BodyKind::Small, vec![5, 0x80], DIFFERENCES, 0),
+        (BodyKind::Small, vec![5, 0x80], DROPPED, 0),
+        (BodyKind::SmallStates, vec![5, 0x80], 0, 0),
+        (BodyKind::Small, vec![5, 0x80, 7], 0, 0),
+        (BodyKind::Small, vec![63, 0x7f, 0, 0], 0, 0),
+        (BodyKind::Small, [5, 0x80].repeat(30), 0, 0),
     ] {
         let mut decoder = Decoder::new(Array::thesis());
         let mut events = Events::empty(Array::thesis());
-        decoder.push(&datagram(Kind::Small, 1, 0, 0, &[9, 0]), None, &mut events);
+        decoder.push(&datagram(BodyKind::Small, 1, 0, 0, &[9, 0]), None, &mut events);
         let mut bytes = datagram(kind, 1, 1, 192, &body);
         bytes[17] |= flags;
         let sum = bytes.len() - 4;
@@ -66,12 +66,12 @@ fn a_recording_misses_what_is_lost_since_it_began_whatever_comes_late_from_befor
         }
         let (before, since) = order.split_at(begins as usize);
         for &number in before {
-            decoder.push(&datagram(Kind::Small, 1, number, 0, &[]), None, &mut events);
+            decoder.push(&datagram(BodyKind::Small, 1, number, 0, &[]), None, &mut events);
         }
         let then = decoder.counts();
         decoder.begin_recording();
         for &number in since {
-            decoder.push(&datagram(Kind::Small, 1, number, 0, &[]), None, &mut events);
+            decoder.push(&datagram(BodyKind::Small, 1, number, 0, &[]), None, &mut events);
         }
         let (highest, last) = (before.iter().max().unwrap(), order.iter().max().unwrap());
         let missing = (highest + 1..=*last).filter(|number| !since.contains(number)).count();
@@ -92,7 +92,7 @@ fn the_newest_status_of_the_latest_session_counts() {
         (1, 9, totals(90), 1),
         (2, 1, totals(2), 2),
     ] {
-        decoder.push(&datagram(Kind::Status, session, sequence, 1000, &body), None, &mut events);
+        decoder.push(&datagram(BodyKind::Status, session, sequence, 1000, &body), None, &mut events);
         assert_eq!(decoder.status().unwrap().frames, frames, "session {session}, number {sequence}");
     }
     assert_eq!((decoder.counts().malformed, decoder.counts().intact), (1, 6));
@@ -127,14 +127,14 @@ fn a_straggler_of_before_a_reset_changes_nothing_that_is_held_since() {
     }
     let held = decoder.held();
     let heard = events.len();
-    assert!(matches!(decoder.push(late, None, &mut events), Outcome::Intact { reset: false, .. }));
+    assert!(matches!(decoder.push(late, None, &mut events), DatagramOutcome::Intact { reset: false, .. }));
     assert!(events.len() > heard, "its events are events");
     assert_eq!(decoder.held(), held);
 }
 
 #[test]
 fn a_board_that_begins_again_with_the_same_session_is_not_taken_for_repetition() {
-    let sent = |sequence: u32| datagram(Kind::Changes, 7, sequence, u64::from(sequence) * 192, &[]);
+    let sent = |sequence: u32| datagram(BodyKind::Changes, 7, sequence, u64::from(sequence) * 192, &[]);
     let (mut decoder, mut events) = (Decoder::new(Array::thesis()), Events::empty(Array::thesis()));
     let mut came = |decoder: &mut Decoder, sequence: u32| decoder.push(&sent(sequence), None, &mut events);
     for sequence in 0..2000 {
@@ -163,7 +163,7 @@ fn a_board_that_begins_again_with_the_same_session_is_not_taken_for_repetition()
 #[test]
 fn a_board_that_begins_again_with_the_same_session_is_no_other_board_however_short_its_first_life_was() {
     let life = |life: u8, n: u32| {
-        (0..n).map(move |k| datagram(Kind::Small, 7, k, u64::from(k) * 192, &[life, 0, k as u8 % 60 + 1, 0x80]))
+        (0..n).map(move |k| datagram(BodyKind::Small, 7, k, u64::from(k) * 192, &[life, 0, k as u8 % 60 + 1, 0x80]))
     };
     for first in (1..=70).chain((80..3000).step_by(97)).chain([255, 256, 257, 1023, 1024, 3000]) {
         for silent in [None, Some(0), Some(300_000)] {
@@ -201,12 +201,12 @@ fn a_single_datagram_of_another_board_is_no_reset_whenever_it_comes() {
                     // Number 0 after a silence is what a board sends at its reset.
                     let other = if silent == 0 { at / 2 } else { (at / 2).max(1).min(at - 1) };
                     if silent == 0 || other > 0 {
-                        let bytes = datagram(Kind::Small, 7, other, u64::from(other) * 192, &[9, 0x80]);
+                        let bytes = datagram(BodyKind::Small, 7, other, u64::from(other) * 192, &[9, 0x80]);
                         decoder.push(&bytes, Some(now), &mut events);
                     }
                 }
                 now += 192;
-                let bytes = datagram(Kind::Small, 7, k, u64::from(k) * 192, &[5, 0x80]);
+                let bytes = datagram(BodyKind::Small, 7, k, u64::from(k) * 192, &[5, 0x80]);
                 decoder.push(&bytes, Some(now), &mut events);
             }
             let counts = decoder.counts();
@@ -227,7 +227,7 @@ fn a_recording_that_began_while_a_session_was_to_begin_again_counts_no_other_boa
                     then = decoder.counts();
                     decoder.begin_recording();
                 }
-                decoder.push(&datagram(Kind::Small, 7, k, u64::from(k) * 192, &[life, 0x80]), None, &mut events);
+                decoder.push(&datagram(BodyKind::Small, 7, k, u64::from(k) * 192, &[life, 0x80]), None, &mut events);
             }
         }
         let since = decoder.counts().since(&then);

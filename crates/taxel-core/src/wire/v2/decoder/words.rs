@@ -13,11 +13,11 @@ mod body;
 mod eight;
 mod single;
 
-pub(super) use body::{Body, Meaning};
+pub(super) use body::{BodyReader, Meaning};
 #[cfg(target_arch = "x86_64")]
 pub(super) use eight::{EIGHT, Eight, FULL};
 
-use super::held::Held;
+use super::held::ValuesByLine;
 use crate::vectors::Instructions;
 use crate::wire::columns::Room;
 use crate::wire::v2::counts::Counts;
@@ -48,9 +48,9 @@ pub(super) fn most_rows(words: usize) -> usize {
 /// least [`most_rows`] rows from there on.
 #[inline]
 pub(super) fn decode(
-    body: &mut Body<'_>,
+    body: &mut BodyReader<'_>,
     set: Instructions,
-    held: &mut Held,
+    held: &mut ValuesByLine,
     room: &mut Room<'_>,
     paired: bool,
     counts: &mut Counts,
@@ -79,7 +79,7 @@ pub(super) fn decode(
 
 /// Decodes plain words up to the first that is not, if the machine has the instructions.
 #[cfg_attr(not(target_arch = "x86_64"), allow(unused_variables))]
-fn blocks(body: &mut Body<'_>, set: Instructions, held: &mut Held, room: &mut Room<'_>, paired: bool) {
+fn blocks(body: &mut BodyReader<'_>, set: Instructions, held: &mut ValuesByLine, room: &mut Room<'_>, paired: bool) {
     #[cfg(target_arch = "x86_64")]
     if set >= Instructions::Avx2
         && body.meaning == Meaning::Changes

@@ -1,6 +1,6 @@
 //! The rows and bounds that appear to bind at an interior point.
 
-use super::super::program::{Guess, Iterate, Point, WeightState};
+use super::super::program::{Guess, Iterate, PrimalDualPoint, WeightState};
 use super::{Interior, PrimalDual};
 use crate::vectors::dot;
 
@@ -39,7 +39,7 @@ impl Interior<'_> {
         let binding = state.slack.iter().zip(&state.inequality).map(|(s, z)| s / room < z / press).collect();
         let pull = if self.normed { state.dual.1.iter().map(|y| -y).collect() } else { vec![0.0; n] };
         let (equality, inequality) = (state.equality.clone(), state.inequality.clone());
-        let point = Point { weights, equality, inequality, pull };
+        let point = PrimalDualPoint { weights, equality, inequality, pull };
         Iterate { point, guess: Guess { places, binding } }
     }
 }

@@ -3,7 +3,7 @@
 use super::super::dense::{add_sum, times};
 use super::Interior;
 use super::newton::Newton;
-use super::variables::{Complement, PrimalDual, Residual, Step};
+use super::variables::{Complement, Direction, PrimalDual, Residual};
 use crate::vectors::dot;
 
 impl Interior<'_> {
@@ -46,7 +46,7 @@ impl Interior<'_> {
         state: &PrimalDual,
         newton: &Newton<'_>,
         mu: f64,
-        affine: Option<&Step>,
+        affine: Option<&Direction>,
     ) -> Complement {
         let mut out = Complement {
             low: state.x.iter().zip(&state.low).map(|(x, l)| mu - x * l).collect(),
@@ -88,7 +88,14 @@ impl Interior<'_> {
     }
 
     /// Gondzio's corrector: products that a longer step would move far from `mu` are pulled back.
-    pub(super) fn correct(&self, state: &PrimalDual, step: &Step, reach: f64, mu: f64, aim: &Complement) -> Complement {
+    pub(super) fn correct(
+        &self,
+        state: &PrimalDual,
+        step: &Direction,
+        reach: f64,
+        mu: f64,
+        aim: &Complement,
+    ) -> Complement {
         let pull = |product: f64| {
             if product < 0.1 * mu {
                 0.1 * mu - product

@@ -5,7 +5,7 @@ use faer::Mat;
 use super::super::dense::{Cholesky, add_gram, add_sum, outer, times};
 use super::Interior;
 use super::cone::Scaling;
-use super::variables::{Complement, PrimalDual, Residual, Room, Step};
+use super::variables::{Complement, Direction, PrimalDual, Residual, Workspace};
 use crate::learn::statement::Norm;
 use crate::vectors::dot;
 
@@ -30,7 +30,7 @@ pub(super) struct Newton<'a> {
 }
 
 impl Interior<'_> {
-    pub(super) fn newton<'b>(&'b self, state: &'b PrimalDual, w: &[f64], room: &mut Room) -> Option<Newton<'b>> {
+    pub(super) fn newton<'b>(&'b self, state: &'b PrimalDual, w: &[f64], room: &mut Workspace) -> Option<Newton<'b>> {
         let n = self.program.width();
         let of_part: Vec<f64> = self
             .parts
@@ -119,7 +119,7 @@ impl Newton<'_> {
         (right, du)
     }
 
-    pub(super) fn direction(&self, r: &Residual, aim: &Complement) -> Step {
+    pub(super) fn direction(&self, r: &Residual, aim: &Complement) -> Direction {
         let (inner, state, program) = (self.inner, self.state, self.inner.program);
         let n = program.width();
         let of_x: Vec<f64> = (0..inner.parts.len())
@@ -188,6 +188,6 @@ impl Newton<'_> {
                 dual.1[j] = h.1[j] - m01[j] * length - ridge * (w[j] + along * s.w1[j]);
             }
         }
-        Step { x, w, low, high, equality: du, slack, inequality, length, dual }
+        Direction { x, w, low, high, equality: du, slack, inequality, length, dual }
     }
 }

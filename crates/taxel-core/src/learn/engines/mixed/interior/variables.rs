@@ -5,7 +5,7 @@ use faer::Mat;
 use super::super::program::retain;
 
 /// The part of a weight above or below its base.
-pub(super) struct Part {
+pub(super) struct WeightPart {
     pub(super) synapse: usize,
     pub(super) sign: f64,
     pub(super) range: f64,
@@ -28,7 +28,7 @@ pub struct PrimalDual {
 }
 
 /// A direction in the same variables.
-pub(super) struct Step {
+pub(super) struct Direction {
     pub(super) x: Vec<f64>,
     pub(super) w: Vec<f64>,
     pub(super) low: Vec<f64>,
@@ -47,7 +47,7 @@ impl PrimalDual {
         retain(&mut self.inequality, keep);
     }
 
-    pub(super) fn go(&mut self, reach: f64, step: &Step) {
+    pub(super) fn go(&mut self, reach: f64, step: &Direction) {
         let go = |v: &mut [f64], d: &[f64]| v.iter_mut().zip(d).for_each(|(v, d)| *v += reach * d);
         go(&mut self.x, &step.x);
         go(&mut self.low, &step.low);
@@ -81,7 +81,7 @@ pub(super) struct Complement {
 }
 
 /// Memory that iterations reuse.
-pub(super) struct Room {
+pub(super) struct Workspace {
     pub(super) matrix: Mat<f64>,
     pub(super) scaled: Vec<f64>,
 }

@@ -1,9 +1,9 @@
 //! Decodes words eight at a time with AVX2; the words after the last group of eight are decoded one by one.
 
-use super::body::Body;
+use super::body::BodyReader;
 use super::eight::{EIGHT, Eight, FULL};
 use crate::wire::columns::Room;
-use crate::wire::v2::decoder::held::Held;
+use crate::wire::v2::decoder::held::ValuesByLine;
 
 /// Decodes plain words with `VALUE` bits of value, in groups of eight.
 ///
@@ -12,7 +12,12 @@ use crate::wire::v2::decoder::held::Held;
 /// The machine must have the features below; each column of `room` must have 8 entries more than the rows so far and
 /// the remaining words together; `body.stride` must be that of `held`, which must have fewer than 65 535 positions.
 #[target_feature(enable = "avx2,bmi1,popcnt")]
-pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut Held, room: &mut Room<'_>, paired: bool) {
+pub(super) unsafe fn blocks<const VALUE: u32>(
+    body: &mut BodyReader<'_>,
+    held: &mut ValuesByLine,
+    room: &mut Room<'_>,
+    paired: bool,
+) {
     let bytes = if VALUE == 16 { 4 } else { 2 };
     while body.bytes.len() - body.at >= bytes * EIGHT {
         if VALUE > 0 && body.t < held.newest || body.position >= i64::from(FULL) - 1 {

@@ -2,10 +2,10 @@
 
 use std::arch::x86_64::*;
 
-use super::body::Body;
+use super::body::BodyReader;
 use super::eight::{EIGHT, FULL, hold_eight};
 use crate::wire::columns::Room;
-use crate::wire::v2::decoder::held::Held;
+use crate::wire::v2::decoder::held::ValuesByLine;
 
 const WORDS: usize = 32;
 
@@ -42,7 +42,7 @@ const fn every(step: u16, first: u16) -> [u16; WORDS] {
 
 /// Lanes of a block, stored in memory.
 #[repr(align(64))]
-struct Lanes([u16; WORDS]);
+struct WordLanes([u16; WORDS]);
 
 /// Constants of every block, in registers.
 #[derive(Clone, Copy)]
@@ -84,7 +84,7 @@ struct BlockEvents {
 impl Constants {
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    fn new(stride: u8, held: &Held) -> Self {
+    fn new(stride: u8, held: &ValuesByLine) -> Self {
         // SAFETY: each table is 64 bytes long.
         let table = |t: &[u16; WORDS]| unsafe { _mm512_loadu_si512(t.as_ptr().cast()) };
         Self {
@@ -182,7 +182,7 @@ impl Constants {
     /// `found` must come from [`Self::found`], with positions in `held`.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    unsafe fn hold(&self, found: &BlockEvents, t: i64, held: &mut Held) {
+    unsafe fn hold(&self, found: &BlockEvents, t: i64, held: &mut ValuesByLine) {
         held.newest = t;
         // Lanes without an event repeat the last one, so that the loop has one of two lengths, which a processor can
         // predict.
@@ -190,7 +190,7 @@ impl Constants {
         let places = _mm512_permutexvar_epi16(repeated, found.position);
         let values = _mm512_permutexvar_epi16(repeated, found.ticks);
         if found.n > EIGHT {
-            let (mut at, mut ticks) = (Lanes([0; WORDS]), Lanes([0; WORDS]));
+            let (mut at, mut ticks) = (WordLanes([0; WORDS]), WordLanes([0; WORDS]));
             // SAFETY: both arrays are 64 bytes long and aligned to cache lines; the positions are those of events.
             unsafe {
                 _mm512_store_si512(at.0.as_mut_ptr().cast(), places);
@@ -208,7 +208,7 @@ impl Constants {
 ///
 /// The positions must be in `held`.
 #[inline(never)]
-unsafe fn hold_many(places: &Lanes, values: &Lanes, t: i64, held: &mut Held) {
+unsafe fn hold_many(places: &WordLanes, values: &WordLanes, t: i64, held: &mut ValuesByLine) {
     for (&place, &value) in places.0.iter().zip(&values.0) {
         // SAFETY: the caller guarantees this.
         unsafe {
@@ -225,7 +225,7 @@ unsafe fn hold_many(places: &Lanes, values: &Lanes, t: i64, held: &mut Held) {
 /// The positions from `begin` on, as many as `given` has lanes, must be in `held`.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-unsafe fn hold_neighbours(begin: usize, given: u32, ticks: __m512i, t: i64, held: &mut Held) {
+unsafe fn hold_neighbours(begin: usize, given: u32, ticks: __m512i, t: i64, held: &mut ValuesByLine) {
     held.newest = t;
     let times = _mm512_set1_epi64(t);
     // SAFETY: the caller guarantees this.
@@ -278,7 +278,12 @@ impl BlockEvents {
 /// The machine must have the features below; each column of `room` must have 32 entries more than the rows so far and
 /// the remaining words together; `body.stride` must be that of `held`, which must have at most 65 536 positions.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut Held, room: &mut Room<'_>, paired: bool) {
+pub(super) unsafe fn blocks<const VALUE: u32>(
+    body: &mut BodyReader<'_>,
+    held: &mut ValuesByLine,
+    room: &mut Room<'_>,
+    paired: bool,
+) {
     let bytes = if VALUE == 16 { 4 } else { 2 };
     let constants = Constants::new(body.stride, held);
     while body.bytes.len() - body.at >= bytes {

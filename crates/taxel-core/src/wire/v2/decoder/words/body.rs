@@ -1,6 +1,6 @@
 //! A datagram's body while it is decoded: the state of the decoding loops.
 
-use crate::wire::v2::{Header, LATEST_OFFSET, Layout, before};
+use crate::wire::v2::{DatagramHeader, LATEST_OFFSET, Layout, before};
 
 /// The meaning of a body's words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub(crate) enum Meaning {
 
 /// A body, and the position of the decoder in it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Body<'a> {
+pub(crate) struct BodyReader<'a> {
     pub(crate) layout: Layout,
     pub(crate) meaning: Meaning,
     /// Bits of a position that name its row.
@@ -39,9 +39,9 @@ pub(crate) struct Body<'a> {
     pub(crate) rows: usize,
 }
 
-impl<'a> Body<'a> {
+impl<'a> BodyReader<'a> {
     /// The body of a header, with nothing read yet; times count from `base`, us.
-    pub(crate) fn new(layout: Layout, meaning: Meaning, header: &Header, base: i64, bytes: &'a [u8]) -> Self {
+    pub(crate) fn new(layout: Layout, meaning: Meaning, header: &DatagramHeader, base: i64, bytes: &'a [u8]) -> Self {
         let (at, rows, stride, position) = (0, 0, header.stride, before(header.line, header.stride));
         Self { layout, meaning, stride, base, bytes, at, t: base, position, cut: false, latest: i64::MIN, rows }
     }

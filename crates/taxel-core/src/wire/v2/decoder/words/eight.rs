@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use crate::vectors::TO_FRONT;
 use crate::wire::columns::Room;
 use crate::wire::v2::HEADER_BYTES;
-use crate::wire::v2::decoder::held::Held;
+use crate::wire::v2::decoder::held::ValuesByLine;
 
 /// Number of words.
 pub(crate) const EIGHT: usize = 8;
@@ -69,7 +69,7 @@ impl Eight {
         at: usize,
         count: usize,
         passed: u16,
-        held: &Held,
+        held: &ValuesByLine,
     ) -> Option<Self> {
         let count = count.min(EIGHT);
         // SAFETY: of words of 4 bytes only the lanes of those words are read, by a mask of eight of 16 entries from 0
@@ -95,7 +95,7 @@ impl Eight {
     /// As for [`Self::read`]; eight words must be readable at `words`.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
-    pub(super) unsafe fn whole<const VALUE: u32>(words: *const u8, passed: u16, held: &Held) -> Option<Self> {
+    pub(super) unsafe fn whole<const VALUE: u32>(words: *const u8, passed: u16, held: &ValuesByLine) -> Option<Self> {
         let lanes = _mm_set1_epi16(-1);
         // SAFETY: eight words of 4 or 2 bytes are readable, as the caller guarantees.
         unsafe {
@@ -109,7 +109,7 @@ impl Eight {
     /// Decodes words of 4 bytes in the first `lanes`; the other lanes are zero.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
-    fn of_large(words: __m256i, lanes: __m128i, passed: u16, held: &Held) -> Option<Self> {
+    fn of_large(words: __m256i, lanes: __m128i, passed: u16, held: &ValuesByLine) -> Option<Self> {
         let halves = |lanes| _mm_packus_epi32(_mm256_castsi256_si128(lanes), _mm256_extracti128_si256::<1>(lanes));
         let value = _mm256_blend_epi16::<0xaa>(words, _mm256_setzero_si256());
         Self::of::<16>(halves(_mm256_srli_epi32::<16>(words)), halves(value), lanes, passed, held)
@@ -119,7 +119,13 @@ impl Eight {
     /// are zero.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
-    fn of<const VALUE: u32>(head: __m128i, value: __m128i, lanes: __m128i, passed: u16, held: &Held) -> Option<Self> {
+    fn of<const VALUE: u32>(
+        head: __m128i,
+        value: __m128i,
+        lanes: __m128i,
+        passed: u16,
+        held: &ValuesByLine,
+    ) -> Option<Self> {
         let (zero, one) = (_mm_setzero_si128(), _mm_set1_epi16(1));
         let (control, skip, value) = if VALUE == 8 {
             let seven = _mm_set1_epi16(0x7f);
@@ -196,7 +202,7 @@ impl Eight {
     /// The machine must have the features below; `held` must be the one passed to [`Self::read`].
     #[inline]
     #[target_feature(enable = "avx2")]
-    pub(crate) unsafe fn hold(&self, t: i64, held: &mut Held) {
+    pub(crate) unsafe fn hold(&self, t: i64, held: &mut ValuesByLine) {
         held.newest = t;
         // Lanes without an event repeat the last one, so that no branch depends on the number of events, which no
         // processor can predict.
@@ -211,7 +217,7 @@ impl Eight {
     /// As for [`Self::hold`].
     #[inline]
     #[target_feature(enable = "avx2")]
-    pub(crate) unsafe fn hold_neighbours(&self, t: i64, held: &mut Held) {
+    pub(crate) unsafe fn hold_neighbours(&self, t: i64, held: &mut ValuesByLine) {
         let begin = usize::from(_mm_cvtsi128_si32(self.position) as u16);
         if self.n < EIGHT || usize::from(_mm_extract_epi16::<7>(self.position) as u16) - begin >= EIGHT {
             // SAFETY: the caller guarantees this.
@@ -236,7 +242,7 @@ impl Eight {
 /// The machine must have SSE 4.1; all eight places must be in `held`.
 #[inline]
 #[target_feature(enable = "sse4.1")]
-pub(super) unsafe fn hold_eight(places: __m128i, values: __m128i, t: i64, held: &mut Held) {
+pub(super) unsafe fn hold_eight(places: __m128i, values: __m128i, t: i64, held: &mut ValuesByLine) {
     // Extracts the lanes from registers: loads from memory would wait for the store.
     let halves = |lanes| [_mm_cvtsi128_si64(lanes) as u64, _mm_extract_epi64::<1>(lanes) as u64];
     for (places, values) in halves(places).into_iter().zip(halves(values)) {

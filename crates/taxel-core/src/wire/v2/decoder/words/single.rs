@@ -1,15 +1,15 @@
 //! Decodes words one by one, on any machine; defines the meaning of each word.
 
-use super::body::{Body, Meaning, word};
+use super::body::{BodyReader, Meaning, word};
 use crate::wire::columns::Room;
 use crate::wire::v2::counts::Counts;
-use crate::wire::v2::decoder::held::Held;
+use crate::wire::v2::decoder::held::ValuesByLine;
 
 /// Decodes at most `most` words of `BYTES` bytes with this layout. `room` must have as many rows left.
 #[inline(always)]
 pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
-    body: &mut Body<'_>,
-    held: &mut Held,
+    body: &mut BodyReader<'_>,
+    held: &mut ValuesByLine,
     room: &mut Room<'_>,
     paired: bool,
     counts: &mut Counts,
@@ -20,7 +20,7 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
     let mask = (1_i64 << stride) - 1;
     let (columns, rows) = (i64::from(held.columns), i64::from(held.rows));
     let end = body.at + (body.bytes.len() - body.at).min(most.saturating_mul(BYTES)) / BYTES * BYTES;
-    let Body { base, mut at, mut t, mut position, mut latest, rows: mut n, .. } = *body;
+    let BodyReader { base, mut at, mut t, mut position, mut latest, rows: mut n, .. } = *body;
     while at < end {
         let bits = word::<BYTES>(body.bytes, at);
         at += BYTES;

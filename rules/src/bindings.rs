@@ -1,0 +1,281 @@
+//! What Python calls.
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use serde_json::{Map, Value, json};
+use taxel_border::convert::{Column, SpikesIn, array, column, slice, to_patterns};
+use taxel_border::enter::{Exclusive, enter, enter_keeping};
+use taxel_border::errors::core;
+use taxel_border::parameters::{Plain, checked, parsed, unknown};
+use taxel_core::parameters::Described;
+use taxel_core::{Result as CoreResult, Stop, problem};
+
+use crate::rules::{Batch, Ended, EpochLearner, Learnt, Skim, Stdp, StdpNeuron, Tempotron, Trained};
+
+/// What training found.
+#[pyclass(frozen, get_all, name = "Trained")]
+pub struct TrainedOut {
+    weights: Column<f64>,
+    /// The share of patterns that were right, by epoch.
+    right: Column<f64>,
+    best_epoch: usize,
+    ended: &'static str,
+    /// A pending exception, such as KeyboardInterrupt.
+    raised: Option<Py<PyAny>>,
+}
+
+/// Trains, telling `progress` of each epoch; what it raises ends the training and is raised again.
+fn train(
+    py: Python<'_>,
+    max_seconds: Option<f64>,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(&mut dyn FnMut(usize, f64), Stop<'_>) -> CoreResult<Trained> + Send,
+) -> PyResult<TrainedOut> {
+    let (trained, raised) = enter_keeping(py, max_seconds, |stop, caller| {
+        let mut report = |epoch: usize, right: f64| {
+            caller.call(progress.as_ref(), |py, function| function.call1(py, (epoch, right)));
+        };
+        work(&mut report, stop)
+    })?;
+    let ended = match trained.ended {
+        Ended::Right => "right",
+        Ended::Epochs => "epochs",
+        Ended::Stopped => "stopped",
+    };
+    let (weights, right) = (column(py, trained.weights), column(py, trained.right));
+    Ok(TrainedOut { weights, right, best_epoch: trained.best_epoch, ended, raised })
+}
+
+fn to_targets(targets: &[PyReadonlyArray1<'_, f64>]) -> PyResult<Vec<Vec<f64>>> {
+    targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect()
+}
+
+/// A rule with its neuron and its training, from its name and all parameters in one list.
+fn to_epoch_learner(json: &str) -> PyResult<EpochLearner> {
+    let mut given: Map<String, Value> = parsed("rule", json)?;
+    let name = match given.remove("name") {
+        Some(Value::String(name)) => name,
+        _ => return Err(core(problem!("rule without a name"))),
+    };
+    let parts = EpochLearner::parts(&name, given).map_err(core)?;
+    let learner: EpochLearner = parsed(&name, &parts.to_string())?;
+    learner.check().map_err(core)?;
+    Ok(learner)
+}
+
+/// The names of all rules by epochs.
+#[pyfunction]
+pub fn rule_names() -> Vec<&'static str> {
+    EpochLearner::names().collect()
+}
+
+/// Trains a rule's neuron.
+#[pyfunction]
+#[pyo3(signature = (parameters, patterns, targets, start, progress))]
+pub fn fit_epochs<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    patterns: Vec<SpikesIn>,
+    targets: Vec<PyReadonlyArray1<'py, f64>>,
+    start: Option<PyReadonlyArray1<'py, f64>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<TrainedOut> {
+    let learner = to_epoch_learner(parameters)?;
+    let (patterns, targets) = (to_patterns(patterns), to_targets(&targets)?);
+    let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
+    train(py, learner.training.max_seconds, progress, |report, stop| {
+        learner.fit(&patterns, &targets, start, report, stop)
+    })
+}
+
+/// What one presentation changes, over the learning rate; output spikes.
+#[pyfunction]
+pub fn change_epochs<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    pattern: SpikesIn,
+    targets: PyReadonlyArray1<'py, f64>,
+) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
+    let learner = to_epoch_learner(parameters)?;
+    let (weights, targets) = (slice("weights", &weights)?, slice("targets", &targets)?);
+    let (change, fired) = enter(py, |_| learner.change(weights, &pattern.0, targets))?;
+    Ok([array(py, change), array(py, fired)])
+}
+
+/// Output spikes of a rule's neuron.
+#[pyfunction]
+pub fn run_epochs<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    pattern: SpikesIn,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let learner = to_epoch_learner(parameters)?;
+    let weights = slice("weights", &weights)?;
+    let fired = enter(py, |stop| learner.run(weights, &pattern.0, stop))?;
+    Ok(array(py, fired))
+}
+
+/// Trains a Tempotron.
+#[pyfunction]
+#[pyo3(signature = (parameters, patterns, labels, start, progress))]
+pub fn fit_tempotron<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    patterns: Vec<SpikesIn>,
+    labels: Vec<bool>,
+    start: Option<PyReadonlyArray1<'py, f64>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<TrainedOut> {
+    let tempotron: Tempotron = parsed("Tempotron", parameters)?;
+    let patterns = to_patterns(patterns);
+    let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
+    train(py, tempotron.max_seconds, progress, |report, stop| tempotron.fit(&patterns, &labels, start, report, stop))
+}
+
+/// Highest potential, its time, time of the spike (infinite where there is none).
+#[pyfunction]
+pub fn peak_tempotron(
+    py: Python<'_>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'_, f64>,
+    pattern: SpikesIn,
+) -> PyResult<(f64, f64, f64)> {
+    let tempotron: Tempotron = parsed("Tempotron", parameters)?;
+    let weights = slice("weights", &weights)?;
+    let peak = enter(py, |_| tempotron.peak(weights, &pattern.0))?;
+    Ok((peak.v_max, peak.t_max, peak.t_spike.unwrap_or(f64::INFINITY)))
+}
+
+/// What one presentation changes, over the learning rate.
+#[pyfunction]
+pub fn change_tempotron<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    pattern: SpikesIn,
+    label: bool,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let tempotron: Tempotron = parsed("Tempotron", parameters)?;
+    let weights = slice("weights", &weights)?;
+    let change = enter(py, |_| tempotron.change(weights, &pattern.0, label))?;
+    Ok(array(py, change))
+}
+
+/// The names of all learners that take all examples at once.
+#[pyfunction]
+pub fn batch_names() -> &'static [&'static str] {
+    Batch::NAMES
+}
+
+/// Learns from all examples at once; returns weights, and further results by name.
+#[pyfunction]
+pub fn fit_batch<'py>(
+    py: Python<'py>,
+    name: &str,
+    parameters: &str,
+    patterns: Vec<SpikesIn>,
+    targets: Vec<PyReadonlyArray1<'py, f64>>,
+) -> PyResult<(Column<f64>, Plain<Value>)> {
+    let batch = Batch::from_json(name, parameters).map_err(core)?;
+    let (patterns, targets) = (to_patterns(patterns), to_targets(&targets)?);
+    let learnt = enter(py, |stop| batch.fit(&patterns, &targets, stop))?;
+    Ok((column(py, learnt.weights), Plain(Value::Object(learnt.results))))
+}
+
+/// Output spikes of such a learner.
+#[pyfunction]
+pub fn run_batch<'py>(
+    py: Python<'py>,
+    name: &str,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    results: &str,
+    pattern: SpikesIn,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let batch = Batch::from_json(name, parameters).map_err(core)?;
+    let learnt = Learnt { weights: slice("weights", &weights)?.to_vec(), results: parsed(name, results)? };
+    let fired = enter(py, |stop| batch.run(&learnt, &pattern.0, stop))?;
+    Ok(array(py, fired))
+}
+
+/// The rows of one pattern, one after the other.
+#[pyfunction]
+pub fn rows_skim<'py>(py: Python<'py>, parameters: &str, pattern: SpikesIn) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let skim: Skim = parsed("SKIM", parameters)?;
+    let rows = enter(py, |stop| skim.rows(&pattern.0, stop))?;
+    Ok(array(py, rows))
+}
+
+/// The output at each row's time.
+#[pyfunction]
+pub fn output_skim<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    pattern: SpikesIn,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let skim: Skim = parsed("SKIM", parameters)?;
+    let weights = slice("weights", &weights)?;
+    let output = enter(py, |stop| skim.output(weights, &pattern.0, stop))?;
+    Ok(array(py, output))
+}
+
+/// A neuron with spike-timing-dependent plasticity, in one stream of time.
+#[pyclass(frozen, name = "STDP")]
+pub struct Plastic(Exclusive<StdpNeuron>);
+
+#[pymethods]
+impl Plastic {
+    #[new]
+    fn new(parameters: &str, trains: usize) -> PyResult<Self> {
+        let parameters: Stdp = parsed("STDP", parameters)?;
+        Ok(Self(Exclusive::new(StdpNeuron::new(&parameters, trains).map_err(core)?)))
+    }
+
+    #[getter]
+    fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array(py, self.0.with(py, |neuron| neuron.weights().to_vec()))
+    }
+
+    fn set_weights(&self, py: Python<'_>, weights: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
+        let weights = slice("weights", &weights)?;
+        self.0.enter(py, |neuron, _| neuron.set_weights(weights))
+    }
+
+    fn rest(&self, py: Python<'_>) {
+        self.0.with(py, StdpNeuron::rest);
+    }
+
+    fn push<'py>(&self, py: Python<'py>, piece: SpikesIn, learn: bool) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, self.0.enter(py, |neuron, stop| neuron.push(&piece.0, learn, stop))?))
+    }
+}
+
+/// What is known of the parameters of a learner: defaults, what must be given, ranges.
+#[pyfunction]
+pub fn parameters(of: &str) -> PyResult<Plain<Value>> {
+    described(of).map(|d| Plain(d.to_json())).ok_or_else(|| unknown(of))
+}
+
+fn described(of: &str) -> Option<Described> {
+    match of {
+        "stdp" => Some(Stdp::described()),
+        "tempotron" => Some(Tempotron::described()),
+        _ => EpochLearner::described(of).or_else(|| Batch::described(of)),
+    }
+}
+
+/// Checks the parameters of a learner, which are JSON; gives them back with every default filled in.
+#[pyfunction]
+pub fn check_parameters(of: &str, parameters: &str) -> PyResult<Plain<Value>> {
+    match of {
+        "stdp" => checked("STDP", parameters, Stdp::check),
+        "tempotron" => checked("Tempotron", parameters, Tempotron::check),
+        _ if EpochLearner::described(of).is_some() => Ok(json!(to_epoch_learner(parameters)?)),
+        _ if Batch::described(of).is_some() => Ok(json!(Batch::from_json(of, parameters).map_err(core)?)),
+        _ => Err(unknown(of)),
+    }
+    .map(Plain)
+}

@@ -1,0 +1,98 @@
+"""E-learning and I-learning against their formulas."""
+
+import itertools
+
+import numpy as np
+import pytest
+from rule_examples import kernel, patterns, right_sides, summed
+
+from taxel import ProblemError
+from taxel_rules import Chronotron, _rules
+
+NEURON = {"tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
+GIVEN = {"eta": 1.0, "initial": (0.0, 1.0), "epochs": 1, "updates": "batch", **NEURON}
+
+
+def cheapest(fired, targets, tau_q):
+    """The way from spikes to targets that costs least, by trying every way to pair them in order."""
+    best = (np.inf, [])
+    for count in range(min(len(fired), len(targets)) + 1):
+        for a in itertools.combinations(range(len(fired)), count):
+            for b in itertools.combinations(range(len(targets)), count):
+                apart = np.array([fired[i] - targets[j] for i, j in zip(a, b, strict=True)])
+                cost = len(fired) + len(targets) - 2 * count + np.sum((apart / tau_q) ** 2 / 2)
+                if cost < best[0]:
+                    best = (cost, list(zip(a, b, strict=True)))
+    return best[1]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_e_learning_adds_removes_and_moves_at_least_cost(seed):
+    (pattern,), (wanted,) = patterns(seed, trains=60, count=1, targets=3, spikes=3)
+    weights = np.random.default_rng(seed).uniform(-2, 4, 60)
+    tau_q, gamma_r = 12.0, 9.0
+    change, fired = Chronotron(rule="E", tau_q=tau_q, gamma_r=gamma_r, **GIVEN).change(weights, pattern, wanted)
+
+    def potential(t):
+        return summed(pattern, t, lambda s: kernel(s, 10.0, 5.0))
+
+    pairs = cheapest(fired, wanted, tau_q)
+    expected = np.zeros(60)
+    for j in set(range(3)) - {j for _, j in pairs}:
+        expected += potential(wanted[j])
+    for i in set(range(len(fired))) - {i for i, _ in pairs}:
+        expected -= potential(fired[i])
+    for i, j in pairs:
+        expected += gamma_r / tau_q**2 * (fired[i] - wanted[j]) * potential(fired[i])
+    assert change == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_a_late_spike_raises_weights_and_an_early_one_lowers_them():
+    (pattern,), _ = patterns(1, trains=60, count=1)
+    learner = Chronotron(rule="E", **GIVEN)
+    weights = np.full(60, 2.0)
+    first = learner.change(weights, pattern, [100.0])[1][:1]
+    silent = np.zeros(60)
+    only = learner.change(weights, pattern, first)[1]
+    assert len(only) > 0
+    late = learner.change(weights, pattern, only - 2.0)[0]
+    early = learner.change(weights, pattern, only + 2.0)[0]
+    assert late.sum() > 0 > early.sum()
+    assert learner.change(silent, pattern, [100.0])[0].sum() > 0
+
+
+def neuron_of(learner):
+    """The neuron as the compiled part has it, with all that was left out."""
+    return _rules.check_parameters("chronotron", learner._json())["neuron"]
+
+
+def test_time_constants_are_the_membranes_where_they_are_left_out():
+    (pattern,), (wanted,) = patterns(2, trains=60, count=1)
+    weights = np.full(60, 2.0)
+    left_out = Chronotron(rule="E", **GIVEN).change(weights, pattern, wanted)[0]
+    given = Chronotron(rule="E", tau_q=10.0, gamma_r=10.0, **GIVEN).change(weights, pattern, wanted)[0]
+    assert left_out.tobytes() == given.tobytes()
+    assert neuron_of(Chronotron(rule="E", **{**GIVEN, "tau": 15.0}))["current"]["exponential"]["tau_s"] == 5.0
+    named = {k: v for k, v in GIVEN.items() if k not in ("tau", "tau_s")}
+    assert neuron_of(Chronotron(rule="E", **named))["current"]["exponential"]["tau_s"] == 3.75
+
+
+@pytest.mark.parametrize("targets", [1, 3])
+def test_i_learning_goes_by_currents_with_the_sign_of_the_weight(targets):
+    (pattern,), (wanted,) = patterns(3, trains=60, count=1, targets=targets, spikes=3)
+    weights = np.random.default_rng(3).uniform(-1, 4, 60)
+    change, fired = Chronotron(rule="I", **GIVEN).change(weights, pattern, wanted)
+
+    def current(s):
+        return np.where(s >= 0, np.exp(-np.maximum(s, 0) / 5.0), 0.0)
+
+    assert len(fired) > 0
+    expected = np.sign(weights) * right_sides(pattern, wanted, fired, current)
+    assert change == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_another_rule_is_one_clear_error():
+    with pytest.raises(ProblemError, match='rule is "X": must be "E" or "I"'):
+        Chronotron(rule="X", **GIVEN)
+    with pytest.raises(ProblemError, match="tau_q is -1 ms"):
+        Chronotron(rule="E", tau_q=-1.0, **GIVEN)

@@ -1,0 +1,128 @@
+"""HTP against its definition, and its demands against the rows of CONE-X."""
+
+import numpy as np
+import pytest
+from making import made
+from rule_examples import kernel, patterns
+
+from taxel import Neuron, ProblemError
+from taxel.learn import ConeX, ConeXProblem
+from taxel_rules import HTP
+
+linprog = pytest.importorskip("scipy.optimize").linprog
+GIVEN = {"initial": (0.0, 1.0), "updates": "pattern", "tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
+STEP = 0.1
+
+
+def cone_x_rows(pattern, targets):
+    """6.9 with after_spike "reset", no refractory time, no threshold rise, on the grid: target rows, silent rows."""
+    times = STEP * np.arange(int(pattern.stop / STEP + 1e-9) + 1)
+    times = times[np.min(np.abs(times[:, None] - targets[None]), axis=1) >= 1e-9]
+
+    def rows(at):
+        earlier = np.searchsorted(targets, at)
+        lost_up_to = np.concatenate([[-np.inf], targets])[earlier][:, None]
+        return np.stack(
+            [(kernel(at[:, None] - train[None], 10.0, 5.0) * (train[None] > lost_up_to)).sum(1) for train in pattern], 1
+        )
+
+    return rows(targets), rows(times), times
+
+
+def demands(learner, pattern, targets, weights):
+    """What HTP corrects, stated from those rows: missed targets, and the peak of each stretch above the threshold."""
+    at, silent, times = cone_x_rows(pattern, targets)
+    change = at[at @ weights < 15.0].sum(0) if np.any(at @ weights < 15.0) else np.zeros(len(pattern))
+    free = np.array([np.any((targets - learner.window_ms <= t) & (t <= targets)) for t in times])
+    u, stretch = silent @ weights, []
+    for k in range(len(times) + 1):
+        over = k < len(times) and u[k] >= 15.0 and not free[k]
+        apart = stretch and k < len(times) and np.any((targets > times[stretch[-1]]) & (targets < times[k]))
+        if stretch and (not over or apart):
+            change = change - silent[max(stretch, key=lambda j: u[j])]
+            stretch = []
+        if over:
+            stretch.append(k)
+    return change
+
+
+@pytest.mark.parametrize("window", [0.0, 3.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_what_is_corrected_are_broken_rows_of_cone_x(window, seed):
+    (pattern,), (wanted,) = patterns(seed, trains=60, count=1, targets=3, spikes=3)
+    weights = np.random.default_rng(seed).uniform(-1, 4, 60)
+    learner = HTP(window_ms=window, eta=1.0, epochs=1, **GIVEN)
+    change, _ = learner.change(weights, pattern, wanted)
+    assert change.any()
+    assert change == pytest.approx(demands(learner, pattern, wanted, weights), rel=1e-9, abs=1e-9)
+
+
+def test_what_meets_the_rows_of_cone_x_is_not_corrected():
+    """One way round: a solution of CONE-X's rows, got from a linear programme, leaves HTP nothing to do."""
+    (pattern,), (wanted,) = patterns(7, trains=80, count=1, targets=3, spikes=2)
+    at, silent, _ = cone_x_rows(pattern, wanted)
+    found = linprog(
+        np.zeros(80),
+        A_ub=silent,
+        b_ub=np.full(len(silent), 15.0 - 1e-3),
+        A_eq=at,
+        b_eq=np.full(3, 15.0 + 1e-9),
+        bounds=(-100, 100),
+    )
+    assert found.status == 0
+    learner = HTP(window_ms=0.0, eta=1.0, epochs=1, **GIVEN)
+    assert not learner.change(found.x, pattern, wanted)[0].any()
+    broken = found.x * 1.01  # the potential now comes to the threshold before its target
+    assert learner.change(broken, pattern, wanted)[0].any()
+
+
+def cone_x(**options):
+    """CONE-X with HTP's neuron: no refractory time, no threshold rise; bounds far out."""
+    bare = {"theta_plus": 0.0, "refractory": 0.0, "after_spike": "reset", "lb": -50.0, "ub": 50.0}
+    kernel = {"kernel": "double_exponential", "tau": 10.0, "tau_s": 5.0, "theta_0": 0.3}
+    return made(ConeX, **bare, **kernel, time="grid", step_ms=STEP, **options)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_rows_that_cone_x_states_are_those_of_htp(seed):
+    (pattern,), (wanted,) = patterns(seed, trains=30, count=1, targets=3, spikes=3)
+    problem = ConeXProblem(cone_x(), [pattern], [wanted])
+    at, silent, times = cone_x_rows(pattern, wanted)
+    for k in range(3):
+        coefficients, limit = problem.target(0, k)
+        assert coefficients == pytest.approx(at[k], abs=1e-12)
+        assert limit == pytest.approx(0.3)
+    for k in range(0, len(times), 37):
+        coefficients, limit = problem.silence(0, times[k])
+        assert coefficients == pytest.approx(silent[k], abs=1e-9)
+        assert limit == pytest.approx(0.3)
+
+
+def test_what_cone_x_ends_with_is_not_corrected():
+    (pattern,), (wanted,) = patterns(9, trains=80, count=1, targets=3, spikes=2)
+    cone = cone_x(margin=1e-4).fit([pattern], [wanted])
+    assert cone.status_ == "solved"
+    learner = HTP(window_ms=0.0, eta=1.0, epochs=1, **{**GIVEN, "theta_0": 0.3})
+    # A target is reached to rounding, also from below.
+    assert not learner.change(cone.weights_ * (1 + 1e-9), pattern, wanted)[0].any()
+
+
+def test_what_htp_ends_with_meets_the_rows_of_cone_x():
+    """The other way round, and the neuron of the house fires there."""
+    (pattern,), (wanted,) = patterns(8, trains=80, count=1, targets=2, spikes=2)
+    learner = HTP(window_ms=0.5, eta=0.02, epochs=4000, until_right=False, **GIVEN).fit([pattern], [wanted])
+    at, silent, times = cone_x_rows(pattern, wanted)
+    assert not learner.change(learner.weights_, pattern, wanted)[0].any()
+    assert np.all(at @ learner.weights_ >= 15.0 * (1 - 1e-9))
+    before = np.array([np.any((wanted - 0.5 <= t) & (t <= wanted)) for t in times])
+    assert np.all((silent @ learner.weights_)[~before] < 15.0)
+    fired = learner.neuron_.run(learner.weights_, pattern)
+    assert fired == pytest.approx(wanted, abs=1.0)
+    assert isinstance(learner.neuron_, Neuron)
+
+
+def test_constants_that_make_no_sense_are_one_clear_error():
+    with pytest.raises(ProblemError, match='after_spike is "membrane": HTP needs'):
+        HTP(window_ms=0.0, after_spike="membrane", eta=1.0, epochs=1, **GIVEN)
+    with pytest.raises(ProblemError, match="window_ms is -1 ms"):
+        HTP(window_ms=-1.0, eta=1.0, epochs=1, **GIVEN)

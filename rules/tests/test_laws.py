@@ -1,0 +1,185 @@
+"""The laws of taxel's learners and of its public names hold for the rules: of parameters, nonsense, docstrings."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import signal
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+import sound
+import test_border as border
+import test_docstrings as docstrings
+import test_error_names as error_names
+import test_manners as manners
+import test_nonsense as nonsense
+import test_parameters as parameters
+from sound_calls import SOUND
+
+import taxel
+import taxel_rules
+from taxel import SpikeTrains
+from taxel._base.parameters import Parameters
+from taxel_rules import _rules
+from taxel_rules._epochs import Status
+
+ROOT = Path(__file__).parents[1]
+PUBLIC = nonsense.public_of([taxel_rules], SOUND)
+RULES = {
+    name: getattr(taxel_rules, name) for name in taxel_rules.__all__ if hasattr(getattr(taxel_rules, name), "_kind")
+}
+KINDS = list(RULES.values())
+#: Values for parameters without a default.
+GIVEN: dict[str, Any] = {"eta": 0.05, "initial": (0.0, 0.5), "epochs": 50, "updates": "pattern", "tau": 10.0}
+GIVEN |= {"tau_s": 5.0, "theta_0": 1.0, "rule": "E", "tau_a": 5.0, "window_ms": 1.0}
+
+each_rule = pytest.mark.parametrize("name", RULES)
+each_kind = pytest.mark.parametrize("kind", KINDS)
+each_range = pytest.mark.parametrize(("kind", "name"), parameters.ranged(KINDS))
+
+
+@pytest.fixture(autouse=True)
+def _of_rules(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the laws find the rules where they look for what they try."""
+    for name, call in SOUND.items():
+        monkeypatch.setitem(sound.SOUND, name, call)
+    for name, rule in RULES.items():
+        monkeypatch.setitem(manners.LEARNERS, name, rule)
+    for given in (manners.GIVEN, parameters.REQUIRED):
+        for name, value in GIVEN.items():
+            monkeypatch.setitem(given, name, value)
+
+
+def test_a_rule_has_a_file_in_each_place_and_nothing_is_left_out() -> None:
+    files = {file.stem for file in (ROOT / "taxel_rules").glob("*.py") if not file.stem.startswith("_")}
+    kinds = {rule._kind for rule in KINDS}
+    assert kinds == files - {"readout"}, "taxel_rules/NAME.py with _kind NAME, a line in taxel_rules/__init__.py"
+    registered = set(_rules.rule_names()) | set(_rules.batch_names())
+    assert kinds - {"stdp", "tempotron"} == registered, "a line in a registry of src/rules.rs"
+    for name in kinds:
+        assert (ROOT / f"tests/test_{name}.py").exists(), f"rules/tests/test_{name}.py"
+    assert all(issubclass(rule, Parameters) for rule in KINDS)
+
+
+@each_rule
+@pytest.mark.parametrize(
+    "law",
+    [
+        manners.test_a_clone_has_the_same_parameters_and_nothing_learnt,
+        manners.test_what_was_learnt_survives_a_copy_and_a_pickle,
+        manners.test_weights_that_are_assigned_have_no_verdict_of_the_fit_and_a_new_fit_has_its_own,
+        manners.test_scores_lie_between_0_and_1_and_predictions_are_spikes,
+        manners.test_values_are_read_or_graded_trains_are_refused_by_name,
+    ],
+)
+def test_a_rule_has_the_manners_of_a_learner(law: Any, name: str) -> None:
+    law(name)
+
+
+@each_rule
+@pytest.mark.parametrize("shift", [1000.0, 1e9])
+def test_moved_in_time_it_learns_the_same(name: str, shift: float) -> None:
+    manners.test_moved_in_time_it_learns_the_same(name, shift)
+
+
+@each_kind
+@pytest.mark.parametrize(
+    "law",
+    [
+        parameters.test_the_signature_shows_what_the_compiled_part_has,
+        parameters.test_the_words_of_a_choice_are_the_compiled_part_s,
+        parameters.test_parameters_go_round,
+        parameters.test_a_wrong_value_changes_nothing,
+        parameters.test_python_types_no_default_of_a_parameter,
+        parameters.test_python_compares_no_parameter_with_a_number,
+    ],
+)
+def test_parameters_are_defined_once(law: Any, kind: type[Parameters]) -> None:
+    law(kind)
+
+
+@each_range
+@pytest.mark.parametrize(
+    "law",
+    [
+        parameters.test_a_value_outside_its_range_is_refused_in_the_table_s_words,
+        parameters.test_the_documentation_says_the_table_s_range_and_unit,
+    ],
+)
+def test_ranges_are_those_of_the_table(law: Any, kind: type[Parameters], name: str) -> None:
+    law(kind, name)
+
+
+def test_every_public_callable_has_a_sound_call_with_every_argument() -> None:
+    assert set(PUBLIC) == set(SOUND)
+    for name, call in SOUND.items():
+        assert nonsense.takes(PUBLIC[name]) <= set(call()[1]), name
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", SOUND)
+@pytest.mark.parametrize(
+    "law",
+    [
+        nonsense.test_a_sound_call_is_sound,
+        pytest.param(partial(nonsense.test_nonsense_in_each_argument_is_one_clear_error, in_full=True), id="nonsense"),
+        nonsense.test_nan_and_infinity_are_refused_where_they_mean_nothing,
+        nonsense.test_numbers_give_numbers,
+    ],
+)
+def test_nonsense_is_one_clear_error(law: Any, name: str) -> None:
+    law(name)
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_docstrings_are_whole(name: str) -> None:
+    value = PUBLIC[name]
+    assert [*docstrings.faults_of_parameters(name, value), *docstrings.faults_of_raises(name, value)] == []
+
+
+def test_at_least_half_show_an_example_that_is_run() -> None:
+    shown = [name for name, value in PUBLIC.items() if ">>>" in (inspect.getdoc(value) or "")]
+    assert 2 * len(shown) >= len(PUBLIC)
+    assert docstrings.unnamed_sources(PUBLIC) == []
+
+
+@pytest.mark.parametrize("name", taxel_rules.__all__)
+def test_a_class_is_named_as_it_is_imported(name: str) -> None:
+    error_names.test_a_class_is_named_as_it_is_imported(getattr(taxel_rules, name))
+
+
+def test_the_words_of_status_are_those_of_the_readme() -> None:
+    table = (ROOT / "README.md").read_text().split("## How a training ended")[1]
+    listed = re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)
+    assert set(listed) - {"status_"} == set(get_args(Status))
+
+
+def test_the_compiled_part_returns_no_json_and_no_long_tuple() -> None:
+    stub = (ROOT / "taxel_rules" / "_rules.pyi").read_text()
+    assert border.of_text(stub) == {"Trained.ended"}
+    assert border.long_tuples(stub) == set()
+
+
+def test_errors_are_taxel_s_own_and_an_interrupt_ends_a_call() -> None:
+    """An extension beside `taxel._core` raises the same classes, and hears Ctrl-C."""
+    with pytest.raises(taxel.ProblemError) as refused:
+        taxel_rules.INST(tau=-1.0)
+    assert (refused.value.argument, refused.value.hint) == ("tau", None)
+    lists = [np.arange(200_000) * 10.0 + n * 0.0999 for n in range(40)]
+    trains = SpikeTrains.from_lists(lists, stop=2e6)
+    before = signal.signal(signal.SIGVTALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+    begun = time.process_time()
+    signal.setitimer(signal.ITIMER_VIRTUAL, 0.3)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            taxel_rules.STDP().partial_fit(trains)
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
+    # Half a second is the goal; a loaded machine needs more.
+    assert time.process_time() - begun < 2.3

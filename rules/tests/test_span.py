@@ -1,0 +1,41 @@
+"""SPAN against its closed form, and that against the integral of filtered trains."""
+
+import numpy as np
+import pytest
+from rule_examples import patterns, right_sides
+
+from taxel import ProblemError, SpikeTrains
+from taxel_rules import SPAN
+
+GIVEN = {"eta": 1.0, "initial": (0.0, 1.0), "epochs": 1, "updates": "batch", "tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
+
+
+def test_the_change_is_the_closed_form():
+    (pattern,), (wanted,) = patterns(1, trains=60, count=1, targets=3, spikes=3)
+    weights = np.random.default_rng(1).uniform(-1, 4, 60)
+    change, fired = SPAN(tau_a=5.0, **GIVEN).change(weights, pattern, wanted)
+
+    def factor(s):
+        return (np.e / 2) ** 2 * (np.abs(s) + 5.0) * np.exp(-np.abs(s) / 5.0)
+
+    assert len(fired) > 0
+    assert change == pytest.approx(right_sides(pattern, wanted, fired, factor), rel=1e-9, abs=1e-9)
+
+
+def test_the_closed_form_is_the_integral_of_input_times_target():
+    tau = 5.0
+    t = np.arange(0, 300, 0.001)
+
+    def filtered(at):
+        s = np.maximum(t - at, 0)
+        return np.e / tau * s * np.exp(-s / tau)
+
+    for apart in (-30.0, -4.0, 0.0, 2.0, 25.0):
+        pattern = SpikeTrains.from_lists([[60.0 - apart]], stop=200.0)
+        change = SPAN(tau_a=tau, **GIVEN).change([0.0], pattern, [60.0])[0]
+        assert change[0] == pytest.approx(np.sum(filtered(60.0 - apart) * filtered(60.0)) * 0.001, rel=1e-6)
+
+
+def test_a_filter_of_no_length_is_one_clear_error():
+    with pytest.raises(ProblemError, match="tau_a is 0 ms"):
+        SPAN(tau_a=0.0, **GIVEN)
