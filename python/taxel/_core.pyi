@@ -8,6 +8,10 @@ from typing import Any, Final, Literal, Protocol, Self, TypeAlias, TypedDict, fi
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel.labels import Note
+from taxel.live._label_table import TableRead
+from taxel.live._shown_files import ReadFrames
+
 class Error(Exception):
     argument: str | None
     hint: str | None
@@ -758,31 +762,21 @@ class ConeXProblem:
 
 # panel: its server, what that asks of Python, and the files of its page by their names below crates/taxel-panel/web
 
-# The array of all sources; name, first column, rows, columns, times (us), values and rest of each source, the rest with
-# where it is known from and ticks by the unit; unit; time from one frame to the next if they are numbered (us);
-# notes and detections as JSON; verdict; the trial, and all trials of the file if there are several; how long the rest
-# of the file takes (s).
-_Rest = tuple[str, NDArray[np.float64], float, bool, list[int], str]
-_ReadFrames = tuple[
-    _Array,
-    list[tuple[str, int, int, int, NDArray[np.int64], NDArray[np.float32], _Rest]],
-    str,
-    int | None,
-    str,
-    str,
-    str | None,
-    list[str],
-    float | None,
-]
+# The fields of a `taxel.labels.Note`, with times in us of the view.
+@type_check_only
+class _Note(TypedDict):
+    text: str
+    t: int
+    at_ns: int
+    recording: str
+    source: str
+    replaces: int | None
 
-# Text, time (us), source, trial, time of the note that it replaces (us), and by the host (ns since 1970).
-_LabelRow = tuple[str, int, str, str, int | None, int | None]
-
-# Labels that were acknowledged and are missing in a table, that were deleted and returned, and other new ones.
-_LabelConflict = tuple[list[_LabelRow], list[_LabelRow], list[_LabelRow]]
-
-# The labels of a table, and its conflict.
-_LabelTable = tuple[list[_LabelRow], _LabelConflict]
+@type_check_only
+class _Conflict(TypedDict):
+    missing: list[_Note]
+    returned: list[_Note]
+    new: list[_Note]
 
 @type_check_only
 class BoardRequests(Protocol):
@@ -806,7 +800,7 @@ class FileRequests(Protocol):
         values: tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]] | None,
     ) -> tuple[list[tuple[int, int]], list[tuple[int, int]], list[tuple[int, int]], int]: ...
     def recordings(self, folder: Path) -> list[str]: ...
-    def read(self, path: Path, trial: str | None, whole: bool) -> tuple[Path | None, _ReadFrames | None]: ...
+    def read(self, path: Path, trial: str | None, whole: bool) -> tuple[Path | None, ReadFrames | None]: ...
     def health_of_frames(
         self, path: Path, trial: str | None
     ) -> tuple[list[tuple[int, int]], list[tuple[int, int]], list[tuple[int, int]], int]: ...
@@ -815,11 +809,11 @@ class FileRequests(Protocol):
 @type_check_only
 class LabelRequests(Protocol):
     def stamp(self, table: Path) -> str: ...
-    def read(self, table: Path, recording: str) -> _LabelTable: ...
+    def read(self, table: Path, recording: str, us: int) -> TableRead: ...
     def change(
-        self, table: Path, recording: str, requests: list[list[tuple[_LabelRow | None, _LabelRow | None]]]
-    ) -> tuple[list[str | list[_LabelRow | None]], _LabelTable]: ...
-    def settle(self, table: Path, recording: str, conflict: _LabelConflict, restore: bool) -> _LabelTable: ...
+        self, table: Path, recording: str, us: int, requests: list[list[tuple[_Note | None, _Note | None]]]
+    ) -> tuple[list[str | list[Note | None]], TableRead]: ...
+    def settle(self, table: Path, recording: str, us: int, conflict: _Conflict, restore: bool) -> TableRead: ...
 
 @type_check_only
 class TrainingRequests(Protocol):

@@ -172,25 +172,26 @@ def test_columns_that_taxel_does_not_know_stay_with_their_labels_on_the_page(row
             table = csv.writer(file)
             table.writerows([("label", "t_us", "source", "recording", "comment", "sure"), *rows])
         handler = LabelRequests(Opening())
-        shown, _ = handler.read(place, "walk.mcap")
-        assert len(shown) == len(rows)
+        assert len(handler.read(place, "walk.mcap", 1).rows) == len(rows)
         at = random.randrange(len(rows))
         left = [row if row[3] != "walk" else (*row[:3], "", *row[4:]) for row in rows]
         label, t, source, trial, *said = left[at]
         changed = {"rename": ("ball", t), "move": (label, 77)}.get(change, (label, t))
-        old = (label, t, source, trial, None, None)
-        edit = (old, (*changed, *old[2:]))
+        old = {"text": label, "t": t, "source": source, "recording": trial}
+        edit = (old, old | dict(zip(("text", "t"), changed, strict=True)))
         if change == "mark":
-            edit = (None, ("ball", 5, "", "", None, None))
+            edit = (None, {"text": "ball", "t": 5})
             left.append(("ball", 5, "", "", "", ""))
         elif change == "delete":
             edit = (old, None)
             del left[at]
         else:
             left[at] = (*changed, source, trial, *said)
-        outcomes, (written, _) = handler.change(place, "walk.mcap", [] if change == "none" else [[edit]])
+        outcomes, written = handler.change(place, "walk.mcap", 1, [] if change == "none" else [[edit]])
         assert not any(isinstance(outcome, str) for outcome in outcomes)
-        assert sorted(row[:4] for row in written) == sorted(row[:4] for row in left)
+        assert sorted((row.text, row.t, row.source, row.recording) for row in written.rows) == sorted(
+            row[:4] for row in left
+        )
         again = taxel.Labels(place).rows
         names = {"comment": "", "sure": ""}
         # A row of the table's own recording may have its name, or none.

@@ -229,14 +229,14 @@ pub trait FileRequests: Send + Sync {
     fn cut(&self, cut: &Cut<'_>) -> Reply<Vec<String>>;
 }
 
-/// Requests about the tables of labels beside recordings.
+/// Requests about the tables of labels beside recordings. Times are those of the view, in which one us of the file is `us`.
 #[allow(clippy::missing_errors_doc)]
 pub trait LabelRequests: Send + Sync {
     /// Returns a text that changes when a table of labels may have changed, or what was acknowledged of it.
     fn stamp(&self, table: &Path) -> Reply<String>;
 
     /// Reads the labels of a recording from a table, which need not exist.
-    fn read(&self, table: &Path, recording: &str) -> Reply<LabelTable>;
+    fn read(&self, table: &Path, recording: &str, us: i64) -> Reply<LabelTable>;
 
     /// Carries out requests in one write of the table as it is now, each of them whole or not at all. Returns when the table
     /// is on the disk.
@@ -244,11 +244,19 @@ pub trait LabelRequests: Send + Sync {
         &self,
         table: &Path,
         recording: &str,
+        us: i64,
         requests: &[Vec<LabelEdit>],
     ) -> Reply<(Vec<EditOutcome>, LabelTable)>;
 
     /// Ends a conflict: restores what was acknowledged, or accepts the table as it is.
-    fn settle(&self, table: &Path, recording: &str, conflict: &LabelConflict, restore: bool) -> Reply<LabelTable>;
+    fn settle(
+        &self,
+        table: &Path,
+        recording: &str,
+        us: i64,
+        conflict: &LabelConflict,
+        restore: bool,
+    ) -> Reply<LabelTable>;
 }
 
 /// Requests about readouts: training one on a recording, and running it on another.

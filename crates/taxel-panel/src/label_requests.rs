@@ -49,9 +49,10 @@ async fn reread(hub: &Hub, recording: &str, stamp: String, us: i64) -> Answer<bo
     hub.labels.opens(recording, stamp, us);
     let table = hub.folder.file(&file_of(recording))?;
     let name = recording.to_owned();
-    let (read, exists) = hub.ask(move |handlers| Ok((handlers.labels.read(&table, &name)?, table.exists()))).await?;
+    let (read, exists) =
+        hub.ask(move |handlers| Ok((handlers.labels.read(&table, &name, us)?, table.exists()))).await?;
     let there = exists || !read.conflict.is_empty();
-    Ok(hub.labels.replace(recording, there.then(|| read.in_view(us))))
+    Ok(hub.labels.replace(recording, there.then_some(read)))
 }
 
 /// Reads tables again that have changed; never returns.
@@ -144,11 +145,11 @@ async fn write_waiting(hub: &Hub, name: &str, us: i64) {
 
 async fn write(hub: &Hub, name: &str, us: i64, edits: Vec<Result<Vec<NumberedEdit>, String>>) -> Answer<Vec<Answer>> {
     let table = hub.folder.file(&file_of(name))?;
-    let in_file = |edits: &Vec<NumberedEdit>| edits.iter().map(|(_, edit)| edit.clone().in_file(us)).collect();
-    let requests: Vec<Vec<_>> = edits.iter().flatten().map(in_file).collect();
+    let of_request = |edits: &Vec<NumberedEdit>| edits.iter().map(|(_, edit)| edit.clone()).collect();
+    let requests: Vec<Vec<_>> = edits.iter().flatten().map(of_request).collect();
     let recording = name.to_owned();
     let (outcomes, read): (Vec<EditOutcome>, LabelTable) =
-        hub.ask(move |handlers| handlers.labels.change(&table, &recording, &requests)).await?;
+        hub.ask(move |handlers| handlers.labels.change(&table, &recording, us, &requests)).await?;
     let mut outcomes = outcomes.into_iter();
     let mut answers = vec![];
     for request in edits {
@@ -156,14 +157,13 @@ async fn write(hub: &Hub, name: &str, us: i64, edits: Vec<Result<Vec<NumberedEdi
         answers.push(match outcome {
             Ok((numbered, Ok(rows))) => {
                 let numbers = numbered.into_iter().map(|(id, _)| id);
-                let rows = rows.into_iter().map(|row| row.map(|row| row.in_view(us)));
                 hub.labels.renumber(name, numbers.zip(rows).filter_map(|(id, row)| Some((id?, row))));
                 Ok(())
             }
             Ok((_, Err(reason))) | Err(reason) => Err(reason.into()),
         });
     }
-    hub.labels.replace(name, Some(read.in_view(us)));
+    hub.labels.replace(name, Some(read));
     hub.labels.follows(name, us);
     hub.clients.send(Broadcast::Labels(name.to_owned()));
     Ok(answers)
@@ -178,9 +178,9 @@ pub(super) async fn settle(hub: &Hub, shown: Option<&Shown>, id: u64, keep: Keep
     let conflict = hub.labels.conflict(&name, id).ok_or_else(|| {
         Refusal::of("conflict_id", "this conflict is settled, or the file has changed since: look at it again")
     })?;
-    let (recording, conflict) = (name.clone(), conflict.in_file(us));
-    let read = hub.ask(move |handlers| handlers.labels.settle(&table, &recording, &conflict, restore)).await?;
-    hub.labels.replace(&name, Some(read.in_view(us)));
+    let recording = name.clone();
+    let read = hub.ask(move |handlers| handlers.labels.settle(&table, &recording, us, &conflict, restore)).await?;
+    hub.labels.replace(&name, Some(read));
     hub.clients.send(Broadcast::Labels(name));
     Ok(())
 }

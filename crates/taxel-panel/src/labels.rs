@@ -24,43 +24,6 @@ impl LabelRow {
     fn is_removal(&self) -> bool {
         self.label.is_empty()
     }
-
-    /// With its times as a client sees them: one us of the file is `us` of the view.
-    pub(super) fn in_view(self, us: i64) -> Self {
-        Self { t_us: self.t_us * us, replaces_us: self.replaces_us.map(|t| t * us), ..self }
-    }
-
-    /// With its times as in the file.
-    fn in_file(self, us: i64) -> Self {
-        Self { t_us: self.t_us / us, replaces_us: self.replaces_us.map(|t| t / us), ..self }
-    }
-}
-
-impl LabelEdit {
-    /// With its times as in the file.
-    pub(super) fn in_file(self, us: i64) -> Self {
-        Self { old: self.old.map(|row| row.in_file(us)), new: self.new.map(|row| row.in_file(us)) }
-    }
-}
-
-impl LabelConflict {
-    fn each(self, change: impl Fn(LabelRow) -> LabelRow) -> Self {
-        let all = |rows: Vec<LabelRow>| rows.into_iter().map(&change).collect();
-        Self { missing: all(self.missing), returned: all(self.returned), new: all(self.new) }
-    }
-
-    /// With its times as in the file.
-    pub(super) fn in_file(self, us: i64) -> Self {
-        self.each(|row| row.in_file(us))
-    }
-}
-
-impl LabelTable {
-    /// With its times as a client sees them.
-    pub(super) fn in_view(self, us: i64) -> Self {
-        let rows = self.rows.into_iter().map(|row| row.in_view(us)).collect();
-        Self { rows, conflict: self.conflict.each(|row| row.in_view(us)) }
-    }
 }
 
 impl LabelChange {

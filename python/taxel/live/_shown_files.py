@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import os
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._base.files import open_file
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.frames import Frames
-from taxel.labels import Labels, beside
+from taxel.labels import Labels, Note, beside
 from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.health import health
@@ -34,10 +33,82 @@ _TEXTS = {".csv", ".txt", ".asc", ".asf", ".lst"}
 #: Time from one frame to the next, us, where frames are numbered: a view shows them as 100 a second.
 _NUMBER_US = 10_000
 
-#: Frames as `_core.PanelRequests.read` returns them.
-ReadFrames = tuple[Any, ...]
-
 _Taxels = list[tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class ReadRest:
+    """Hold how a sensor rests.
+
+    Parameters
+    ----------
+    source : str
+        Where the rest is known from.
+    values : float64, one a taxel, NaN where unknown
+    ticks_by_unit : float
+    loaded_from : float
+        From where on a value above rest is a load.
+    falls : bool
+        Whether values fall under load.
+    flickering : list of int
+        Indices of taxels.
+    preload_at : str
+        What lay on the sensor, in words.
+    """
+
+    source: str
+    values: NDArray[np.float64]
+    ticks_by_unit: float
+    loaded_from: float
+    falls: bool
+    flickering: list[int]
+    preload_at: str
+
+
+@dataclass(frozen=True)
+class ReadSource:
+    """Hold the frames of a sensor, from column `left` of the array that is shown; times in us."""
+
+    name: str
+    left: int
+    rows: int
+    columns: int
+    t: NDArray[np.int64]
+    values: NDArray[np.float32]
+    rest: ReadRest
+
+
+@dataclass(frozen=True)
+class ReadFrames:
+    """Hold a recording of frames for the panel's server.
+
+    Parameters
+    ----------
+    array : the array of all sources
+    sources : list of ReadSource
+    unit : str
+    number_us : int, optional
+        Time from one frame to the next, us, where frames are numbered.
+    notes : list of (time in us or None, text, source)
+    detections : list of (label, time, time at which it was known), us
+    verdict : str
+        Empty if it is unknown.
+    trial, trials : str and list of str
+        The trial, and all of the file where it has several.
+    left_s : float, optional
+        How long the rest of the file takes to read, s.
+    """
+
+    array: _core._Array
+    sources: list[ReadSource]
+    unit: str
+    number_us: int | None
+    notes: list[tuple[int | None, str, str]]
+    detections: list[tuple[str, int, int]]
+    verdict: str
+    trial: str | None = None
+    trials: list[str] = field(default_factory=list)
+    left_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -127,7 +198,8 @@ class ShownFiles:
             (recording, names), left_s = self.opened(path, trial), None
         if not recording.is_several and recording.has_events:
             return self._converted(recording), None
-        return None, (*_frames(recording), recording.name if names else None, names, left_s)
+        frames = _frames(recording)
+        return None, replace(frames, trial=recording.name if names else None, trials=names, left_s=left_s)
 
     def health(self, path: Path, trial: str | None) -> tuple[_Taxels, _Taxels, _Taxels, int]:
         """Return the taxels that are dead, stuck, noisy, in the array that is shown, and how many cannot be judged."""
@@ -193,8 +265,7 @@ def _array_of(frames: dict[str, Frames]) -> tuple[Array, list[int]]:
     return Array._beside([one.array for one in frames.values()], gap=1)
 
 
-def _frames(recording: Recording) -> tuple[Any, ...]:
-    """Return array, sources, unit, distance of numbered frames, remarks and verdict (empty if unknown)."""
+def _frames(recording: Recording) -> ReadFrames:
     sources = _sources(recording)
     frames = {name: _in_its_unit(one) for name, one in sources.items()}
     units = {one.unit for one in frames.values()}
@@ -203,7 +274,7 @@ def _frames(recording: Recording) -> tuple[Any, ...]:
     array, lefts = _array_of(frames)
     us = 1 if recording.timed else _NUMBER_US
     parts = [
-        (name, left, one.array.rows, one.array.columns, _times(one.t, us), _values(one), _rest(one))
+        ReadSource(name, left, one.array.rows, one.array.columns, _times(one.t, us), _values(one), _rest(one))
         for (name, one), left in zip(frames.items(), lefts, strict=True)
     ]
     noted = {name: {(note.t, note.text) for note in one.notes} for name, one in sources.items()}
@@ -213,12 +284,13 @@ def _frames(recording: Recording) -> tuple[Any, ...]:
     labels = {(row.t, row.text) for row in _labels_beside(recording)}
     notes = {note for note in notes if note[:2] not in labels}
     found = [(d.label, d.t, d.known) for one in sources.values() for d in one.detections]
-    remarks = json.dumps([sorted(notes, key=lambda note: (note[0] or 0, note[1])), found])
+    sorted_notes = sorted(notes, key=lambda note: (note[0] or 0, note[1]))
     verdict = "" if recording.verdict.status == "unknown" else recording.verdict
-    return array._parts(), parts, units.pop(), None if us == 1 else us, remarks, verdict
+    number_us = None if us == 1 else us
+    return ReadFrames(array._parts(), parts, units.pop(), number_us, sorted_notes, found, verdict)
 
 
-def _labels_beside(recording: Recording) -> tuple[Any, ...]:
+def _labels_beside(recording: Recording) -> tuple[Note, ...]:
     """Return the labels of the table beside a file, which the panel shows as such and not as notes."""
     table = beside(recording.path)
     return Labels(table).rows if table.is_file() else ()
@@ -229,15 +301,11 @@ def _in_its_unit(recording: Recording) -> Frames:
     return recording.frames() if recording.calibration is None else recording.calibrated()
 
 
-def _rest(frames: Frames) -> tuple[str, NDArray[np.float64], float, float, bool, list[int], str]:
-    """Return how a sensor rests.
-
-    These are the rest's source, that of each taxel, ticks by the unit, from where on a value above it is a load,
-    whether values fall, what flickers, and what lay on it.
-    """
+def _rest(frames: Frames) -> ReadRest:
     rest = of_frames(frames)
     source, flickers = {"unit": "given"}.get(rest.source, rest.source), np.flatnonzero(flickering(frames)).tolist()
-    return source, rest.values, ticks_by_unit(frames), loaded_from(frames, rest), rest.falls, flickers, rest.preload_at
+    loaded = loaded_from(frames, rest)
+    return ReadRest(source, rest.values, ticks_by_unit(frames), loaded, rest.falls, flickers, rest.preload_at)
 
 
 def _times(t: NDArray[np.int64], us: int) -> NDArray[np.int64]:

@@ -11,7 +11,7 @@ use taxel_core::detect::Detection;
 use taxel_core::held::UNKNOWN;
 use taxel_core::rest::Value;
 use taxel_core::wire::Command;
-use taxel_live::recording::{Note, Remarks};
+use taxel_live::recording::{self, Remarks};
 use taxel_panel::{
     Activity, BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, FrameFile, FrameIndex, FramePlace,
     FrameRest, FrameSource, FramesRead, LabelConflict, LabelEdit, LabelRequests, LabelRow, LabelTable, Opening,
@@ -23,7 +23,6 @@ use crate::held::from_touches;
 use taxel_border::convert::{ArrayParts, array, from_array, slice, to_array};
 use taxel_border::enter::enter;
 use taxel_border::errors::ProblemError;
-use taxel_border::parameters::parsed;
 
 /// Calls the methods of a Python object; the text of an exception is the reason of a refusal.
 struct PythonHandler(Py<PyAny>);
@@ -107,7 +106,7 @@ impl FileRequests for PythonHandler {
     fn read(&self, path: &Path, trial: Option<&str>, opening: Opening) -> Reply<ReadFile> {
         let whole = opening == Opening::Whole;
         self.call(|handler| {
-            let (events, frames): (Option<PathBuf>, Option<ReadFramesIn<'_>>) =
+            let (events, frames): (Option<PathBuf>, Option<ReadFrames<'_>>) =
                 handler.call_method1("read", (path, trial, whole))?.extract()?;
             match (events, frames) {
                 (_, Some(frames)) => Ok(ReadFile::Frames(FramesRead(Box::new(to_index(handler.py(), frames)?)))),
@@ -134,33 +133,41 @@ impl LabelRequests for PythonHandler {
         self.call(|handler| handler.call_method1("stamp", (table,))?.extract())
     }
 
-    fn read(&self, table: &Path, recording: &str) -> Reply<LabelTable> {
-        self.call(|handler| handler.call_method1("read", (table, recording))?.extract()).map(to_table)
+    fn read(&self, table: &Path, recording: &str, us: i64) -> Reply<LabelTable> {
+        let read: TableRead = self.call(|handler| handler.call_method1("read", (table, recording, us))?.extract())?;
+        Ok(read.into())
     }
 
     fn change(
         &self,
         table: &Path,
         recording: &str,
+        us: i64,
         requests: &[Vec<LabelEdit>],
     ) -> Reply<(Vec<EditOutcome>, LabelTable)> {
-        let edit = |edit: &LabelEdit| (edit.old.clone().map(from_row), edit.new.clone().map(from_row));
+        let edit = |edit: &LabelEdit| (edit.old.clone().map(Note::from), edit.new.clone().map(Note::from));
         let requests: Vec<Vec<_>> = requests.iter().map(|request| request.iter().map(edit).collect()).collect();
-        let (outcomes, read): (Vec<OutcomeIn>, TableParts) =
-            self.call(|handler| handler.call_method1("change", (table, recording, requests))?.extract())?;
+        let (outcomes, read): (Vec<Outcome>, TableRead) =
+            self.call(|handler| handler.call_method1("change", (table, recording, us, requests))?.extract())?;
         let outcome = |outcome| match outcome {
-            OutcomeIn::Refused(reason) => Err(reason),
-            OutcomeIn::Written(rows) => Ok(rows.into_iter().map(|row| row.map(to_row)).collect()),
+            Outcome::Refused(reason) => Err(reason),
+            Outcome::Written(notes) => Ok(notes.into_iter().map(|note| note.map(LabelRow::from)).collect()),
         };
-        Ok((outcomes.into_iter().map(outcome).collect(), to_table(read)))
+        Ok((outcomes.into_iter().map(outcome).collect(), read.into()))
     }
 
-    fn settle(&self, table: &Path, recording: &str, conflict: &LabelConflict, restore: bool) -> Reply<LabelTable> {
-        let rows = |rows: &[LabelRow]| rows.iter().cloned().map(from_row).collect::<Vec<_>>();
-        let LabelConflict { missing, returned, new } = conflict;
-        let conflict: ConflictParts = (rows(missing), rows(returned), rows(new));
-        let given = (table, recording, conflict, restore);
-        self.call(|handler| handler.call_method1("settle", given)?.extract()).map(to_table)
+    fn settle(
+        &self,
+        table: &Path,
+        recording: &str,
+        us: i64,
+        conflict: &LabelConflict,
+        restore: bool,
+    ) -> Reply<LabelTable> {
+        let conflict = Conflict::from(conflict.clone());
+        let given = (table, recording, us, conflict, restore);
+        let read: TableRead = self.call(|handler| handler.call_method1("settle", given)?.extract())?;
+        Ok(read.into())
     }
 }
 
@@ -223,97 +230,139 @@ impl PresetRequests for PythonHandler {
     }
 }
 
-/// A label as Python has it: text, time (us), source, trial, time of the note that it replaces (us), and by the host (ns).
-type LabelParts = (String, i64, String, String, Option<i64>, Option<i64>);
-
-/// A conflict as Python has it: labels that are missing, that returned, and that are new.
-type ConflictParts = (Vec<LabelParts>, Vec<LabelParts>, Vec<LabelParts>);
-
-/// A table of labels as Python has it: its rows and its conflict.
-type TableParts = (Vec<LabelParts>, ConflictParts);
-
-/// What became of a request, as Python has it.
-#[derive(FromPyObject)]
-enum OutcomeIn {
-    Refused(String),
-    Written(Vec<Option<LabelParts>>),
+/// A `Note` of Python, whose times are in us of the view; from Rust it comes as a dictionary.
+#[derive(FromPyObject, IntoPyObject)]
+struct Note {
+    text: String,
+    t: i64,
+    at_ns: i64,
+    recording: String,
+    source: String,
+    replaces: Option<i64>,
 }
 
-fn to_row((label, t_us, source, trial, replaces_us, host_ns): LabelParts) -> LabelRow {
-    LabelRow { label, t_us, source, trial, replaces_us, host_ns }
-}
-
-fn from_row(LabelRow { label, t_us, source, trial, replaces_us, host_ns }: LabelRow) -> LabelParts {
-    (label, t_us, source, trial, replaces_us, host_ns)
-}
-
-fn to_table((rows, (missing, returned, new)): TableParts) -> LabelTable {
-    let all = |rows: Vec<LabelParts>| rows.into_iter().map(to_row).collect();
-    LabelTable {
-        rows: all(rows),
-        conflict: LabelConflict { missing: all(missing), returned: all(returned), new: all(new) },
+impl From<Note> for LabelRow {
+    fn from(Note { text: label, t: t_us, at_ns, recording: trial, source, replaces: replaces_us }: Note) -> Self {
+        Self { label, t_us, source, trial, replaces_us, host_ns: (at_ns != 0).then_some(at_ns) }
     }
 }
 
-/// A source of frames: name, first column, rows, columns, times (us), values, rest.
-type SourceIn<'py> = (String, u16, u16, u16, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f32>, RestIn<'py>);
+impl From<LabelRow> for Note {
+    fn from(
+        LabelRow { label: text, t_us: t, source, trial: recording, replaces_us: replaces, host_ns }: LabelRow,
+    ) -> Self {
+        Self { text, t, at_ns: host_ns.unwrap_or(0), recording, source, replaces }
+    }
+}
 
-/// The rest of a source: where it is known from, that of each cell (NaN where unknown), ticks by the unit, whether values
-/// fall from it, the cells that flicker, and where something lay then (for people).
-type RestIn<'py> = (String, PyReadonlyArray1<'py, f64>, f64, f64, bool, Vec<usize>, String);
+/// `Conflict` of Python.
+#[derive(FromPyObject, IntoPyObject)]
+struct Conflict {
+    missing: Vec<Note>,
+    returned: Vec<Note>,
+    new: Vec<Note>,
+}
 
-/// Frames as Python has read them: the array of all sources, the sources; unit, time from one frame to the next if they
-/// are numbered (us), notes (time, text, source) and detections (label, time, known) as JSON, the verdict, the trial and all
-/// trials of the file, how long the rest of the file takes (s).
-type ReadFramesIn<'py> =
-    (ArrayParts, Vec<SourceIn<'py>>, String, Option<i64>, String, String, Option<String>, Vec<String>, Option<f64>);
+impl From<LabelConflict> for Conflict {
+    fn from(LabelConflict { missing, returned, new }: LabelConflict) -> Self {
+        Self { missing: all(missing), returned: all(returned), new: all(new) }
+    }
+}
 
-/// Notes (time, text, source) and detections (label, time, known) of frames.
-type RemarksIn = (Vec<(Option<i64>, String, String)>, Vec<(String, i64, i64)>);
+/// `TableRead` of Python.
+#[derive(FromPyObject)]
+struct TableRead {
+    rows: Vec<Note>,
+    conflict: Conflict,
+}
 
-fn to_index(py: Python<'_>, frames: ReadFramesIn<'_>) -> PyResult<FrameIndex> {
-    let (array, sources, unit, number_us, remarks, verdict, trial, trials, left_s) = frames;
+impl From<TableRead> for LabelTable {
+    fn from(TableRead { rows, conflict: Conflict { missing, returned, new } }: TableRead) -> Self {
+        let conflict = LabelConflict { missing: all(missing), returned: all(returned), new: all(new) };
+        Self { rows: all(rows), conflict }
+    }
+}
+
+fn all<T, U: From<T>>(rows: Vec<T>) -> Vec<U> {
+    rows.into_iter().map(U::from).collect()
+}
+
+/// What became of a request: the rows that were written, or why it was refused.
+#[derive(FromPyObject)]
+enum Outcome {
+    Refused(String),
+    Written(Vec<Option<Note>>),
+}
+
+/// `ReadRest` of Python: its values are NaN where the rest is unknown.
+#[derive(FromPyObject)]
+struct ReadRest<'py> {
+    source: String,
+    values: PyReadonlyArray1<'py, f64>,
+    ticks_by_unit: f64,
+    loaded_from: f64,
+    falls: bool,
+    flickering: Vec<usize>,
+    preload_at: String,
+}
+
+/// `ReadSource` of Python.
+#[derive(FromPyObject)]
+struct ReadSource<'py> {
+    name: String,
+    left: u16,
+    rows: u16,
+    columns: u16,
+    t: PyReadonlyArray1<'py, i64>,
+    values: PyReadonlyArray1<'py, f32>,
+    rest: ReadRest<'py>,
+}
+
+/// `ReadFrames` of Python.
+#[derive(FromPyObject)]
+struct ReadFrames<'py> {
+    array: ArrayParts,
+    sources: Vec<ReadSource<'py>>,
+    unit: String,
+    number_us: Option<i64>,
+    notes: Vec<(Option<i64>, String, String)>,
+    detections: Vec<(String, i64, i64)>,
+    verdict: String,
+    trial: Option<String>,
+    trials: Vec<String>,
+    left_s: Option<f64>,
+}
+
+fn to_index(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<FrameIndex> {
+    let ReadFrames { array, sources, unit, number_us, notes, detections, verdict, trial, trials, left_s } = frames;
     let array = to_array(array)?;
-    let (notes, detections): RemarksIn = parsed("remarks", &remarks)?;
     let (notes, note_sources) =
-        notes.into_iter().map(|(t_us, text, source)| (Note { at_ns: 0, t_us, text }, source)).unzip();
-    let remarks = Remarks {
-        notes,
-        detections: detections
-            .into_iter()
-            .map(|(label, t, known)| (0, Detection { label, t, known, slope: f64::NAN, repaired: false }))
-            .collect(),
-        ..Remarks::default()
-    };
+        notes.into_iter().map(|(t_us, text, source)| (recording::Note { at_ns: 0, t_us, text }, source)).unzip();
+    let detections = detections
+        .into_iter()
+        .map(|(label, t, known)| (0, Detection { label, t, known, slope: f64::NAN, repaired: false }))
+        .collect();
+    let remarks = Remarks { notes, detections, ..Remarks::default() };
     let file = FrameFile { unit, number_us, remarks, note_sources, verdict, trial, trials, left_s };
     let mut placed = vec![];
-    for (
-        name,
-        left,
-        rows,
-        columns,
-        t,
-        values,
-        (rest, rests, ticks_by_unit, loaded_from, falls, flickering, preload_at),
-    ) in &sources
-    {
-        let (t, values, rests) = (slice("t", t)?, slice("values", values)?, slice("rest", rests)?);
+    for ReadSource { name, left, rows, columns, t, values, rest } in &sources {
+        let (t, values, rests) = (slice("t", t)?, slice("values", values)?, slice("rest", &rest.values)?);
         let inside = *left <= array.columns && *columns <= array.columns - left && *rows <= array.rows;
         let cells = usize::from(*rows) * usize::from(*columns);
-        let each = rests.len() == cells && flickering.iter().all(|&cell| cell < cells);
+        let each = rests.len() == cells && rest.flickering.iter().all(|&cell| cell < cells);
         if !inside || values.len() != t.len() * cells || !each {
             return Err(ProblemError::new_err(format!("source {name}: does not fit the array")));
         }
         let known = |&rest: &f64| if rest.is_nan() { f64::NO_REST } else { rest };
         let rest = FrameRest {
-            source: RestSource::named(rest)
-                .ok_or_else(|| ProblemError::new_err(format!("source {name}: rest {rest:?} is none")))?,
+            source: RestSource::named(&rest.source)
+                .ok_or_else(|| ProblemError::new_err(format!("source {name}: rest {:?} is none", rest.source)))?,
             values: rests.iter().map(known).collect(),
-            ticks_by_unit: *ticks_by_unit,
-            loaded_from: *loaded_from,
-            falls: *falls,
-            flickering: flickering.clone(),
-            preload_at: preload_at.clone(),
+            ticks_by_unit: rest.ticks_by_unit,
+            loaded_from: rest.loaded_from,
+            falls: rest.falls,
+            flickering: rest.flickering.clone(),
+            preload_at: rest.preload_at.clone(),
         };
         let place = FramePlace { name: name.clone(), left: *left, rows: *rows, columns: *columns };
         placed.push(FrameSource { place, t: t.to_vec(), values, rest });

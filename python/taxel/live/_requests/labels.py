@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from taxel.labels import Note
 from taxel.live._label_join import Conflict, Edit
@@ -11,15 +13,8 @@ from taxel.live._label_table import LabelTables, TableRead
 from taxel.live._requests.reasons import reasons
 from taxel.live._shown_files import Opening
 
-#: A label, its time (us), source and trial ("": all), the time of the note that it replaces, and that by the host (ns);
-#: "" removes that note.
-_LabelRow = tuple[str, int, str, str, int | None, int | None]
-
-#: Labels that were acknowledged and are missing in a table, that were deleted and returned, and other new ones.
-_LabelConflict = tuple[list[_LabelRow], list[_LabelRow], list[_LabelRow]]
-
-#: The labels of a table, and its conflict.
-_LabelTable = tuple[list[_LabelRow], _LabelConflict]
+#: The fields of a `Note` but `others`, with times in us of the view.
+_Fields = Mapping[str, Any]
 
 
 def _own_names(recording: str) -> frozenset[str]:
@@ -27,16 +22,15 @@ def _own_names(recording: str) -> frozenset[str]:
     return frozenset({"", recording, Path(recording).stem})
 
 
-def _to_note(row: _LabelRow, unit_us: float) -> Note:
-    label, t, source, trial, replaces, host_ns = row
-    replaced = None if replaces is None else round(replaces / unit_us)
-    return Note(label.strip(), round(t / unit_us), host_ns or 0, trial, source, replaced)
+def _in_file(fields: _Fields, unit_us: float) -> Note:
+    note = Note(**fields)
+    replaced = None if note.replaces is None else round(note.replaces / unit_us)
+    return replace(note, text=note.text.strip(), t=round((note.t or 0) / unit_us), replaces=replaced)
 
 
-def _to_row(note: Note, unit_us: float) -> _LabelRow:
+def _in_view(note: Note, unit_us: float) -> Note:
     replaced = None if note.replaces is None else round(note.replaces * unit_us)
-    t = round((note.t or 0) * unit_us)
-    return note.text, t, note.source, note.recording, replaced, note.at_ns or None
+    return replace(note, t=round((note.t or 0) * unit_us), replaces=replaced)
 
 
 class LabelRequests:
@@ -60,14 +54,18 @@ class LabelRequests:
         with reasons():
             return self._labels.stamp(table)
 
-    def read(self, table: Path, recording: str) -> _LabelTable:
+    def read(self, table: Path, recording: str, us: int) -> TableRead:
         """Return the labels of a recording from a table, and where the table lacks what was acknowledged."""
         with reasons():
-            return self._shown(table, self._labels.read(table, _own_names(recording)))
+            return self._shown(table, us, self._labels.read(table, _own_names(recording)))
 
     def change(
-        self, table: Path, recording: str, requests: Sequence[Sequence[tuple[_LabelRow | None, _LabelRow | None]]]
-    ) -> tuple[list[str | list[_LabelRow | None]], _LabelTable]:
+        self,
+        table: Path,
+        recording: str,
+        us: int,
+        requests: Sequence[Sequence[tuple[_Fields | None, _Fields | None]]],
+    ) -> tuple[list[str | list[Note | None]], TableRead]:
         """Carry out requests in one write of a table as it is now, and return when it is on the disk.
 
         Parameters
@@ -75,42 +73,48 @@ class LabelRequests:
         table : Path
         recording : str
             Its file name.
-        requests : sequence of sequence of (row or None, row or None)
-            The edits of each request, the old row and the new one. A request is carried out whole or not at all.
+        us : int
+            One us of the file in the view: above 1 where frames are numbered.
+        requests : sequence of sequence of (fields or None, fields or None)
+            The edits of each request, the old note and the new one. A request is carried out whole or not at all.
 
         Returns
         -------
         list
-            For each request the new rows as they were written, or why it was not carried out.
+            For each request the new notes as they were written, or why it was not carried out.
         table
             As `read` returns it.
         """
-        unit_us = self._opening.unit_us(table)
+        unit_us = self._unit_us(table, us)
 
-        def note(row: _LabelRow | None) -> Note | None:
-            return None if row is None else _to_note(row, unit_us)
+        def note(fields: _Fields | None) -> Note | None:
+            return None if fields is None else _in_file(fields, unit_us)
 
         edits = [[Edit(note(old), note(new)) for old, new in request] for request in requests]
         with reasons():
             outcomes, read = self._labels.change(table, _own_names(recording), edits)
-        written: list[str | list[_LabelRow | None]] = [
-            one if isinstance(one, str) else [None if note is None else _to_row(note, unit_us) for note in one]
+        written: list[str | list[Note | None]] = [
+            one if isinstance(one, str) else [None if note is None else _in_view(note, unit_us) for note in one]
             for one in outcomes
         ]
-        return written, self._shown(table, read)
+        return written, self._shown(table, us, read)
 
-    def settle(self, table: Path, recording: str, conflict: _LabelConflict, restore: bool) -> _LabelTable:
+    def settle(self, table: Path, recording: str, us: int, conflict: Mapping[str, Any], restore: bool) -> TableRead:
         """End a conflict: restore what was acknowledged, or accept the table as it is."""
-        unit_us = self._opening.unit_us(table)
-        seen = Conflict(*(tuple(_to_note(row, unit_us) for row in rows) for rows in conflict))
+        unit_us = self._unit_us(table, us)
+        seen = Conflict(**{kind: tuple(_in_file(one, unit_us) for one in notes) for kind, notes in conflict.items()})
         with reasons():
-            return self._shown(table, self._labels.settle(table, _own_names(recording), seen, restore=restore))
+            return self._shown(table, us, self._labels.settle(table, _own_names(recording), seen, restore=restore))
 
-    def _shown(self, table: Path, read: TableRead) -> _LabelTable:
-        unit_us = self._opening.unit_us(table)
-        conflict = read.conflict
-        rows, *others = (
-            [_to_row(note, unit_us) for note in notes]
-            for notes in (read.rows, conflict.missing, conflict.returned, conflict.new)
-        )
-        return sorted(rows, key=lambda row: row[1]), (others[0], others[1], others[2])
+    def _unit_us(self, table: Path, us: int) -> float:
+        """Return how long one us of a table is in the view."""
+        return us * self._opening.unit_us(table)
+
+    def _shown(self, table: Path, us: int, read: TableRead) -> TableRead:
+        unit_us = self._unit_us(table, us)
+
+        def in_view(notes: tuple[Note, ...]) -> tuple[Note, ...]:
+            return tuple(_in_view(note, unit_us) for note in notes)
+
+        conflict = Conflict(*map(in_view, (read.conflict.missing, read.conflict.returned, read.conflict.new)))
+        return TableRead(tuple(sorted(in_view(read.rows), key=lambda note: note.t or 0)), conflict)
