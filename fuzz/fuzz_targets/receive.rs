@@ -4,13 +4,13 @@
 
 use libfuzzer_sys::fuzz_target;
 use taxel_core::wire::v2::{DATAGRAM_BYTES, HEADER_BYTES, DatagramHeader};
-use taxel_core::wire::{Decoder, Receiver};
+use taxel_core::wire::{Decoder, SenderDecoder};
 use taxel_core::{Array, Events};
 
 fuzz_target!(|input: &[u8]| {
     let Some((&[way, rows, columns], mut rest)) = input.split_first_chunk::<3>() else { return };
     let array = Array::new(u16::from(rows).max(1), u16::from(columns).max(1), 1.0, "fuzz").unwrap();
-    let mut receiver = Receiver::new(Decoder::new(array.clone()), 1 + (way & 1));
+    let mut decoder = SenderDecoder::new(Decoder::new(array.clone()), 1 + (way & 1));
     let mut events = Events::empty(array);
     let (mut first, mut bytes, mut took) = (Vec::new(), 0, 0u64);
     while let Some((&[kind, length, wait], after)) = rest.split_first_chunk::<3>() {
@@ -24,23 +24,23 @@ fuzz_target!(|input: &[u8]| {
         took += i64::from(wait) as u64;
         let arrived = (way & 2 != 0).then_some((took as i64) << (way >> 2));
         bytes += datagram.len() as u64;
-        receiver.push(&datagram, arrived, &mut events);
+        decoder.push(&datagram, arrived, &mut events);
         // The same again, when its version is certain: of version 2 it gives nothing.
         if kind & 2 != 0 && DatagramHeader::read(&datagram).is_ok() {
-            let (decoded, counts) = (events.len(), receiver.two().counts());
+            let (decoded, counts) = (events.len(), decoder.version_2().counts());
             bytes += datagram.len() as u64;
-            receiver.push(&datagram, arrived, &mut events);
-            assert_eq!((events.len(), receiver.two().counts().intact), (decoded, counts.intact));
+            decoder.push(&datagram, arrived, &mut events);
+            assert_eq!((events.len(), decoder.version_2().counts().intact), (decoded, counts.intact));
         }
         first.push(datagram);
     }
-    receiver.finish_into(&mut events);
+    decoder.finish_into(&mut events);
     events.view().check().unwrap();
-    let (one, two) = (*receiver.counts(), receiver.two().counts());
+    let (one, two) = (*decoder.counts(), decoder.version_2().counts());
     assert_eq!(two.datagrams, two.intact + two.repeated + two.old + two.short + two.foreign + two.checksum);
     assert_eq!(one.bytes, 5 * one.words + one.skipped);
     assert_eq!(events.len() as u64, one.changes + two.events);
-    assert!(one.bytes + receiver.refused() <= bytes);
+    assert!(one.bytes + decoder.refused() <= bytes);
 });
 
 /// A datagram of version 2 whose checksum holds: its header's first bytes from the piece, few boards and sessions.

@@ -5,7 +5,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use taxel_core::vectors::Instructions;
-use taxel_core::wire::v2::{Decoder, DatagramHeader, Heard, stride};
+use taxel_core::wire::v2::{Decoder, DatagramHeader, DatagramOutcome, stride};
 use taxel_core::{Array, Events};
 
 fuzz_target!(|input: &[u8]| {
@@ -30,7 +30,7 @@ fuzz_target!(|input: &[u8]| {
         let mut decoder = Decoder::new(array.clone()).instructions(set).unwrap();
         let mut events = Events::empty(array.clone());
         for datagram in &datagrams {
-            assert!(matches!(decoder.push(datagram, None, &mut events), Heard::Intact { .. }));
+            assert!(matches!(decoder.push(datagram, None, &mut events), DatagramOutcome::Intact { .. }));
         }
         events.view().check().unwrap();
         assert_eq!(decoder.counts().events, events.len() as u64);
