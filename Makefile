@@ -108,6 +108,7 @@ test-studies: released $(VENV)/.for-test
 
 slow: released $(VENV)/.for-test dist bridge
 	cargo test --release --workspace --quiet -- --ignored
+	cargo check --manifest-path fuzz/Cargo.toml --quiet
 	$(BIN)/python -m pytest -q -m slow
 	$(BIN)/python -m pytest -q -m slow rules $(BESIDE)
 
@@ -118,7 +119,6 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 	cargo fmt --manifest-path bridge/zenoh/Cargo.toml --check
 	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs rules/src/rules/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
 	cargo clippy --workspace --all-targets --all-features --quiet -- -D warnings
-	cargo check --manifest-path fuzz/Cargo.toml --target-dir target/fuzz --quiet
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
