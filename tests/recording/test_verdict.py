@@ -28,7 +28,8 @@ def test_a_verdict_says_what_became_of_a_file(tmp_path: Path) -> None:
     for share in (0.5, 0.7, 0.9, 0.99):
         (tmp_path / f"cut{share}.mcap").write_bytes(data[: int(len(data) * share)])
     spoilt = bytearray(data)
-    spoilt[len(data) // 2 : len(data) // 2 + 40] = bytes(40)
+    middle = slice(len(data) // 2, len(data) // 2 + 40)
+    spoilt[middle] = bytes(byte ^ 0xFF for byte in spoilt[middle])  # zeros there would stay zeros
     (tmp_path / "spoilt.mcap").write_bytes(spoilt)
     for ending in (".lsa", ".npz", ".csv", ".h5"):
         taxel.convert(whole, tmp_path / f"of{ending}")
