@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sklearn.base
 from refusal import refused
 from rule_examples import kernel, patterns, summed
 
@@ -220,3 +221,7 @@ def test_labels_that_make_no_sense_are_one_clear_error():
             Tempotron().fit([pattern], labels)
     with pytest.raises(ProblemError, match="Tempotron: not fitted yet"):
         Tempotron().predict([pattern])
+
+
+def test_scikit_learn_takes_it_for_no_classifier() -> None:
+    assert not sklearn.base.is_classifier(Tempotron())

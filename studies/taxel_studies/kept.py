@@ -60,7 +60,7 @@ def confirm(name: str, folder: Path, *, data: Path | None = None, strict: bool =
     Parameters
     ----------
     name : str
-        Of a study whose toy result is kept.
+        The name of a study whose toy result is kept.
     folder : Path
         Of the kept figures.
     data : Path, optional

@@ -185,7 +185,7 @@ def source_from(
     untimed, turned : bool, float
         As of `FrameTable`.
     columns : sequence of str
-        Of a stream of numbers, as of `Columns`.
+        Columns of a stream of numbers, as those of `Columns`.
     **header
         Its other parts; default: a sensor of the table's array alone.
     """
