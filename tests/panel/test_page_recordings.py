@@ -177,7 +177,9 @@ def test_a_click_anywhere_in_the_row_makes_a_label_and_a_handle_moves_it(replay:
     assert replay.locator("#label-list li").count() == replay.locator(".flag").count() == 5
     # Without a name nothing is lost: the label is set where the click was, once there is one.
     replay.locator("#label-name").fill("")
+    replay.locator("#label-name").blur()
     replay.mouse.click(pixel(replay, 6.0), low)
+    replay.locator("#label-name:focus").wait_for()
     replay.keyboard.type("toe")
     replay.keyboard.press("Enter")
     shows(replay, "label-count", "^6 label")
