@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from shell import call
 
@@ -48,7 +48,6 @@ def example(seed: int, shift_ms: float, **more: Any) -> Example:
     return one
 
 
-@settings(max_examples=40)
 @given(st.integers(0, 1000), st.floats(-900, 900))
 def test_labels_that_are_off_are_measured_and_others_are_not_called_so(seed: int, shift_ms: float) -> None:
     found = off_by([example(seed, shift_ms)], ["contact", "lift"], FLOOR)
@@ -93,7 +92,7 @@ def test_training_says_first_by_how_much_labels_are_off(tmp_path: Path, capsys, 
     taxel.convert(frames, tmp_path / "a.npz")
     rows = [f"{label},{t + 1000 * shift_ms}" for label, times in truth.items() for t in times]
     (tmp_path / "a.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
-    arguments = ("train", tmp_path / "a.npz", "--labels", tmp_path / "a.csv", "--recipe", "touch")
+    arguments = ("train", tmp_path / "a.npz", "--labels", tmp_path / "a.csv", "--recipe", "touch", "--folds", 2)
     code, out, _ = call(capsys, *arguments, "-o", tmp_path / "r.json")
     assert code == 0
     helps = dict(re.findall(r"^(\w+): \d+% missed, .*; what may help is (.*)$", out, re.MULTILINE))
@@ -161,7 +160,7 @@ def test_kinds_that_differ_by_place_are_told_and_of_others_the_advice_says_what_
         assert code == 0, error
         return out.splitlines()
 
-    told = lines(("left", "right"), left, 5)
+    told = lines(("left", "right"), left, 2)
     for name in ("left", "right"):
         assert any(one.startswith(f"{name}, neuron: 12 of 12 found, 0 missed, 0 false") for one in told), told[:5]
     told = lines(("wet", "dry"), random.permutation(24) < 12, 2)
