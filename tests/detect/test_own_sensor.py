@@ -187,7 +187,7 @@ def test_a_training_that_is_ended_while_its_report_is_drawn_leaves_no_folder(
         raise KeyboardInterrupt
 
     arguments = written(tmp_path, *touched((6, 6), 3, gain=100.0, noise=1.0))
-    monkeypatch.setattr("taxel.report.detections.render", ended)
+    monkeypatch.setattr("taxel.report.detections.picture", ended)
     assert call(capsys, *arguments, "--folds", 0, "--report", tmp_path / "a" / "b")[0] != 0
     assert not (tmp_path / "a").exists()
 
