@@ -188,10 +188,11 @@ def test_arrays_of_somebody_else(tmp_path: Path, ending: str, flat: bool) -> Non
 
 
 @pytest.mark.parametrize(
-    ("kind", "ending", "order"),
-    mixed(["?", "i1", ">u2", "i4", "u8", "f2", ">f4", "f8"], [".npy", ".npz", ".h5"], ["C", "C", "C", "F", "F", "F"]),
+    ("kind", "stored"),
+    mixed(["?", "i1", ">u2", "i4", "u8", "f2", ">f4", "f8"], [(e, o) for o in "CF" for e in (".npy", ".npz", ".h5")]),
 )
-def test_arrays_of_every_kind_of_number_open(tmp_path: Path, kind: str, ending: str, order: str) -> None:
+def test_arrays_of_every_kind_of_number_open(tmp_path: Path, kind: str, stored: tuple[str, Any]) -> None:
+    ending, order = stored
     values = np.zeros((7, 2, 3), kind, order=order)
     values[2:5, 1] = 1
     if np.dtype(kind).kind == "f":

@@ -326,7 +326,7 @@ def test_events_of_every_dtype_are_in_memory_once(kind: str, dtype: str, tmp_pat
             ("p", 2, "True or False"),
             ("intensity", 1e300, "a whole number that fits uint16"),
         ],
-        ["npz", "h5", "npz"],
+        ["npz", "h5"],
     ),
 )
 def test_a_value_that_a_column_of_events_does_not_hold_is_refused_with_its_place(
