@@ -92,7 +92,7 @@ def test_training_says_first_by_how_much_labels_are_off(tmp_path: Path, capsys, 
     taxel.convert(frames, tmp_path / "a.npz")
     rows = [f"{label},{t + 1000 * shift_ms}" for label, times in truth.items() for t in times]
     (tmp_path / "a.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
-    arguments = ("train", tmp_path / "a.npz", "--labels", tmp_path / "a.csv", "--recipe", "touch", "--folds", 2)
+    arguments = ("train", tmp_path / "a.npz", "--labels", tmp_path / "a.csv", "--recipe", "touch")
     code, out, _ = call(capsys, *arguments, "-o", tmp_path / "r.json")
     assert code == 0
     helps = dict(re.findall(r"^(\w+): \d+% missed, .*; what may help is (.*)$", out, re.MULTILINE))
@@ -160,7 +160,7 @@ def test_kinds_that_differ_by_place_are_told_and_of_others_the_advice_says_what_
         assert code == 0, error
         return out.splitlines()
 
-    told = lines(("left", "right"), left, 2)
+    told = lines(("left", "right"), left, 5)
     for name in ("left", "right"):
         assert any(one.startswith(f"{name}, neuron: 12 of 12 found, 0 missed, 0 false") for one in told), told[:5]
     told = lines(("wet", "dry"), random.permutation(24) < 12, 2)
