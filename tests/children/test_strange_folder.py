@@ -25,13 +25,12 @@ CHECKOUT = Path(__file__).parents[2]
 #: Modules that something imports if they are there, beside all that are installed or of Python itself.
 OPTIONAL = ("usercustomize", "zenoh", "taxel_zenoh", "pylsl", "serial", "rerun", "foxglove", "__main__", "_opening")
 SCENE = """
-surface = "columns"
+array = { rows = 8, columns = 8 }
 [[bodies]]
-shape.sphere.radius_mm = 25
-x_mm = 50
-y_mm = 60
-mass_g = 36
-motion.dropped.height_mm = 20
+shape.sphere.radius_mm = 5
+x_mm = 10
+y_mm = 10
+motion.pressed = { depth_mm = 0.6, speed_mm_s = 50, hold_ms = 5 }
 """
 
 
@@ -82,38 +81,39 @@ def beside(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture
-def here(tmp_path: Path) -> Path:
-    """The current folder, with such files too."""
-    return plant(tmp_path / "here")
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The current folder, with such files too: each command writes files of other names."""
+    return plant(tmp_path_factory.mktemp("current") / "here")
 
 
 def commands(folder: Path) -> dict[str, list[list[object]]]:
     """Return the words of every command, and of each of its ways that starts a child."""
     port = free_port()
+    few = ["--window-ms", 50, "--periods", 10, "--taxels", 1, "--draws", 1, "--shuffles", 1, "--folds", 2]
     live = ["--host", "127.0.0.1", "--port", port, "--seconds", 0.3]
     return {
-        "demo": [["--scenes", 1, "--seed", 1, "--noise", 1, "--folder", "report"]],
+        "demo": [["--scenes", 1, "--seed", 1, "--noise", 1, "--folder", "demo"]],
         "emulate": [["--port", port, "--scenes", 1, "--seed", 1]],
         "simulate": [[folder / "scene.toml", "-o", "touch.mcap", "--movie", "touch.gif", "--slower", 1]],
         "device": [["ports"]],
         "record": [["walk.mcap", *live]],
         "live": [["--panel", *live]],
         "view": [[folder / "a.h5", "--no-open", "--seconds", 0.5]],
-        "info": [[folder / "a.h5"], [folder / "a.h5", "--picture", "a.png"]],
+        "info": [[folder / "a.h5", "--picture", "a.png"]],
         "calibrate": [[folder / "counts.h5", "--load", 9.81, "--from", 2, "--to", 4, "--tare", 0.4]],
         "convert": [[folder / "a.h5", "c.h5"]],
         "cut": [[folder / "a.h5", "d.h5", "--from", 1, "--to", 3]],
         "merge": [[folder / "a.h5", folder / "b.h5", "-o", "both.h5", "--beside"]],
         "encode": [[folder / "a.h5", "spikes.npz", "--encoder", "contact_area"]],
-        "train": [[folder / "a.h5", "--labels", "notes", "-o", "r.json", "--report", "report"]],
+        "train": [[folder / "a.h5", "--labels", "notes", "--folds", 0, "-o", "r.json", "--report", "train"]],
         "detect": [[folder / "a.h5", "--readout", folder / "readout.json"]],
         "export": [["nir", folder / "readout.json", "graph.nir"]],
-        "information": [[folder / "a.h5", "--labels", folder / "labels.csv", "--window-ms", 50, "--report", "r.html"]],
+        "information": [[folder / "a.h5", "--labels", folder / "labels.csv", "--report", "r.html", *few]],
         "bridge": [live],
         "show": [[folder / "a.h5", "foxglove:0", "--seconds", 0.5]],
         "bench": [["encode_contact_area", "--quick"]],
-        "study": [["fig6.2", "--size", "toy", "--jobs", 2, "--report", "report"]],
+        "study": [["fig6.2", "--size", "toy", "--jobs", 2, "--report", "study"]],
     }
 
 
@@ -140,7 +140,7 @@ def test_a_training_of_the_page_runs_no_code_of_a_strange_folder(
 ) -> None:
     monkeypatch.chdir(here)
     handler = TrainingRequests(Opening(), ShownFiles())
-    assert "contact, neuron: " in handler.train(beside / "a.h5", here / "r.json")[0]
+    assert "contact, neuron: " in handler.train(beside / "a.h5", here / "page.json")[0]
     check_nothing_ran(here, beside)
 
 
@@ -174,4 +174,6 @@ def test_an_empty_entry_of_pythonpath_is_dropped(tmp_path: Path, entries: str) -
 def check_nothing_ran(*folders: Path) -> None:
     for folder in folders:
         ran = folder / "RAN"
-        assert not ran.exists(), (folder, ran.read_text())
+        said = ran.read_text() if ran.exists() else ""
+        ran.unlink(missing_ok=True)  # of the next command it says nothing
+        assert not said, (folder, said)

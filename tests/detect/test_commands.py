@@ -68,7 +68,7 @@ def trained(folder: Path) -> Path:
             [
                 *("train", str(folder / "1.npz"), str(folder / "2.npz"), "--labels", str(folder / "labels.csv")),
                 *("--recipe", str(folder / "recipe.toml"), "--set", "neurons.lift.tau=3.0"),
-                *("--tare", str(folder / "tare.json"), "--out", str(out), "--json"),
+                *("--tare", str(folder / "tare.json"), "--folds", "0", "--out", str(out), "--json"),
             ]
         )
     assert not ended.value.code
@@ -211,7 +211,7 @@ def test_notes_can_be_the_labels_and_registers_give_the_frame(folder: Path, tmp_
         write_noted(seed, tmp_path / f"{seed}.mcap", 2400)
     tare = ("--tare", folder / "tare.json")
     readout = tmp_path / "r.json"
-    plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0", "-o", readout)
+    plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0", "--folds", 0, "-o", readout)
     assert call(capsys, "train", tmp_path / "1.mcap", tmp_path / "2.mcap", *plan, *tare)[0] == 0
     for line_10ns, frame_us in ((2400, 192.0), (6248, 499.84)):
         place = tmp_path / f"{frame_us}.mcap"
@@ -242,7 +242,7 @@ def walk(folder: Path, seconds: int) -> Path:
 def test_without_a_recipe_it_starts_from_the_recipe_of_the_unit(tmp_path: Path, capsys) -> None:
     labels = walk(tmp_path, 9)
     out = tmp_path / "gait.json"
-    arguments = ("train", tmp_path / "walk.npz", "--labels", labels, "--out", out, "--overwrite")
+    arguments = ("train", tmp_path / "walk.npz", "--labels", labels, "--folds", 0, "--out", out, "--overwrite")
     code, said, _ = call(capsys, *arguments, "--json")
     assert (code, json.loads(said)["recipe"]) == (0, "gait_insole")
     assert json.loads(said)["recordings"][0]["score"]["missed"] == 0
@@ -338,7 +338,7 @@ def test_wrong_input_ends_in_one_line(
 def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Path, capsys, tmp_path: Path) -> None:
     events = taxel.open(folder / "9.npz").events
     plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0")
-    arguments = ("train", folder / "9.npz", "--labels", folder / "truth.csv", *plan)
+    arguments = ("train", folder / "9.npz", "--labels", folder / "truth.csv", "--folds", 0, *plan)
     code, said, _ = call(capsys, *arguments, "-o", tmp_path / "by_itself.json")
     first = min(row.t for row in taxel.Labels(folder / "truth.csv").rows)
     assert code == 0
@@ -359,7 +359,7 @@ def test_the_command_that_follows_a_training_is_said_and_runs(
 ) -> None:
     monkeypatch.chdir(folder)
     out = tmp_path / "a readout.json"
-    command = ("train", "9.npz", "--labels", "truth.csv", "--recipe", "recipe.toml", "-o", out)
+    command = ("train", "9.npz", "--labels", "truth.csv", "--recipe", "recipe.toml", "--folds", 0, "-o", out)
     code, said, _ = call(capsys, *command, *(() if given is None else ("--tare", given)))
     assert code == 0
     [following] = re.findall(r"^written to .*; next: taxel (.*)$", said, re.MULTILINE)

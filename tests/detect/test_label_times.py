@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from shell import call
 
@@ -48,7 +48,6 @@ def example(seed: int, shift_ms: float, **more: Any) -> Example:
     return one
 
 
-@settings(max_examples=40)
 @given(st.integers(0, 1000), st.floats(-900, 900))
 def test_labels_that_are_off_are_measured_and_others_are_not_called_so(seed: int, shift_ms: float) -> None:
     found = off_by([example(seed, shift_ms)], ["contact", "lift"], FLOOR)

@@ -61,7 +61,7 @@ def written(folder: Path, frames: Frames, labels: dict[str, np.ndarray], more: s
     ("shape", "values"),
     [
         pytest.param((24, 32), {"gain": 1200.0, "noise": 6.0, "offset": 3000.0}, marks=pytest.mark.slow),
-        ((16, 16), {"gain": 0.8, "noise": 0.006, "offset": 0.2}),
+        pytest.param((16, 16), {"gain": 0.8, "noise": 0.006, "offset": 0.2}, marks=pytest.mark.slow),
         ((8, 8), {"gain": 200.0, "noise": 1.0, "offset": 10.0}),
     ],
 )
@@ -111,7 +111,7 @@ def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys
     assert parts["load"] == LocalLoad(noise_floor=0.5, least_noise=0.05, local_ms=[50.0, 300.0], period_ms=0.5)
     assert Recipe.load("gait_plate", None, None, 0.5).encoder == Recipe.load("gait_plate").encoder
     arguments = written(tmp_path, *touched((6, 6), 3, gain=100.0, noise=1.0))
-    assert call(capsys, *arguments, "--set", "encoders.levels.noise_floor=9")[0] == 0
+    assert call(capsys, *arguments, "--folds", 0, "--set", "encoders.levels.noise_floor=9")[0] == 0
     assert taxel.Readout.load(tmp_path / "readout.json").encoder.parts["levels"].noise_floor == 9.0
 
 
@@ -158,14 +158,14 @@ def test_a_recording_that_begins_with_a_touch_has_the_rest_of_its_quiet_stretch(
     frames, labels = touched((8, 8), 4, gain=200.0, noise=1.0, offset=10.0)
     first = int(labels["contact"][0]) - 50_000
     arguments = written(tmp_path, frames.between(first, int(frames.t[-1]) + 1), labels)
-    code, out, error = call(capsys, *arguments)
+    code, out, error = call(capsys, *arguments, "--folds", 0)
     assert code == 0, error
     assert "contact, neuron: 12 of 12 found, 0 missed, 0 false" in out
 
 
 def test_a_label_outside_the_recording_is_said_and_left_out(tmp_path: Path, capsys) -> None:
     arguments = written(tmp_path, *touched((8, 8), 4, gain=200.0, noise=1.0, offset=10.0), more="slip,900000000\n")
-    code, out, error = call(capsys, *arguments)
+    code, out, error = call(capsys, *arguments, "--folds", 0)
     assert (code, "contact, neuron: 12 of 12" in out) == (0, True)
     labels, recording = tmp_path / "labels.csv", tmp_path / "own.npz"
     assert f"1 of the 25 events of {labels} left out: outside {recording} (0.000 to 12.990 s)" in error
@@ -187,8 +187,8 @@ def test_a_training_that_is_ended_while_its_report_is_drawn_leaves_no_folder(
         raise KeyboardInterrupt
 
     arguments = written(tmp_path, *touched((6, 6), 3, gain=100.0, noise=1.0))
-    monkeypatch.setattr("taxel.report.detections.render", ended)
-    assert call(capsys, *arguments, "--report", tmp_path / "a" / "b")[0] != 0
+    monkeypatch.setattr("taxel.report.detections.picture", ended)
+    assert call(capsys, *arguments, "--folds", 0, "--report", tmp_path / "a" / "b")[0] != 0
     assert not (tmp_path / "a").exists()
 
 
@@ -433,7 +433,7 @@ def test_a_noisy_mat_in_force_or_pressure_rests_at_0_for_info_train_and_detect(
     assert (code, "rest                0, as the values are force or pressure" in out) == (0, True), error
     (area,) = re.findall(r"contact area +at most (\d+) mm2", out)
     assert 100 <= int(area) <= 3200, "the noise of the others is no contact"
-    code, out, error = call(capsys, *arguments)
+    code, out, error = call(capsys, *arguments, "--folds", 0)
     assert (code, "\ntare: " in out) == (0, False), error
     truth = ("--truth", tmp_path / "labels.csv", "--json")
     code, out, error = call(capsys, "detect", tmp_path / "own.npz", "--readout", tmp_path / "readout.json", *truth)

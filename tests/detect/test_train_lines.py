@@ -112,7 +112,18 @@ def test_one_rule_tells_kinds_at_a_frame_of_a_touch_and_says_which_lies_below(tm
 
 def test_labels_are_learnt_as_given_where_that_is_asked_for(tmp_path: Path, capsys) -> None:
     recording, labels = recorded(tmp_path, 1)
-    arguments = ("train", recording, "--labels", labels, "--no-align", "--overwrite", "-o", tmp_path / "r.json")
+    arguments = (
+        "train",
+        recording,
+        "--labels",
+        labels,
+        "--no-align",
+        "--folds",
+        0,
+        "--overwrite",
+        "-o",
+        tmp_path / "r.json",
+    )
     code, out, _ = call(capsys, *arguments)
     assert (code, "labels moved" in out) == (0, False)
     assert "alignment" not in json.loads(call(capsys, *arguments, "--json")[1])
@@ -194,7 +205,7 @@ def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Pat
 @pytest.mark.usefixtures("drawn")
 def test_a_page_draws_labels_as_given_and_as_felt(tmp_path: Path, capsys) -> None:
     recording, labels = recorded(tmp_path, 1, late_us=7_000)
-    options = ("--labels", labels, "-o", tmp_path / "r.json", "--overwrite", "--report")
+    options = ("--labels", labels, "-o", tmp_path / "r.json", "--overwrite", "--folds", 0, "--report")
     assert call(capsys, "train", recording, *options, tmp_path / "with")[0] == 0
     page = (tmp_path / "with" / "report.html").read_text()
     assert page.count('<div class="picture"><svg') == 2 * 4

@@ -188,16 +188,11 @@ def test_arrays_of_somebody_else(tmp_path: Path, ending: str, flat: bool) -> Non
 
 
 @pytest.mark.parametrize(
-    ("ending", "order"),
-    # A .h5 has one order, and is opened in a process of its own.
-    [
-        *((ending, order) for ending in (".npy", ".npz") for order in "CF"),
-        (".h5", "C"),
-        pytest.param(".h5", "F", marks=pytest.mark.slow),
-    ],
+    ("kind", "stored"),
+    mixed(["?", "i1", ">u2", "i4", "u8", "f2", ">f4", "f8"], [(e, o) for o in "CF" for e in (".npy", ".npz", ".h5")]),
 )
-@pytest.mark.parametrize("kind", ["?", "i1", ">u2", "i4", "u8", "f2", ">f4", "f8"])
-def test_arrays_of_every_kind_of_number_open(tmp_path: Path, ending: str, kind: str, order: str) -> None:
+def test_arrays_of_every_kind_of_number_open(tmp_path: Path, kind: str, stored: tuple[str, Any]) -> None:
+    ending, order = stored
     values = np.zeros((7, 2, 3), kind, order=order)
     values[2:5, 1] = 1
     if np.dtype(kind).kind == "f":

@@ -226,7 +226,7 @@ def test_training_on_values_that_fall_says_what_turns_them(tmp_path, capsys) -> 
     taxel.convert(palm(5, -1, 0.4), tmp_path / "palm.npz")
     rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
     (tmp_path / "labels.csv").write_text("label,t_us\n" + "".join(rows))
-    command = ("train", tmp_path / "palm.npz", "--labels", tmp_path / "labels.csv", "-o")
+    command = ("train", tmp_path / "palm.npz", "--labels", tmp_path / "labels.csv", "--folds", 0, "-o")
     for encoder, fails in ((("--encoder", "contact_area"), True), ((), False)):
         code, _, said = call(capsys, *command, tmp_path / f"{fails}", *encoder)
         assert code == 2 * fails
@@ -265,7 +265,7 @@ def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_t
     rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
     (tmp_path / "palm.notes.csv").write_text("label,t_us\n" + "".join(rows))
     turns = "say falls = true in a layout file beside it, palm.layout.toml"
-    code, _, said = call(capsys, "train", tmp_path / "palm.npz", "-o", tmp_path / "a.json")
+    code, _, said = call(capsys, "train", tmp_path / "palm.npz", "--folds", 0, "-o", tmp_path / "a.json")
     assert code == 0
     (line,) = said.splitlines()
     assert line.startswith("taxel: warning: ")
@@ -279,7 +279,7 @@ def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_t
     assert hint in call(capsys, *command)[1]
     (tmp_path / "palm.layout.toml").write_text("falls = true\n")
     assert json.loads(call(capsys, *command, "--json")[1])["hint"] is None
-    assert "falls" not in call(capsys, "train", tmp_path / "palm.npz", "-o", tmp_path / "b.json")[2]
+    assert "falls" not in call(capsys, "train", tmp_path / "palm.npz", "--folds", 0, "-o", tmp_path / "b.json")[2]
 
 
 def test_a_slope_that_all_detections_have_is_no_column(tmp_path, capsys) -> None:
@@ -287,7 +287,7 @@ def test_a_slope_that_all_detections_have_is_no_column(tmp_path, capsys) -> None
     taxel.convert(palm(5, 1, 0.4), tmp_path / "palm.npz")
     rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
     (tmp_path / "palm.notes.csv").write_text("label,t_us\n" + "".join(rows))
-    assert call(capsys, "train", tmp_path / "palm.npz", "-o", tmp_path / "a.json")[0] == 0
+    assert call(capsys, "train", tmp_path / "palm.npz", "--folds", 0, "-o", tmp_path / "a.json")[0] == 0
     command = ("detect", tmp_path / "palm.npz", "--readout", tmp_path / "a.json", "--tare", "0.9")
     slopes = [one["slope_mv_per_ms"] for one in json.loads(call(capsys, *command, "--json")[1])["detections"]]
     assert len(slopes) == 12

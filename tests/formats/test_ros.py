@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import mixed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
@@ -151,8 +152,7 @@ def test_a_multi_array_is_its_data_and_says_its_rows_and_columns(
         taxel.open(bag, topic="/status")
 
 
-@pytest.mark.parametrize("name", ["grasp.bag", "grasp.db3"])
-@pytest.mark.parametrize("begins", [0, 2])
+@pytest.mark.parametrize(("begins", "name"), mixed([0, 2], ["grasp.bag", "grasp.db3"]))
 def test_multi_arrays_of_every_number_are_listed_and_read_also_after_empty_ones(
     begins: int, name: str, tmp_path: Path
 ) -> None:
@@ -275,8 +275,7 @@ def test_a_wrong_stamp_gives_way_to_the_bags_time_and_those_of_most_to_the_bags_
         ([7], 7, [0]),
     ],
 )
-@pytest.mark.parametrize("layout", ["a row", "a grid"])
-@pytest.mark.parametrize("name", ["grasp.bag", "grasp.mcap"])
+@pytest.mark.parametrize(("layout", "name"), mixed(["a row", "a grid"], ["grasp.bag", "grasp.mcap"]))
 def test_the_most_frequent_length_is_read_whatever_comes_first(
     name: str, layout: str, lengths: list[int], read: int, places: list[int], tmp_path: Path, capsys
 ) -> None:

@@ -61,13 +61,13 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
 
 
 def test_the_expected_time_stands_first_and_a_bar_shows_what_is_left(tmp_path, monkeypatch, capsys):
-    recording, labels = folder(tmp_path, 60)
+    recording, labels = folder(tmp_path, 24)
     asked = ["information", *map(str, (recording, "--labels", labels, *QUICK, "--overwrite"))]
     report = ["--report", str(tmp_path / "page.html")]
     with pytest.raises(SystemExit):
         main([*asked, *report])
     told = capsys.readouterr().err
-    assert re.fullmatch(r"60 trials: about \d+ s on an idle processor; Ctrl-C prints what is known by then\n", told)
+    assert re.fullmatch(r"24 trials: about \d+ s on an idle processor; Ctrl-C prints what is known by then\n", told)
     monkeypatch.setenv("TTY_COMPATIBLE", "1")  # as a terminal
     with pytest.raises(SystemExit):
         main([*asked, *report])
@@ -103,7 +103,7 @@ def note(recording, labels):
 
 
 def test_notes_are_trials_as_rows_of_a_table_are(tmp_path):
-    recording, labels = folder(tmp_path, 40)
+    recording, labels = folder(tmp_path, 24)
     rows = [line.split(",")[1:] for line in labels.read_text().splitlines()[1:]]
     asked = [*QUICK, "--json", "--report", tmp_path / "page.html", "--overwrite"]
     expected = json.loads(run(recording, "--labels", labels, *asked).stdout)
@@ -319,7 +319,7 @@ def test_a_label_that_tables_write_for_what_is_missing_is_refused(tmp_path):
 
 
 def test_a_sensor_that_a_table_of_events_does_not_hold_is_said(tmp_path):
-    events, rows = ordered(40)
+    events, rows = ordered(24)
     taxel.convert(events, tmp_path / "touches.csv")
     labels = tmp_path / "labels.csv"
     labels.write_text("\n".join(["t_us,label", *(f"{t},{label}" for t, label in rows)]) + "\n")

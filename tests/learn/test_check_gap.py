@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import stated
 import test_cone_r
-from draws import seeds
+from draws import mixed, seeds
 from making import made
 
 from taxel import NotFittedError, ProblemError, SpikeTrains
@@ -124,7 +124,7 @@ def spoilt(random, proof):
         yield {"rows": [row for row, kept in zip(rows, keep, strict=True) if kept], "values": values[keep]}
 
 
-@pytest.mark.parametrize("part", seeds(8, quick=2))
+@pytest.mark.parametrize("part", seeds(8, quick=1))
 def test_what_is_proven_holds_whatever_the_multipliers_and_the_weights(part, monkeypatch):
     closed = 0
     for seed in range(12 * part, 12 * part + 12):
@@ -170,7 +170,9 @@ def gap_unless_refused(*arguments, **silence):
         return np.inf
 
 
-@pytest.mark.parametrize("options", [{}, {"norm": "square"}, {"engine": "cone solver"}])
+@pytest.mark.parametrize(
+    "options", [{}, {"norm": "square"}, pytest.param({"engine": "cone solver"}, marks=pytest.mark.slow)]
+)
 def test_every_multiplier_is_needed(options):
     cone, examples = small(**options)
     proof, gap = cone.multipliers_, check_gap(cone, *examples)
@@ -318,9 +320,7 @@ def test_multipliers_name_their_rows():
 MIXES = [(0, 1, 0), (1, 0, 0), (2, 2, 200), (0, 0, 1), (0, 1, 100), (0, 0, 0)]
 
 
-@pytest.mark.parametrize("time", ["grid", "continuous"])
-@pytest.mark.parametrize("norm", ["norm", "square"])
-@pytest.mark.parametrize("lambdas", MIXES, ids=str)
+@pytest.mark.parametrize(("lambdas", "norm", "time"), mixed(MIXES, ["norm", "square"], ["grid", "continuous"]))
 def test_the_gap_of_a_cone_x_is_proven_too(lambdas, norm, time):
     checked = 0
     for seed in range(5):

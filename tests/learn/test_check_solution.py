@@ -164,7 +164,7 @@ def test_a_peak_between_the_target_and_1e_6_ms_behind_it_is_found(share, holds):
         assert (found.wrong is None or "does not fire" not in found.wrong) == holds, found
 
 
-@pytest.mark.parametrize("seeds", stretches(60, quick=20))
+@pytest.mark.parametrize("seeds", stretches(60, quick=15))
 def test_fits_with_less_weight_are_held_against_the_exact_potential(seeds):
     """No right fit misses a target, and every fit that misses one is found to."""
     right = late = missed = 0

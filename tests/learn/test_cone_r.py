@@ -422,7 +422,7 @@ LONG = {"tau": 40.0, "tolerance": 1e-9, "lambdas": (4, 0, 100, 100, 80)}
 @pytest.fixture(scope="module")
 def long_rows():
     """Rows on which a fit takes seconds."""
-    return made(ConeR, **LONG).prepare(*examples(13, trains=600, patterns=120, targets=5, duration=2000.0))
+    return made(ConeR, **LONG).prepare(*examples(13, trains=300, patterns=60, targets=5, duration=2000.0))
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")

@@ -62,7 +62,7 @@ def drawn(seed):
     return patterns, targets, silence if random.random() < 0.7 else None, options
 
 
-@pytest.mark.parametrize("seed", seeds(60, quick=20))
+@pytest.mark.parametrize("seed", seeds(60, quick=8))
 def test_any_combination_is_the_least_of_what_is_stated(seed):
     patterns, targets, silence, options = drawn(seed)
     cone = made(ConeR, **options).fit(patterns, targets, silence=silence)

@@ -114,7 +114,7 @@ def test_on_the_grid_verdict_and_objective_are_those_of_every_row_handed_whole_t
     assert cone.margin_.mv == pytest.approx(np.min(rows[4] + (cone.margin or 0.0) - rows[3] @ w), abs=1e-12)
 
 
-@pytest.mark.parametrize("seeds", stretches(60, quick=15))
+@pytest.mark.parametrize("seeds", stretches(60, quick=8))
 def test_verdicts_over_the_edge_of_what_can_be_met_are_those_of_highs_and_each_no_is_proven(seeds):
     verdicts = []
     for seed in seeds:
@@ -162,9 +162,10 @@ def test_the_problem_states_the_rows_of_the_grid_by_pattern_and_time():
             assert problem.silence(1, t, margin=False)[1] == pytest.approx(threshold(cone, t, fired, 0.0), rel=1e-14)
 
 
-@pytest.mark.parametrize("kernel", ["alpha", "double_exponential"])
-@pytest.mark.parametrize("first_threshold", ["theta_0", "printed"])
-@pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
+@pytest.mark.parametrize(
+    ("kernel", "first_threshold", "after_spike"),
+    mixed(["alpha", "double_exponential"], ["theta_0", "printed"], ["keep", "ignore", "reset"]),
+)
 def test_the_problem_states_rows_at_any_instant_with_their_tapered_margin_and_slope(
     kernel, first_threshold, after_spike
 ):
@@ -358,7 +359,7 @@ def test_max_seconds_ends_a_fit_with_the_best_so_far(lambdas):
 def test_control_c_stops_a_fit_at_once_keeps_the_best_so_far_and_then_raises():
     patterns, targets = large()
     cone = ConeX(horizon=200.0)
-    with ctrl_c_after(1.5, answered_within=10):
+    with ctrl_c_after(0.5, answered_within=10):
         for _ in range(1000):
             cone.fit(patterns, targets)
     assert cone.status_ in ("stopped", "feasible", "solved", "infeasible")

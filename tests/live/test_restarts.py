@@ -50,7 +50,7 @@ def life(draw: np.random.Generator, wire: int, session: int, frames: int) -> lis
 
 
 @pytest.mark.parametrize("wire", [1, 2])
-@pytest.mark.parametrize("seed", seeds(8, quick=3))
+@pytest.mark.parametrize("seed", seeds(8, quick=1))
 def test_over_any_restarts_each_step_back_is_in_the_verdict_live_as_in_the_file(
     tmp_path: Path, wire: int, seed: int
 ) -> None:

@@ -63,6 +63,40 @@ def test_a_sensor_of_any_shape_is_seen_pointed_at_and_saved(
         assert 0 < height < 4 * width
 
 
+def test_colours_are_those_of_their_makers_and_grow_lighter_all_the_way(replay: Any) -> None:
+    """Oracle: Matplotlib's tables; the law: lightness tells the order, which is what colour-blind eyes need."""
+    import matplotlib
+
+    for name in ("lipari", "batlow", "cividis", "viridis", "grey"):
+        words = replay.evaluate("name => import('/colours.js').then(c => [...c.pressureWords(name, 'dark', 1)])", name)
+        colours = np.array([[w & 255, w >> 8 & 255, w >> 16 & 255] for w in words])
+        if name in ("cividis", "viridis"):
+            ours = np.array(matplotlib.colormaps[name].colors) * 255
+            assert np.abs(colours - ours).max() <= 3, name
+        linear = np.where(colours / 255 <= 0.04045, colours / 255 / 12.92, ((colours / 255 + 0.055) / 1.055) ** 2.4)
+        luminance = linear @ [0.2126, 0.7152, 0.0722]
+        assert (np.diff(luminance) > -1e-3).all(), name
+        light = replay.evaluate("name => import('/colours.js').then(c => [...c.pressureWords(name, 'light', 1)])", name)
+        assert light == words[::-1], name
+
+
+def test_tones_have_their_pitch_and_fade(replay: Any) -> None:
+    for hz, length in ((440, 0.12), (880, 0.35), (330, 0.2)):
+        samples = replay.evaluate(
+            """([hz, length]) => import('/tones.js').then(async ({ sound }) => {
+                const context = new OfflineAudioContext(1, 24000, 48000);
+                sound(context, hz, length);
+                return [...(await context.startRendering()).getChannelData(0)];
+            })""",
+            [hz, length],
+        )
+        wave = np.array(samples)
+        spectrum = np.abs(np.fft.rfft(wave * np.hanning(len(wave))))
+        assert abs(np.argmax(spectrum) * 2 - hz) <= 4
+        assert np.abs(wave[int(48_000 * length) + 10 :]).max() == 0
+        assert np.abs(np.diff(wave)).max() < 0.2 * 2 * np.pi * 880 / 48_000 * 1.1
+
+
 def test_the_page_fits_a_phone_and_its_foot_hides_nothing(chromium: Any, live: SimpleNamespace) -> None:
     with opened(chromium, live.url, width=390, height=844, has_touch=True, is_mobile=True) as page:
         shows(page, "state-word", "^Live$")
@@ -111,37 +145,3 @@ def test_every_control_has_a_name_and_every_id_is_one(page: Any) -> None:
             .map(e => e.outerHTML.slice(0, 80))"""
     )
     assert nameless == []
-
-
-def test_colours_are_those_of_their_makers_and_grow_lighter_all_the_way(replay: Any) -> None:
-    """Oracle: Matplotlib's tables; the law: lightness tells the order, which is what colour-blind eyes need."""
-    import matplotlib
-
-    for name in ("lipari", "batlow", "cividis", "viridis", "grey"):
-        words = replay.evaluate("name => import('/colours.js').then(c => [...c.pressureWords(name, 'dark', 1)])", name)
-        colours = np.array([[w & 255, w >> 8 & 255, w >> 16 & 255] for w in words])
-        if name in ("cividis", "viridis"):
-            ours = np.array(matplotlib.colormaps[name].colors) * 255
-            assert np.abs(colours - ours).max() <= 3, name
-        linear = np.where(colours / 255 <= 0.04045, colours / 255 / 12.92, ((colours / 255 + 0.055) / 1.055) ** 2.4)
-        luminance = linear @ [0.2126, 0.7152, 0.0722]
-        assert (np.diff(luminance) > -1e-3).all(), name
-        light = replay.evaluate("name => import('/colours.js').then(c => [...c.pressureWords(name, 'light', 1)])", name)
-        assert light == words[::-1], name
-
-
-def test_tones_have_their_pitch_and_fade(replay: Any) -> None:
-    for hz, length in ((440, 0.12), (880, 0.35), (330, 0.2)):
-        samples = replay.evaluate(
-            """([hz, length]) => import('/tones.js').then(async ({ sound }) => {
-                const context = new OfflineAudioContext(1, 24000, 48000);
-                sound(context, hz, length);
-                return [...(await context.startRendering()).getChannelData(0)];
-            })""",
-            [hz, length],
-        )
-        wave = np.array(samples)
-        spectrum = np.abs(np.fft.rfft(wave * np.hanning(len(wave))))
-        assert abs(np.argmax(spectrum) * 2 - hz) <= 4
-        assert np.abs(wave[int(48_000 * length) + 10 :]).max() == 0
-        assert np.abs(np.diff(wave)).max() < 0.2 * 2 * np.pi * 880 / 48_000 * 1.1

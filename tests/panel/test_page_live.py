@@ -41,60 +41,6 @@ __all__ = ["live", "page", "recording", "replay"]
 pytestmark = pytest.mark.timeout(600)
 
 
-def story(page: Any, folder: Path, name: str, floor_ticks: int) -> None:
-    """Set a register, see the map move, record, label, stop, replay, and look into the file."""
-    before = page.evaluate(PIXELS, "pressure-map")
-    press(page, "1")
-    floor = page.get_by_label("Noise floor", exact=True)
-    floor.fill(str(floor_ticks))
-    floor.press("Tab")
-    # The page must show the value that the board reports, not the one that was typed.
-    page.locator("#read-back").click()
-    shows(page, "registers-why", "^$")
-    until(lambda: floor.input_value() == str(floor_ticks), "the board holds the floor")
-    until(lambda: page.evaluate(PIXELS, "pressure-map") != before, "the map moves")
-    record_form(page, name=name, index="7", label="heel", length="", countdown="0")
-    press(page, "r")
-    shows(page, "state-word", rf"Recording {name}7\.mcap")
-    page.locator("#label-name").evaluate(
-        "input => { input.value = 'contact'; input.dispatchEvent(new Event('input')) }"
-    )
-    press(page, "m")
-    shows(page, "label-count", "^1 label")
-    begun = clock(page)
-    until(lambda: clock(page) > begun + 1, "a second of the board's time")
-    until(lambda: float((page.locator("#record-state").inner_text().split() or ["0"])[0]) >= 2, "two seconds of it")
-    press(page, "r")
-    shows(page, "record-last-file", rf"^{name}7\.mcap$")
-    page.locator("#files").select_option(f"{name}7.mcap")
-    shows(page, "state-word", "^Replay$")
-    shows(page, "label-count", "^1 label")
-    press(page, "Home")
-    start = still(page)
-    press(page, "Space")
-    until(lambda: clock(page) > start + 0.2, "it plays")
-    file = taxel.open(folder / f"{name}7.mcap")
-    assert len(file.events.t) > 0
-    assert file.registers is not None
-    assert file.registers.noise_floor == floor_ticks
-    rows = list(csv.DictReader((folder / f"{name}7.notes.csv").open()))
-    assert [row["label"] for row in rows] == ["contact"]
-    # The trial's label is no event: it has no time. The recording may begin in silence.
-    said = {note.text: note.t for note in file.notes}
-    assert said == {"heel": None, "contact": int(rows[0]["t_us"])}
-    assert file.events.t[0] - 2_500_000 <= said["contact"] <= file.events.t[-1] + 2_500_000
-
-
-def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live: SimpleNamespace) -> None:
-    story(page, live.folder, "walk", 5)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("turn", range(20))
-def test_the_story_holds_every_time(page: Any, live: SimpleNamespace, turn: int) -> None:
-    story(page, live.folder, f"again{turn:02}-", 3 + turn % 5)
-
-
 def test_a_board_is_chosen_connected_and_remembered(chromium: Any, tmp_path: Path) -> None:
     port = str(free_port())
     with (
@@ -128,68 +74,6 @@ def test_a_board_is_chosen_connected_and_remembered(chromium: Any, tmp_path: Pat
             lambda: page.locator("#delta-intensity").is_checked() and page.locator("#notice").is_hidden(),
             "it is taken",
         )
-
-
-def test_a_refused_value_stays_typed_with_its_reason_until_escape(page: Any) -> None:
-    period = page.get_by_label("Step period", exact=True)
-    period.fill("4")
-    period.press("Enter")
-    shows(page, "register-step_period-reason", r"4 x step_period 4\.00 us is longer than line_read 3\.00 us \(rule 2\)")
-    assert period.input_value() == "4"
-    assert period.get_attribute("aria-invalid") == "true"
-    # A slower line period makes the value valid: both are written together.
-    for name, value in (("Line period", "20"), ("Line read", "20")):
-        page.get_by_label(name, exact=True).fill(value)
-        page.get_by_label(name, exact=True).press("Enter")
-    until(lambda: period.get_attribute("aria-invalid") == "false" and period.input_value() == "4.00", "all are written")
-    period.fill("nonsense")
-    period.press("Enter")
-    shows(page, "register-step_period-reason", "nonsense is no number")
-    period.press("Escape")
-    assert period.input_value() == "4.00"
-    page.locator("#preset").select_option("5.2 kHz")
-    until(lambda: period.input_value() == "0.75", "the preset is back")
-
-
-def test_presets_of_ones_own_are_kept_applied_and_deleted(page: Any) -> None:
-    page.locator("#preset-path").click()
-    floor = page.get_by_label("Noise floor", exact=True)
-    floor.fill("9")
-    floor.press("Enter")
-    until(lambda: page.locator("#preset").input_value() == "", "no preset is this")
-    page.locator("#preset-name").fill("quiet")
-    page.locator("#preset-name").press("Enter")
-    until(lambda: page.locator("#preset").input_value() == "quiet", "it is kept")
-    page.locator("#preset").select_option("5.2 kHz")
-    until(lambda: floor.input_value() == "3", "another is applied")
-    page.locator("#preset").select_option("quiet")
-    until(lambda: floor.input_value() == "9", "and ours again")
-    page.locator("#preset-delete").click()
-    until(lambda: page.locator("#preset option[value=quiet]").count() == 0, "it is gone")
-    page.locator("#preset").select_option("5.2 kHz")
-    until(lambda: floor.input_value() == "3", "the preset is back")
-
-
-def test_recordings_count_down_go_on_by_themselves_and_overwrite_nothing(page: Any, live: SimpleNamespace) -> None:
-    record_form(page, name="auto", index="1", countdown="1", length="1", advance=True)
-    press(page, "r")
-    shows(page, "record-word", "^Cancel$")
-    shows(page, "record-word", "^Stop$")
-    until((live.folder / "auto2.mcap").exists, "the second begins by itself")
-    press(page, "r")
-    shows(page, "record-word", "^Record$")
-    before = (live.folder / "auto1.mcap").read_bytes()
-    record_form(page, name="auto", index="1", countdown="0", length="1", advance=False)
-    press(page, "r")
-    shows(page, "record-reason", r"auto1\.mcap.*exists")
-    for name in ("../away", ".hidden", ""):
-        record_form(page, name=name, index="")
-        press(page, "r")
-        until(lambda: page.locator("#record-reason").is_visible(), f"{name!r} is refused")
-    assert (live.folder / "auto1.mcap").read_bytes() == before
-    record_form(page, name="auto", index="one")
-    press(page, "r")
-    shows(page, "record-reason", "index: one is no number")
 
 
 def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, tmp_path: Path) -> None:
@@ -287,6 +171,122 @@ def test_the_page_is_there_while_a_tare_waits(chromium: Any, tmp_path: Path) -> 
                     time.sleep(0.01)
                 # The serial line has had its first user, the tare.
                 shows(page, "where-info", re.escape(control))
+
+
+def story(page: Any, folder: Path, name: str, floor_ticks: int) -> None:
+    """Set a register, see the map move, record, label, stop, replay, and look into the file."""
+    before = page.evaluate(PIXELS, "pressure-map")
+    press(page, "1")
+    floor = page.get_by_label("Noise floor", exact=True)
+    floor.fill(str(floor_ticks))
+    floor.press("Tab")
+    # The page must show the value that the board reports, not the one that was typed.
+    page.locator("#read-back").click()
+    shows(page, "registers-why", "^$")
+    until(lambda: floor.input_value() == str(floor_ticks), "the board holds the floor")
+    until(lambda: page.evaluate(PIXELS, "pressure-map") != before, "the map moves")
+    record_form(page, name=name, index="7", label="heel", length="", countdown="0")
+    press(page, "r")
+    shows(page, "state-word", rf"Recording {name}7\.mcap")
+    page.locator("#label-name").evaluate(
+        "input => { input.value = 'contact'; input.dispatchEvent(new Event('input')) }"
+    )
+    press(page, "m")
+    shows(page, "label-count", "^1 label")
+    begun = clock(page)
+    until(lambda: clock(page) > begun + 1, "a second of the board's time")
+    until(lambda: float((page.locator("#record-state").inner_text().split() or ["0"])[0]) >= 2, "two seconds of it")
+    press(page, "r")
+    shows(page, "record-last-file", rf"^{name}7\.mcap$")
+    page.locator("#files").select_option(f"{name}7.mcap")
+    shows(page, "state-word", "^Replay$")
+    shows(page, "label-count", "^1 label")
+    press(page, "Home")
+    start = still(page)
+    press(page, "Space")
+    until(lambda: clock(page) > start + 0.2, "it plays")
+    file = taxel.open(folder / f"{name}7.mcap")
+    assert len(file.events.t) > 0
+    assert file.registers is not None
+    assert file.registers.noise_floor == floor_ticks
+    rows = list(csv.DictReader((folder / f"{name}7.notes.csv").open()))
+    assert [row["label"] for row in rows] == ["contact"]
+    # The trial's label is no event: it has no time. The recording may begin in silence.
+    said = {note.text: note.t for note in file.notes}
+    assert said == {"heel": None, "contact": int(rows[0]["t_us"])}
+    assert file.events.t[0] - 2_500_000 <= said["contact"] <= file.events.t[-1] + 2_500_000
+
+
+def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live: SimpleNamespace) -> None:
+    story(page, live.folder, "walk", 5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turn", range(20))
+def test_the_story_holds_every_time(page: Any, live: SimpleNamespace, turn: int) -> None:
+    story(page, live.folder, f"again{turn:02}-", 3 + turn % 5)
+
+
+def test_a_refused_value_stays_typed_with_its_reason_until_escape(page: Any) -> None:
+    period = page.get_by_label("Step period", exact=True)
+    period.fill("4")
+    period.press("Enter")
+    shows(page, "register-step_period-reason", r"4 x step_period 4\.00 us is longer than line_read 3\.00 us \(rule 2\)")
+    assert period.input_value() == "4"
+    assert period.get_attribute("aria-invalid") == "true"
+    # A slower line period makes the value valid: both are written together.
+    for name, value in (("Line period", "20"), ("Line read", "20")):
+        page.get_by_label(name, exact=True).fill(value)
+        page.get_by_label(name, exact=True).press("Enter")
+    until(lambda: period.get_attribute("aria-invalid") == "false" and period.input_value() == "4.00", "all are written")
+    period.fill("nonsense")
+    period.press("Enter")
+    shows(page, "register-step_period-reason", "nonsense is no number")
+    period.press("Escape")
+    assert period.input_value() == "4.00"
+    page.locator("#preset").select_option("5.2 kHz")
+    until(lambda: period.input_value() == "0.75", "the preset is back")
+
+
+def test_presets_of_ones_own_are_kept_applied_and_deleted(page: Any) -> None:
+    page.locator("#preset-path").click()
+    floor = page.get_by_label("Noise floor", exact=True)
+    floor.fill("9")
+    floor.press("Enter")
+    until(lambda: page.locator("#preset").input_value() == "", "no preset is this")
+    page.locator("#preset-name").fill("quiet")
+    page.locator("#preset-name").press("Enter")
+    until(lambda: page.locator("#preset").input_value() == "quiet", "it is kept")
+    page.locator("#preset").select_option("5.2 kHz")
+    until(lambda: floor.input_value() == "3", "another is applied")
+    page.locator("#preset").select_option("quiet")
+    until(lambda: floor.input_value() == "9", "and ours again")
+    page.locator("#preset-delete").click()
+    until(lambda: page.locator("#preset option[value=quiet]").count() == 0, "it is gone")
+    page.locator("#preset").select_option("5.2 kHz")
+    until(lambda: floor.input_value() == "3", "the preset is back")
+
+
+def test_recordings_count_down_go_on_by_themselves_and_overwrite_nothing(page: Any, live: SimpleNamespace) -> None:
+    record_form(page, name="auto", index="1", countdown="1", length="1", advance=True)
+    press(page, "r")
+    shows(page, "record-word", "^Cancel$")
+    shows(page, "record-word", "^Stop$")
+    until((live.folder / "auto2.mcap").exists, "the second begins by itself")
+    press(page, "r")
+    shows(page, "record-word", "^Record$")
+    before = (live.folder / "auto1.mcap").read_bytes()
+    record_form(page, name="auto", index="1", countdown="0", length="1", advance=False)
+    press(page, "r")
+    shows(page, "record-reason", r"auto1\.mcap.*exists")
+    for name in ("../away", ".hidden", ""):
+        record_form(page, name=name, index="")
+        press(page, "r")
+        until(lambda: page.locator("#record-reason").is_visible(), f"{name!r} is refused")
+    assert (live.folder / "auto1.mcap").read_bytes() == before
+    record_form(page, name="auto", index="one")
+    press(page, "r")
+    shows(page, "record-reason", "index: one is no number")
 
 
 def test_looking_back_while_live_holds_the_view_and_not_the_board(page: Any) -> None:

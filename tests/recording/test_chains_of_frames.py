@@ -202,7 +202,7 @@ def check(recording: taxel.Recording, models: dict[str, Model], where: str) -> N
 
 
 @pytest.mark.parametrize("maker", MAKERS)
-@pytest.mark.parametrize("seed", seeds(60, quick=5))
+@pytest.mark.parametrize("seed", seeds(60, quick=2))
 def test_in_any_chain_of_steps_frames_and_what_is_beside_them_stay_or_are_said_to_be_lost(  # noqa: PLR0912, PLR0915
     tmp_path: Path, maker: str, seed: int
 ) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import mixed
 
 import taxel
 from taxel import _core
@@ -39,8 +40,7 @@ except OSError as error:
 """
 
 
-@pytest.mark.parametrize("compression", ["none", "lz4"])
-@pytest.mark.parametrize("limit", [60_000, 1_000_000, 2_345_678])
+@pytest.mark.parametrize(("compression", "limit"), mixed(["none", "lz4"], [60_000, 1_000_000, 2_345_678]))
 def test_a_disk_that_fills_up_is_one_error_and_leaves_a_readable_file(
     tmp_path: Path, compression: str, limit: int
 ) -> None:

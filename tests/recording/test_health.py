@@ -71,7 +71,7 @@ class Sensor:
         return taxel.Events(t, x, y, p, array=self.array, intensity=ticks.astype(int))
 
 
-@pytest.mark.parametrize("seed", seeds(20, quick=6))
+@pytest.mark.parametrize("seed", seeds(20, quick=3))
 def test_nothing_is_named_on_boards_joined_in_mid_stream(seed: int) -> None:
     sensor = Sensor(seed)
     sensor.play(300)

@@ -231,17 +231,11 @@ def of_anybody(folder: Path, size: int, kind: str, dtype: str) -> Path:
     return path
 
 
-#: Types of frames that are all converted alike: where a layout says more, one of them is enough in a quick run.
-ALIKE = ("u1", "?", ">f4", "f4 F")
-
-
 @pytest.mark.parametrize(
     ("kind", "dtype"),
-    [
-        pytest.param(kind, dtype, marks=pytest.mark.slow if "layout" in kind and dtype in ALIKE else ())
-        for kind in ("npz", "h5", "npy layout", "npz layout", "npy layout falls")
-        for dtype in (*ALIKE, ">i2", "f8", "f8 F")
-    ],
+    mixed(
+        ["npz", "h5", "npy layout", "npz layout", "npy layout falls"], ["u1", "?", ">f4", "f4 F", ">i2", "f8", "f8 F"]
+    ),
 )
 def test_frames_of_every_dtype_are_in_memory_once(kind: str, dtype: str, tmp_path: Path, opened: Opened) -> None:
     sizes = {}
@@ -263,11 +257,14 @@ def test_a_column_of_times_is_in_memory_once(tmp_path: Path, opened: Opened) -> 
     assert whole["peak"] - small["peak"] <= 1.4 * whole["arrays"] + 4 * MIB
 
 
-@pytest.mark.parametrize("kind", ["npy", "own h5", "own npz"])
-@pytest.mark.parametrize(("t", "says"), [("numbers", "rate_hz = 100"), ("times", "rate_hz = 100\nfalls = 9")])
+@pytest.mark.parametrize(
+    ("kind", "of"),
+    mixed(["npy", "own h5", "own npz"], [("numbers", "rate_hz = 100"), ("times", "rate_hz = 100\nfalls = 9")]),
+)
 def test_what_a_layout_says_of_a_single_taxel_takes_little_memory(
-    kind: str, t: str, says: str, tmp_path: Path, opened: Opened
+    kind: str, of: tuple[str, str], tmp_path: Path, opened: Opened
 ) -> None:
+    t, says = of
     (tmp_path / "layout.toml").write_text(f"{says}\n")
     path = tmp_path / f"a.{kind.rpartition(' ')[2]}"
     peaks = {}
@@ -318,21 +315,24 @@ def test_events_of_every_dtype_are_in_memory_once(kind: str, dtype: str, tmp_pat
     assert many["peak"] - few["peak"] <= 1.4 * many["arrays"] + 4 * MIB
 
 
-@pytest.mark.parametrize("kind", ["npz", "h5"])
 @pytest.mark.parametrize(
-    ("column", "value", "why"),
-    [
-        ("t", 0.5, "a whole number that fits int64"),
-        ("x", 65_536, "a whole number that fits uint16"),
-        ("y", -1, "a whole number that fits uint16"),
-        ("x", np.nan, "a whole number that fits uint16"),
-        ("p", 2, "True or False"),
-        ("intensity", 1e300, "a whole number that fits uint16"),
-    ],
+    ("of", "kind"),
+    mixed(
+        [
+            ("t", 0.5, "a whole number that fits int64"),
+            ("x", 65_536, "a whole number that fits uint16"),
+            ("y", -1, "a whole number that fits uint16"),
+            ("x", np.nan, "a whole number that fits uint16"),
+            ("p", 2, "True or False"),
+            ("intensity", 1e300, "a whole number that fits uint16"),
+        ],
+        ["npz", "h5"],
+    ),
 )
 def test_a_value_that_a_column_of_events_does_not_hold_is_refused_with_its_place(
-    column: str, value: float, why: str, kind: str, tmp_path: Path
+    of: tuple[str, float, str], kind: str, tmp_path: Path
 ) -> None:
+    column, value, why = of
     columns = events_of_anybody(150_000, "f8")
     columns[column] = columns[column].copy()
     columns[column][149_000] = value
@@ -341,14 +341,13 @@ def test_a_value_that_a_column_of_events_does_not_hold_is_refused_with_its_place
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("dtype", ["f2", "i1", "u1", ">i4", "f4"])
-def test_events_of_a_narrow_dtype_open_without_a_warning(dtype: str, tmp_path: Path) -> None:
-    for kind in ("npz", "h5"):
-        events = taxel.open(as_file(tmp_path / f"a.{kind}", events_of_anybody(100, dtype))).events
-        assert (events.t.dtype, events.x.dtype, events.p.dtype) == (np.int64, np.uint16, np.bool_)
-        assert list(events.t) == list(range(100))
-        assert set(events.x) == {7}
-        assert events.p.all()
+@pytest.mark.parametrize(("dtype", "kind"), mixed(["f2", "i1", "u1", ">i4", "f4"], ["npz", "h5"]))
+def test_events_of_a_narrow_dtype_open_without_a_warning(dtype: str, kind: str, tmp_path: Path) -> None:
+    events = taxel.open(as_file(tmp_path / f"a.{kind}", events_of_anybody(100, dtype))).events
+    assert (events.t.dtype, events.x.dtype, events.p.dtype) == (np.int64, np.uint16, np.bool_)
+    assert list(events.t) == list(range(100))
+    assert set(events.x) == {7}
+    assert events.p.all()
 
 
 def as_events(**more: Any) -> dict[str, Any]:
@@ -525,37 +524,43 @@ def test_a_control_group_of_version_1_counts_also_from_within_a_container(place:
     assert limits.available(tmp_path) == 0
 
 
-#: What reading a table of labels takes, once all that it needs is loaded.
+#: What reading tables of labels takes, each in a process of its own, once all that it needs is loaded.
 LABELS = """
-import re, sys, taxel
+import os, re, sys, taxel
 peak = lambda: int(re.findall(r"VmHWM: *\\t? *(\\d+)", open("/proc/self/status").read())[0]) * 1024
-taxel.Labels(sys.argv[1])
-before = peak()
-taxel.Labels(sys.argv[2])
-print(peak() - before)
-"""
-
-
-@pytest.mark.parametrize(
-    ("head", "row"),
-    [
-        ("label,t_us", "a,1"),
-        ("label,t_us", "heel{k},{k}000"),
-        ("recording,label,t_us,source", "g,a{k},{k},palm"),
-        ("label,t_us,note,by", "heel,{k},x{k},y{k}"),
-        ("label,t_us", "ħēęļ{k},{k}"),
-        ("label,t_us,note", "heel,{k}," + "x" * 300),
-    ],
-)
-def test_a_table_of_labels_claims_what_it_takes(head: str, row: str, tmp_path: Path) -> None:
-    (few := tmp_path / "few.csv").write_text(f"{head}\n{row.format(k=1)}\n", encoding="utf-8")
-    rows = "".join(f"{row.format(k=k)}\n" for k in range(60_000))
-    (many := tmp_path / "many.csv").write_text(f"{head}\n{rows}", encoding="utf-8")
-    done = subprocess.run([sys.executable, "-c", LABELS, few, many], check=True, capture_output=True, text=True)
-    with limits.opening(1), pytest.raises(FormatError, match="claims") as refusal:
+for few, many in zip(sys.argv[1::2], sys.argv[2::2]):
+    if not os.fork():
+        taxel.Labels(few)
+        before = peak()
         taxel.Labels(many)
-    claimed = int(re.findall(r"claims (\d+) bytes", str(refusal.value))[0])
-    assert claimed / 3 <= int(done.stdout) <= 1.05 * claimed
+        print(peak() - before, flush=True)
+        os._exit(0)
+    os.wait()
+"""
+#: The head and a row of tables that differ in what a row takes.
+TABLES = [
+    ("label,t_us", "a,1"),
+    ("label,t_us", "heel{k},{k}000"),
+    ("recording,label,t_us,source", "g,a{k},{k},palm"),
+    ("label,t_us,note,by", "heel,{k},x{k},y{k}"),
+    ("label,t_us", "ħēęļ{k},{k}"),
+    ("label,t_us,note", "heel,{k}," + "x" * 300),
+]
+
+
+def test_a_table_of_labels_claims_what_it_takes(tmp_path: Path) -> None:
+    files = []
+    for number, (head, row) in enumerate(TABLES):
+        for name, count in (("few", 1), ("many", 60_000)):
+            rows = "".join(f"{row.format(k=k)}\n" for k in range(count))
+            files.append(tmp_path / f"{name}{number}.csv")
+            files[-1].write_text(f"{head}\n{rows}", encoding="utf-8")
+    done = subprocess.run([sys.executable, "-c", LABELS, *files], check=True, capture_output=True, text=True)
+    for many, taken in zip(files[1::2], done.stdout.split(), strict=True):
+        with limits.opening(1), pytest.raises(FormatError, match="claims") as refusal:
+            taxel.Labels(many)
+        claimed = int(re.findall(r"claims (\d+) bytes", str(refusal.value))[0])
+        assert claimed / 3 <= int(taken) <= 1.05 * claimed, many.read_text()[:50]
 
 
 # columns that grow
@@ -594,8 +599,10 @@ def test_what_no_opening_reads_names_no_option_of_one() -> None:
         limits.unpacked("a", 9, 8)
 
 
-@pytest.mark.parametrize("name", ["walk.npz", "walk.mcap", "walk.lsa", "walk.csv"])
-@pytest.mark.parametrize("command", ["info", "convert", "cut", "merge", "encode", "emulate"])
+@pytest.mark.parametrize(
+    ("command", "name"),
+    mixed(["info", "convert", "cut", "merge", "encode", "emulate"], ["walk.npz", "walk.mcap", "walk.lsa", "walk.csv"]),
+)
 def test_a_command_names_its_option_in_one_line(
     command: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -98,7 +98,7 @@ READERS: dict[str, Callable[[Path], taxel.Recording]] = {
     ("reader", "kind"),
     [
         # A .h5 is written and opened in processes of their own; a .npz holds the same columns.
-        pytest.param(reader, kind, marks=pytest.mark.slow if kind == ".h5" and k % 4 else ())
+        pytest.param(reader, kind, marks=pytest.mark.slow if kind == ".h5" and k % 8 else ())
         for k, reader in enumerate(READERS)
         for kind in KINDS
     ],

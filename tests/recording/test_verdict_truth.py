@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from draws import seeds
+from draws import mixed, seeds
 from loopback import until
 from mcap.reader import make_reader
 from mcap.writer import Writer
@@ -126,7 +126,7 @@ def write(path: Path, came: list[bytes], draw: np.random.Generator, told: Told, 
         writer.finish(counts(len(came)))
 
 
-@pytest.mark.parametrize("seed", seeds(40, quick=15))
+@pytest.mark.parametrize("seed", seeds(40, quick=6))
 def test_the_numbers_of_a_verdict_are_the_losses(seed: int, tmp_path: Path) -> None:
     draw, told, path = np.random.default_rng(seed), Told(), tmp_path / "a.mcap"
     finish = bool(draw.random() < 0.6)
@@ -282,7 +282,8 @@ def test_what_another_program_changed_in_a_finished_file_is_damage(change: str, 
     assert "what it holds is not what was recorded" in anew.verdict
     if change == "its neighbour":
         assert anew.verdict.lost.get("lost_in_file", 0) > 0
-    for ending in ("npz", "h5", "mcap"):
+    # A .h5 is written and opened in processes of their own.
+    for ending in ("npz", "mcap", *(["h5"] if seed or change == "a bit" else [])):
         taxel.convert(anew, tmp_path / f"c.{ending}")
         assert taxel.open(tmp_path / f"c.{ending}").verdict.to_dict() == anew.verdict.to_dict()
 
@@ -341,9 +342,7 @@ def test_small_messages_that_another_program_added_are_not_there_twice(tmp_path:
     assert (verdict.lost, verdict.damaged) == ({}, {})
 
 
-@pytest.mark.parametrize("lines", [False, True])
-@pytest.mark.parametrize("dropped", [0, 3])
-@pytest.mark.parametrize("begins", [0, 2**32 - 20, 2**33 + 7])
+@pytest.mark.parametrize(("lines", "dropped", "begins"), mixed([False, True], [3, 0], [0, 2**32 - 20, 2**33 + 7]))
 def test_what_a_file_without_its_end_lacks_is_told_as_dropped_or_left_out(
     lines: bool, dropped: int, begins: int, tmp_path: Path
 ) -> None:
