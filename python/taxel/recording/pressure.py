@@ -44,9 +44,6 @@ _TRACKED_US, _STRETCH = 50_000, 10
 #: In silence, where nothing changes, the rest is tracked so many times, and then after each further one in so many of
 #: it: a wrong time stamp may make it one of years.
 _IN_SILENCE = 64
-#: *Reading*: noise adds up to at most so many times the greatest sum of the stretch of this length, us, in which it is
-#: least, and so many taxels just above the floor (crates/taxel-panel/src/keyframe_index/frames.rs has the same).
-_TIMES_LEAST, _STRETCH_US, _NOISY_TAXELS = 1.5, 250_000, 4
 #: Largest rectangle around the taxels with events whose rest is tracked with regard to neighbours.
 _MOST_PLACES = 1 << 18
 
@@ -112,19 +109,11 @@ class Series:
         area = over(lambda block: block.area(above) if in_mm2 else block.loaded(above).astype(np.float64))
         centre, total = None if array.is_channels else over(lambda block: block.centre(above)), over(loaded_sum)
         if centre is not None and rest.source == "quiet" and len(frames):
-            centre[total <= _of_noise(frames.t, total, above)] = np.nan
+            centre[total <= _core.frame_noise(frames.t, total, above)] = np.nan
         return cls(
             frames.t, frames.unit, above, None if array.is_channels else area, over(Frames.peak), total,
             centre, "mm2" if in_mm2 else "taxels", array.centre_unit or "", rest, force_n(frames),
         )  # fmt: skip
-
-
-def _of_noise(t: NDArray[np.int64], total: NDArray[np.float64], above: float) -> float:
-    """Return the most that the noise of frames adds up to, as on the page: by the stretch in which it is least."""
-    begins = np.flatnonzero(np.diff((t - t[0]) // _STRETCH_US, prepend=-1))
-    greatest = np.maximum.reduceat(total, begins)
-    # The last one may be short.
-    return float(_TIMES_LEAST * greatest[: max(1, len(greatest) - 1)].min() + _NOISY_TAXELS * above)
 
 
 def force_n(frames: Frames) -> NDArray[np.float64] | None:
