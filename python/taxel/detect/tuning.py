@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import number, several, text
-from taxel._base.errors import refused
+from taxel._base.arguments import finite, number, several, text
 from taxel._base.progress import Progress, reporting
 from taxel.detect.examples import Example, checked
 from taxel.detect.loads import FoundTimes, Loads, Stretch, clock_of
@@ -111,9 +110,7 @@ def tune(
         sorted({name for example in sound for name in example.labels}) if labels is None else several("labels", labels)
     )
     names = [text("labels", name) for name in names]
-    width_ms = number("window_ms", window_ms, "ms")
-    if not 0.0 <= width_ms <= 3_600_000.0:
-        raise refused("window_ms", f" is {width_ms:g}: must be from 0 to 3600000")
+    width_ms = finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6)
     floor = number("noise_floor", noise_floor)
     if any(isinstance(example.source, SpikeTrains) for example in sound):
         return dict.fromkeys(names)

@@ -21,7 +21,7 @@ from taxel._base.h5_file import H5File
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import files_at
+from taxel.formats.checks import candidates, files_at
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 
@@ -41,8 +41,7 @@ _SOURCE = (
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``subj*.h5``."""
-    candidates = sorted(path.glob("subj*.h5")) if path.is_dir() else [path]
-    return [f for f in candidates if re.fullmatch(r"subj\w+\.h5", f.name)]
+    return [f for f in candidates(path, "subj*.h5") if re.fullmatch(r"subj\w+\.h5", f.name)]
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
@@ -215,10 +214,8 @@ def _loaded(image: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def _events_table(path: Path) -> dict[tuple[str, int], dict[str, int]]:
-    if not path.exists():
-        return {}
     columns = {e: f"{e}_frame" for e in ("contact", "heel_off", "foot_off")}
-    rows = text.table(path, ["subject", "trial", *columns.values()])
+    rows = text.table(path, ["subject", "trial", *columns.values()], optional=True)
     whole = [
         {c: int(text.number(row[c], path, int(row["line"]), c)) for c in ("trial", *columns.values())} for row in rows
     ]
@@ -229,13 +226,11 @@ def _events_table(path: Path) -> dict[tuple[str, int], dict[str, int]]:
 
 
 def _trials_table(path: Path) -> dict[tuple[str, int], dict[str, str | float]]:
-    if not path.exists():
-        return {}
     names = {"1": "slow", "2": "normal", "3": "fast"}
     return {
         (row["subject"], int(text.number(row["trial"], path, int(row["line"]), "trial"))): {
             "condition": names.get(row["condition"], row["condition"]),
             "speed_m_s": text.number(row["speed_m_s"], path, int(row["line"]), "speed_m_s"),
         }
-        for row in text.table(path, ["subject", "trial", "condition", "speed_m_s"])
+        for row in text.table(path, ["subject", "trial", "condition", "speed_m_s"], optional=True)
     }

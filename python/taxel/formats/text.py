@@ -322,13 +322,15 @@ def _block(
     return values
 
 
-def table(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
-    """Read a comma-separated table with a header line; each row also has its ``line``.
+def table(path: Path, columns: Sequence[str], *, optional: bool = False) -> list[dict[str, str]]:
+    """Read a comma-separated table with a header line; each row also has its ``line``; none without an optional one.
 
     Raises
     ------
     FormatError : a column is missing, or a row has another length than the header (names file and line)
     """
+    if optional and not path.exists():
+        return []
     parsed = HeaderTable.read(path.name, lines(path))
     if not parsed.header:
         raise FormatError(f"{path.name}: empty; must begin with a line of column names")

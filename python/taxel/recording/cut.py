@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import assert_never
 
 import numpy as np
-from numpy.typing import NDArray
 
 from taxel._base.arguments import finite, instance, text, window
 from taxel._core import ProblemError
@@ -131,7 +130,8 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
                 calibration = part.calibration.to(lambda whole: None if whole is None else whole._region(columns, rows))
                 return parts.Sensor(small, part.side, part.heel, calibration)
             case parts.Settings():
-                held = Once(lambda: _cropped(part.held(), top, bottom, left, right))
+                inside = np.s_[top:bottom, left:right]
+                held = part.held.to(lambda held: None if held is None else np.ascontiguousarray(held[inside]))
                 return parts.Settings(held, part.registers, part.register_changes)
             case parts.Marks():
                 return replace(part, zeroings=Once(lambda: zeroings(part.zeroings())))
@@ -147,12 +147,6 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
                 assert_never(part)
 
     return Contents.of(applied(of.main, rule, lambda: [*of.main.part(parts.Columns).received(), *of.others()]))
-
-
-def _cropped(
-    held: NDArray[np.uint16] | None, top: int, bottom: int, left: int, right: int
-) -> NDArray[np.uint16] | None:
-    return None if held is None else np.ascontiguousarray(held[top:bottom, left:right])
 
 
 def span_us(recording: Recording) -> tuple[int, int]:

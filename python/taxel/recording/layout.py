@@ -128,7 +128,7 @@ def _array(of: Source, layout: Layout) -> Array:
     if not array._is_measured:
         with_names = held if array.shape == held.shape else replace(array, pitch_mm=held.pitch_mm, name=held.name)
         return with_names if held.places is None or array.shape == held.shape else array
-    along = held.places is not None and kind in _ALONG and held.places == _places_along(of)
+    along = kind in _ALONG and held.places == packaged(kind).array(held.columns, held, of.sensor.side).places
     if held._is_measured and not along and (held.pitch_mm, held.places) != (array.pitch_mm, array.places):
         raise ProblemError(f"says taxels {array._apart()}; the file says {held._apart()}")
     return array
@@ -136,10 +136,6 @@ def _array(of: Source, layout: Layout) -> Array:
 
 #: Formats with a layout that comes along, which another layout may replace.
 _ALONG = ("gaitpdb",)
-
-
-def _places_along(of: Source) -> object:
-    return packaged(of.origin.kind).array(of.sensor.array.columns, of.sensor.array, of.sensor.side).places
 
 
 #: Kinds of files of one recording, whose times no other one has.

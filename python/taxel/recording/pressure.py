@@ -418,7 +418,7 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
     half a tick, as in `taxel.encode.ContactArea`; in another unit the range of a recording's values counts as 150
     ticks; in one of force or pressure by more than six times the noise of a quiet stretch, or than 0 without one.
     """
-    read = _read(recording, tare)
+    read = readings(recording, tare)
     if read is None:
         return None
     frames, rest, floor = read
@@ -459,14 +459,6 @@ def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
     return drawn.frames(_rest_of(recording, drawn, None), events.array)[len(from_first) - len(t) :]
 
 
-def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:
-    """Return raw frames, the rest of each taxel, and the threshold of a loaded taxel; None without intensities.
-
-    The rest is as of `above_rest`, but that of a quiet stretch as it was there.
-    """
-    return _read(recording, tare)
-
-
 def quiet_rest(recording: Recording) -> Rest | None:
     """Return the rest that a quiet stretch of a board's events shows, on their held values; None without intensities.
 
@@ -476,10 +468,14 @@ def quiet_rest(recording: Recording) -> Rest | None:
     return None if present is None or not present.any() else _Drawn.of(recording).found()
 
 
-def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float] | None:
+def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:
+    """Return raw frames, the rest of each taxel, and the threshold of a loaded taxel; None without intensities.
+
+    The rest is as of `above_rest`, but that of a quiet stretch as it was there.
+    """
     if not recording.has_events:
         frames = recording.frames()
-        rest = _rest_of_frames(recording, frames, tare)
+        rest = _measured(recording, tare) or of_frames(frames)
         return frames, rest, loaded_from(frames, rest)
     events = recording.events
     if events.present is None or not events.present.any():
@@ -496,22 +492,19 @@ def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float]
 
 def _rest_of(recording: Recording, drawn: _Drawn, tare: Tare | None) -> Rest:
     """Return the rest of the taxels with events, in their order."""
-    given = _given(recording, tare)
-    rest = drawn.found() if given is None else replace(given, values=given.values[drawn.taxels])
+    measured = _measured(recording, tare)
+    rest = drawn.found() if measured is None else replace(measured, values=measured.values[drawn.taxels])
     return replace(rest, zeroed=len({k for k, *_ in drawn.zeroed}))
 
 
-def _rest_of_frames(recording: Recording, frames: Frames, tare: Tare | None) -> Rest:
-    given = _given(recording, tare)
-    return of_frames(frames) if given is None else given
-
-
-def _given(recording: Recording, tare: Tare | None) -> Rest | None:
+def _measured(recording: Recording, tare: Tare | None) -> Rest | None:
     """Return the measured rest; NaN where a taxel has none."""
     if tare is not None:
         if tare.array.shape != recording.array.shape:
-            given, stated = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
-            raise ProblemError(f"the tare is of {given} taxels, {recording.path} of {stated}")
+            measured, stated = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
+            raise ProblemError(f"the tare is of {measured} taxels, {recording.path} of {stated}")
         return Rest("tare", tare.rest.reshape(-1))
-    of = recording.calibration
-    return None if of is None or of.rest is None else Rest("calibration", of.rest.reshape(-1))
+    calibration = recording.calibration
+    if calibration is None or calibration.rest is None:
+        return None
+    return Rest("calibration", calibration.rest.reshape(-1))

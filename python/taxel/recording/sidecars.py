@@ -48,11 +48,6 @@ def labels_of(origin: Origin) -> tuple[Path, str, str]:
     return origin.path, origin.label, trial_of(origin.name, origin.label)
 
 
-def has_calibration(path: Path) -> bool:
-    """Return whether a calibration file lies beside a file."""
-    return Calibration.beside(path) is not None
-
-
 def calibration_beside(path: Path, of: Source) -> Once[Calibration | None]:
     """Return the calibration beside a file (`Calibration.beside`); None if there is none.
 
@@ -64,7 +59,7 @@ def calibration_beside(path: Path, of: Source) -> Once[Calibration | None]:
         place = Calibration.beside(path)
         return None if place is None else _fitting(place, of)
 
-    return Once(read, lambda: has_calibration(path))
+    return Once(read, lambda: Calibration.beside(path) is not None)
 
 
 def calibrated_by(recording: Recording, place: Path) -> Recording:

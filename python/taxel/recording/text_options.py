@@ -51,7 +51,8 @@ class TextOptions(SharedOptions):
         options["array"] = arrays if len(arrays) > 1 else arrays[0] if arrays else None
         options["layout"] = self.layout or self._instead_of_layout(place)
         opened = open_all(place, **options)
-        return [self._timed(self._on_array(recording)) for recording in opened]
+        placed = map(self._on_array, opened)
+        return [recording if self.rate_hz is None else recording.at_rate(self.rate_hz) for recording in placed]
 
     def given(self) -> dict[str, Any]:
         """Return the options that differ from their defaults, as JSON holds them."""
@@ -111,9 +112,6 @@ class TextOptions(SharedOptions):
         """
         trials = (trial for path in several("paths", paths) for trial in self.open_trials(path))
         return [sensor for trial in trials for sensor in sensors(trial)]
-
-    def _timed(self, recording: Recording) -> Recording:
-        return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
 
     def open_one(self, path: str | os.PathLike[str]) -> Recording:
         """Open a file that holds one recording, with its feet joined.

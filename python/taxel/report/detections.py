@@ -369,13 +369,9 @@ def _planes(
             crossing = half[: taxels * (levels - tonic)].reshape(taxels, levels - tonic)
             behind = [("tonic", half[-taxels:])] if tonic else []
             for name, plane in [*((_nth("level", levels - tonic, n), p) for n, p in enumerate(crossing.T)), *behind]:
-                words = (_sign(halves, s), name, _nth("delay", delays, d))
+                words = (("ON", "OFF")[s] if halves == 2 else "", name, _nth("delay", delays, d))
                 planes.append((" ".join(filter(None, words)), plane))
     return planes
-
-
-def _sign(halves: int, n: int) -> str:
-    return ("ON", "OFF")[n] if halves == 2 else ""
 
 
 def _nth(what: str, count: int, n: int) -> str:
