@@ -234,7 +234,7 @@ def test_spike_trains_are_learnt_and_judged_as_their_events_are() -> None:
 
 
 def test_points_that_differ_in_lambdas_alone_come_to_what_each_comes_to_by_itself() -> None:
-    from taxel.detect.training import Fitting, encoded
+    from taxel.detect.training import Fitting, encode_examples
 
     plans = [
         dataclasses.replace(
@@ -243,7 +243,7 @@ def test_points_that_differ_in_lambdas_alone_come_to_what_each_comes_to_by_itsel
         for l1 in (0.0, 1.0, 4.0)
     ]
     data = [one._replace(labels={"lift": one.labels["lift"]}) for one in examples(1, 2)]
-    patterns = encoded(data, plans[0], lambda *_: None)
+    patterns = encode_examples(data, plans[0], lambda *_: None)
     rows = Fitting(patterns, plans[0], "lift", None, lambda *_: None)
     for plan in plans:
         assert rows.fits(plan)

@@ -23,7 +23,7 @@ from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import progress, say_warnings, tare_option
 from taxel.cli._say import say
-from taxel.cli._topics import listed
+from taxel.cli._topics import list_topics
 from taxel.clock import doubt
 from taxel.spikes import SpikeTrains, to_ms
 
@@ -85,7 +85,7 @@ def info(
     with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {file}", 0, 0)
         if file.exists() and is_bag(file) and not files.opener._names_topic(file):
-            say(*listed(file, topics(file, files.types, files.ros), as_json))
+            say(*list_topics(file, topics(file, files.types, files.ros), as_json))
             return
         every = files.opener.open_trials(file)
         recording = every[0]

@@ -20,8 +20,8 @@ from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_frames, later_us, silent_windows
-from taxel.detect.alignment import Alignment, align, aligned
-from taxel.detect.examples import Example, array_of, called, checked, unit_of
+from taxel.detect.alignment import Alignment, align, align_by
+from taxel.detect.examples import Example, array_of, check_examples, name_of, unit_of
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
 from taxel.detect.loads import clock_of
 from taxel.detect.readout import SILENCE_MS, Readout
@@ -118,12 +118,12 @@ def fit(
     >>> fit([Example(frames, {"contact": [20_000]})], recipe)
     Readout(contact; LevelCrossing(levels=[5.0]) on 1 x 1 taxels; grid, keep)
     """
-    return trained(examples, recipe, progress).readout
+    return fit_aligned(examples, recipe, progress).readout
 
 
-def trained(examples: Sequence[Example], recipe: Recipe, progress: Progress | None) -> Trained:
+def fit_aligned(examples: Sequence[Example], recipe: Recipe, progress: Progress | None) -> Trained:
     """Train a readout as `fit` does, and return how its labels were aligned as well."""
-    sound, clocks = checked(examples), [clock_of(example) for example in examples]
+    sound, clocks = check_examples(examples), [clock_of(example) for example in examples]
     report = reporting(progress)
     recipe = in_frames(instance("recipe", recipe, Recipe), sound, clocks)
     possibly = possible(recipe, sound)
@@ -155,9 +155,9 @@ class Encoded:
         #: The recipe with the parts of `patterns`.
         self.plan = recipe._narrowed(labels, search=search, choices=given)
         #: The examples as the trains that the first points receive.
-        self.patterns = encoded(examples, self.plan, report)
+        self.patterns = encode_examples(examples, self.plan, report)
         self._others: dict[str, Sequence[Example]] = {}
-        self._encode: Callable[[Recipe], Sequence[Example]] = lambda plan: encoded(examples, plan, report)
+        self._encode: Callable[[Recipe], Sequence[Example]] = lambda plan: encode_examples(examples, plan, report)
 
     def receiving(self, plan: Recipe) -> tuple[Recipe, Sequence[Example]]:
         """Return a recipe for one point of one label with the parts that the trains are of, and these trains."""
@@ -180,7 +180,7 @@ class Encoded:
         return mine
 
 
-def encoded(examples: Sequence[Example], recipe: Recipe, report: Progress) -> list[Example]:
+def encode_examples(examples: Sequence[Example], recipe: Recipe, report: Progress) -> list[Example]:
     """Return (checked) examples with the spike trains of the recipe's encoder as their sources."""
     array_of(examples)
     results = []
@@ -344,10 +344,10 @@ class Fitting:
             if len(every) <= place and place:
                 raise ProblemError(f"{label}: {counted(len(every), 'quantity', 'quantities')} follow it")
             followed = every[place] if every else None
-            self.alignment = aligned(label, given, followed and (followed.train, followed.score))
+            self.alignment = align_by(label, given, followed and (followed.train, followed.score))
         elif recipe.align:
             self.alignment = align(sources, label, given, received.latency_ms, ages)
-        self._names = [called(k, example) for k, example in enumerate(examples)]
+        self._names = [name_of(k, example) for k, example in enumerate(examples)]
         self._sources = sources if followed is None else [only(of, quantities[followed.train]) for of in sources]
         felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
         for name, times in zip(self._names, felt, strict=True):
@@ -462,7 +462,7 @@ def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     if len(outside):
         at, start, stop = (ms - _begin_ms(source) for ms in (outside[0], source.start, source.stop))
         raise ProblemError(
-            f"{called(k, example)}: {label} at {at:.3f} ms lies outside it, {start:.3f} to {stop:.3f} ms"
+            f"{name_of(k, example)}: {label} at {at:.3f} ms lies outside it, {start:.3f} to {stop:.3f} ms"
         )
     return events
 
@@ -488,7 +488,7 @@ def _inputs(k: int, example: Example, recipe: Recipe, label: str, array: Array |
     places = encoder.places(names, array or Array(1, 1))
     if len(places) != len(trains):
         made = f"{counted(len(trains), 'train')}, the encoders make {len(places)}"
-        raise ProblemError(f"{called(k, example)}: {made}: must be equally many")
+        raise ProblemError(f"{name_of(k, example)}: {made}: must be equally many")
     return trains.select(places)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.arguments import finite, number, several, text
 from taxel._base.progress import Progress, reporting
-from taxel.detect.examples import Example, checked
+from taxel.detect.examples import Example, check_examples
 from taxel.detect.loads import FoundTimes, Loads, Stretch, clock_of
 from taxel.detect.plain_rule import PlainRule
 from taxel.spikes import SpikeTrains, to_us
@@ -104,7 +104,7 @@ def tune(
     (PlainRule(area >= 1, release 0.5, 1 frame: onset touch), PlainRule(area >= 1, release 0.5, 1 frame: end removal))
     """
     clocks = [clock_of(example) for example in examples] if isinstance(examples, Sequence) else []
-    sound = checked(examples)
+    sound = check_examples(examples)
     report = reporting(progress)
     names = (
         sorted({name for example in sound for name in example.labels}) if labels is None else several("labels", labels)

@@ -19,7 +19,7 @@ from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.checks import ascending, candidates, files_at, whole_us
-from taxel.formats.layout import packaged
+from taxel.formats.layout import load_packaged
 from taxel.formats.trial import Trial, scored_around, stances
 from taxel.frames import Frames
 
@@ -57,7 +57,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that breaks the format (names file, line and column)
     """
     paths = files_at(path, files, "file such as GaCo02_01.txt")
-    places, foot_of = packaged("gaitpdb"), Array(1, 8, name="gaitpdb foot")
+    places, foot_of = load_packaged("gaitpdb"), Array(1, 8, name="gaitpdb foot")
     known = _events_table(paths[0].parent / "events.csv")
     for file in paths:
         match = _NAME.fullmatch(file.name)

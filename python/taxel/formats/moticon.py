@@ -85,7 +85,7 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
     }
     marked: dict[tuple[str, str], list[int]] = {place: [] for place in MARKERS.values()}
     table = (line.split("\t") for line in chain([begin], content))
-    for line, rows in text.grouped(table, file, first, len(names)):
+    for line, rows in text.group_rows(table, file, first, len(names)):
         seconds = text.numbers([[row[at]] for row in rows], file, line, ["time"])[:, 0]
         times = whole_us(file.name, seconds, line)
         t.add(t=times)

@@ -136,7 +136,7 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
     linearly interpolated to S[2k+1] and from there to S[2k+2], rounded down to whole counts. The phase is the one of
     three under which the fewest cells violate |3 (b - c) - (a - d)| <= 3, over the whole trial.
     """
-    whole = _loaded(image)
+    whole = _check_image(image)
     # Cells outside of the box of all loaded columns and frames are 0 and lie on every line.
     box = tuple(_span(np.flatnonzero(whole.any(axis=axes))) for axes in ((0, 2), (0, 1)))
     y = whole[:, *box]
@@ -188,7 +188,7 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
     ------
     ProblemError : not counts of shape (rows, columns, frames), or no count above 0
     """
-    image = _loaded(image)
+    image = _check_image(image)
     total = image.sum(axis=(0, 1), dtype=np.int64)
     loaded = np.flatnonzero(total > 0)
     rows = np.flatnonzero(image.any(axis=(1, 2)))
@@ -206,7 +206,7 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
     }
 
 
-def _loaded(image: NDArray[np.int32]) -> NDArray[np.int32]:
+def _check_image(image: NDArray[np.int32]) -> NDArray[np.int32]:
     counts: NDArray[np.int32] = arguments.numbers("image", image, np.int32)
     if counts.ndim != 3 or not counts.any() or counts.min() < 0:
         raise refused("image", f" has shape {counts.shape}: must be rows x columns x frames of counts, loaded once")

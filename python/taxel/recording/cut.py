@@ -12,7 +12,7 @@ from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.recording import parts
 from taxel.recording.changes import Zeroing
-from taxel.recording.contents import Contents, applied
+from taxel.recording.contents import Contents, apply_rule
 from taxel.recording.once import Once
 from taxel.recording.recording import Recording
 
@@ -146,7 +146,7 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
             case _:
                 assert_never(part)
 
-    return Contents.of(applied(of.main, rule, lambda: [*of.main.part(parts.Columns).received(), *of.others()]))
+    return Contents.of(apply_rule(of.main, rule, lambda: [*of.main.part(parts.Columns).received(), *of.others()]))
 
 
 def span_us(recording: Recording) -> tuple[int, int]:

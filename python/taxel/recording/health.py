@@ -139,7 +139,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     # A missing value is no reading that could show what a taxel does.
     held = held_by(recorded, hold=False)
     if isinstance(held, Events):
-        return judged(held.array, _statistics_of_events(held))
+        return judge(held.array, _statistics_of_events(held))
     if not isinstance(held, Frames):
         raise refused("recorded", f" is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
     activity, moved = (of.astype(np.int64).reshape(held.array.shape) for of in _core.changes_of_frames(held._parts()))
@@ -152,7 +152,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
             values = held.values - least
             ticks = Frames(frozen(np.multiply(values, scale, out=values)), held.t, array=held.array)
     counts = _core.touches_of_frames(ticks._parts(), 0.0 if held.unit in FORCE_UNITS else np.nan)
-    result = judged(held.array, TaxelStatistics(activity, moved, Touches.of(*counts)), loud=False)
+    result = judge(held.array, TaxelStatistics(activity, moved, Touches.of(*counts)), loud=False)
     if not len(held):
         return result
     # In frames a taxel that never changes is dead or stuck, depending on its value.
@@ -200,7 +200,7 @@ class TaxelStatistics(NamedTuple):
     """The greatest value that it is known to have held, ticks; -1 for a taxel without any event."""
 
 
-def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> Health:
+def judge(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> Health:
     """Return the health of taxels with these statistics, by the rules of `health`; `loud`: that of noise too."""
     exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
     activity, of = statistics.activity, statistics.touches

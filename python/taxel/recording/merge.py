@@ -22,7 +22,7 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, named, with_losses
+from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, name_remarks, with_losses
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import UNKNOWN, anything, known
 from taxel.recording.recording import Recording
@@ -76,10 +76,10 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
         raise refused("gap_us", f" is {shown(gap_us)}: must be 0 or more")
     if not sources:
         raise ProblemError("recordings: there must be one or more")
-    return Recording(merged([part._contents for part in sources], gap, beside=beside))
+    return Recording(merge_contents([part._contents for part in sources], gap, beside=beside))
 
 
-def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: bool = False) -> Contents:
+def merge_contents(recordings: Sequence[Contents], gap: float | None = None, *, beside: bool = False) -> Contents:
     """Return the contents of several recordings as those of one; arguments and errors are those of `merge`."""
     sources = [recording.main for recording in recordings]
     if len({part.has_events for part in sources}) > 1:
@@ -229,7 +229,7 @@ class _Merging:
         return parts.Losses(
             counts=known(self.agreed((part.counts() for part in losses), {}, "what each received and lost, by cause")),
             verdict=known(verdict),
-            remarks=named([(part.origin.name, part.losses.remarks) for part in self.sources]),
+            remarks=name_remarks([(part.origin.name, part.losses.remarks) for part in self.sources]),
             truncated=any(part.truncated for part in losses),
             rebuilt=known(self.agreed((part.rebuilt() for part in losses), {}, "what reading each had to put up with")),
         )

@@ -24,12 +24,12 @@ from taxel.recording.recording import Recording
 from taxel.recording.rest import (
     FrameBlock,
     Rest,
+    find_rest,
     flickering,
-    found,
+    frames_above,
     loaded_from,
     of_frames,
     ticks_by_unit,
-    tracked,
 )
 from taxel.tare import Tare
 
@@ -342,7 +342,7 @@ class _Drawn:
     def found(self) -> Rest:
         """Return the rest that a quiet stretch shows; its values are those of the taxels with events."""
         size, blocks = self.box[0] * self.box[1], lambda: (block for _, block in self.blocks())
-        rest = found(blocks, size, self.box[1], corner=self.corner, stands_for=self.sampled[1])
+        rest = find_rest(blocks, size, self.box[1], corner=self.corner, stands_for=self.sampled[1])
         preload = None if rest.preload is None else rest.preload[self.places]
         # A board's comparators are turned by its register, not by a layout file.
         return replace(rest, values=rest.values[self.places], preload=preload, falls=False)
@@ -378,7 +378,7 @@ class _Drawn:
 def _above(rest: Rest, blocks: Iterable[FrameBlock], columns: int, scale: float = 1.0) -> Iterable[FrameBlock]:
     """Yield frames above a rest: tracked where none is given; 0 where a value or its rest is not known."""
     if rest.source in ("quiet", "none"):
-        yield from tracked(rest, blocks, columns, scale)
+        yield from frames_above(rest, blocks, columns, scale)
         return
     known = np.where(np.isnan(rest.values), np.inf, rest.values)
     for t, values in blocks:
