@@ -108,13 +108,13 @@ def test_events_out_of_reach_are_named_by_label_time_and_example() -> None:
     data = examples(1, 2)
     plan = recipe()
     neurons = {label: {**own, "ub": 1e-6} for label, own in plan.neurons.items()}
-    with pytest.warns(UserWarning, match="out of reach") as caught:
+    with pytest.warns(UserWarning, match="cannot be learnt") as caught:
         fit(data, dataclasses.replace(plan, neurons=neurons))
     for label in plan.neurons:
         (said,) = [str(one.message) for one in caught if str(one.message).startswith(f"{label}: ")]
         first = data[0].labels[label][0] / 1000.0
         count = sum(len(example.labels[label]) for example in data)
-        assert said.startswith(f"{label}: {count} of {count} events are out of reach")
+        assert said.startswith(f"{label}: {count} of {count} events cannot be learnt")
         assert f"({first:.10g} ms of example 0, " in said
         assert "pattern" not in said
 
@@ -123,7 +123,7 @@ def test_events_out_of_reach_are_named_from_the_beginning_of_a_recording_since_1
     begin_us = 1_795_000_000_000_000
     frames = taxel.Frames([[[v]] for v in (0.0, 9.0, 9.0, 0.0)], begin_us + 10_000 * np.arange(4), unit="N")
     plan = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "ub": 1e-6, "delay_ms": 1.0})
-    with pytest.warns(UserWarning, match=r"out of reach.* \(10 ms\)"):
+    with pytest.warns(UserWarning, match=r"cannot be learnt.* \(10 ms\)"):
         fit([Example(frames, {"contact": [begin_us + 10_000]})], plan)
     with pytest.raises(taxel.ProblemError, match=r"contact at 5000.000 ms lies outside it, 0.000 to 30.000 ms"):
         fit([Example(frames, {"contact": [begin_us + 5_000_000]})], plan)

@@ -102,7 +102,7 @@ def fit(
 
     Warns
     -----
-    UserWarning : what `taxel.learn.ConeR` warns of, behind the label; events out of reach by their times
+    UserWarning : what `taxel.learn.ConeR` warns of, behind the label; events that cannot be learnt by their times
 
     Notes
     -----
@@ -509,18 +509,19 @@ def _remarks(
         if count < TWO_FOLDS:
             yield (
                 f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from; {TWO_FOLDS} are the "
-                f"least to score it held out: label more. {len(missed)} out of reach of the inputs ({listed})"
+                f"least to score it held out: label more. {len(missed)} cannot be learnt: too few input spikes come before "
+                f"them ({listed})"
             )
         elif len(missed) == count:
             yield (
-                f"{count} of {count} events are out of reach, as too few input spikes come before them ({listed}): "
-                "none was learnt. Their times may be off, or of another recording"
+                f"{count} of {count} events cannot be learnt, as too few input spikes come before them ({listed}). Their "
+                "times may be off, or of another recording"
             )
         else:
             yield (
-                f"{len(missed)} of {count} events are out of reach, as too few input spikes come before "
-                f"them ({listed}); the rest was learnt. A larger delay_ms or tau, wider lb and ub, or another of the "
-                "recipe's points (taxel train --search) may reach them"
+                f"{len(missed)} of {count} events cannot be learnt, as too few input spikes come before them ({listed}); "
+                "the others were. A larger delay_ms or tau, wider lb and ub, or another of the recipe's points (taxel "
+                "train --search) may help"
             )
     # The learner names unreachable targets, if any, first.
     yield from caught[bool(missed) :]

@@ -565,6 +565,33 @@ mod tests {
     }
 
     #[test]
+    fn a_source_that_begins_later_has_the_noise_of_its_own_frames() {
+        let values = vec![210.0; 600 * 6];
+        let noise = [0, 1_000_000].map(|late| {
+            let rest = FrameRest {
+                source: RestSource::Quiet,
+                values: vec![200.0; 6],
+                ticks_by_unit: 0.5,
+                loaded_from: 7.0,
+                falls: false,
+                flickering: vec![],
+                preload_at: String::new(),
+            };
+            let sources = [("left", 0, 0), ("right", 4, late)].map(|(name, left, begin)| FrameSource {
+                place: place(name, left),
+                t: (0..600).map(|k| begin + 10_000 * k).collect(),
+                values: &values,
+                rest: rest.clone(),
+            });
+            let array = Array::new(2, 7, 1.0, "feet").unwrap();
+            let index = FrameIndex::new(array, FrameFile::default(), sources.into());
+            index.time_columns.unwrap().source_noise().to_vec()
+        });
+        assert_eq!(noise[0], noise[1]);
+        assert!(noise[0][1] > 4 * 7);
+    }
+
+    #[test]
     fn steps_go_from_frame_to_frame_both_ways() {
         let left = ((0..9).map(|k| 10_000 * k).collect::<Vec<i64>>(), vec![1.0; 54]);
         let index = index(&left, &(vec![], vec![]));
