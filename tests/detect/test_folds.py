@@ -104,7 +104,7 @@ def test_a_point_that_finds_nothing_is_not_chosen() -> None:
     assert judge(examples(1, 9), best, 2, window_ms=10.0).together.missed == 0
 
 
-def test_events_out_of_reach_are_named_by_label_time_and_example() -> None:
+def test_events_that_cannot_be_learnt_are_named_by_label_time_and_example() -> None:
     data = examples(1, 2)
     plan = recipe()
     neurons = {label: {**own, "ub": 1e-6} for label, own in plan.neurons.items()}
@@ -119,7 +119,7 @@ def test_events_out_of_reach_are_named_by_label_time_and_example() -> None:
         assert "pattern" not in said
 
 
-def test_events_out_of_reach_are_named_from_the_beginning_of_a_recording_since_1970() -> None:
+def test_events_that_cannot_be_learnt_are_named_from_the_beginning_of_a_recording_since_1970() -> None:
     begin_us = 1_795_000_000_000_000
     frames = taxel.Frames([[[v]] for v in (0.0, 9.0, 9.0, 0.0)], begin_us + 10_000 * np.arange(4), unit="N")
     plan = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "ub": 1e-6, "delay_ms": 1.0})

@@ -29,6 +29,11 @@ SecondsOption = Annotated[
 ]
 
 
+#: What a command prints, and whether it may replace what it writes.
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace files that are written, if they exist.")]
+
+
 class _Command(TyperCommand):
     """A command whose errors name options as they are typed, not as Python's arguments; an example is one line."""
 

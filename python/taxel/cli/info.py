@@ -18,7 +18,7 @@ from taxel._base.messages import counted
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.cli._app import App
+from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import progress, say_warnings, tare_option
@@ -54,10 +54,8 @@ def info(
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
     tare: Annotated[str | None, tare_option("Default: that of a quiet stretch.")] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the files that are written if they exist.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Summarise a recording: contents, losses, rates, pressure, and dead, stuck or noisy taxels.
 

@@ -326,8 +326,8 @@ class Fitting:
         neuron = learner._on_grid()
         acts_after_ms = ACTS_AFTER_MS if neuron.kernel == "exponential" else neuron.step_ms
         self.delay_ms = delay_ms + (0.0 if ages is None else acts_after_ms)
-        given = self._given = [_times(k, example, label) for k, example in enumerate(examples)]
-        count = sum(map(len, given))
+        label_times = self._label_times = [_times(k, example, label) for k, example in enumerate(examples)]
+        count = sum(map(len, label_times))
         if not count:
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
         sources = [_inputs(k, example, recipe, label, array) for k, example in enumerate(examples)]
@@ -339,17 +339,17 @@ class Fitting:
             known = {} if known is None else known
             inputs = recipe.inputs_of(label)
             if inputs not in known:
-                known[inputs] = follow(sources, label, given, received.latency_ms, list(quantities))
+                known[inputs] = follow(sources, label, label_times, received.latency_ms, list(quantities))
             every = known[inputs]
             if len(every) <= place and place:
                 raise ProblemError(f"{label}: {counted(len(every), 'quantity', 'quantities')} follow it")
             followed = every[place] if every else None
-            self.alignment = align_by(label, given, followed and (followed.train, followed.score))
+            self.alignment = align_by(label, label_times, followed and (followed.train, followed.score))
         elif recipe.align:
-            self.alignment = align(sources, label, given, received.latency_ms, ages)
+            self.alignment = align(sources, label, label_times, received.latency_ms, ages)
         self._names = [name_of(k, example) for k, example in enumerate(examples)]
         self._sources = sources if followed is None else [only(of, quantities[followed.train]) for of in sources]
-        felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
+        felt = label_times if self.alignment is None else [self.alignment.felt(k) for k in range(len(label_times))]
         for name, times in zip(self._names, felt, strict=True):
             self._check_apart(name, times, neuron.refractory)
         later = [np.zeros(len(times), np.int64) for times in felt]
@@ -418,17 +418,17 @@ class Fitting:
         """Return the labels of each example that were not aligned, ms."""
         of = self.alignment
         assert of is not None
-        return [to_ms(of.given[of.unpaired & (of.example == k)]) for k in range(len(self._given))]
+        return [to_ms(of.given[of.unpaired & (of.example == k)]) for k in range(len(self._label_times))]
 
     def wrong(self, cone: ConeR, run_threshold: float) -> int:
         """Return how many labels, as given, a fitted learner misses on these examples, and how many it invents."""
         neuron = cone._on_grid()
         neuron.set_params(theta_0=run_threshold * neuron.theta_0)
         found, truths = [], []
-        for source, given in zip(self._sources, self._given, strict=True):
+        for source, times in zip(self._sources, self._label_times, strict=True):
             t = np.rint(to_us(neuron.run(cone.weights_, source) - self._shift_ms)).astype(np.int64)
             found.append(Detections([self._label] * len(t), t, t))
-            truths.append({self._label: given})
+            truths.append({self._label: times})
         return score_together(found, truths, FOLLOWED_MS).rank[0]
 
     def seen(self, cone: ConeR) -> dict[str, Any]:
@@ -506,22 +506,16 @@ def _remarks(
         at = [(targets[p][k] - shift_ms - begins_ms[p], f" of {names[p]}" * (len(targets) > 1)) for p, k in missed]
         places = [f"{ms:.10g} ms{name}" for ms, name in at]
         listed = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
+        why = f"cannot be learnt, as too few input spikes come before them ({listed})"
         if count < TWO_FOLDS:
-            yield (
-                f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from; {TWO_FOLDS} are the "
-                f"least to score it held out: label more. {len(missed)} cannot be learnt: too few input spikes come before "
-                f"them ({listed})"
-            )
+            there = f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from"
+            yield f"{there}; {TWO_FOLDS} are the least to score it held out: label more. {len(missed)} {why}"
         elif len(missed) == count:
-            yield (
-                f"{count} of {count} events cannot be learnt, as too few input spikes come before them ({listed}). Their "
-                "times may be off, or of another recording"
-            )
+            yield f"{count} of {count} events {why}. Their times may be off, or of another recording"
         else:
             yield (
-                f"{len(missed)} of {count} events cannot be learnt, as too few input spikes come before them ({listed}); "
-                "the others were. A larger delay_ms or tau, wider lb and ub, or another of the recipe's points (taxel "
-                "train --search) may help"
+                f"{len(missed)} of {count} events {why}; the others were. A larger delay_ms or tau, wider lb and ub, or "
+                "another of the recipe's points (taxel train --search) may help"
             )
     # The learner names unreachable targets, if any, first.
     yield from caught[bool(missed) :]
