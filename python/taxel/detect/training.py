@@ -514,8 +514,8 @@ def _remarks(
             yield f"{count} of {count} events {why}. Their times may be off, or of another recording"
         else:
             yield (
-                f"{len(missed)} of {count} events {why}; the others were. A larger delay_ms or tau, wider lb and ub, or "
-                "another of the recipe's points (taxel train --search) may help"
+                f"{len(missed)} of {count} events {why}; the others were. A larger delay_ms or tau, wider lb and ub, "
+                "or another of the recipe's points (taxel train --search) may help"
             )
     # The learner names unreachable targets, if any, first.
     yield from caught[bool(missed) :]
