@@ -15,7 +15,7 @@ import pytest
 from shell import call
 
 import taxel
-from taxel.cli._commands import OWN, added
+from taxel.cli._commands import OWN, plugins
 from taxel.cli._opening import FileOptions
 from taxel.live import send
 from taxel.recording.text_options import TextOptions
@@ -218,7 +218,7 @@ def test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work(cap
     assert "docs/start.md" in epilog
     lines = dict(line.split(maxsplit=1) for line in listed.splitlines())
     assert code == 0
-    assert {*lines} == {*OWN, *added()}
+    assert {*lines} == {*OWN, *plugins()}
     assert {name: text for name, text in lines.items() if len(text) > 60 or not text.endswith(".")} == {}
     order = [*lines]
     way = ("record", "info", "train", "detect", "bench")

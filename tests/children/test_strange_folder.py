@@ -15,7 +15,7 @@ from shell import run
 
 import taxel
 from taxel import Array, Frames
-from taxel.cli._commands import OWN, added
+from taxel.cli._commands import OWN, plugins
 from taxel.live._requests.training import TrainingRequests
 from taxel.live._shown_files import Opening, ShownFiles
 
@@ -118,12 +118,12 @@ def commands(folder: Path) -> dict[str, list[list[object]]]:
 
 
 def test_every_command_is_tried() -> None:
-    assert commands(Path()).keys() == {*OWN, *added()}
+    assert commands(Path()).keys() == {*OWN, *plugins()}
 
 
 @pytest.mark.parametrize(
     "command",
-    [pytest.param(name, marks=pytest.mark.slow if name in ("demo", "bench") else ()) for name in (*OWN, *added())],
+    [pytest.param(name, marks=pytest.mark.slow if name in ("demo", "bench") else ()) for name in (*OWN, *plugins())],
 )
 def test_a_command_runs_no_code_of_a_strange_folder(command: str, here: Path, beside: Path) -> None:
     for words in commands(beside)[command]:

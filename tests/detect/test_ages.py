@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from taxel import Array, Events, Frames, SpikeTrains, Tare
 from taxel.detect import Example, Recipe, judge, run, score
 from taxel.detect.ages import Ages, in_frames, later_us
-from taxel.detect.training import trained
+from taxel.detect.training import fit_aligned
 
 KINDS = ("small", "large")
 
@@ -50,7 +50,7 @@ def test_kinds_are_told_at_any_rate(rate: float, jitter: float, rise_s: float, s
     learnt, unseen = (touched(seed, rate, jitter, rise_s, start_us) for seed in (1, 2))
     rest_us = start_us + 1_200_000
     examples = [Example(frames, labels, Tare.take(frames, stop_us=rest_us)) for frames, labels in (learnt, unseen)]
-    readout = trained(examples[:1], Recipe.load("touch", labels=KINDS, noise_floor=0.012), None).readout
+    readout = fit_aligned(examples[:1], Recipe.load("touch", labels=KINDS, noise_floor=0.012), None).readout
     result = score(run(readout, unseen[0], tare=examples[1].tare), unseen[1])
     assert result.missed + result.false <= 1, result
 
@@ -82,7 +82,7 @@ def test_kinds_are_told_where_a_tenth_of_the_frames_is_lost(seed: int) -> None:
         kept = np.random.default_rng(drawn).uniform(size=len(frames)) > 0.1
         some = Frames(frames.values[kept], frames.t[kept], unit="mV", array=frames.array)
         examples.append(Example(some, labels, Tare.take(some, stop_us=1_200_000)))
-    readout = trained(examples[:1], Recipe.load("touch", labels=KINDS, noise_floor=0.012), None).readout
+    readout = fit_aligned(examples[:1], Recipe.load("touch", labels=KINDS, noise_floor=0.012), None).readout
     result = score(run(readout, examples[1].source, tare=examples[1].tare), examples[1].labels)
     assert result.missed <= 2, result
     assert result.false == 0, result

@@ -13,7 +13,7 @@ from test_readout import recipe, tare, touches
 import taxel
 from taxel.detect import Alignment, Example, Fold, Part, Recipe, fit, judge, recipes, run, score
 from taxel.detect.alignment import align
-from taxel.detect.training import trained
+from taxel.detect.training import fit_aligned
 
 #: Each touch has a stretch of its own, ms: it is felt in the middle, unrelated inputs fire at both ends.
 STRETCH = 400.0
@@ -115,7 +115,7 @@ def examples(*seeds: int, jitter_ms: float = 0.0) -> list[Example]:
     return made
 
 
-@pytest.mark.filterwarnings("ignore:.* out of reach")
+@pytest.mark.filterwarnings("ignore:.* cannot be learnt")
 def test_labels_that_are_off_teach_what_exact_ones_do() -> None:
     plan = dataclasses.replace(recipe(), align=True)
     exact, off = examples(1, 2, 3), examples(1, 2, 3, jitter_ms=20.0)
@@ -138,7 +138,7 @@ def test_the_part_that_is_tested_moves_no_label() -> None:
     other = judge([*data[:2], *examples(7, jitter_ms=40.0)], plan, [fold]).trained[0]
     assert one.readout == other.readout == fit(data[:2], plan)
     assert {label: a.to_dict() for label, a in one.alignments.items()} == {
-        label: a.to_dict() for label, a in trained(data[:2], plan, None).alignments.items()
+        label: a.to_dict() for label, a in fit_aligned(data[:2], plan, None).alignments.items()
     }
     assert set(one.alignments["contact"].example) == {0, 1}
 
@@ -150,14 +150,14 @@ def test_scores_are_against_the_labels_as_they_were_given() -> None:
     assert judged.together["contact"].error.sd > 5.0
 
 
-@pytest.mark.filterwarnings("ignore:.* out of reach")
+@pytest.mark.filterwarnings("ignore:.* cannot be learnt")
 def test_without_align_labels_are_learnt_as_they_are_given() -> None:
     """And with it, exactly so where each lies where it was felt."""
     spikes = [taxel.SpikeTrains.from_lists([[20.0, 120.0], [60.0]], stop=200.0)]
     plain = Recipe(taxel.encode.LevelCrossing([1.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
     aligned = dataclasses.replace(plain, align=True)
     assert plain.align is False
-    assert trained([Example(spikes[0], {"a": [20_000]})], plain, None).alignments == {}
+    assert fit_aligned([Example(spikes[0], {"a": [20_000]})], plain, None).alignments == {}
     exact, off = ([Example(spikes[0], {"a": times})] for times in ([20_000, 120_000], [25_000, 118_000]))
     assert fit(exact, plain) == fit(exact, aligned) == fit(off, aligned)
     assert fit(off, plain) != fit(off, aligned)

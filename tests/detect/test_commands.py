@@ -386,7 +386,7 @@ def test_the_tare_that_is_said_is_no_more_than_half_of_the_recording(tmp_path: P
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_too_few_labels_are_said_before_parameters(folder: Path, capsys, tmp_path: Path, count: int) -> None:
-    """Below four, other parameters are no remedy, though events are out of reach."""
+    """Below four, other parameters are no remedy, though events cannot be learnt."""
     rows = (folder / "truth.csv").read_text().splitlines()[1:]
     few = [line for label in ("contact", "lift") for line in [one for one in rows if one.startswith(label)][:count]]
     (tmp_path / "few.csv").write_text("\n".join(["label,t_us", *few]) + "\n")

@@ -104,26 +104,26 @@ def test_a_point_that_finds_nothing_is_not_chosen() -> None:
     assert judge(examples(1, 9), best, 2, window_ms=10.0).together.missed == 0
 
 
-def test_events_out_of_reach_are_named_by_label_time_and_example() -> None:
+def test_events_that_cannot_be_learnt_are_named_by_label_time_and_example() -> None:
     data = examples(1, 2)
     plan = recipe()
     neurons = {label: {**own, "ub": 1e-6} for label, own in plan.neurons.items()}
-    with pytest.warns(UserWarning, match="out of reach") as caught:
+    with pytest.warns(UserWarning, match="cannot be learnt") as caught:
         fit(data, dataclasses.replace(plan, neurons=neurons))
     for label in plan.neurons:
         (said,) = [str(one.message) for one in caught if str(one.message).startswith(f"{label}: ")]
         first = data[0].labels[label][0] / 1000.0
         count = sum(len(example.labels[label]) for example in data)
-        assert said.startswith(f"{label}: {count} of {count} events are out of reach")
+        assert said.startswith(f"{label}: {count} of {count} events cannot be learnt")
         assert f"({first:.10g} ms of example 0, " in said
         assert "pattern" not in said
 
 
-def test_events_out_of_reach_are_named_from_the_beginning_of_a_recording_since_1970() -> None:
+def test_events_that_cannot_be_learnt_are_named_from_the_beginning_of_a_recording_since_1970() -> None:
     begin_us = 1_795_000_000_000_000
     frames = taxel.Frames([[[v]] for v in (0.0, 9.0, 9.0, 0.0)], begin_us + 10_000 * np.arange(4), unit="N")
     plan = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "ub": 1e-6, "delay_ms": 1.0})
-    with pytest.warns(UserWarning, match=r"out of reach.* \(10 ms\)"):
+    with pytest.warns(UserWarning, match=r"cannot be learnt.* \(10 ms\)"):
         fit([Example(frames, {"contact": [begin_us + 10_000]})], plan)
     with pytest.raises(taxel.ProblemError, match=r"contact at 5000.000 ms lies outside it, 0.000 to 30.000 ms"):
         fit([Example(frames, {"contact": [begin_us + 5_000_000]})], plan)
@@ -234,7 +234,7 @@ def test_spike_trains_are_learnt_and_judged_as_their_events_are() -> None:
 
 
 def test_points_that_differ_in_lambdas_alone_come_to_what_each_comes_to_by_itself() -> None:
-    from taxel.detect.training import Fitting, encoded
+    from taxel.detect.training import Fitting, encode_examples
 
     plans = [
         dataclasses.replace(
@@ -243,7 +243,7 @@ def test_points_that_differ_in_lambdas_alone_come_to_what_each_comes_to_by_itsel
         for l1 in (0.0, 1.0, 4.0)
     ]
     data = [one._replace(labels={"lift": one.labels["lift"]}) for one in examples(1, 2)]
-    patterns = encoded(data, plans[0], lambda *_: None)
+    patterns = encode_examples(data, plans[0], lambda *_: None)
     rows = Fitting(patterns, plans[0], "lift", None, lambda *_: None)
     for plan in plans:
         assert rows.fits(plan)

@@ -9,7 +9,7 @@ import taxel
 from taxel import Frames, ProblemError, SpikeTrains, Tare
 from taxel.detect import Example, Recipe, run, score
 from taxel.detect.followed import follow, silence
-from taxel.detect.training import possible, trained
+from taxel.detect.training import fit_aligned, possible
 from taxel.encode import Composite, ContactArea, LocalLoad
 
 STEP_MS = 0.5
@@ -81,7 +81,7 @@ def test_a_training_takes_levels_of_the_local_load_and_with_a_stale_tare_those_o
     recipe = Recipe.load("touch", labels=["contact"])
     # One recording with a stale tare shows one error of it; two show that levels above the rest do not carry over.
     for away, inputs in ((0.0, ["levels"]), (10.0, ["changes"])):
-        made = trained([frames(1, away), frames(3, away)], recipe, None)
+        made = fit_aligned([frames(1, away), frames(3, away)], recipe, None)
         assert made.recipe.neurons["contact"]["inputs"] == inputs
         assert "search" in made.recipe.neurons["contact"]
         unseen = frames(2, away)
@@ -97,7 +97,7 @@ def test_a_point_that_leaves_no_more_counts_only_where_that_is_enough(fewer, inp
     neuron = {"inputs": ["area"], "refractory": 15.0, "tau": 0.3, "ub": 3.0, "lb": 0.0, "delay_ms": 0.1}
     choose = [{"inputs": ["levels"], "fewer": fewer}]
     recipe = Recipe(encoder, {}, {"contact": {**neuron, "choose": choose}}, run_threshold=0.8, align=True)
-    made = trained([frames(1, 0.0)], recipe, None)
+    made = fit_aligned([frames(1, 0.0)], recipe, None)
     assert made.recipe.neurons["contact"] == {**neuron, "inputs": inputs, "choose": choose}
 
 

@@ -16,7 +16,7 @@ import taxel
 from taxel import Array, Frames, Tare
 from taxel.detect import Example, score
 from taxel.detect.advice import _chance
-from taxel.detect.examples import checked
+from taxel.detect.examples import check_examples
 from taxel.detect.label_times import held_by_tare, off_by
 
 ARRAY = Array(6, 6, pitch_mm=5.0)
@@ -44,7 +44,7 @@ def example(seed: int, shift_ms: float, **more: Any) -> Example:
     """Return touches with their labels so much too late, and the tare before the first label."""
     frames, truth = touched(seed, **more)
     labels = {label: times + round(1000 * shift_ms) for label, times in truth.items()}
-    (one,) = checked([Example(frames, labels, Tare.take(frames, stop_us=int(labels["contact"][0]) - 20_000))])
+    (one,) = check_examples([Example(frames, labels, Tare.take(frames, stop_us=int(labels["contact"][0]) - 20_000))])
     return one
 
 
@@ -70,7 +70,7 @@ def test_labels_that_nothing_follows_are_not_off(seed: int) -> None:
     frames, _ = touched(seed)
     random = np.random.default_rng(seed)
     labels = {"odd": np.sort(random.integers(3_000_000, int(frames.t[-1]), 12))}
-    (one,) = checked([Example(frames, labels, Tare.take(frames, stop_us=2_000_000))])
+    (one,) = check_examples([Example(frames, labels, Tare.take(frames, stop_us=2_000_000))])
     assert off_by([one], ["odd"], FLOOR) == {}
 
 
@@ -79,7 +79,7 @@ def test_a_tare_that_ends_in_a_touch_holds_it(seed: int, share: float) -> None:
     frames, truth = touched(seed, 5, 0.0)
     begin, end = (int(truth[label][0]) for label in ("contact", "lift"))
     until = int(begin + share * (end - begin))
-    (one,) = checked([Example(frames, truth, Tare.take(frames, stop_us=until))])
+    (one,) = check_examples([Example(frames, truth, Tare.take(frames, stop_us=until))])
     held = held_by_tare([one], FLOOR)
     assert held == (4 if until - begin > 20_000 else held)
     assert held_by_tare([one._replace(tare=Tare.take(frames, stop_us=begin - 20_000))], FLOOR) == 0

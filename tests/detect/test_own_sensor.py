@@ -21,11 +21,11 @@ from taxel import Array, Frames, SpikeTrains, Tare
 from taxel._base import progress
 from taxel.cli import _recordings
 from taxel.detect import Example, PlainRule, Recipe, choose, judge, load, recipes, run, score, training
-from taxel.detect.advice import advised
+from taxel.detect.advice import advise
 from taxel.detect.floors import measured_floor
 from taxel.detect.followed import follow
 from taxel.detect.plain_score import PlainScore
-from taxel.detect.training import trained
+from taxel.detect.training import fit_aligned
 from taxel.encode import ContactArea, LevelCrossing, LocalLoad
 
 LABELS = ("contact", "lift")
@@ -203,21 +203,21 @@ def test_advice_names_the_rule_that_won_or_the_recipe_of_its_inputs() -> None:
 
     rule = PlainScore({"contact": PlainRule("area", 2)}, scored(12))
     floor = measured_floor([example])
-    of_area = trained([example], Recipe.load("touch", None, LABELS, floor), None)
+    of_area = fit_aligned([example], Recipe.load("touch", None, LABELS, floor), None)
     other = of_area._replace(recipe=Recipe(LevelCrossing([1.0])))
     for made, helps in ((of_area, "the plain rule"), (other, "--recipe touch")):
-        advice = advised(made, [example], scored(6), scored(12), None, rule)["contact"]
+        advice = advise(made, [example], scored(6), scored(12), None, rule)["contact"]
         assert (advice.helps, "leaves 0 missed and false on the same labels, the neuron 6" in advice.because) == (
             helps,
             True,
         )
-    assert advised(other, [example], scored(6), scored(12), None)["contact"].helps == "more labels"
+    assert advise(other, [example], scored(6), scored(12), None)["contact"].helps == "more labels"
     row = Example(Frames(np.zeros((2, 1, 4)), [0, 1], unit="V", array=Array(1, 4)), labels)
-    assert advised(other, [row], scored(6), scored(12), None)["contact"].helps == "--array 8x8xMM"
+    assert advise(other, [row], scored(6), scored(12), None)["contact"].helps == "--array 8x8xMM"
     learners = dict(zip(("contact", "foot_off"), of_area.learners.values(), strict=True))
     gait = other._replace(readout=taxel.Readout(of_area.readout.encoder, learners))
-    assert advised(gait, [row], scored(6), scored(12), None)["contact"].helps == "more labels"
-    assert advised(gait, [example], scored(6), scored(12), None, rule)["contact"].helps == "the plain rule"
+    assert advise(gait, [row], scored(6), scored(12), None)["contact"].helps == "more labels"
+    assert advise(gait, [example], scored(6), scored(12), None, rule)["contact"].helps == "the plain rule"
 
 
 def test_where_only_the_first_touches_have_labels_those_of_the_others_may_help() -> None:
@@ -229,7 +229,7 @@ def test_where_only_the_first_touches_have_labels_those_of_the_others_may_help()
         first = {label: times[:count] for label, times in labels.items()}
         example, times = Example(frames, first, tare), labels["contact"]
         some = score(taxel.Detections(["contact"] * found, times[:found], times[:found]), {"contact": first["contact"]})
-        advice = advised(trained([example], plan, None), [example], some, some, None)
+        advice = advise(fit_aligned([example], plan, None), [example], some, some, None)
         return f"{advice['contact'].helps}: {advice['contact'].because}" if advice else ""
 
     assert helps(5, 12).startswith("labels of all events: 7.2 of 13.0 s lie before the first or behind the last one")
@@ -247,7 +247,7 @@ def test_a_name_that_is_not_known_as_an_end_is_said_where_no_input_follows_it() 
         example = Example(frames, times, tare)
         plan = Recipe.load("touch", None, list(times), measured_floor([example]))
         none = score(taxel.Detections([], [], []), times)
-        assert advised(trained([example], plan, None), [example], none, none, None)[name].helps == helps
+        assert advise(fit_aligned([example], plan, None), [example], none, none, None)[name].helps == helps
 
 
 def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail(
@@ -272,7 +272,7 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
     }
     blind = Recipe.load("touch", floors, LABELS, 3.0)
     said.clear()
-    made = training.trained([example], blind, lambda step, *_: said.append(step))
+    made = training.fit_aligned([example], blind, lambda step, *_: said.append(step))
     assert [one for one in said if one.startswith("encoding")] == ["encoding 1 of 1"] * 4
     assert sorted(followed) == ["contact", "lift"]
     assert {one.inputs for one in made.readout.neurons.values()} <= {("area",), ("load",), ()}
@@ -458,7 +458,7 @@ def test_a_touch_smaller_than_all_that_were_learnt_is_found(sides: list[int], sm
     tare = Tare.take(frames.between(0, 900_000))
     example = Example(frames, labels, tare)
     plan = Recipe.load("touch", labels=LABELS, noise_floor=measured_floor([example]))
-    readout = trained([example], plan, None).readout
+    readout = fit_aligned([example], plan, None).readout
     others, truth = squares([small] * 3)
     judged = score(run(readout, others, tare=tare), truth)
     assert {label: (one.missed, one.false) for label, one in judged.by_label.items()} == dict.fromkeys(LABELS, (0, 0))
@@ -475,7 +475,7 @@ def test_where_the_first_inputs_feel_nothing_others_are_tried() -> None:
     assert {label: one.missed for label, one in judged.together.by_label.items()} == dict.fromkeys(LABELS, 0)
 
 
-@pytest.mark.filterwarnings("ignore:.* out of reach")
+@pytest.mark.filterwarnings("ignore:.* cannot be learnt")
 @settings(max_examples=settings.default.max_examples // 6)
 @given(st.integers(0, 1000))
 def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed: int) -> None:
@@ -483,9 +483,11 @@ def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed
     apart = np.random.default_rng(seed).uniform(0.55, 0.9, 12)
     labels = {"contact": [t + round(1e6 * by) for t, by in zip(labels["contact"], apart, strict=True)]}
     example = Example(frames, labels, Tare.take(frames.between(0, 900_000)))
-    made = trained([example], Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example])), None)
+    made = fit_aligned(
+        [example], Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example])), None
+    )
     none = score(taxel.Detections([], [], []), labels)
-    advice = advised(made, [example], none, none, 1.0)["contact"]
+    advice = advise(made, [example], none, none, 1.0)["contact"]
     assert advice.helps == "other labels, or another tare"
     assert advice.because.startswith("nothing was felt of 12 of 12 labels: they are of another recording, or")
 

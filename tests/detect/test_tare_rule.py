@@ -12,7 +12,7 @@ from shell import call
 import taxel
 from taxel import Array, Events, Frames, Tare
 from taxel.detect import PlainRule, run
-from taxel.detect.advice import drifted
+from taxel.detect.advice import count_drifted
 from taxel.detect.readout import run_counting
 
 FLOOR = 6.0
@@ -35,7 +35,7 @@ def touched(seed: int, drift: float = 0.0, stays: float = 0.0) -> Frames:
 def test_a_drift_off_the_tare_is_said_and_a_load_that_stays_is_none(drift: float, stays: float, said: bool) -> None:
     for seed in range(5):
         frames = touched(seed, drift, stays)
-        count = drifted(frames, Tare.take(frames, stop_us=1_000_000), FLOOR)
+        count = count_drifted(frames, Tare.take(frames, stop_us=1_000_000), FLOOR)
         assert (30 <= count <= 36) if said else count == 0
 
 
@@ -43,15 +43,15 @@ def test_a_slow_press_is_no_drift() -> None:
     values = np.full((3000, 6, 6), 50.0)
     values[500:] += np.linspace(0, 300, 2500)[:, None, None]
     frames = Frames(values, 20_000 * np.arange(3000), unit="counts", array=Array(6, 6))
-    assert drifted(frames, Tare.take(frames, stop_us=1_000_000), FLOOR) == 0
-    assert drifted(frames[:60], Tare.take(frames, stop_us=1_000_000), FLOOR) == 0
+    assert count_drifted(frames, Tare.take(frames, stop_us=1_000_000), FLOOR) == 0
+    assert count_drifted(frames[:60], Tare.take(frames, stop_us=1_000_000), FLOOR) == 0
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_no_drift_is_said_of_an_emulated_board(seed: int) -> None:
     scenes = [taxel.simulate.Scene.draw(seed=10 * seed + k) for k in range(4)]
     events = taxel.simulate.play(scenes, seed=seed).events
-    assert drifted(events, Tare.take(events, stop_us=int(events.t[0]) + 20_000), 3.0) == 0
+    assert count_drifted(events, Tare.take(events, stop_us=int(events.t[0]) + 20_000), 3.0) == 0
 
 
 def test_the_command_names_a_drift(tmp_path: Path, capsys) -> None:

@@ -12,8 +12,8 @@ from test_readout import ARRAY, recipe, tare, touches
 
 import taxel
 from taxel.detect import Example, PlainRule, run, score
-from taxel.detect.advice import advised, loaded_at_rest
-from taxel.detect.training import Trained, trained
+from taxel.detect.advice import advise, loaded_at_rest
+from taxel.detect.training import Trained, fit_aligned
 from taxel.encode import ContactArea, LevelCrossing
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -251,7 +251,7 @@ def scored(found: int, missed: int, false: int) -> taxel.detect.Score:
 def made() -> tuple[Trained, Example]:
     events, truth = touches(1)
     plan = taxel.detect.Recipe.load("touch")
-    return trained([Example(events, truth, tare())], plan, None), Example(events, truth, tare())
+    return fit_aligned([Example(events, truth, tare())], plan, None), Example(events, truth, tare())
 
 
 @pytest.mark.parametrize(
@@ -268,7 +268,7 @@ def made() -> tuple[Trained, Example]:
     ],
 )
 def test_what_may_help_is_named_where_many_are_missed_or_false(made, held, own, search_s, helps) -> None:
-    advice = advised(made[0], [made[1]], scored(*held), scored(*own), search_s)
+    advice = advise(made[0], [made[1]], scored(*held), scored(*own), search_s)
     assert ({} if helps is None else {"contact": helps}) == {label: one.helps for label, one in advice.items()}
     if helps == "--search":
         assert advice["contact"].because == "it tries 5 sets of parameters, in about 10 s"
@@ -282,12 +282,12 @@ def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
     assert loaded_at_rest([example, stale], ContactArea()) == 64
     assert loaded_at_rest([example, stale._replace(tare=None)], ContactArea()) == 0
     assert loaded_at_rest([stale], LevelCrossing([10.0])) == 0
-    few = advised(readout, [stale], scored(0, 1, 0), scored(0, 1, 0), 2.0)["contact"]
+    few = advise(readout, [stale], scored(0, 1, 0), scored(0, 1, 0), 2.0)["contact"]
     assert (few.helps, few.because) == (
         "more labels",
         "there is 1; 4 are the least to score it held out, 10 for five folds",
     )
-    advice = advised(readout, [stale], scored(9, 1, 0), scored(9, 1, 0), 2.0)
+    advice = advise(readout, [stale], scored(9, 1, 0), scored(9, 1, 0), 2.0)
     assert advice["contact"].helps == "another tare"
     assert advice["contact"].because == "64 taxels read above theirs while nothing touches them"
 
@@ -296,9 +296,9 @@ def test_another_recipe_may_help_where_it_is_made_for_the_labels(made) -> None:
     readout, example = made
     frames = taxel.Frames(np.zeros((2, 8, 8)), [0, 1000], unit="N", array=ARRAY)
     tared = example._replace(source=frames, tare=taxel.Tare.take(frames), labels={})
-    assert advised(readout, [tared], scored(9, 1, 0), scored(9, 1, 0), None)["contact"].helps == "more labels"
+    assert advise(readout, [tared], scored(9, 1, 0), scored(9, 1, 0), None)["contact"].helps == "more labels"
     by_gait = readout._replace(recipe=taxel.detect.Recipe.load("gait_insole", None, ["contact", "lift"]))
-    advice = advised(by_gait, [tared], scored(9, 1, 0), scored(9, 1, 0), None)["contact"]
+    advice = advise(by_gait, [tared], scored(9, 1, 0), scored(9, 1, 0), None)["contact"]
     why = "it is made for contact and lift on a grid of 8 x 8 taxels; this training took gait_insole"
     assert (advice.helps, advice.because) == ("--recipe touch", why)
 

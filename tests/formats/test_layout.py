@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import taxel
 from taxel import Array, Events, FormatError, Frames, Places
 from taxel.cli import app
-from taxel.formats.layout import Layout, packaged
+from taxel.formats.layout import Layout, load_packaged
 from taxel.recording.text_options import TextOptions
 
 from .making import write_gaitpdb
@@ -320,7 +320,7 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
         assert places.x.ravel().tolist() == [sign * x for x in (500, 700, 300, 700, 300, 700, 300, 500)]
         assert places.y.ravel().tolist() == [800, 400, 400, 0, 0, -400, -400, -800]
         assert (places.unit, foot.array.centre_unit) == (None, "places")
-    assert packaged("gaitpdb").heel == "bottom"
+    assert load_packaged("gaitpdb").heel == "bottom"
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import taxel
 from taxel import _core
 from taxel.cli import app
-from taxel.cli.board import counters_table, doubted
+from taxel.cli.board import counters_table, doubts
 from taxel.clock import doubt
 from taxel.live import Live
 
@@ -95,7 +95,7 @@ def test_live_says_it_too(drift_ppm: float, wrong: bool) -> None:
     shown = console.export_text()
     assert f"drift {drift_ppm:+.1f} ppm, delays p50 41 us, p99 620 us" in shown
     assert ("wrong: the sender does not keep pace with its clock" in shown) == wrong
-    assert list(doubted(now)) == ([pace["doubt"]] if wrong else [])
-    assert list(doubted({**before, "sources": {"foot": now, "imu": {"lines": 3}}})) == (
+    assert list(doubts(now)) == ([pace["doubt"]] if wrong else [])
+    assert list(doubts({**before, "sources": {"foot": now, "imu": {"lines": 3}}})) == (
         [f"foot: {pace['doubt']}"] if wrong else []
     )

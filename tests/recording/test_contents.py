@@ -14,14 +14,14 @@ from taxel import Note
 from taxel.recording.between import between
 from taxel.recording.contents import Board, Contents, Drawn, FrameSource, Source, Stream, parts_of
 from taxel.recording.cut import region
-from taxel.recording.frames import as_frames, calibrated
-from taxel.recording.merge import merged
+from taxel.recording.frames import as_frames, calibrate
+from taxel.recording.merge import merge_contents
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import known
 from taxel.recording.parts import Columns, Timing
 from taxel.recording.raw import Samples
 from taxel.recording.recording import with_notes
-from taxel.recording.stored import stored
+from taxel.recording.stored import storable
 
 from .parts import flat, holds, unsaid
 from .test_chains import ARRAY, KINDS, write
@@ -85,7 +85,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
         {*TABLE, "sensor.array", "sensor.calibration", "settings.held", "marks.zeroings", "stream.columns"},
     ),
     "merge": (
-        lambda of, _: merged([of, of], gap=0 if isinstance(of.main, FrameSource) else None),
+        lambda of, _: merge_contents([of, of], gap=0 if isinstance(of.main, FrameSource) else None),
         {*TABLE, *TIMED, *NAMED, "losses.verdict", "timing.stretch"},
     ),
     "on_clock": (
@@ -95,12 +95,12 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
     "with_notes": (lambda of, _: with_notes(of, (Note("more", 5, 0),)), {"marks.notes"}),
     "as_frames": (lambda of, _: replace(of, main=as_frames(of.main)), {*TABLE, "settings.held"}),
     "calibrated": (
-        lambda of, _: replace(of, main=calibrated(of.main)),
+        lambda of, _: replace(of, main=calibrate(of.main)),
         {*TABLE, "settings.held", "sensor.calibration"},
     ),
     **{
         kind: (
-            lambda of, folder, kind=kind: stored(of, folder / f"new{kind}"),
+            lambda of, folder, kind=kind: storable(of, folder / f"new{kind}"),
             {
                 *TABLE,
                 *NAMED,

@@ -25,7 +25,7 @@ from taxel.detect.folds import _split
 from taxel.encode import LevelCrossing
 from taxel.recording.contents import Contents, Source, alone, source_from
 from taxel.recording.once import known
-from taxel.recording.opening import joined
+from taxel.recording.opening import join_feet
 from taxel.recording.parts import Losses, Marks, Origin
 from taxel.recording.text_options import TextOptions
 
@@ -259,7 +259,7 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
     for foot, values in (("left", quiet), ("right", pressed)):
         frames = Frames(values, np.arange(400) * 10_000, array=array)
         sources[foot] = source_from(frames, Origin(tmp_path / "a.asc", f"a {foot}", "pedar", foot))
-    [both] = joined([taxel.Recording(Contents.of(one)) for one in sources.values()])
+    [both] = join_feet([taxel.Recording(Contents.of(one)) for one in sources.values()])
     taxel.convert(both, tmp_path / "a.mcap")
     code, _, errors = call(capsys, "info", tmp_path / "a.mcap", "--tare", "0.5")
     assert code == 0
@@ -272,7 +272,7 @@ def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
     sources: dict[str, Source] = {}
     for foot in ("left", "right"):
         sources[foot] = source_from(frames, Origin(tmp_path / "walk.asc", f"walk {foot}", "pedar", foot))
-    [both] = joined([taxel.Recording(Contents.of(one)) for one in sources.values()])
+    [both] = join_feet([taxel.Recording(Contents.of(one)) for one in sources.values()])
     taxel.convert(both, tmp_path / "walk.mcap")
     (tmp_path / "walk.notes.csv").write_text("label,t_us,source\nheel,10000,left\nturn,20000,\ntoe,30000,right\n")
     back = taxel.open(tmp_path / "walk.mcap")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taxel import Frames
-from taxel.recording.rest import of_frames, ticks_by_unit, tracked
+from taxel.recording.rest import frames_above, of_frames, ticks_by_unit
 
 
 @pytest.mark.parametrize("seconds", [60, 600])
@@ -15,7 +15,7 @@ def test_a_press_that_is_held_stays_and_drift_of_an_hour_is_followed(seconds: in
     values[30 * hz : (30 + seconds) * hz, 2:4, 2:4] += 200
     frames = Frames(values.astype(np.float32), np.arange(n) * (1_000_000 // hz), unit="counts")
     rest = of_frames(frames)
-    [(_, above)] = tracked(rest, [(frames.t, frames.values.reshape(n, 36))], 6, ticks_by_unit(frames))
+    [(_, above)] = frames_above(rest, [(frames.t, frames.values.reshape(n, 36))], 6, ticks_by_unit(frames))
     total = above.sum(axis=1)
     assert total[(30 + seconds) * hz - 5] > 0.8 * 800
     assert total[: 30 * hz].max() < 100

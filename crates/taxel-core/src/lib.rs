@@ -22,6 +22,7 @@ pub mod vectors;
 pub mod array;
 pub mod baseline;
 pub mod events;
+pub mod frame_noise;
 pub mod frames;
 pub mod held;
 pub mod rest;

@@ -13,7 +13,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-core",
         &[
-            &["error"],
+            &["error", "frame_noise"],
             &["reading"],
             &["allowed", "vectors"],
             &["parameters", "array"],

@@ -8,6 +8,7 @@ mod event_rate;
 pub mod frames;
 pub mod live;
 pub mod recording;
+mod stepped_frames;
 
 use std::sync::Arc;
 

@@ -2,6 +2,7 @@
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
+use taxel_core::frame_noise::FrameNoise;
 use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
 use taxel_core::preload::{place, preload as preload_of};
 use taxel_core::rest::{Rest, Value, touched_from};
@@ -96,6 +97,14 @@ pub fn above_rest<'py>(
         Ok(above)
     })?;
     Ok(array(py, found))
+}
+
+/// The most that the noise of frames adds up to, of their sums above rest at times `t`, us: taxels count above `floor`.
+#[pyfunction]
+pub fn frame_noise(t: PyReadonlyArray1<'_, i64>, sums: PyReadonlyArray1<'_, f64>, floor: f64) -> PyResult<f64> {
+    let mut noise = FrameNoise::default();
+    slice("t", &t)?.iter().zip(slice("sums", &sums)?).for_each(|(&t, &sum)| noise.take(t, sum));
+    Ok(noise.most(floor))
 }
 
 /// The rest of frames without a tare: `columns` of the array, its noise floor, the rest of each taxel to begin

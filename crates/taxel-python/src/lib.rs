@@ -60,7 +60,7 @@ mod _core {
     };
     #[pymodule_export]
     use crate::held::{
-        HeldValues, PyTrackedRest, above_rest, changes_of_frames, held_as_events, preload, touched_above,
+        HeldValues, PyTrackedRest, above_rest, changes_of_frames, frame_noise, held_as_events, preload, touched_above,
         touches_of_events, touches_of_frames,
     };
     #[pymodule_export]

@@ -108,7 +108,7 @@ def _plain(error: Any) -> str:
         line = f"{error.option_name}: needs a value"
     else:
         line = error.format_message()
-    return f"{line.rstrip('.')}; see {_typed(error.ctx)} --help"
+    return f"{line.rstrip('.')}; see {_command_path(error.ctx)} --help"
 
 
 def _value(name: str, parameter: Any, fault: dict[str, Any]) -> str:
@@ -125,7 +125,7 @@ def _value(name: str, parameter: Any, fault: dict[str, Any]) -> str:
     return f"{name} is {shown(value)}: {fault['msg'].replace('Input should be', 'must be')}"
 
 
-def _typed(context: Any) -> str:
+def _command_path(context: Any) -> str:
     """Return the command that was being parsed, as it is typed."""
     return "taxel" if context is None else str(context.command_path)
 

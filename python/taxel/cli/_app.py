@@ -29,6 +29,11 @@ SecondsOption = Annotated[
 ]
 
 
+#: What a command prints, and whether it may replace what it writes.
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace files that are written, if they exist.")]
+
+
 class _Command(TyperCommand):
     """A command whose errors name options as they are typed, not as Python's arguments; an example is one line."""
 
@@ -104,9 +109,9 @@ def as_command(
 
 def _with_fields(work: Callable[..., None]) -> Callable[..., None]:
     """Return a command with the fields of each dataclass that it takes in place of that argument."""
-    given = inspect.signature(work, eval_str=True).parameters
+    parameters = inspect.signature(work, eval_str=True).parameters
     groups: dict[str, Any] = {
-        name: parameter.annotation for name, parameter in given.items() if is_dataclass(parameter.annotation)
+        name: parameter.annotation for name, parameter in parameters.items() if is_dataclass(parameter.annotation)
     }
     if not groups:
         return work
@@ -116,7 +121,7 @@ def _with_fields(work: Callable[..., None]) -> Callable[..., None]:
         held = {name: group(**{field: typed.pop(field) for field in fields[name]}) for name, group in groups.items()}
         work(**typed, **held)
 
-    each = [fields[name].values() if name in fields else [parameter] for name, parameter in given.items()]
+    each = [fields[name].values() if name in fields else [parameter] for name, parameter in parameters.items()]
     return as_command(call, work, chain.from_iterable(each))
 
 
@@ -126,8 +131,8 @@ def with_out(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     out = Annotated[Path | None, typer.Option("--out", "-o", metavar=upper, help=f"The same as {upper}.")]
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
-        given = dict(inspect.signature(work, eval_str=True).parameters)
-        given[name] = given[name].replace(default=None, annotation=_or_none(given[name].annotation))
+        parameters = dict(inspect.signature(work, eval_str=True).parameters)
+        parameters[name] = parameters[name].replace(default=None, annotation=_or_none(parameters[name].annotation))
 
         def call(ctx: typer.Context, typed_out: Path | None, **typed: Any) -> None:
             if typed_out is None and typed[name] is None:
@@ -138,8 +143,10 @@ def with_out(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
 
         more = {"ctx": typer.Context, "typed_out": out}
         keyword = inspect.Parameter.KEYWORD_ONLY
-        given |= {key: inspect.Parameter(key, keyword, default=None, annotation=kind) for key, kind in more.items()}
-        return as_command(call, work, given.values())
+        parameters |= {
+            key: inspect.Parameter(key, keyword, default=None, annotation=kind) for key, kind in more.items()
+        }
+        return as_command(call, work, parameters.values())
 
     return decorate
 

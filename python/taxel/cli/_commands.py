@@ -39,7 +39,7 @@ OWN = {
 }
 
 
-def added() -> dict[str, EntryPoint]:
+def plugins() -> dict[str, EntryPoint]:
     """Return the commands of other distributions by name; none has the name of ours."""
     return {point.name: point for point in sorted(entry_points(group="taxel.commands")) if point.name not in OWN}
 
@@ -49,12 +49,12 @@ class Commands(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002  click's argument
         """Name all commands, ours first, in the order of the work."""
-        return [*OWN, *added()]
+        return [*OWN, *plugins()]
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002  click's arguments
         """Write a line a command, without importing it."""
         with formatter.section("Commands"):
-            formatter.write_dl([*OWN.items(), *((name, _description(point)) for name, point in added().items())])
+            formatter.write_dl([*OWN.items(), *((name, _description(point)) for name, point in plugins().items())])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Import the command that was typed, and call what waits for that, which is the context's object.
@@ -79,8 +79,8 @@ class Commands(TyperGroup):
         """
         if cmd_name in OWN:
             command = typer.main.get_command(import_module(f"taxel.cli.{cmd_name}").app)
-        elif point := added().get(cmd_name):
-            command = _imported(point)
+        elif point := plugins().get(cmd_name):
+            command = _import(point)
         else:
             return None
         command.name = cmd_name
@@ -91,7 +91,7 @@ def _description(point: EntryPoint) -> str:
     return escaped((point.dist and point.dist.metadata["Summary"]) or "")
 
 
-def _imported(point: EntryPoint) -> Any:
+def _import(point: EntryPoint) -> Any:
     try:
         return typer.main.get_command(point.load())
     except Exception as error:  # another distribution's code may raise any error

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from taxel.formats.ros import Topic
 
 
-def listed(file: Path, found: Sequence[Topic], as_json: bool) -> list[str]:
+def list_topics(file: Path, found: Sequence[Topic], as_json: bool) -> list[str]:
     """Return the topics of a ROS bag that hold numbers as lines for people, or as one of JSON."""
     if as_json:
         return [json.dumps({"file": str(file), "kind": "ros", "topics": [asdict(topic) for topic in found]})]

@@ -89,8 +89,8 @@ def with_live_options(command: str, *names: str) -> Callable[[Callable[..., None
             options = {field.name: typed.pop(field.name) for field in chosen}
             work(options=options, **typed)
 
-        given = inspect.signature(work, eval_str=True).parameters.items()
-        each = [map(_parameter, chosen) if name == "options" else [parameter] for name, parameter in given]
+        parameters = inspect.signature(work, eval_str=True).parameters.items()
+        each = [map(_parameter, chosen) if name == "options" else [parameter] for name, parameter in parameters]
         return as_command(call, work, chain.from_iterable(each))
 
     return decorate
@@ -164,7 +164,7 @@ def outside(counters: dict[str, Any], array: Array) -> str | None:
     return f"{beyond:,} of {words:,} words name taxels outside {size}, and are dropped: give the board's own --array"
 
 
-def doubted(counters: dict[str, Any]) -> Iterator[str]:
+def doubts(counters: dict[str, Any]) -> Iterator[str]:
     """Yield why the drift or the delays of a board and of each other source cannot be, where they cannot."""
     every = {"": counters, **counters["sources"]}
     for name, counts in every.items():
@@ -181,7 +181,7 @@ def exit_code(summary: Summary, array: Array) -> int:
     return WRONG_INPUT if outside(summary.counters, array) else 0
 
 
-def _bridged(counts: dict[str, Any] | None) -> list[tuple[str, str, str]]:
+def _bridge_rows(counts: dict[str, Any] | None) -> list[tuple[str, str, str]]:
     """Return the rows of the table on the connection to another computer."""
     if counts is None:
         return []
@@ -228,7 +228,7 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
         ("bytes", f"{capture['bytes']:,}", rate(capture["bytes"], earlier["bytes"])),
         ("events", f"{now['events']:,}", rate(now["events"], before["events"])),
         ("lost", lost, ""),
-        *_bridged(now["bridged"]),
+        *_bridge_rows(now["bridged"]),
         ("damaged", damage, ""),
         ("arrival to decoded", delays(now["decode_latency"]), ""),
         ("board's clock", f"{board}{drift}", ""),

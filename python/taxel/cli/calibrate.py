@@ -11,7 +11,7 @@ import typer
 import taxel
 from taxel._base.files import beside, named, try_whole
 from taxel._core import ProblemError
-from taxel.cli._app import App
+from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import assignments, progress, say_warnings, tare_option
 from taxel.cli._say import say
@@ -59,8 +59,8 @@ def calibrate(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The new file. Default: beside the recording.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file if it exists.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Calibrate readings (ticks, counts) to N or kPa by a known load, a table or the fabric's law.
 

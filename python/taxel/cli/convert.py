@@ -12,7 +12,7 @@ import typer
 import taxel
 from taxel._base.files import try_whole
 from taxel._core import ProblemError
-from taxel.cli._app import App, with_out
+from taxel.cli._app import App, JsonOption, OverwriteOption, with_out
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import of_source, progress
@@ -44,8 +44,8 @@ def convert(
         str | None, typer.Option("--source", metavar="NAME", help="The source to convert, of a recording with several.")
     ] = None,
     compression: Annotated[str, typer.Option(help="Compression of a .mcap: none, lz4 or zstd.")] = "none",
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target if it exists.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Convert recordings to another format, and report what the target cannot hold.
 

@@ -13,7 +13,7 @@ import taxel
 from taxel import _core
 from taxel._base.messages import plain
 from taxel._core import ProblemError
-from taxel.cli._app import App, with_out
+from taxel.cli._app import App, JsonOption, OverwriteOption, with_out
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import READ_HELP, of_source
 from taxel.cli._say import say
@@ -51,8 +51,8 @@ def cut(
     source: Annotated[
         str | None, typer.Option("--source", metavar="NAME", help="The source to cut, of a recording with several.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Cut a recording by time, by region or by label.
 

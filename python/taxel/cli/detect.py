@@ -13,7 +13,7 @@ import typer
 import taxel
 from taxel._base.files import try_whole, write_whole
 from taxel._base.times import begun
-from taxel.cli._app import App
+from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import READ_HELP, ReportOption, progress, say_warnings, tare_option, try_report
 from taxel.cli._say import say
@@ -51,8 +51,8 @@ def detect(
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
     csv: Annotated[Path | None, typer.Option(help="Write the detections to this .csv.")] = None,
     report: ReportOption = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table if it exists.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Detect events in a recording, or in each of a folder, by a trained readout or a plain rule.
 

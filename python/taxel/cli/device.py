@@ -14,7 +14,7 @@ from rich.table import Table
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._core import ProblemError
-from taxel.cli._app import App, SecondsOption
+from taxel.cli._app import App, JsonOption, SecondsOption
 from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.device import Device, ports
@@ -25,7 +25,6 @@ app = App(no_args_is_help=True, help="Find a board on its serial line, set it by
 
 PlaceArgument = Annotated[str, typer.Argument(help="A serial device (/dev/ttyUSB0), or host:port.")]
 BaudOption = Annotated[int, typer.Option(help="Baud rate of the serial line.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
 @app.callback()

@@ -136,13 +136,13 @@ def emulate(typed: _Typed) -> None:
 
     Example: taxel emulate --port 5208 --scenes 5 --seed 1 --truth labels.csv
     """
-    _together(typed)
+    _check_options(typed)
     if typed.labels is not None:
         try_whole(typed.labels, overwrite=typed.overwrite)
-    touch, text, board = _played(typed)
+    touch, text, board = _touch_of(typed)
     console = Console(stderr=True, quiet=typed.as_json)
     console.print(f"{text}, to {typed.host}:{typed.port}")
-    report = _emulated(typed, touch, board, console)
+    report = _run(typed, touch, board, console)
     if typed.labels is not None:
         console.print(f"truth: {typed.labels}")
     if typed.as_json:
@@ -154,7 +154,7 @@ def emulate(typed: _Typed) -> None:
         _print(report, in_time=not typed.pipe)
 
 
-def _together(typed: _Typed) -> None:
+def _check_options(typed: _Typed) -> None:
     """Refuse options that do not go together."""
     others = typed.replay is not None or typed.pipe
     if typed.replay is not None and typed.pipe:
@@ -173,7 +173,7 @@ def _together(typed: _Typed) -> None:
             raise ProblemError(f"{name} without {needed}")
 
 
-def _played(typed: _Typed) -> tuple[Any, str, dict[str, Any]]:
+def _touch_of(typed: _Typed) -> tuple[Any, str, dict[str, Any]]:
     """Return the touch that the board plays, its description, and the board as `taxel.simulate.emulate` takes it.
 
     If the array is known, a wrong preset is refused first.
@@ -211,13 +211,13 @@ def _played(typed: _Typed) -> tuple[Any, str, dict[str, Any]]:
         speed = 1.0 if typed.speed is None else typed.speed
         return Replay(open_one(typed.replay, limit=typed.limit), speed), f"replay of {typed.replay}", options
     if typed.pipe:
-        return *_piped(3 if typed.noise_floor is None else typed.noise_floor), options
+        return *_open_pipe(3 if typed.noise_floor is None else typed.noise_floor), options
     if scene_file is not None:
         return _from_file(scene_file, typed.scenes, tare_ms), f"{typed.scene}, seed {seed}", options
     return *_scenes(seed, typed.scenes, tare_ms, typed.rest), options
 
 
-def _emulated(typed: _Typed, touch: Any, board: dict[str, Any], console: Console) -> EmulatorReport:
+def _run(typed: _Typed, touch: Any, board: dict[str, Any], console: Console) -> EmulatorReport:
     """Run the board until its end or Ctrl-C, and show the progress."""
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(pulse_style="bar.complete"), TextColumn("{task.fields[status]}"),
@@ -250,7 +250,7 @@ def _emulated(typed: _Typed, touch: Any, board: dict[str, Any], console: Console
     return last[0]
 
 
-def _piped(noise_floor: int) -> tuple[Any, str]:
+def _open_pipe(noise_floor: int) -> tuple[Any, str]:
     """Return the frames of standard input as a touch, and their description."""
     pipe = Pipe(sys.stdin.buffer, noise_floor)
     halved = f", values halved {counted(pipe.shift, 'time')}" if pipe.shift else ""
@@ -303,7 +303,7 @@ def _number(option: str, name: str, value: str) -> float:
 
 
 @contextmanager
-def _named(option: str) -> Iterator[None]:
+def _name_option(option: str) -> Iterator[None]:
     """Name the option that an error is about."""
     try:
         yield
@@ -318,7 +318,7 @@ def _flaws(assignments: list[str], seed: int) -> Flaws | None:
         size, _, own_seed = value.partition(":")
         sizes[name] = _number("flaw", name, size)
         seeds[name] = int(_number("flaw", name, own_seed)) if own_seed else seed
-    with _named("flaw"):
+    with _name_option("flaw"):
         return Flaws(**sizes, seeds=seeds) if sizes else None
 
 
@@ -329,14 +329,14 @@ def _circuit(assignments: list[str], seed: int) -> Circuit | None:
     parts |= dict.fromkeys(("hysteresis_v", "settle_us", "amplifier_us"), converter)
     for name, value in _pairs("circuit", assignments, parts).items():
         parts[name][name] = _number("circuit", name, value)
-    with _named("circuit"):
+    with _name_option("circuit"):
         return Circuit(readout=VirtualGround(**readout), converter=Converter(**converter)) if assignments else None
 
 
 def _faults(assignments: list[str], seed: int) -> Faults | None:
     values = _pairs("fault", assignments, Faults._names())
     shares = {name: _number("fault", name, value) for name, value in values.items()}
-    with _named("fault"):
+    with _name_option("fault"):
         return Faults(**shares, seed=seed) if shares else None
 
 

@@ -11,7 +11,7 @@ import typer
 import taxel
 from taxel._base.files import try_whole
 from taxel._core import ProblemError, encoder_names
-from taxel.cli._app import App, with_out
+from taxel.cli._app import App, JsonOption, OverwriteOption, with_out
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings, tare_option
 from taxel.cli._say import say
@@ -28,8 +28,8 @@ def encode(
     files: FileOptions,
     values: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=SET_HELP)] = None,
     tare: Annotated[str | None, tare_option()] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Encode a recording as spike trains.
 

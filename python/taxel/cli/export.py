@@ -11,7 +11,7 @@ import typer
 import taxel
 from taxel._base.messages import installing
 from taxel._core import Error
-from taxel.cli._app import App, with_out
+from taxel.cli._app import App, JsonOption, OverwriteOption, with_out
 from taxel.cli._say import say
 
 app = App(no_args_is_help=True, help="Write a readout for other simulators and for chips.")
@@ -34,8 +34,8 @@ def nir(
             help="Time step of the reading simulator, ms, if it adds 1 in the step of a spike (snnTorch: 0.1).",
         ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write a readout as a NIR graph, in SI units, and report what NIR cannot hold.
 

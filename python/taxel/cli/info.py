@@ -18,12 +18,12 @@ from taxel._base.messages import counted
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.cli._app import App
+from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import progress, say_warnings, tare_option
 from taxel.cli._say import say
-from taxel.cli._topics import listed
+from taxel.cli._topics import list_topics
 from taxel.clock import doubt
 from taxel.spikes import SpikeTrains, to_ms
 
@@ -54,10 +54,8 @@ def info(
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
     tare: Annotated[str | None, tare_option("Default: that of a quiet stretch.")] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the files that are written if they exist.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Summarise a recording: contents, losses, rates, pressure, and dead, stuck or noisy taxels.
 
@@ -85,7 +83,7 @@ def info(
     with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {file}", 0, 0)
         if file.exists() and is_bag(file) and not files.opener._names_topic(file):
-            say(*listed(file, topics(file, files.types, files.ros), as_json))
+            say(*list_topics(file, topics(file, files.types, files.ros), as_json))
             return
         every = files.opener.open_trials(file)
         recording = every[0]

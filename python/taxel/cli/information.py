@@ -14,7 +14,7 @@ from taxel._base.files import try_whole
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
-from taxel.cli._app import App
+from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._bar import bar, duration
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings
@@ -65,8 +65,8 @@ def information(
     shuffles: Annotated[int, typer.Option(help="How often labels are shuffled, for the test against zero.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the random phases, folds, taxels and bootstrap.")] = 0,
     report: Annotated[Path, typer.Option(help="The page with pictures, an .html.")] = Path("information.html"),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the page if it exists.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Estimate how many bits labelled touches hold, by sampling period, time, number of taxels and data rate.
 

@@ -30,7 +30,7 @@ from taxel.cli.board import (
     CongestionOption,
     RateOption,
     counters_table,
-    doubted,
+    doubts,
     exit_code,
     for_live,
     outside,
@@ -98,11 +98,11 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
     Example: taxel live --panel --control 127.0.0.1:5209
     Example: taxel live --remote zenoh:192.168.1.5:7447/left --panel
     """
-    _together(options, typed)
+    _check_options(options, typed)
     given_tare = options["tare"]
     options = for_live(options, typed.rate_hz, typed.bits)
     trained, rest, record, address, lines = (options[name] for name in ("readout", "tare", "record", "remote", "lines"))
-    _fresh(typed, rest)
+    _check_fresh_tare(typed, rest)
     if typed.report is not None:
         if record is None or record.suffix != ".mcap":
             raise ProblemError("--report is made from the recording: give --record FILE.mcap")
@@ -121,7 +121,7 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
                 "--preset, or by --rate-hz and --bits"
             )
         with Live(**options | {"remote": board}) as pipeline:
-            last = _shown(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
+            last = _show(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
             summary = last.stop()
             # Detections that the readout made while `stop` ran.
             _drain(last, console, say)
@@ -132,7 +132,7 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
     if typed.report is not None and trained is not None and summary.path is not None:
         _report(typed.report, trained, summary.path, tare if tare is not None else rest)
         console.print(f"report: {typed.report / 'report.html'}")
-    _unsent(summary)
+    _report_unsent(summary)
     if not lines:
         _print_summary(summary, options["guard_frames"])
     elif summary.verdict.status in ("damaged", "lost", "nothing arrived"):
@@ -145,7 +145,7 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
     raise typer.Exit(exit_code(summary, pipeline.array))
 
 
-def _shown(
+def _show(
     typed: _Typed,
     pipeline: Live,
     console: Console,
@@ -195,14 +195,14 @@ def _print_summary(summary: Summary, guard_frames: float) -> None:
         say(f"{counted(counters['late'], 'event')} out of order: read out on arrival, and recorded")
     if counters["events_dropped"]:
         say(f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow")
-    for why in doubted(counters):
+    for why in doubts(counters):
         say(why)
     if summary.path is not None:
         say(f"recorded to {summary.path}")
     say(summary.verdict)
 
 
-def _unsent(summary: Summary) -> None:
+def _report_unsent(summary: Summary) -> None:
     """Report lines that did not reach their destination."""
     for line in summary.counters["sent"]:
         if lost := line["lost"]:
@@ -210,7 +210,7 @@ def _unsent(summary: Summary) -> None:
             say(f"taxel: lines not sent to {line['to']}: {lost} of {line['sent'] + lost}: {why}", err=True)
 
 
-def _together(options: dict[str, Any], typed: _Typed) -> None:
+def _check_options(options: dict[str, Any], typed: _Typed) -> None:
     """Refuse options that would have no effect."""
     readout, tare, send = (options[name] for name in ("readout", "tare", "send"))
     if readout is None and not typed.panel:
@@ -221,7 +221,7 @@ def _together(options: dict[str, Any], typed: _Typed) -> None:
         raise ProblemError("--folder belongs to the panel: give --panel")
 
 
-def _fresh(typed: _Typed, rest: Tare | float | None) -> None:
+def _check_fresh_tare(typed: _Typed, rest: Tare | float | None) -> None:
     """Refuse options that need a fresh tare, if none is taken."""
     if isinstance(rest, float):
         if typed.save_tare is not None:

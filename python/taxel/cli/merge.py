@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import taxel
-from taxel.cli._app import App
+from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import READ_HELP
 from taxel.cli._say import say
@@ -32,8 +32,8 @@ def merge(
     label: Annotated[
         str | None, typer.Option(help="Merge only the half second before and after each note with this text.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Merge recordings: by time, side by side, or the parts around a label in each.
 

@@ -25,7 +25,7 @@ from taxel.cli.board import (
     BitsOption,
     RateOption,
     counters_table,
-    doubted,
+    doubts,
     exit_code,
     for_live,
     outside,
@@ -251,6 +251,6 @@ def _print(summary: Summary, as_json: bool) -> None:
                 received += f", {counted(counts['bytes_in_no_line'], 'byte')} in no line"
         trouble = counts.get("trouble")  # sources of lines alone have this key
         say(f"  {name}: {received}" + (f"; {trouble}" if trouble else ""))
-    for why in doubted(counters):
+    for why in doubts(counters):
         say(why)
     say(summary.verdict)

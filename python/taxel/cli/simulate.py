@@ -12,7 +12,7 @@ import taxel
 from taxel._base.files import try_whole, write_whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.cli._app import App
+from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._bar import bar
 from taxel.cli._recordings import progress
 from taxel.cli._say import say
@@ -39,10 +39,8 @@ def simulate(
         Path | None, typer.Option("--truth", help="Write the true times of the touches to this CSV, label,t_us.")
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of taxels and noise. Default: the scene's.")] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the files that are written if they exist.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Simulate a scene on the emulated board, as fast as possible; without -o and --movie only check it.
 

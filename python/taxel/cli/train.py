@@ -15,7 +15,7 @@ import taxel
 from taxel._base.files import try_whole
 from taxel._base.messages import collected
 from taxel._core import ProblemError
-from taxel.cli._app import App
+from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import (
     READ_HELP,
@@ -71,7 +71,7 @@ def train(
             "own: FILE with the label before its suffix."
         ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the files if they exist.")] = False,
+    overwrite: OverwriteOption = False,
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
     folds: Annotated[
         int | None,
@@ -91,7 +91,7 @@ def train(
         ),
     ] = False,
     report: ReportOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Train neurons to detect labelled events, and save them as a readout.
 

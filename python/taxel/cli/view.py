@@ -16,13 +16,13 @@ from taxel.cli._app import App, SecondsOption
 from taxel.cli._opening import FileOptions
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._say import say
-from taxel.cli._topics import listed
+from taxel.cli._topics import list_topics
 from taxel.cli.console import Console
 from taxel.formats.ros import is_bag, topics
 from taxel.live import Panel
 from taxel.recording import Recording
 from taxel.recording.opening import recordings_in
-from taxel.recording.sidecars import calibrated_by
+from taxel.recording.sidecars import calibrate_by
 
 app = App()
 
@@ -79,7 +79,7 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
     first = every[0]
     bag = is_bag(first)
     if bag and not files.opener._names_topic(first):
-        raise ProblemError(*listed(first, topics(first, files.types, files.ros), as_json=False))
+        raise ProblemError(*list_topics(first, topics(first, files.types, files.ros), as_json=False))
     if not files.opener.words() and calibration is None and not bag:
         return None
 
@@ -87,7 +87,7 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
         opened = files.opener.open_joined(file)
         if calibration is None:
             return opened
-        return [calibrated_by(sensor, calibration) for sensor in opened]
+        return [calibrate_by(sensor, calibration) for sensor in opened]
 
     # What was opened now, so that the errors are those of the command, is what the panel asks for first.
     opened = {first.absolute(): opens(first)}

@@ -35,8 +35,8 @@ def trained(*, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Progre
     """Train contact and lift on `examples`, with the same parameters, by the demo's `recipe`."""
     labelled = examples(boards=boards, scenes=scenes, draw=draw, progress=progress)
     with warnings.catch_warnings():
-        # The base of the foam loses the ball long before a slow lift ends: such targets are out of reach.
-        warnings.filterwarnings("ignore", ".* out of reach")
+        # The base of the foam loses the ball long before a slow lift ends: such events cannot be learnt.
+        warnings.filterwarnings("ignore", ".* cannot be learnt")
         return fit(labelled, recipe(), progress=progress)
 
 

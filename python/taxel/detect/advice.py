@@ -13,8 +13,8 @@ from taxel import _core
 from taxel._base.messages import counted
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
-from taxel.detect.examples import Example, checked
-from taxel.detect.label_times import TOUCH, Off, held_by_tare, off_by, unlabelled
+from taxel.detect.examples import Example, check_examples
+from taxel.detect.label_times import TOUCH, Off, held_by_tare, off_by, unlabelled_us
 from taxel.detect.loads import lacks_neighbours
 from taxel.detect.plain_score import PlainScore, floor_of
 from taxel.detect.scoring import Score
@@ -53,7 +53,7 @@ class Advice(NamedTuple):
     option: str | None = None
 
 
-def advised(
+def advise(
     made: Trained,
     examples: Sequence[Example],
     scored: Score,
@@ -97,7 +97,7 @@ def advised(
         return {}
     if fall := fallen(examples):
         return dict.fromkeys(many, Advice("falls = true in a layout file", fall))
-    sound, encoder = checked(examples), made.recipe.encoder
+    sound, encoder = check_examples(examples), made.recipe.encoder
     off, held = off_by(sound, many, floor_of(encoder)), held_by_tare(sound, floor_of(encoder))
     known = _Known(made, sound, scored, learnt, search_s, plain, off, held, loaded_at_rest(examples, encoder))
     recipe = _other_recipe(made, examples)
@@ -113,7 +113,7 @@ def advised(
 
 @dataclass(frozen=True)
 class _Known:
-    """Hold what is known of a training: as in `advised`, and of labels and tares what is off, held or loaded."""
+    """Hold what is known of a training: as in `advise`, and of labels and tares what is off, held or loaded."""
 
     made: Trained
     examples: Sequence[Example]
@@ -140,7 +140,7 @@ class _Known:
 
     def of_time(self, label: str) -> Advice | None:
         """Return that events may lack labels before the first and behind the last, where much time lies there."""
-        (outside, whole), scored = unlabelled(self.examples, label), self.scored[label]
+        (outside, whole), scored = unlabelled_us(self.examples, label), self.scored[label]
         found = scored.false <= scored.missed and 2 * scored.found >= scored.events
         if found or outside < _UNLABELLED * whole:
             return None
@@ -318,7 +318,7 @@ def _at(source: Events | Frames, t_us: int) -> Frames:
     return source[place : place + 1]
 
 
-def drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> int:
+def count_drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> int:
     """Return how many taxels drifted above a tare by more than the noise floor; 0 where it may be a load.
 
     A taxel counts that reads no more in the first eighth of the recording and more in the last, in nine of ten

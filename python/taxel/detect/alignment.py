@@ -149,10 +149,10 @@ def align(
         fired = one_after_another([np.rint(to_us(ms - latency_ms)).astype(np.int64) for ms in spikes], patterns)
         scores[train] = score(Detections([label] * len(fired), fired, fired), {label: truth}, WINDOW_MS)
     best = _best(scores, len(truth))
-    return aligned(label, given, None if best is None else (best, scores[best]))
+    return align_by(label, given, None if best is None else (best, scores[best]))
 
 
-def aligned(label: str, given: Sequence[NDArray[np.int64]], by: tuple[int, Score] | None) -> Alignment:
+def align_by(label: str, given: Sequence[NDArray[np.int64]], by: tuple[int, Score] | None) -> Alignment:
     """Return by how much labels move to what a train tells of them; none where there is no such train.
 
     Parameters

@@ -60,7 +60,7 @@ class Example(NamedTuple):
     name: str = ""
 
 
-def called(k: int, example: Example) -> str:
+def name_of(k: int, example: Example) -> str:
     """Return what errors call the example k."""
     return example.name or f"example {k}"
 
@@ -103,7 +103,7 @@ class Outcome(NamedTuple):
         return f"detections {what}: {self.outside} of {len(self.found)}{share}"
 
 
-def checked(examples: Sequence[Example]) -> list[Example]:
+def check_examples(examples: Sequence[Example]) -> list[Example]:
     """Return the examples with their sources read and their labels as columns of whole us; refuse what is no example.
 
     Raises
@@ -122,9 +122,9 @@ def checked(examples: Sequence[Example]) -> list[Example]:
                 "and labels"
             )
         _, labels, *rest = example
-        given: list[Any] = [None, "", ""]
-        given[: len(rest)] = rest
-        tare, group, name = given
+        optional: list[Any] = [None, "", ""]
+        optional[: len(rest)] = rest
+        tare, group, name = optional
         name = text(f"example {k}: name", name) or str(getattr(example[0], "title", f"example {k}"))
         if not isinstance(labels, Mapping):
             raise ProblemError(f"{name}: labels is {shown(labels)}: must be times (us) by label")
@@ -145,7 +145,7 @@ def array_of(examples: Sequence[Example]) -> Array | None:
     first = arrays[0]
     for k, array in enumerate(arrays):
         if (array is None) != (first is None) or (array is not None and first is not None and not first.fits(array)):
-            of = f"{called(k, examples[k])} is of {array!r}, {called(0, examples[0])} of {first!r}"
+            of = f"{name_of(k, examples[k])} is of {array!r}, {name_of(0, examples[0])} of {first!r}"
             raise ProblemError(f"{of}: must have the same taxels")
     if first is not None:
         # One line for all, as every second recording may be of the other foot.
@@ -163,6 +163,6 @@ def unit_of(examples: Sequence[Example]) -> str | None:
     units = [None if isinstance(example.source, SpikeTrains) else recorded_unit(example.source) for example in examples]  # type: ignore[arg-type]
     for k, unit in enumerate(units):
         if unit != units[0]:
-            of = f"{called(k, examples[k])} is in {unit}, {called(0, examples[0])} in {units[0]}"
+            of = f"{name_of(k, examples[k])} is in {unit}, {name_of(0, examples[0])} in {units[0]}"
             raise ProblemError(f"{of}: must be in one unit, as a readout learns values of one only")
     return units[0]

@@ -22,8 +22,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import checked_path, instance, number, shown
-from taxel._base.errors import refused
+from taxel._base.arguments import checked_path, finite, instance, number, shown
 from taxel._base.h5_file import H5File
 from taxel._base.h5_writing import write_h5
 from taxel._core import FormatError, ProblemError
@@ -198,12 +197,7 @@ def _tree(place: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _spike(spike_ms: object) -> float | None:
-    if spike_ms is None:
-        return None
-    length = number("spike_ms", spike_ms)
-    if not 1e-6 <= length <= 1000.0:
-        raise refused("spike_ms", f" is {length:g}: must be from 1e-6 to 1000")
-    return length
+    return None if spike_ms is None else finite("spike_ms", spike_ms, least=1e-6, most=1000.0)
 
 
 def _gains(neuron: Neuron, spike_s: float | None) -> tuple[str, dict[str, float], float]:

@@ -20,13 +20,23 @@ from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect.ages import in_frames
-from taxel.detect.examples import Example, array_of, checked, unit_of
+from taxel.detect.examples import Example, array_of, check_examples, unit_of
 from taxel.detect.loads import Clock, clock_of
 from taxel.detect.plain_score import PlainScore, floor_of, plain_score
 from taxel.detect.readout import Readout, run
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, score, score_together
-from taxel.detect.training import Encoded, Fitting, Known, Trained, encoded, learn, possible, readout_of, rows_of
+from taxel.detect.training import (
+    Encoded,
+    Fitting,
+    Known,
+    Trained,
+    encode_examples,
+    learn,
+    possible,
+    readout_of,
+    rows_of,
+)
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms
 
@@ -157,7 +167,7 @@ def judge(
     >>> judge(examples, recipe, [Fold([Part(0)], [Part(1)])]).together.found
     1
     """
-    examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
+    examples, window, clocks = _check_arguments(examples, window_ms, frame_us)
     report = reporting(progress)
     search = flag("search", search)
     ways, how = _folds(examples, k)
@@ -172,7 +182,7 @@ def judge(
         plan = recipe
         if search:
             inner = fold.inner or INNER
-            chosen = _chosen(examples, patterns.patterns, patterns.plan, inner, fold.train, window, clocks, report)
+            chosen = _choose(examples, patterns.patterns, patterns.plan, inner, fold.train, window, clocks, report)
             plan = replace(recipe, neurons=chosen.neurons)
         with collected():  # a readout that is only scored: the score shows what it misses
             parts_of = partial(_parts_of, fold.train)
@@ -180,7 +190,7 @@ def judge(
         of_fold = replace(whole, neurons=plan.neurons)._at(made.recipe.neurons)
         trained.append(made._replace(recipe=of_fold, readout=made.readout._with(unit=unit)))
         for part in fold.test:
-            detections.setdefault(part.example, []).append(_detected(trained[-1].readout, examples, part, clocks))
+            detections.setdefault(part.example, []).append(_detect(trained[-1].readout, examples, part, clocks))
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
     labels = recipe._labels(examples)
     truths = _truths(examples, ways, labels)
@@ -190,14 +200,14 @@ def judge(
     return Judged(scores, score_together(joined, truths, window), how, tuple(trained), plain)
 
 
-def _sound_examples(
+def _check_arguments(
     examples: Sequence[Example], window_ms: float, frame_us: float | None
 ) -> tuple[list[Example], float, list[Clock]]:
     """Return checked examples, the window of scores (ms), and the clock of each example."""
     if frame_us is not None:
         finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
     clocks = [clock_of(example, frame_us) for example in examples] if isinstance(examples, Sequence) else []
-    return checked(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6), clocks
+    return check_examples(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6), clocks
 
 
 def choose(
@@ -248,18 +258,20 @@ def choose(
     >>> choose(examples, recipe, k=2).neurons
     {'contact': {'ub': 2.0}}
     """
-    examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
+    examples, window, clocks = _check_arguments(examples, window_ms, frame_us)
     unit_of(examples)
     recipe = in_frames(instance("recipe", recipe, Recipe), examples, clocks)
     report = reporting(progress)
     parts = [Part(n) for n in range(len(examples))]
     ways = whole("k", k, 2, 2**31) if isinstance(k, int | np.integer) else _folds(examples, k)[0]
     narrowed = recipe._narrowed(recipe._labels(examples), search=True)
-    chosen = _chosen(examples, encoded(examples, narrowed, report), narrowed, ways, parts, window, clocks, report)
+    chosen = _choose(
+        examples, encode_examples(examples, narrowed, report), narrowed, ways, parts, window, clocks, report
+    )
     return replace(chosen, encoder=recipe.encoder)
 
 
-def _chosen(
+def _choose(
     examples: Sequence[Example],
     patterns: Sequence[Example],
     recipe: Recipe,
@@ -333,7 +345,7 @@ def _marks(
             with collected():  # a readout that is only scored: the score shows what it misses
                 readout = readout_of({label: rows.fit(plan)}, {label: rows.delay_ms}, plan, array)
             for part in fold.test:
-                found = _detected(readout, _read(examples, patterns, readout, part), part, clocks)
+                found = _detect(readout, _read(examples, patterns, readout, part), part, clocks)
                 detections[m].setdefault(part.example, []).append(found)
     truths = _truths(examples, folds, (label,))
     return [
@@ -357,7 +369,7 @@ def _read(examples: Sequence[Example], patterns: Sequence[Example], readout: Rea
     return patterns if on_grid and all(len(neuron.weights) == len(trains) for neuron in neurons) else examples
 
 
-def _detected(readout: Readout, examples: Sequence[Example], part: Part, clocks: Sequence[Clock]) -> Detections:
+def _detect(readout: Readout, examples: Sequence[Example], part: Part, clocks: Sequence[Clock]) -> Detections:
     example, (frame_us, version) = examples[part.example], clocks[part.example]
     detections = run(readout, example.source, tare=example.tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
     return detections[(detections.t >= part.start) & (detections.t < part.stop)]
@@ -420,7 +432,7 @@ def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
             counts[label] += len(times)
     rarest = min(counts, key=lambda label: counts[label])
     parts = [Part(n) for n in range(len(examples))]
-    recordings = len(_grouped(examples, parts))
+    recordings = len(_group(examples, parts))
     most = min(_MOST, counts[rarest] // 2, *([recordings] if recordings > 1 else []))
     if most < 2:
         return 0, f"of {rarest} there {'is' if counts[rarest] == 1 else 'are'} {counts[rarest]}, and two folds need 4"
@@ -443,17 +455,17 @@ def _lacks(examples: Sequence[Example], parts: Sequence[Part], labels: Iterable[
 def _folds(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequence[Fold], str]:
     """Return folds, made or given, and what they hold out."""
     if isinstance(k, Sequence) and not isinstance(k, str):
-        return _sound(k, len(examples)), f"{len(k)} given folds"
+        return _check_folds(k, len(examples)), f"{len(k)} given folds"
     count = whole("folds", k, 2, 2**31)
     parts = [Part(n) for n in range(len(examples))]
-    recordings = len(_grouped(examples, parts))
+    recordings = len(_group(examples, parts))
     if recordings > 1 and count > recordings:
         raise refused("folds", f" is {count}: must be 2 to {recordings}, the number of recordings")
     how = f"{count} blocks of time" if recordings == 1 else f"whole recordings, {count} folds"
     return _split(examples, parts, count), how
 
 
-def _grouped(examples: Sequence[Example], parts: Sequence[Part]) -> list[list[Part]]:
+def _group(examples: Sequence[Example], parts: Sequence[Part]) -> list[list[Part]]:
     """Return the parts of each recording: those of examples of one group together."""
     groups: dict[object, list[Part]] = {}
     for part in parts:
@@ -461,7 +473,7 @@ def _grouped(examples: Sequence[Example], parts: Sequence[Part]) -> list[list[Pa
     return list(groups.values())
 
 
-def _sound(folds: Sequence[Fold], examples: int) -> list[Fold]:
+def _check_folds(folds: Sequence[Fold], examples: int) -> list[Fold]:
     """Return folds with the places of examples as whole numbers; refuse those that make no sense."""
     if not len(folds):
         raise refused("folds", " is empty: must be one Fold or more")
@@ -473,16 +485,16 @@ def _sound(folds: Sequence[Fold], examples: int) -> list[Fold]:
         train, test, inner = (several(f"fold {n}: {name}", getattr(fold, name)) for name in fold._fields)
         if not train or not test:
             raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold with parts to train on and parts to test")
-        train, test = ([_sound_part(f"fold {n}", part, examples) for part in parts] for parts in (train, test))
+        train, test = ([_check_part(f"fold {n}", part, examples) for part in parts] for parts in (train, test))
         for part in test:
             if any(part.start < trained.stop and trained.start < part.stop for trained in tested.get(part.example, ())):
                 raise ProblemError(f"fold {n}: {shown(part)} is tested twice")
             tested.setdefault(part.example, []).append(part)
-        sound.append(Fold(train, test, _sound(inner, examples) if inner else inner))
+        sound.append(Fold(train, test, _check_folds(inner, examples) if inner else inner))
     return sound
 
 
-def _sound_part(where: str, part: object, examples: int) -> Part:
+def _check_part(where: str, part: object, examples: int) -> Part:
     if not isinstance(part, Part) or not 0 <= (example := whole(f"{where}: example", part.example)) < examples:
         raise ProblemError(f"{where}: {shown(part)} is no Part of {examples} examples")
     start, stop = window("us", part.start, part.stop)
@@ -497,14 +509,14 @@ def _split(examples: Sequence[Example], parts: Sequence[Part], count: int) -> li
     Of several recordings whole ones are tested; of one alone stretches between its events, with about equally many
     each.
     """
-    groups = _grouped(examples, parts)
+    groups = _group(examples, parts)
     if len(groups) == 1:
         (group,) = groups
         events = np.sort(np.concatenate([_only_inside(examples[part.example], part) for part in group]))
         edges = (-np.inf, *_between_events(events, count), np.inf)
         stretches = [[_within(part, *of) for part in group] for of in pairwise(edges)]
         groups = [filled for each in stretches if (filled := [part for part in each if part.start < part.stop])]
-    return _dealt(groups, count)
+    return _deal(groups, count)
 
 
 def _within(part: Part, start: float, stop: float) -> Part:
@@ -522,12 +534,12 @@ def _folds_for(label: str, examples: Sequence[Example], parts: Sequence[Part], c
         if not any(_lacks(examples, fold.train, [label]) for fold in folds):
             return folds
     of_label = _only(examples, label)
-    groups = _grouped(examples, parts)
+    groups = _group(examples, parts)
     events = [sum(len(_only_inside(of_label[part.example], part)) for part in group) for group in groups]
     having = [group for group, count_of in zip(groups, events, strict=True) if count_of]
     others = [group for group, count_of in zip(groups, events, strict=True) if not count_of]
     if len(having) > 1:
-        return _dealt([*having, *others], min(count, len(having)))
+        return _deal([*having, *others], min(count, len(having)))
     if sum(events) < 4:
         return []
     silent = [part for group in others for part in group]
@@ -535,7 +547,7 @@ def _folds_for(label: str, examples: Sequence[Example], parts: Sequence[Part], c
     return [Fold([*fold.train, *silent], fold.test) for fold in folds]
 
 
-def _dealt(groups: Sequence[Sequence[Part]], count: int) -> list[Fold]:
+def _deal(groups: Sequence[Sequence[Part]], count: int) -> list[Fold]:
     """Return folds that test each group of parts once."""
     count = min(count, len(groups))
     return [

@@ -92,7 +92,7 @@ def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple
             yield Off(float(np.median(apart[k:end])), alike, len(times)), float(apart[end - 1] - apart[k])
 
 
-def unlabelled(examples: Sequence[Example], label: str) -> tuple[int, int]:
+def unlabelled_us(examples: Sequence[Example], label: str) -> tuple[int, int]:
     """Return how long recordings last further before their first label and behind their last than labels lie apart, us.
 
     And how long they last. Of an example without the label nothing counts.

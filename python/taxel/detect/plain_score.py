@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
 from taxel._base.progress import Progress
-from taxel.detect.examples import Example, called
+from taxel.detect.examples import Example, name_of
 from taxel.detect.loads import Clock, Loads, Stretch, lacks_neighbours
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.scoring import Score, score_together
@@ -167,7 +167,7 @@ def plain_score(
         k for k, example in enumerate(examples) if example.tare is None or isinstance(example.source, SpikeTrains)
     ]
     if lacking:
-        why = f"{called(lacking[0], examples[lacking[0]])} has no tare" if len(examples) > 1 else "there is no tare"
+        why = f"{name_of(lacking[0], examples[lacking[0]])} has no tare" if len(examples) > 1 else "there is no tare"
         return PlainScore(dict.fromkeys(labels), None, f"{why} to measure a load from")
     if lacks_neighbours(examples):
         return PlainScore(dict.fromkeys(labels), None, "plain rules need neighbours on a grid, and these are channels")
@@ -180,12 +180,12 @@ def plain_score(
             report(f"tuning plain rules, fold {n + 1} of {len(ways)}", 0, 0)
         mine = best_rules(loads, labels, train, window_ms) if ways else rules
         for part in test:
-            detections.setdefault(part[0], []).append(_detected(loads, mine, part))
+            detections.setdefault(part[0], []).append(_detect(loads, mine, part))
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
     return PlainScore(rules, score_together(joined, truths, window_ms))
 
 
-def _detected(loads: Loads, rules: Mapping[str, PlainRule | None], part: Stretch) -> Detections:
+def _detect(loads: Loads, rules: Mapping[str, PlainRule | None], part: Stretch) -> Detections:
     """Return what the rule of each label detects of it in a part of an example."""
     detections = Detections([], [], [])
     for label, rule in rules.items():

@@ -114,7 +114,7 @@ class Readout(_Detector):
             if label not in neurons:
                 raise refused("inputs", f": no neuron {shown(label)}: there are {', '.join(map(str, neurons))}")
         trained = {
-            text("label", label): _trained(label, cell, delay_ms, named.get(label)) for label, cell in neurons.items()
+            text("label", label): _neuron_of(label, cell, delay_ms, named.get(label)) for label, cell in neurons.items()
         }
         if not isinstance(delay_ms, Mapping):
             # Also where each neuron comes with its own.
@@ -216,7 +216,7 @@ class Readout(_Detector):
         """
         instance("trains", trains, SpikeTrains)
         inputs = trains.split_by_sign() if trains.signed else trains
-        received = _received(self.encoder, self._neuron(label), self.array, 1)
+        received = _receives(self.encoder, self._neuron(label), self.array, 1)
         return (inputs if received is None else inputs.select(received)).delayed(self.delays_ms)
 
     @property
@@ -289,7 +289,7 @@ class Readout(_Detector):
 
     def _spread(self, cell: TrainedNeuron) -> NDArray[np.float64]:
         """Return one weight a train of the whole encoder, at each delay."""
-        received = _received(self.encoder, cell, self.array, len(self.delays_ms))
+        received = _receives(self.encoder, cell, self.array, len(self.delays_ms))
         if received is None:
             return cell.weights
         if np.count_nonzero(received) != len(cell.weights):
@@ -338,7 +338,7 @@ class Readout(_Detector):
         def build(parts: Parts) -> Readout:
             if parts.text:
                 return cls.from_json(parts.text)
-            neurons = {label: _gathered(parts, cell) for label, cell in parts.neurons.items()}
+            neurons = {label: _gather(parts, cell) for label, cell in parts.neurons.items()}
             return cls(parts.encoder, neurons, array=parts.array, unit=parts.unit, delays_ms=parts.delays_ms)
 
         return read_nir(
@@ -454,16 +454,16 @@ def run_counting(
     return Detections._from_parts(columns), outside
 
 
-def _received(encoder: Encoder, cell: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:
+def _receives(encoder: Encoder, cell: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:
     """Return which of the encoder's trains, at each delay, a neuron receives; None where it receives all."""
     if not cell.inputs or not isinstance(encoder, Composite):
         return None
     return np.tile(encoder.places(cell.inputs, array or Array(1, 1)), delays)
 
 
-def _gathered(parts: Parts, cell: TrainedNeuron) -> TrainedNeuron:
+def _gather(parts: Parts, cell: TrainedNeuron) -> TrainedNeuron:
     """Return a neuron with weights of its inputs alone; with all trains as inputs where others have weights too."""
-    received = _received(parts.encoder, cell, parts.array, len(parts.delays_ms))
+    received = _receives(parts.encoder, cell, parts.array, len(parts.delays_ms))
     if received is None:
         return cell
     is_gathered = len(received) == len(cell.weights) and not cell.weights[~received].any()
@@ -482,7 +482,7 @@ def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
     return detections[np.argsort(detections.known, kind="stable")]
 
 
-def _trained(
+def _neuron_of(
     label: str, cell: Any, delay_ms: float | Mapping[str, float], inputs: Sequence[str] | None
 ) -> TrainedNeuron:
     """Return a neuron with weights, delay and inputs, given a learner or a tuple."""

@@ -20,7 +20,7 @@ from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import to_us
 
-__all__ = ["LISTS", "Recipe", "changed", "learner_from", "with_floor"]
+__all__ = ["LISTS", "Recipe", "change_values", "learner_from", "with_floor"]
 
 
 #: Keys of a recipe's file that a recipe does not hold: which recordings it fits, whose parameters other labels have.
@@ -338,7 +338,7 @@ class Recipe:
                 )
         if labels is not None:
             values = recipes.for_labels(values, several("labels", labels))
-        values = changed(values, {} if changes is None else changes)
+        values = change_values(values, {} if changes is None else changes)
         return cls.from_dict(values if noise_floor is None else with_floor(values, noise_floor))
 
 
@@ -385,7 +385,7 @@ def with_floor(values: Mapping[str, Any], noise_floor: float) -> dict[str, Any]:
     }
 
 
-def changed(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def change_values(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return values changed at dotted keys; a change for all neurons takes precedence over a neuron's own value."""
     if not isinstance(changes, Mapping):
         raise refused("changes", f" is {shown(changes)}: must be values by dotted key")

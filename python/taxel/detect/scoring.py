@@ -61,12 +61,12 @@ class Spread(NamedTuple):
         >>> Spread.of([1.0, 2.0, 3.0, 4.0])
         2.5 ± 1.29 (median 2.5, 95 % in 1.07 to 3.92)
         """
-        given = finite_numbers("values", values)
-        if given.ndim != 1:
-            raise refused("values", f" has {given.ndim} dimensions: must have one")
-        spread = cls(**_core.spread(given))
+        sample = finite_numbers("values", values)
+        if sample.ndim != 1:
+            raise refused("values", f" has {sample.ndim} dimensions: must have one")
+        spread = cls(**_core.spread(sample))
         # The mean of equal values is rounded, so that they seem to vary by some 1e-17.
-        return spread._replace(mean=float(given[0]), sd=0.0) if len(given) > 1 and np.ptp(given) == 0.0 else spread
+        return spread._replace(mean=float(sample[0]), sd=0.0) if len(sample) > 1 and np.ptp(sample) == 0.0 else spread
 
     def __repr__(self) -> str:
         if np.isnan(self.mean):

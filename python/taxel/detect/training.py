@@ -20,8 +20,8 @@ from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_frames, later_us, silent_windows
-from taxel.detect.alignment import Alignment, align, aligned
-from taxel.detect.examples import Example, array_of, called, checked, unit_of
+from taxel.detect.alignment import Alignment, align, align_by
+from taxel.detect.examples import Example, array_of, check_examples, name_of, unit_of
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
 from taxel.detect.loads import clock_of
 from taxel.detect.readout import SILENCE_MS, Readout
@@ -102,7 +102,7 @@ def fit(
 
     Warns
     -----
-    UserWarning : what `taxel.learn.ConeR` warns of, behind the label; events out of reach by their times
+    UserWarning : what `taxel.learn.ConeR` warns of, behind the label; events that cannot be learnt by their times
 
     Notes
     -----
@@ -118,12 +118,12 @@ def fit(
     >>> fit([Example(frames, {"contact": [20_000]})], recipe)
     Readout(contact; LevelCrossing(levels=[5.0]) on 1 x 1 taxels; grid, keep)
     """
-    return trained(examples, recipe, progress).readout
+    return fit_aligned(examples, recipe, progress).readout
 
 
-def trained(examples: Sequence[Example], recipe: Recipe, progress: Progress | None) -> Trained:
+def fit_aligned(examples: Sequence[Example], recipe: Recipe, progress: Progress | None) -> Trained:
     """Train a readout as `fit` does, and return how its labels were aligned as well."""
-    sound, clocks = checked(examples), [clock_of(example) for example in examples]
+    sound, clocks = check_examples(examples), [clock_of(example) for example in examples]
     report = reporting(progress)
     recipe = in_frames(instance("recipe", recipe, Recipe), sound, clocks)
     possibly = possible(recipe, sound)
@@ -155,9 +155,9 @@ class Encoded:
         #: The recipe with the parts of `patterns`.
         self.plan = recipe._narrowed(labels, search=search, choices=given)
         #: The examples as the trains that the first points receive.
-        self.patterns = encoded(examples, self.plan, report)
+        self.patterns = encode_examples(examples, self.plan, report)
         self._others: dict[str, Sequence[Example]] = {}
-        self._encode: Callable[[Recipe], Sequence[Example]] = lambda plan: encoded(examples, plan, report)
+        self._encode: Callable[[Recipe], Sequence[Example]] = lambda plan: encode_examples(examples, plan, report)
 
     def receiving(self, plan: Recipe) -> tuple[Recipe, Sequence[Example]]:
         """Return a recipe for one point of one label with the parts that the trains are of, and these trains."""
@@ -180,7 +180,7 @@ class Encoded:
         return mine
 
 
-def encoded(examples: Sequence[Example], recipe: Recipe, report: Progress) -> list[Example]:
+def encode_examples(examples: Sequence[Example], recipe: Recipe, report: Progress) -> list[Example]:
     """Return (checked) examples with the spike trains of the recipe's encoder as their sources."""
     array_of(examples)
     results = []
@@ -326,8 +326,8 @@ class Fitting:
         neuron = learner._on_grid()
         acts_after_ms = ACTS_AFTER_MS if neuron.kernel == "exponential" else neuron.step_ms
         self.delay_ms = delay_ms + (0.0 if ages is None else acts_after_ms)
-        given = self._given = [_times(k, example, label) for k, example in enumerate(examples)]
-        count = sum(map(len, given))
+        label_times = self._label_times = [_times(k, example, label) for k, example in enumerate(examples)]
+        count = sum(map(len, label_times))
         if not count:
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
         sources = [_inputs(k, example, recipe, label, array) for k, example in enumerate(examples)]
@@ -339,17 +339,17 @@ class Fitting:
             known = {} if known is None else known
             inputs = recipe.inputs_of(label)
             if inputs not in known:
-                known[inputs] = follow(sources, label, given, received.latency_ms, list(quantities))
+                known[inputs] = follow(sources, label, label_times, received.latency_ms, list(quantities))
             every = known[inputs]
             if len(every) <= place and place:
                 raise ProblemError(f"{label}: {counted(len(every), 'quantity', 'quantities')} follow it")
             followed = every[place] if every else None
-            self.alignment = aligned(label, given, followed and (followed.train, followed.score))
+            self.alignment = align_by(label, label_times, followed and (followed.train, followed.score))
         elif recipe.align:
-            self.alignment = align(sources, label, given, received.latency_ms, ages)
-        self._names = [called(k, example) for k, example in enumerate(examples)]
+            self.alignment = align(sources, label, label_times, received.latency_ms, ages)
+        self._names = [name_of(k, example) for k, example in enumerate(examples)]
         self._sources = sources if followed is None else [only(of, quantities[followed.train]) for of in sources]
-        felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
+        felt = label_times if self.alignment is None else [self.alignment.felt(k) for k in range(len(label_times))]
         for name, times in zip(self._names, felt, strict=True):
             self._check_apart(name, times, neuron.refractory)
         later = [np.zeros(len(times), np.int64) for times in felt]
@@ -418,17 +418,17 @@ class Fitting:
         """Return the labels of each example that were not aligned, ms."""
         of = self.alignment
         assert of is not None
-        return [to_ms(of.given[of.unpaired & (of.example == k)]) for k in range(len(self._given))]
+        return [to_ms(of.given[of.unpaired & (of.example == k)]) for k in range(len(self._label_times))]
 
     def wrong(self, cone: ConeR, run_threshold: float) -> int:
         """Return how many labels, as given, a fitted learner misses on these examples, and how many it invents."""
         neuron = cone._on_grid()
         neuron.set_params(theta_0=run_threshold * neuron.theta_0)
         found, truths = [], []
-        for source, given in zip(self._sources, self._given, strict=True):
+        for source, times in zip(self._sources, self._label_times, strict=True):
             t = np.rint(to_us(neuron.run(cone.weights_, source) - self._shift_ms)).astype(np.int64)
             found.append(Detections([self._label] * len(t), t, t))
-            truths.append({self._label: given})
+            truths.append({self._label: times})
         return score_together(found, truths, FOLLOWED_MS).rank[0]
 
     def seen(self, cone: ConeR) -> dict[str, Any]:
@@ -462,7 +462,7 @@ def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     if len(outside):
         at, start, stop = (ms - _begin_ms(source) for ms in (outside[0], source.start, source.stop))
         raise ProblemError(
-            f"{called(k, example)}: {label} at {at:.3f} ms lies outside it, {start:.3f} to {stop:.3f} ms"
+            f"{name_of(k, example)}: {label} at {at:.3f} ms lies outside it, {start:.3f} to {stop:.3f} ms"
         )
     return events
 
@@ -488,7 +488,7 @@ def _inputs(k: int, example: Example, recipe: Recipe, label: str, array: Array |
     places = encoder.places(names, array or Array(1, 1))
     if len(places) != len(trains):
         made = f"{counted(len(trains), 'train')}, the encoders make {len(places)}"
-        raise ProblemError(f"{called(k, example)}: {made}: must be equally many")
+        raise ProblemError(f"{name_of(k, example)}: {made}: must be equally many")
     return trains.select(places)
 
 
@@ -506,21 +506,16 @@ def _remarks(
         at = [(targets[p][k] - shift_ms - begins_ms[p], f" of {names[p]}" * (len(targets) > 1)) for p, k in missed]
         places = [f"{ms:.10g} ms{name}" for ms, name in at]
         listed = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
+        why = f"cannot be learnt, as too few input spikes come before them ({listed})"
         if count < TWO_FOLDS:
-            yield (
-                f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from; {TWO_FOLDS} are the "
-                f"least to score it held out: label more. {len(missed)} out of reach of the inputs ({listed})"
-            )
+            there = f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from"
+            yield f"{there}; {TWO_FOLDS} are the least to score it held out: label more. {len(missed)} {why}"
         elif len(missed) == count:
-            yield (
-                f"{count} of {count} events are out of reach, as too few input spikes come before them ({listed}): "
-                "none was learnt. Their times may be off, or of another recording"
-            )
+            yield f"{count} of {count} events {why}. Their times may be off, or of another recording"
         else:
             yield (
-                f"{len(missed)} of {count} events are out of reach, as too few input spikes come before "
-                f"them ({listed}); the rest was learnt. A larger delay_ms or tau, wider lb and ub, or another of the "
-                "recipe's points (taxel train --search) may reach them"
+                f"{len(missed)} of {count} events {why}; the others were. A larger delay_ms or tau, wider lb and ub, "
+                "or another of the recipe's points (taxel train --search) may help"
             )
     # The learner names unreachable targets, if any, first.
     yield from caught[bool(missed) :]

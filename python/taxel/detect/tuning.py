@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import number, several, text
-from taxel._base.errors import refused
+from taxel._base.arguments import finite, number, several, text
 from taxel._base.progress import Progress, reporting
-from taxel.detect.examples import Example, checked
+from taxel.detect.examples import Example, check_examples
 from taxel.detect.loads import FoundTimes, Loads, Stretch, clock_of
 from taxel.detect.plain_rule import PlainRule
 from taxel.spikes import SpikeTrains, to_us
@@ -105,15 +104,13 @@ def tune(
     (PlainRule(area >= 1, release 0.5, 1 frame: onset touch), PlainRule(area >= 1, release 0.5, 1 frame: end removal))
     """
     clocks = [clock_of(example) for example in examples] if isinstance(examples, Sequence) else []
-    sound = checked(examples)
+    sound = check_examples(examples)
     report = reporting(progress)
     names = (
         sorted({name for example in sound for name in example.labels}) if labels is None else several("labels", labels)
     )
     names = [text("labels", name) for name in names]
-    width_ms = number("window_ms", window_ms, "ms")
-    if not 0.0 <= width_ms <= 3_600_000.0:
-        raise refused("window_ms", f" is {width_ms:g}: must be from 0 to 3600000")
+    width_ms = finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6)
     floor = number("noise_floor", noise_floor)
     if any(isinstance(example.source, SpikeTrains) for example in sound):
         return dict.fromkeys(names)

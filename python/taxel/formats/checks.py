@@ -15,10 +15,15 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["ascending", "ascending_us", "files_at", "sensor", "table", "whole_us"]
+__all__ = ["ascending", "candidates", "files_at", "sensor", "table", "whole_us"]
 
 #: Times that are converted at once, so that little memory is taken beside them.
 _PIECE = 1 << 16
+
+
+def candidates(path: Path, *patterns: str) -> list[Path]:
+    """Return the files of a folder that patterns fit, in the order of their names; of a file itself."""
+    return sorted(file for pattern in patterns for file in path.glob(pattern)) if path.is_dir() else [path]
 
 
 def files_at(path: str | Path, files: Callable[[Path], list[Path]], what: str) -> list[Path]:
@@ -79,16 +84,6 @@ def whole_us(place: str, seconds: NDArray[np.float64], first_line: int = 1) -> N
             raise FormatError(f"{place}, line {first_line + k}: time {seconds[k]:g} s; must lie within 142 years of 0")
         t[part] = np.rint(seconds[part] * 1e6)
     return t
-
-
-def ascending_us(place: str, seconds: NDArray[np.float64], first_line: int = 1) -> NDArray[np.int64]:
-    """Return a file's column of times in s as whole us.
-
-    Raises
-    ------
-    FormatError : a time that does not ascend, or lies farther from 0 than 142 years (names the line)
-    """
-    return ascending(place, whole_us(place, seconds, first_line), first_line)
 
 
 def ascending(place: str, t: NDArray[np.int64], first_line: int = 1) -> NDArray[np.int64]:

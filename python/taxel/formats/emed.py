@@ -20,7 +20,7 @@ from taxel._base.limits import TIME_US
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import files_at, sensor
+from taxel.formats.checks import candidates, files_at, sensor
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 from taxel.spikes import to_us
@@ -43,8 +43,7 @@ _NEWTON = {"kPa": 0.1, "N/cm2": 1.0}
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``.lst`` whose head names the matrix and the time a frame."""
-    candidates = sorted(path.iterdir()) if path.is_dir() else [path]
-    return [f for f in candidates if f.suffix.lower() == ".lst" and _is_export(f)]
+    return [f for f in candidates(path, "*") if f.suffix.lower() == ".lst" and _is_export(f)]
 
 
 def _is_export(path: Path) -> bool:
@@ -104,13 +103,12 @@ def _pages(at: int, begin: str, content: Iterator[str]) -> Iterator[tuple[int, l
 def _read(file: Path) -> Trial:
     content = text.stream(file)
     above, begin = text.before(content, lambda line: _FRAME_LINE.search(line) is not None)
-    head = [*above, *([] if begin is None else [begin])]
-    shape, size, period = _head(file, head)
+    shape, size, period = _head(file, [*above, *([] if begin is None else [begin])], len(above))
     if begin is None:
         raise FormatError(f"{file.name}: no page with a frame's number (Pict-No.: 1)")
     area, pages = size[0] * size[1], list[_Page]()
     read = Growing(file.name, values=(shape, np.float32))
-    for first, lines in _pages(len(head), begin, content):
+    for first, lines in _pages(len(above) + 1, begin, content):
         page, places, cells = _page(file, lines, first, shape)
         if pages and page.number <= pages[-1].number:
             raise FormatError(f"{file.name}, line {page.line}: frame {page.number} after frame {pages[-1].number}")
@@ -134,10 +132,9 @@ def _read(file: Path) -> Trial:
     )
 
 
-def _head(file: Path, content: Sequence[str]) -> tuple[tuple[int, int], tuple[float, float], float]:
-    """Return rows and columns, the size of a sensor in cm, and the time between frames in ms."""
-    first = next((k for k, line in enumerate(content) if _FRAME_LINE.search(line)), len(content))
-    head = "\n".join(content[: first + 1])
+def _head(file: Path, content: Sequence[str], first: int) -> tuple[tuple[int, int], tuple[float, float], float]:
+    """Return rows and columns, the size of a sensor in cm, and ms between frames; `first` lines stand above pages."""
+    head = "\n".join(content)
     matches = {name: pattern.search(head) for name, pattern in _HEAD.items()}
     expected = {"matrix": "Matrix: 64x95", "size": "Sensor size: 0.500x0.500 cm", "period": "Time/picture:10.0 ms"}
     for name, match in matches.items():

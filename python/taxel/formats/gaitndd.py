@@ -22,7 +22,7 @@ from taxel._base.limits import unpacked
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending, files_at, whole_us
+from taxel.formats.checks import ascending, candidates, files_at, whole_us
 from taxel.formats.trial import Trial, scored_around
 from taxel.frames import Frames
 
@@ -42,8 +42,7 @@ _SOURCE = "step times that the authors derived from this very channel (left foot
 
 def files(path: Path) -> list[Path]:
     """Find the headers of this format: ``NAME.hea`` with ``NAME.let`` beside it."""
-    candidates = sorted(path.glob("*.hea")) if path.is_dir() else [path]
-    return [f for f in candidates if f.suffix == ".hea" and f.with_suffix(".let").exists()]
+    return [f for f in candidates(path, "*.hea") if f.suffix == ".hea" and f.with_suffix(".let").exists()]
 
 
 def trials(path: str | Path) -> Iterator[Trial]:

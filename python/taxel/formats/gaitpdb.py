@@ -18,9 +18,9 @@ from taxel._base.columns import Growing
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending, files_at, whole_us
-from taxel.formats.layout import packaged
-from taxel.formats.trial import Trial, scored_around
+from taxel.formats.checks import ascending, candidates, files_at, whole_us
+from taxel.formats.layout import load_packaged
+from taxel.formats.trial import Trial, scored_around, stances
 from taxel.frames import Frames
 
 __all__ = ["contacts", "files", "trials"]
@@ -37,8 +37,7 @@ _SOURCE = "the foot's own total force: contact above 50 N, foot-off below 25 N, 
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format, by their names."""
-    candidates = sorted(path.glob("*_*.txt*")) if path.is_dir() else [path]
-    return [f for f in candidates if _NAME.fullmatch(f.name)]
+    return [f for f in candidates(path, "*_*.txt*") if _NAME.fullmatch(f.name)]
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
@@ -58,7 +57,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that breaks the format (names file, line and column)
     """
     paths = files_at(path, files, "file such as GaCo02_01.txt")
-    places, foot_of = packaged("gaitpdb"), Array(1, 8, name="gaitpdb foot")
+    places, foot_of = load_packaged("gaitpdb"), Array(1, 8, name="gaitpdb foot")
     known = _events_table(paths[0].parent / "events.csv")
     for file in paths:
         match = _NAME.fullmatch(file.name)
@@ -119,20 +118,15 @@ def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
     turns = np.flatnonzero(loaded[1:] != loaded[:-1]) + 1
     if len(known) and known[0] > 0 and loaded[0]:
         turns = np.append(0, turns)
-    ups, downs = known[turns[loaded[turns]]], known[turns[~loaded[turns]]]
-    downs = downs[np.searchsorted(downs, ups[0], side="right") :] if len(ups) else downs[:0]
-    n = min(len(ups), len(downs))
-    stances = np.stack([ups[:n], downs[:n]], axis=1)
-    return stances[stances[:, 1] - stances[:, 0] >= 20]
+    every = stances(known[turns[loaded[turns]]], known[turns[~loaded[turns]]])
+    return every[every[:, 1] - every[:, 0] >= 20]
 
 
 def _events_table(path: Path) -> dict[tuple[str, str], NDArray[np.int64]]:
-    if not path.exists():
-        return {}
-    stances: dict[tuple[str, str], list[list[int]]] = {}
-    for row in text.table(path, ["person", "foot", "contact_sample", "off_sample"]):
+    walks: dict[tuple[str, str], list[list[int]]] = {}
+    for row in text.table(path, ["person", "foot", "contact_sample", "off_sample"], optional=True):
         samples = [int(text.number(row[c], path, int(row["line"]), c)) for c in ("contact_sample", "off_sample")]
         if not 0 <= samples[0] < samples[1]:
             raise FormatError(f"{path.name}, line {row['line']}: contact {samples[0]}, off {samples[1]}; must ascend")
-        stances.setdefault((row["person"], row["foot"]), []).append(samples)
-    return {key: np.array(rows, np.int64) for key, rows in stances.items()}
+        walks.setdefault((row["person"], row["foot"]), []).append(samples)
+    return {key: np.array(rows, np.int64) for key, rows in walks.items()}

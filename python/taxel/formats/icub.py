@@ -17,7 +17,7 @@ from taxel._base.limits import unpacked
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import files_at
+from taxel.formats.checks import candidates, files_at
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 
@@ -33,8 +33,7 @@ _JOINTS = tuple(f"joint{k}" for k in range(7, 16))
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: tables whose first line names trial, slice and the thumb's taxels."""
-    candidates = sorted([*path.glob("*.csv.gz"), *path.glob("*.csv")]) if path.is_dir() else [path]
-    return [f for f in candidates if f.name.endswith((".csv", ".csv.gz")) and _begins_so(f)]
+    return [f for f in candidates(path, "*.csv", "*.csv.gz") if f.name.endswith((".csv", ".csv.gz")) and _begins_so(f)]
 
 
 def _begins_so(path: Path) -> bool:

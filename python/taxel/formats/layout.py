@@ -23,7 +23,7 @@ from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places
 
-__all__ = ["Data", "Layout", "Table", "advice", "packaged"]
+__all__ = ["Data", "Layout", "Table", "advice", "load_packaged"]
 
 #: Times of a table in units of these, us.
 UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
@@ -330,6 +330,6 @@ def as_size(value: object) -> str:
 
 
 @cache
-def packaged(name: str) -> Layout:
+def load_packaged(name: str) -> Layout:
     """Return the layout that comes along for a format whose source says where its sensors are."""
     return Layout.read(Path(__file__).parent / "layouts" / f"{name}.layout.toml")

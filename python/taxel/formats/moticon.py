@@ -19,7 +19,7 @@ from taxel._base.columns import Growing
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending, ascending_us, files_at, whole_us
+from taxel.formats.checks import ascending, candidates, files_at, whole_us
 from taxel.formats.trial import Trial, scored_around
 from taxel.frames import Frames
 
@@ -37,8 +37,7 @@ _SOURCE = "the maker's step finder (neither the first nor the last loaded frame)
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``.txt`` with a comment that names the sensor insoles."""
-    candidates = sorted(path.glob("*.txt")) if path.is_dir() else [path]
-    return [f for f in candidates if f.suffix == ".txt" and _is_export(f)]
+    return [f for f in candidates(path, "*.txt") if f.suffix == ".txt" and _is_export(f)]
 
 
 def _is_export(path: Path) -> bool:
@@ -86,7 +85,7 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
     }
     marked: dict[tuple[str, str], list[int]] = {place: [] for place in MARKERS.values()}
     table = (line.split("\t") for line in chain([begin], content))
-    for line, rows in text.grouped(table, file, first, len(names)):
+    for line, rows in text.group_rows(table, file, first, len(names)):
         seconds = text.numbers([[row[at]] for row in rows], file, line, ["time"])[:, 0]
         times = whole_us(file.name, seconds, line)
         t.add(t=times)
@@ -97,10 +96,11 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             values = _numbers(cells, file, [line + k for k in there], labels)
             read[foot].add(t=times[there], values=values[:, :-1], total=values[:, -1])
     ascending(file.name, t.column("t"), first)
+    table_place = f"steps.csv, {file.stem}"
     for foot, columns in chosen.items():
         readings = read[foot]
         truth = {
-            event: ascending_us(f"steps.csv, {file.stem}", np.array(steps[foot, event]))
+            event: ascending(table_place, whole_us(table_place, np.array(steps[foot, event])))
             if steps
             else np.array(marked[foot, event], np.int64)
             for event in ("contact", "foot_off")
@@ -175,10 +175,8 @@ def _mark(
 
 
 def _steps_table(path: Path) -> dict[str, dict[tuple[str, str], list[float]]]:
-    if not path.exists():
-        return {}
     recordings: dict[str, dict[tuple[str, str], list[float]]] = {}
-    for row in text.table(path, ["recording", "foot", "contact_s", "toe_off_s"]):
+    for row in text.table(path, ["recording", "foot", "contact_s", "toe_off_s"], optional=True):
         places = recordings.setdefault(row["recording"], {(f, e): [] for f, e in MARKERS.values()})
         if row["foot"] not in {"left", "right"}:
             raise FormatError(f"{path.name}, line {row['line']}: foot {row['foot']!r}; must be left or right")

@@ -19,8 +19,8 @@ from taxel._base.columns import Growing
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending, files_at, whole_us
-from taxel.formats.trial import Trial, scored_around
+from taxel.formats.checks import ascending, candidates, files_at, whole_us
+from taxel.formats.trial import Trial, scored_around, stances
 from taxel.frames import Frames
 
 __all__ = ["contacts", "files", "trials"]
@@ -30,8 +30,7 @@ _SOURCE = "the insole's own sum, 10 % of its largest: no truth of its own"
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``.asc`` whose head names time in seconds."""
-    candidates = sorted(path.iterdir()) if path.is_dir() else [path]
-    return [f for f in candidates if f.suffix.lower() == ".asc" and _is_export(f)]
+    return [f for f in candidates(path, "*") if f.suffix.lower() == ".asc" and _is_export(f)]
 
 
 def _is_export(path: Path) -> bool:
@@ -91,8 +90,8 @@ def _read(file: Path) -> Iterator[Trial]:
             f"{file.name}, line {head + 3 + k}: {t[k + 1] - t[k]} us after the line before, at {hertz:g} Hz"
         )
     for foot, total in zip(feet, read.column("totals").T, strict=True):
-        stances = contacts(total)
-        truth = {"contact": t[stances[:, 0]], "foot_off": t[stances[:, 1]]}
+        frames = contacts(total)
+        truth = {"contact": t[frames[:, 0]], "foot_off": t[frames[:, 1]]}
         yield Trial(
             name=f"{file.stem} {foot}",
             person=file.stem,
@@ -130,7 +129,4 @@ def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
     total = arguments.floats("total", total)
     loaded = (total >= 0.1 * total.max()).astype(np.int8) if len(total) else np.zeros(0, np.int8)
     edges = np.diff(loaded)
-    ups, downs = np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1
-    downs = downs[np.searchsorted(downs, ups[0]) :] if len(ups) else downs[:0]
-    n = min(len(ups), len(downs))
-    return np.stack([ups[:n], downs[:n]], axis=1)
+    return stances(np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1)

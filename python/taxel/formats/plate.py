@@ -21,7 +21,7 @@ from taxel._base.h5_file import H5File
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import files_at
+from taxel.formats.checks import candidates, files_at
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 
@@ -41,8 +41,7 @@ _SOURCE = (
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``subj*.h5``."""
-    candidates = sorted(path.glob("subj*.h5")) if path.is_dir() else [path]
-    return [f for f in candidates if re.fullmatch(r"subj\w+\.h5", f.name)]
+    return [f for f in candidates(path, "subj*.h5") if re.fullmatch(r"subj\w+\.h5", f.name)]
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
@@ -137,7 +136,7 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
     linearly interpolated to S[2k+1] and from there to S[2k+2], rounded down to whole counts. The phase is the one of
     three under which the fewest cells violate |3 (b - c) - (a - d)| <= 3, over the whole trial.
     """
-    whole = _loaded(image)
+    whole = _check_image(image)
     # Cells outside of the box of all loaded columns and frames are 0 and lie on every line.
     box = tuple(_span(np.flatnonzero(whole.any(axis=axes))) for axes in ((0, 2), (0, 1)))
     y = whole[:, *box]
@@ -189,7 +188,7 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
     ------
     ProblemError : not counts of shape (rows, columns, frames), or no count above 0
     """
-    image = _loaded(image)
+    image = _check_image(image)
     total = image.sum(axis=(0, 1), dtype=np.int64)
     loaded = np.flatnonzero(total > 0)
     rows = np.flatnonzero(image.any(axis=(1, 2)))
@@ -207,7 +206,7 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
     }
 
 
-def _loaded(image: NDArray[np.int32]) -> NDArray[np.int32]:
+def _check_image(image: NDArray[np.int32]) -> NDArray[np.int32]:
     counts: NDArray[np.int32] = arguments.numbers("image", image, np.int32)
     if counts.ndim != 3 or not counts.any() or counts.min() < 0:
         raise refused("image", f" has shape {counts.shape}: must be rows x columns x frames of counts, loaded once")
@@ -215,10 +214,8 @@ def _loaded(image: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def _events_table(path: Path) -> dict[tuple[str, int], dict[str, int]]:
-    if not path.exists():
-        return {}
     columns = {e: f"{e}_frame" for e in ("contact", "heel_off", "foot_off")}
-    rows = text.table(path, ["subject", "trial", *columns.values()])
+    rows = text.table(path, ["subject", "trial", *columns.values()], optional=True)
     whole = [
         {c: int(text.number(row[c], path, int(row["line"]), c)) for c in ("trial", *columns.values())} for row in rows
     ]
@@ -229,13 +226,11 @@ def _events_table(path: Path) -> dict[tuple[str, int], dict[str, int]]:
 
 
 def _trials_table(path: Path) -> dict[tuple[str, int], dict[str, str | float]]:
-    if not path.exists():
-        return {}
     names = {"1": "slow", "2": "normal", "3": "fast"}
     return {
         (row["subject"], int(text.number(row["trial"], path, int(row["line"]), "trial"))): {
             "condition": names.get(row["condition"], row["condition"]),
             "speed_m_s": text.number(row["speed_m_s"], path, int(row["line"]), "speed_m_s"),
         }
-        for row in text.table(path, ["subject", "trial", "condition", "speed_m_s"])
+        for row in text.table(path, ["subject", "trial", "condition", "speed_m_s"], optional=True)
     }

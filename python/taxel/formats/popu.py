@@ -16,7 +16,7 @@ from taxel._base import arguments
 from taxel._base.archive import read_arrays, stored_names
 from taxel._core import FormatError
 from taxel.array import Array
-from taxel.formats.checks import files_at
+from taxel.formats.checks import candidates, files_at
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 
@@ -27,12 +27,7 @@ _NAME = re.compile(r"([a-z]+)(\d*)(?:_(\d+))?")
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: a .npz with ``readings`` and ``pose``."""
-    candidates = sorted(path.glob("*.npz")) if path.is_dir() else [path]
-    return [f for f in candidates if f.suffix == ".npz" and _holds_poses(f)]
-
-
-def _holds_poses(path: Path) -> bool:
-    return {"readings", "pose"} <= set(stored_names(path))
+    return [f for f in candidates(path, "*.npz") if f.suffix == ".npz" and {"readings", "pose"} <= set(stored_names(f))]
 
 
 def trials(path: str | Path) -> Iterator[Trial]:

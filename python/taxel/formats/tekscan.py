@@ -23,7 +23,7 @@ from taxel._base.number_text import refuse_digits
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import files_at, sensor
+from taxel.formats.checks import candidates, files_at, sensor
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 
@@ -45,8 +45,7 @@ _RAW_SUM = re.compile(r"Raw Sum=\s*,*\s*([^,\s]+)")
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``.asf``, ``.csv`` and ``.txt`` whose first line names the data's type."""
-    candidates = sorted(path.iterdir()) if path.is_dir() else [path]
-    return [f for f in candidates if f.suffix.lower() in _ENDINGS and _is_export(f)]
+    return [f for f in candidates(path, "*") if f.suffix.lower() in _ENDINGS and _is_export(f)]
 
 
 def _is_export(path: Path) -> bool:

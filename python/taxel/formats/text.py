@@ -28,7 +28,7 @@ __all__ = [
     "beginning",
     "blocks",
     "first_bytes",
-    "grouped",
+    "group_rows",
     "head",
     "lines",
     "number",
@@ -110,7 +110,7 @@ def _pieces(path: Path) -> Iterator[bytes]:
 
 def _up_to(path: Path, most: int) -> Iterator[bytes]:
     total = 0
-    with _opened(path) as file:
+    with _open(path) as file:
         while piece := file.read(_PIECE):
             total += len(piece)
             if total > most:
@@ -166,12 +166,12 @@ def first_bytes(path: Path, count: int) -> bytes:
 
 
 def _bytes(path: Path, most: int) -> bytes:
-    with _opened(path) as file:
+    with _open(path) as file:
         return file.read(most)
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[BinaryIO]:
+def _open(path: Path) -> Iterator[BinaryIO]:
     """Open a text file, to be read unpacked."""
     with open_file(path) as raw:
         try:
@@ -190,11 +190,11 @@ def _lines(path: Path, data: bytes, begin: int = 0) -> list[str]:
     try:
         content = ends.decode().split("\n")
     except UnicodeDecodeError:
-        content = [_decoded(line) for line in ends.split(b"\n")]
+        content = [_decode(line) for line in ends.split(b"\n")]
     return content[:-1] if content and not content[-1] else content
 
 
-def _decoded(line: bytes) -> str:
+def _decode(line: bytes) -> str:
     try:
         return line.decode()
     except UnicodeDecodeError:
@@ -266,11 +266,11 @@ def blocks(
     ------
     FormatError : as of `numbers`
     """
-    for line, some in grouped(rows, path, first_line, len(names)):
+    for line, some in group_rows(rows, path, first_line, len(names)):
         yield line, _block(some, path, line, names, missing, unmarked)
 
 
-def grouped(
+def group_rows(
     rows: Iterable[Sequence[str]], path: Path, first_line: int, columns: int
 ) -> Iterator[tuple[int, list[Sequence[str]]]]:
     """Yield the rows of a table some after the others, each time with the number of the first line.
@@ -322,13 +322,15 @@ def _block(
     return values
 
 
-def table(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
-    """Read a comma-separated table with a header line; each row also has its ``line``.
+def table(path: Path, columns: Sequence[str], *, optional: bool = False) -> list[dict[str, str]]:
+    """Read a comma-separated table with a header line; each row also has its ``line``; none without an optional one.
 
     Raises
     ------
     FormatError : a column is missing, or a row has another length than the header (names file and line)
     """
+    if optional and not path.exists():
+        return []
     parsed = HeaderTable.read(path.name, lines(path))
     if not parsed.header:
         raise FormatError(f"{path.name}: empty; must begin with a line of column names")

@@ -15,7 +15,7 @@ from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["MARGIN_US", "Trial", "scored_around"]
+__all__ = ["MARGIN_US", "Trial", "scored_around", "stances"]
 
 #: Readers score detections from this time before the first reference event to this time after the last one, us.
 MARGIN_US = 100_000
@@ -138,6 +138,13 @@ class Trial:
     def __repr__(self) -> str:
         events = ", ".join(f"{len(times)} {event}" for event, times in self.truth.items()) or "no truth"
         return escaped(f"Trial({self.name}: {self.recorded!r}, {events})")
+
+
+def stances(ups: NDArray[np.int64], downs: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return each begin of a load with the end that follows it, shape (n, 2); both ascend and alternate."""
+    downs = downs[np.searchsorted(downs, ups[0]) :] if len(ups) else downs[:0]
+    n = min(len(ups), len(downs))
+    return np.stack([ups[:n], downs[:n]], axis=1)
 
 
 def scored_around(truth: Mapping[str, NDArray[np.int64]]) -> tuple[int, int]:

@@ -18,7 +18,7 @@ from taxel._base.files import open_file
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.recording import parts
-from taxel.recording.contents import Board, Contents, S, Source, applied, together
+from taxel.recording.contents import Board, Contents, S, Source, apply_rule, share_clock
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.verdict import Verdict
@@ -36,7 +36,7 @@ def between(of: Contents, start: float, stop: float) -> Contents:
     if len(every) == 1:
         return Contents.of(whole)
     every_part = {name: _between(source, every, start, stop) for name, source in inside(every).items()}
-    apart = Once(lambda: len(every) > 1 and of.main.timing.clock_of is None and not together(every))
+    apart = Once(lambda: len(every) > 1 and of.main.timing.clock_of is None and not share_clock(every))
     return Contents(whole, Slices(every_part, of.main.origin, apart))
 
 
@@ -76,7 +76,7 @@ def _between(of: S, sources: Mapping[str, Source], start: float, stop: float) ->
         count = sum(note.t is None for note in marks.notes())
         return [f"{counted(count, 'note')} without a time"] * bool(count)
 
-    return applied(of, rule, untimed)
+    return apply_rule(of, rule, untimed)
 
 
 def _verdict(of: Source, sources: Mapping[str, Source]) -> Verdict | None:
@@ -112,14 +112,14 @@ class Slices(Mapping[str, Source]):
     """Hold the same part of all sources of a file; refuse access to those whose clock is not that of the interval."""
 
     def __init__(self, every_part: Mapping[str, Source], origin: parts.Origin, apart: Once[bool]) -> None:
-        self._parts, self._one, self._apart = every_part, origin, apart
+        self._parts, self._origin, self._apart = every_part, origin, apart
 
     def __getitem__(self, name: str) -> Source:
         part = self._parts[name]
         if self._apart():
             raise ProblemError(
-                f"{self._one.path}: a slice by one clock, and its sources ({', '.join(self)}) have each its own; say "
-                "on_clock(name) before between"
+                f"{self._origin.path}: a slice by one clock, and its sources ({', '.join(self)}) have each its own; "
+                "say on_clock(name) before between"
             )
         return part
 
@@ -131,7 +131,7 @@ class Slices(Mapping[str, Source]):
 
     def but(self, label: str, part: Source) -> Slices:
         """Return the same with another part in the place of one."""
-        return Slices({**self._parts, label: part}, self._one, self._apart)
+        return Slices({**self._parts, label: part}, self._origin, self._apart)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what there is access to, and the names of the others, so that a pickle reads no other source."""

@@ -24,12 +24,12 @@ __all__ = [
     "Source",
     "Stream",
     "alone",
-    "applied",
-    "named",
+    "apply_rule",
+    "name_remarks",
     "parts_of",
     "several",
+    "share_clock",
     "source_from",
-    "together",
     "with_losses",
 ]  # fmt: skip
 
@@ -141,7 +141,7 @@ def parts_of(of: Source) -> dict[str, parts.Part]:
     return {field.name: getattr(of, field.name) for field in fields(of) if field.metadata.get("is_part", True)}
 
 
-def applied(of: S, rule: Callable[[parts.Part], parts.Part | None], lines: Callable[[], Iterable[str]] = tuple) -> S:
+def apply_rule(of: S, rule: Callable[[parts.Part], parts.Part | None], lines: Callable[[], Iterable[str]] = tuple) -> S:
     """Return a source with a rule applied to each of its parts.
 
     Parameters
@@ -262,14 +262,14 @@ def several(sources: Mapping[str, Source]) -> Several:
         parts.Sensor(first.sensor.array, calibration=no),
         refuse,
         first,
-        are_frames=together(sources),
+        are_frames=share_clock(sources),
         settings=parts.Settings(held=no, registers=no, register_changes=no),
         marks=replace(first.marks, board_changes=no, zeroings=no),
         timing=parts.Timing(no, first.timing.clock_of),
         losses=parts.Losses(
             counts=Once(lambda: {name: source.losses.counts() for name, source in sources.items()}),
             verdict=Once(lambda: _verdict(sources)),
-            remarks=named([(name, source.losses.remarks) for name, source in sources.items()]),
+            remarks=name_remarks([(name, source.losses.remarks) for name, source in sources.items()]),
             truncated=any(losses.truncated for losses in every),
             lost=Once(lambda: tuple(dict.fromkeys(line for losses in every for line in losses.lost()))),
         ),
@@ -283,14 +283,14 @@ def _verdict(sources: Mapping[str, Source]) -> Verdict | None:
     return Verdict._of_sources(known_verdicts) if known_verdicts else None
 
 
-def named(remarks: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[str, ...]:
+def name_remarks(remarks: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[str, ...]:
     """Return the remarks of several recordings as those of one: each with its recording's name if they differ."""
     if len({lines for _, lines in remarks}) == 1:
         return remarks[0][1]
     return tuple(dict.fromkeys(f"{name}: {line}" for name, lines in remarks for line in lines))
 
 
-def together(sources: Mapping[str, Source]) -> bool:
+def share_clock(sources: Mapping[str, Source]) -> bool:
     """Return whether sources share one clock: frames without arrival times, as those of two feet."""
     return all(
         not source.has_events

@@ -20,13 +20,13 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Board, Contents, Source, Stream, alone, source_from, together
+from taxel.recording.contents import Board, Contents, Source, Stream, alone, share_clock, source_from
 from taxel.recording.frames import as_frames, period_us
 from taxel.recording.kinds import ENDINGS
 from taxel.recording.opening import OpenOptions, open_file
 from taxel.recording.parts import Wire
 from taxel.recording.recording import Recording
-from taxel.recording.stored import is_made, stored
+from taxel.recording.stored import is_made, storable
 from taxel.recording.write_csv import write_csv
 from taxel.recording.write_h5 import write_h5
 from taxel.recording.write_mcap import write_mcap
@@ -96,13 +96,13 @@ def convert(
     if frames_hz is not None:
         if isinstance(source, Frames):
             raise refused("frames_hz", ": frames keep their own times; open the file and ask it for frames(rate_hz)")
-        if whole.is_several and together(whole.sources):
+        if whole.is_several and share_clock(whole.sources):
             whole = alone(
                 {name: as_frames(source, frames_hz, name="frames_hz") for name, source in whole.sources.items()}
             )
         else:
             whole = Contents(as_frames(whole.main, frames_hz, name="frames_hz"), whole.sources)
-    written = stored(whole, place)
+    written = storable(whole, place)
     made, lost = written.main, list(written.main.losses.lost())
     match kind:
         case ".lsa":
@@ -133,7 +133,7 @@ def _write_lsa(place: Path, of: Source, overwrite: bool) -> None:
     ):
         made = Path(folder) / "made.lsa"
         payload = of.part(Wire).payload
-        assert payload is not None  # `stored` sets it
+        assert payload is not None  # `storable` sets it
         _core.write_lsa(made, payload.tobytes())
         os.replace(made, part)
     write_whole(done, lambda _: None, overwrite=True)

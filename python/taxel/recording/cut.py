@@ -6,14 +6,13 @@ from dataclasses import replace
 from typing import assert_never
 
 import numpy as np
-from numpy.typing import NDArray
 
 from taxel._base.arguments import finite, instance, text, window
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.recording import parts
 from taxel.recording.changes import Zeroing
-from taxel.recording.contents import Contents, applied
+from taxel.recording.contents import Contents, apply_rule
 from taxel.recording.once import Once
 from taxel.recording.recording import Recording
 
@@ -131,7 +130,8 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
                 calibration = part.calibration.to(lambda whole: None if whole is None else whole._region(columns, rows))
                 return parts.Sensor(small, part.side, part.heel, calibration)
             case parts.Settings():
-                held = Once(lambda: _cropped(part.held(), top, bottom, left, right))
+                inside = np.s_[top:bottom, left:right]
+                held = part.held.to(lambda held: None if held is None else np.ascontiguousarray(held[inside]))
                 return parts.Settings(held, part.registers, part.register_changes)
             case parts.Marks():
                 return replace(part, zeroings=Once(lambda: zeroings(part.zeroings())))
@@ -146,13 +146,7 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
             case _:
                 assert_never(part)
 
-    return Contents.of(applied(of.main, rule, lambda: [*of.main.part(parts.Columns).received(), *of.others()]))
-
-
-def _cropped(
-    held: NDArray[np.uint16] | None, top: int, bottom: int, left: int, right: int
-) -> NDArray[np.uint16] | None:
-    return None if held is None else np.ascontiguousarray(held[top:bottom, left:right])
+    return Contents.of(apply_rule(of.main, rule, lambda: [*of.main.part(parts.Columns).received(), *of.others()]))
 
 
 def span_us(recording: Recording) -> tuple[int, int]:

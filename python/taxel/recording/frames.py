@@ -80,18 +80,18 @@ def as_frames(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz"
     if period is not None and of.untimed:
         raise ProblemError(f"{of.origin.path}: its frames have no times, so they have no rate; see recording.at_rate")
     if isinstance(of, FrameSource):
-        return replace(of, frame_table=replace(of.frame_table, frames=Once(lambda: _resampled(of.table, period))))
+        return replace(of, frame_table=replace(of.frame_table, frames=Once(lambda: _resample(of.table, period))))
     if not isinstance(of, Board):
         # Reading the events raises the error that lists the sources.
         _ = of.table
     header = {part: getattr(of, part) for part in ("marks", "timing", "losses")}
     # The first frame includes the held values.
     header["settings"] = parts.Settings(known(None), of.settings.registers, of.settings.register_changes)
-    frames = Once(lambda: _drawn(of, period))
+    frames = Once(lambda: _draw(of, period))
     return Drawn(of.origin, of.sensor, parts.FrameTable(frames), of.part(parts.Wire), **header)
 
 
-def _drawn(of: Source, period: int | None) -> Frames:
+def _draw(of: Source, period: int | None) -> Frames:
     events, held, stretch = of.table, of.settings.held(), of.timing.stretch
     assert isinstance(events, Events)  # the caller checked
     # A value of 65 535 stands for an unknown one.
@@ -100,7 +100,7 @@ def _drawn(of: Source, period: int | None) -> Frames:
     return Frames.from_events(events, period, *(() if stretch is None else stretch()), held=begins)
 
 
-def _resampled(frames: Frames, period: int | None) -> Frames:
+def _resample(frames: Frames, period: int | None) -> Frames:
     if period is None or not len(frames):
         return frames
     t = np.arange(frames.t[0], frames.t[-1] + 1, period, dtype=np.int64)
@@ -137,7 +137,7 @@ def _at_rate(of: Source, rate_hz: float) -> Source:
     return replace(of, frame_table=frame_table, marks=replace(of.marks, notes=of.marks.notes.to(notes)))
 
 
-def calibrated(of: Source, rate_hz: float | None = None, rest: Tare | None = None) -> FrameSource:
+def calibrate(of: Source, rate_hz: float | None = None, rest: Tare | None = None) -> FrameSource:
     """Return the same recording as frames in N or kPa, by its calibration.
 
     Parameters

@@ -17,7 +17,7 @@ from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats.layout import Layout, packaged
+from taxel.formats.layout import Layout, load_packaged
 from taxel.frames import Frames
 from taxel.recording.contents import Board, Contents, FrameSource, S, Source, Stream, alone
 from taxel.recording.frames import times_at
@@ -61,7 +61,7 @@ def on_array(of: S, array: Array) -> S:
     return same
 
 
-def laid_out(of: Contents, layout: Layout, *, given: bool) -> Contents:
+def apply_layout(of: Contents, layout: Layout, *, given: bool) -> Contents:
     """Return a recording with what its layout says of it; it says nothing of streams of numbers.
 
     Parameters
@@ -78,13 +78,13 @@ def laid_out(of: Contents, layout: Layout, *, given: bool) -> Contents:
     """
     return alone(
         {
-            name: source if isinstance(source, Stream) else _laid_out(source, layout, given=given)
+            name: source if isinstance(source, Stream) else _apply_layout(source, layout, given=given)
             for name, source in of.sources.items()
         }
     )
 
 
-def _laid_out(of: Source, layout: Layout, *, given: bool) -> Source:
+def _apply_layout(of: Source, layout: Layout, *, given: bool) -> Source:
     """Return a source with what its layout says of it."""
     kind, name, sensor = of.origin.kind, of.origin.name, of.sensor
     strict = given or kind not in _STATING
@@ -128,7 +128,7 @@ def _array(of: Source, layout: Layout) -> Array:
     if not array._is_measured:
         with_names = held if array.shape == held.shape else replace(array, pitch_mm=held.pitch_mm, name=held.name)
         return with_names if held.places is None or array.shape == held.shape else array
-    along = held.places is not None and kind in _ALONG and held.places == _places_along(of)
+    along = kind in _ALONG and held.places == load_packaged(kind).array(held.columns, held, of.sensor.side).places
     if held._is_measured and not along and (held.pitch_mm, held.places) != (array.pitch_mm, array.places):
         raise ProblemError(f"says taxels {array._apart()}; the file says {held._apart()}")
     return array
@@ -136,10 +136,6 @@ def _array(of: Source, layout: Layout) -> Array:
 
 #: Formats with a layout that comes along, which another layout may replace.
 _ALONG = ("gaitpdb",)
-
-
-def _places_along(of: Source) -> object:
-    return packaged(of.origin.kind).array(of.sensor.array.columns, of.sensor.array, of.sensor.side).places
 
 
 #: Kinds of files of one recording, whose times no other one has.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,7 +15,6 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.calibration import Calibration
 from taxel.clock import Clock
 from taxel.detections import Detections
 from taxel.events import Events, repaired_of
@@ -24,12 +22,11 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, named, with_losses
+from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, name_remarks, with_losses
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import UNKNOWN, anything, known
 from taxel.recording.recording import Recording
 from taxel.recording.verdict import Verdict
-from taxel.wire import Registers
 
 T = TypeVar("T")
 #: What has a time of its own.
@@ -79,10 +76,10 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
         raise refused("gap_us", f" is {shown(gap_us)}: must be 0 or more")
     if not sources:
         raise ProblemError("recordings: there must be one or more")
-    return Recording(merged([part._contents for part in sources], gap, beside=beside))
+    return Recording(merge_contents([part._contents for part in sources], gap, beside=beside))
 
 
-def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: bool = False) -> Contents:
+def merge_contents(recordings: Sequence[Contents], gap: float | None = None, *, beside: bool = False) -> Contents:
     """Return the contents of several recordings as those of one; arguments and errors are those of `merge`."""
     sources = [recording.main for recording in recordings]
     if len({part.has_events for part in sources}) > 1:
@@ -139,10 +136,10 @@ class _Merging:
             return FrameSource(frame_table=self.frame_table(), **header)
         return Stream(frame_table=self.frame_table(), stream=parts.Columns(columns), **header)
 
-    def agreed(self, values: Iterable[T], empty: T, line: str, same: Callable[[T, T], bool] = operator.eq) -> T:
+    def agreed(self, values: Iterable[T], empty: T, line: str, key: Callable[[T], object] = lambda value: value) -> T:
         """Return the common value if all recordings agree, else the empty value; then a line says so."""
         first, *others = every = list(values)
-        if all(value is first or same(first, value) for value in others):
+        if all(value is first or key(value) == key(first) for value in others):
             return first
         if any(map(anything, every)):
             self.lost.append(f"{line} (the recordings differ)")
@@ -169,7 +166,7 @@ class _Merging:
             if not self.beside and stated.names not in (None, array.names):
                 self.lost.append(f"the names of the taxels of {name}")
         calibrations = [sensor.calibration() for sensor in sensors]
-        calibration = self.agreed(calibrations, None, "the calibration", _same_calibration)
+        calibration = self.agreed(calibrations, None, "the calibration", lambda stated: stated and stated.to_json())
         if self.beside and calibration is not None and len(sensors) > 1:
             self.lost.append("the calibration (it is of one of the sensors)")
             calibration = None
@@ -184,11 +181,13 @@ class _Merging:
         """Merge registers that are equal, and the values that the taxels held at the beginning."""
         settings = [source.settings for source in self.sources]
         registers = [part.registers() for part in settings]
-        held = _beside_held(self.sources, self.array, self.lefts) if self.beside else self.held()
+        held = self.held_beside() if self.beside else self.held()
         changes = self.agreed((part.register_changes() for part in settings), (), "the settings of the registers")
         return parts.Settings(
             held=known(held),
-            registers=known(self.agreed(registers, None, "the board's registers", _same_registers)),
+            registers=known(
+                self.agreed(registers, None, "the board's registers", lambda held: held and (held, held.array))
+            ),
             register_changes=known(changes),
         )
 
@@ -230,7 +229,7 @@ class _Merging:
         return parts.Losses(
             counts=known(self.agreed((part.counts() for part in losses), {}, "what each received and lost, by cause")),
             verdict=known(verdict),
-            remarks=named([(part.origin.name, part.losses.remarks) for part in self.sources]),
+            remarks=name_remarks([(part.origin.name, part.losses.remarks) for part in self.sources]),
             truncated=any(part.truncated for part in losses),
             rebuilt=known(self.agreed((part.rebuilt() for part in losses), {}, "what reading each had to put up with")),
         )
@@ -240,7 +239,7 @@ class _Merging:
         tables = [table for table in self.tables if isinstance(table, Frames)]
         frames = [source.frame_table for source in self.sources if isinstance(source, FrameSource)]
         return parts.FrameTable(
-            known(_frames(tables, self.shifts, self.array, self.beside)),
+            known(_frames(tables, self.shifts, self.array, self.lefts if self.beside else None)),
             all(part.untimed for part in frames),
             self.agreed((part.turned for part in frames), None, "whether readings were turned"),
         )
@@ -259,6 +258,12 @@ class _Merging:
                 self.lost.append(f"{len(together)} zeroed taxels (the recordings differ)")
                 return ()
         return together
+
+    def held_beside(self) -> NDArray[np.uint16] | None:
+        """Return the values that the taxels of all sensors held at the beginning."""
+        every = [part.settings.held() for part in self.sources]
+        known_lefts = [(values, left) for values, left in zip(every, self.lefts, strict=True) if values is not None]
+        return _side_by_side(np.full(self.array.shape, UNKNOWN, np.uint16), known_lefts) if known_lefts else None
 
     def held(self) -> NDArray[np.uint16] | None:
         """Return the values held at the beginning, if they and the events since imply those held in later parts."""
@@ -294,18 +299,10 @@ def _later(mark: M, shift: int) -> M:
     return replace(mark, t=None if mark.t is None else mark.t + shift)
 
 
-def _same_registers(a: Registers | None, b: Registers | None) -> bool:
-    return a is not None and b is not None and a == b and a.array == b.array
-
-
 def _same_clock(a: Clock | None, b: Clock | None) -> bool:
     if a is None or b is None:
         return False
     return np.array_equal(a.board_us, b.board_us) and np.array_equal(a.arrived_ns, b.arrived_ns)
-
-
-def _same_calibration(a: Calibration | None, b: Calibration | None) -> bool:
-    return a is not None and b is not None and a.to_json() == b.to_json()
 
 
 def _of_files(sources: Sequence[Source], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
@@ -347,18 +344,6 @@ def _begin(part: Source) -> int:
         return part.timing.stretch()[0]
     t = part.table.t
     return int(t.min()) if len(t) else 0
-
-
-def _beside_held(sources: Sequence[Source], array: Array, lefts: Sequence[int]) -> NDArray[np.uint16] | None:
-    """Return the values that the taxels of all sensors held at the beginning."""
-    every = [part.settings.held() for part in sources]
-    if all(values is None for values in every):
-        return None
-    held = np.full(array.shape, UNKNOWN, np.uint16)
-    for values, left in zip(every, lefts, strict=True):
-        if values is not None:
-            held[: values.shape[0], left : left + values.shape[1]] = values
-    return held
 
 
 def _shifts(tables: Sequence[Events | Frames], gap: float | None) -> list[int]:
@@ -410,19 +395,24 @@ def _events(tables: list[Events], shifts: list[int], array: Array, lefts: list[i
     return Events(t[order], x[order], y[order], p[order], array=array, markers=markers, **more)
 
 
-def _frames(tables: list[Frames], shifts: list[int], array: Array, beside: bool) -> Frames:
+def _side_by_side(whole: NDArray[Any], parts: Iterable[tuple[NDArray[Any], int]]) -> NDArray[Any]:
+    """Fill values of a whole sensor with those of its parts, each from a column on; return them."""
+    for values, left in parts:
+        whole[..., : values.shape[-2], left : left + values.shape[-1]] = values
+    return whole
+
+
+def _frames(tables: list[Frames], shifts: list[int], array: Array, lefts: list[int] | None) -> Frames:
+    """Return all frames in order of time, or those of sensors side by side, the first columns of which are `lefts`."""
     units = {table.unit for table in tables}
     if len(units) > 1:
         raise ProblemError(f"recordings: frames in {' and '.join(sorted(units))}; must be in one unit")
     times = [table.t + shift for table, shift in zip(tables, shifts, strict=True)]
-    if beside:
+    if lefts is not None:
         if any(not np.array_equal(t, times[0]) for t in times):
             raise ProblemError("recordings: frames beside one another must have the same times")
-        values = np.zeros((len(times[0]), *array.shape), np.float32)
-        left = 0
-        for table in tables:
-            values[:, : table.array.rows, left : left + table.array.columns] = table.values
-            left += table.array.columns
+        zeros = np.zeros((len(times[0]), *array.shape), np.float32)
+        values = _side_by_side(zeros, zip((table.values for table in tables), lefts, strict=True))
         return Frames(values, times[0], unit=tables[0].unit, array=array)
     t = np.concatenate(times)
     order = np.argsort(t, kind="stable")

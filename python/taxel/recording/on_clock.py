@@ -17,7 +17,7 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Contents, Source, alone, applied
+from taxel.recording.contents import Contents, Source, alone, apply_rule
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import Once
 from taxel.recording.read_mcap import ascending
@@ -48,7 +48,7 @@ def on_clock(of: Contents, name: str) -> Contents:
         raise ProblemError(f"{path}: is on the clock of {whole.timing.clock_of} already")
     to = None if name == HOST else _clock(sources[name])
     moved = {
-        of_source: _moved(source, name, None if of_source == name else _times(_clock(source), to))
+        of_source: _move(source, name, None if of_source == name else _times(_clock(source), to))
         for of_source, source in sources.items()
     }
     if of.is_several:
@@ -82,7 +82,7 @@ def _times(clock: Clock, to: Clock | None) -> Times:
     return times
 
 
-def _moved(of: Source, name: str, times: Times | None) -> Source:
+def _move(of: Source, name: str, times: Times | None) -> Source:
     """Return a source with its times converted to another clock; None leaves them unchanged."""
     if times is None:
         return replace(of, timing=replace(of.timing, clock_of=name))
@@ -138,4 +138,4 @@ def _moved(of: Source, name: str, times: Times | None) -> Source:
             case _:
                 assert_never(part)
 
-    return applied(of, rule, of.part(parts.Columns).received)
+    return apply_rule(of, rule, of.part(parts.Columns).received)

@@ -29,7 +29,7 @@ from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording import parts
 from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, several, source_from
 from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_table_of_taxel, kind_of
-from taxel.recording.layout import check_size, laid_out, on_array
+from taxel.recording.layout import apply_layout, check_size, on_array
 from taxel.recording.once import known
 from taxel.recording.read_csv import check_head, read_csv
 from taxel.recording.read_foreign import is_of_another_program, read_foreign
@@ -38,7 +38,7 @@ from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
 from taxel.recording.read_npz import read_npz
 from taxel.recording.read_ros import Topics, read_ros
-from taxel.recording.recording import Recording, noted
+from taxel.recording.recording import Recording, add_notes
 from taxel.recording.sidecars import labels_of, with_sidecars
 from taxel.recording.without_layout import refuse_without_layout
 
@@ -233,15 +233,18 @@ def open_file(place: Path, options: OpenOptions) -> Recording:
         else:
             array = None if options.array is None else instance("array", options.array, Array)
             contents = _read(place, kind, array, options.pairing, options.differences)
-        return Recording(
-            with_sidecars(contents if layout is None else laid_out(contents, layout, given=options.layout is not None))
-        )
+        return _with_layout(contents, layout, given=options.layout is not None)
     except MemoryError:
         raise helped(
             FormatError(f"{place}: needs more memory than there is ({limits.available()} bytes are available)"),
             "limit",
             "larger",
         ) from None
+
+
+def _with_layout(contents: Contents, layout: Layout | None, *, given: bool) -> Recording:
+    """Return a recording with what its layout, if any, and the files beside it say of it; see `apply_layout`."""
+    return Recording(with_sidecars(contents if layout is None else apply_layout(contents, layout, given=given)))
 
 
 def _on_given(of: Source, array: Array) -> Source:
@@ -278,7 +281,7 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
         _warn_of_tables(folder, recorded, files, options)
         opened = [_count_memory(open_file(file, options)) for file in recorded]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
-    elif not (names := _formats_of(folder)) and (foreign := _laid_out_in(files, options.layout)):
+    elif not (names := _formats_of(folder)) and (foreign := _with_layouts(files, options.layout)):
         pairs = [(file.relative_to(folder), _count_memory(open_file(file, options))) for file in foreign]
     else:
         if len(names) != 1:
@@ -294,7 +297,7 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
             raise FormatError(f"{folder}: holds {problem}; {hint or known_kinds}")
         trials = sorted(_counting_memory(formats.trials(folder, names[0])), key=lambda trial: _order(Path(trial.name)))
         pairs = [(Path(trial.name), _recording_of(trial, folder, names[0], options.layout)) for trial in trials]
-    return _labelled(folder / LABELS, pairs)
+    return _add_labels(folder / LABELS, pairs)
 
 
 def _counting_memory(trials: Iterable[Trial]) -> Iterator[Trial]:
@@ -325,7 +328,7 @@ def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path
     """Warn of tables and arrays with a layout that are left out beside recordings, but for those converted to one."""
     stems = {file.stem for file in recorded}
     left = [
-        file.name for file in _laid_out_in(files, options.layout) if file not in recorded and file.stem not in stems
+        file.name for file in _with_layouts(files, options.layout) if file not in recorded and file.stem not in stems
     ]
     if left:
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
@@ -337,7 +340,7 @@ def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path
         )
 
 
-def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recording]:
+def _add_labels(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recording]:
     """Add the reference events of a folder to the notes of its recordings."""
     if not table.exists():
         return [recording for _, recording in pairs]
@@ -371,7 +374,7 @@ def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     if not contents.is_several:
         return recording.with_notes(_notes(labels, name, contents.main))
     sources = {
-        label: source if isinstance(source, Stream) else noted(source, tuple(_notes(labels, name, source)))
+        label: source if isinstance(source, Stream) else add_notes(source, tuple(_notes(labels, name, source)))
         for label, source in contents.sources.items()
     }
     return Recording(Contents(several(sources), sources))
@@ -396,21 +399,21 @@ def _notes(labels: Labels, name: Path, of: Source) -> list[Note]:
     )
 
 
-def _laid_out_in(files: Sequence[Path], given: str | os.PathLike[str] | None) -> list[Path]:
+def _with_layouts(files: Sequence[Path], given_layout: str | os.PathLike[str] | None) -> list[Path]:
     """Return the files of a folder that are of another program, and of which a layout says how to read them."""
     foreign = (file for file in files if not file.name.endswith(".notes.csv") and is_of_another_program(file))
-    return [file for file in foreign if given is not None or Layout.beside(file) is not None]
+    return [file for file in foreign if given_layout is not None or Layout.beside(file) is not None]
 
 
-def _layout(place: Path, given: str | os.PathLike[str] | Layout | None) -> Layout | None:
+def _layout(place: Path, stated: str | os.PathLike[str] | Layout | None) -> Layout | None:
     """Return what the given layout file says, or the one beside a recording; None if there is none."""
-    if isinstance(given, Layout):
-        return given
-    file = Layout.beside(place) if given is None else Path(arguments.checked_path("layout", given))
+    if isinstance(stated, Layout):
+        return stated
+    file = Layout.beside(place) if stated is None else Path(arguments.checked_path("layout", stated))
     return None if file is None else Layout.read(file)
 
 
-def _recording_of(trial: Trial, place: Path, kind: str, given: str | os.PathLike[str] | None) -> Recording:
+def _recording_of(trial: Trial, place: Path, kind: str, given_layout: str | os.PathLike[str] | None) -> Recording:
     """Return a trial of another format as a recording, with its reference events as notes."""
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
@@ -427,8 +430,8 @@ def _recording_of(trial: Trial, place: Path, kind: str, given: str | os.PathLike
             losses=parts.Losses(lost=known(_beside_frames(trial))),
         )
     )
-    layout = _layout(place, given)
-    return Recording(with_sidecars(contents if layout is None else laid_out(contents, layout, given=given is not None)))
+    layout = _layout(place, given_layout)
+    return _with_layout(contents, layout, given=given_layout is not None)
 
 
 def _beside_frames(trial: Trial) -> tuple[str, ...]:
@@ -447,7 +450,7 @@ def recordings_in(folder: Path, layout: str | os.PathLike[str] | None = None) ->
     bags = sorted((file for file in files if os.access(file, os.R_OK) and is_bag(file)), key=_order)
     recorded = [file for file in files if file not in bags and _is_written_by_taxel(file)]
     others = [file for kind in formats.FORMATS.values() for file in kind.files(folder)]
-    found = recorded or [file for file in others if file not in bags] or ([] if bags else _laid_out_in(files, layout))
+    found = recorded or [file for file in others if file not in bags] or ([] if bags else _with_layouts(files, layout))
     return [*sorted(found, key=_order), *bags]
 
 
@@ -488,7 +491,7 @@ def _format_or_kind(file: Path, layout: str | os.PathLike[str] | None) -> str:
     return "foreign" if is_of_another_program(file) and _layout(file, layout) is not None else kind_of(file)
 
 
-def joined(opened: Sequence[Recording]) -> list[Recording]:
+def join_feet(opened: Sequence[Recording]) -> list[Recording]:
     """Return recordings with the feet of each trial joined as its sources, `left` and `right`.
 
     Parameters
@@ -530,10 +533,10 @@ def sensors(recording: Recording) -> list[Recording]:
 
 def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordings") -> list[Recording]:
     """Return each sensor of recordings as one of its own; refuse what is no recording."""
-    given = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
-    if not len(given):
+    every = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
+    if not len(every):
         raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
-    return [recording for entry in given for recording in sensors(instance(name, entry, Recording))]
+    return [recording for entry in every for recording in sensors(instance(name, entry, Recording))]
 
 
 def _formats_of(place: Path) -> list[str]:

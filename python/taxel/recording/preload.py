@@ -26,11 +26,9 @@ def without_preload(recording: Recording, first_us: int) -> tuple[Tare | None, s
     read = (source, of_quiet(source)) if isinstance(source, Frames) else readings(recording)
     if read is None or not read[1].preload_at or read[1].quiet_us is None or read[1].quiet_us[0] >= first_us:
         return None, ""
-    span, line = _without(read[0], read[1], first_us), f"{recording.path}: the rest is {read[1]}"
-    if span is None:
-        return None, f"{line}, and there is no other rest, so the tare holds it; give a tare's file"
-    tare = Tare.take(source, start_us=span[0], stop_us=span[1], note=str(recording.path))
-    return tare, f"{line}, so the tare is of a time without it"
+    span = _without(read[0], read[1], first_us)
+    tare = None if span is None else Tare.take(source, start_us=span[0], stop_us=span[1], note=str(recording.path))
+    return tare, _line(recording, read[1], found=span is not None)
 
 
 def free_of_preload(recording: Recording, rest: Rest) -> tuple[tuple[int, int] | None, str]:
@@ -41,11 +39,16 @@ def free_of_preload(recording: Recording, rest: Rest) -> tuple[tuple[int, int] |
     source = recorded(recording)
     read = (source,) if isinstance(source, Frames) else readings(recording)
     assert read is not None  # a rest is of values
-    free, line = _free(read[0], rest), f"{recording.path}: the rest is {rest}"
+    free = _free(read[0], rest)
     span = _later(read[0], free) if len(free) else None
-    if span is None:
-        return rest.quiet_us, f"{line}, and there is no other rest, so the tare holds it; give a tare's file"
-    return span, f"{line}, so the tare is of a time without it"
+    return rest.quiet_us if span is None else span, _line(recording, rest, found=span is not None)
+
+
+def _line(recording: Recording, rest: Rest, *, found: bool) -> str:
+    """Return the line on a tare beside a rest with something on the array, where a time without it was found or not."""
+    without = "so the tare is of a time without it"
+    lacks = "and there is no other rest, so the tare holds it; give a tare's file"
+    return f"{recording.path}: the rest is {rest}, {without if found else lacks}"
 
 
 def _free(frames: Frames, rest: Rest) -> NDArray[np.int64]:

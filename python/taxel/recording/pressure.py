@@ -24,12 +24,12 @@ from taxel.recording.recording import Recording
 from taxel.recording.rest import (
     FrameBlock,
     Rest,
+    find_rest,
     flickering,
-    found,
+    frames_above,
     loaded_from,
     of_frames,
     ticks_by_unit,
-    tracked,
 )
 from taxel.tare import Tare
 
@@ -44,9 +44,6 @@ _TRACKED_US, _STRETCH = 50_000, 10
 #: In silence, where nothing changes, the rest is tracked so many times, and then after each further one in so many of
 #: it: a wrong time stamp may make it one of years.
 _IN_SILENCE = 64
-#: *Reading*: noise adds up to at most so many times the greatest sum of the stretch of this length, us, in which it is
-#: least, and so many taxels just above the floor (crates/taxel-panel/src/keyframe_index/frames.rs has the same).
-_TIMES_LEAST, _STRETCH_US, _NOISY_TAXELS = 1.5, 250_000, 4
 #: Largest rectangle around the taxels with events whose rest is tracked with regard to neighbours.
 _MOST_PLACES = 1 << 18
 
@@ -112,19 +109,11 @@ class Series:
         area = over(lambda block: block.area(above) if in_mm2 else block.loaded(above).astype(np.float64))
         centre, total = None if array.is_channels else over(lambda block: block.centre(above)), over(loaded_sum)
         if centre is not None and rest.source == "quiet" and len(frames):
-            centre[total <= _of_noise(frames.t, total, above)] = np.nan
+            centre[total <= _core.frame_noise(frames.t, total, above)] = np.nan
         return cls(
             frames.t, frames.unit, above, None if array.is_channels else area, over(Frames.peak), total,
             centre, "mm2" if in_mm2 else "taxels", array.centre_unit or "", rest, force_n(frames),
         )  # fmt: skip
-
-
-def _of_noise(t: NDArray[np.int64], total: NDArray[np.float64], above: float) -> float:
-    """Return the most that the noise of frames adds up to, as on the page: by the stretch in which it is least."""
-    begins = np.flatnonzero(np.diff((t - t[0]) // _STRETCH_US, prepend=-1))
-    greatest = np.maximum.reduceat(total, begins)
-    # The last one may be short.
-    return float(_TIMES_LEAST * greatest[: max(1, len(greatest) - 1)].min() + _NOISY_TAXELS * above)
 
 
 def force_n(frames: Frames) -> NDArray[np.float64] | None:
@@ -353,7 +342,7 @@ class _Drawn:
     def found(self) -> Rest:
         """Return the rest that a quiet stretch shows; its values are those of the taxels with events."""
         size, blocks = self.box[0] * self.box[1], lambda: (block for _, block in self.blocks())
-        rest = found(blocks, size, self.box[1], corner=self.corner, stands_for=self.sampled[1])
+        rest = find_rest(blocks, size, self.box[1], corner=self.corner, stands_for=self.sampled[1])
         preload = None if rest.preload is None else rest.preload[self.places]
         # A board's comparators are turned by its register, not by a layout file.
         return replace(rest, values=rest.values[self.places], preload=preload, falls=False)
@@ -389,7 +378,7 @@ class _Drawn:
 def _above(rest: Rest, blocks: Iterable[FrameBlock], columns: int, scale: float = 1.0) -> Iterable[FrameBlock]:
     """Yield frames above a rest: tracked where none is given; 0 where a value or its rest is not known."""
     if rest.source in ("quiet", "none"):
-        yield from tracked(rest, blocks, columns, scale)
+        yield from frames_above(rest, blocks, columns, scale)
         return
     known = np.where(np.isnan(rest.values), np.inf, rest.values)
     for t, values in blocks:
@@ -429,7 +418,7 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
     half a tick, as in `taxel.encode.ContactArea`; in another unit the range of a recording's values counts as 150
     ticks; in one of force or pressure by more than six times the noise of a quiet stretch, or than 0 without one.
     """
-    read = _read(recording, tare)
+    read = readings(recording, tare)
     if read is None:
         return None
     frames, rest, floor = read
@@ -470,14 +459,6 @@ def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
     return drawn.frames(_rest_of(recording, drawn, None), events.array)[len(from_first) - len(t) :]
 
 
-def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:
-    """Return raw frames, the rest of each taxel, and the threshold of a loaded taxel; None without intensities.
-
-    The rest is as of `above_rest`, but that of a quiet stretch as it was there.
-    """
-    return _read(recording, tare)
-
-
 def quiet_rest(recording: Recording) -> Rest | None:
     """Return the rest that a quiet stretch of a board's events shows, on their held values; None without intensities.
 
@@ -487,10 +468,14 @@ def quiet_rest(recording: Recording) -> Rest | None:
     return None if present is None or not present.any() else _Drawn.of(recording).found()
 
 
-def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float] | None:
+def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:
+    """Return raw frames, the rest of each taxel, and the threshold of a loaded taxel; None without intensities.
+
+    The rest is as of `above_rest`, but that of a quiet stretch as it was there.
+    """
     if not recording.has_events:
         frames = recording.frames()
-        rest = _rest_of_frames(recording, frames, tare)
+        rest = _measured(recording, tare) or of_frames(frames)
         return frames, rest, loaded_from(frames, rest)
     events = recording.events
     if events.present is None or not events.present.any():
@@ -507,22 +492,19 @@ def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float]
 
 def _rest_of(recording: Recording, drawn: _Drawn, tare: Tare | None) -> Rest:
     """Return the rest of the taxels with events, in their order."""
-    given = _given(recording, tare)
-    rest = drawn.found() if given is None else replace(given, values=given.values[drawn.taxels])
+    measured = _measured(recording, tare)
+    rest = drawn.found() if measured is None else replace(measured, values=measured.values[drawn.taxels])
     return replace(rest, zeroed=len({k for k, *_ in drawn.zeroed}))
 
 
-def _rest_of_frames(recording: Recording, frames: Frames, tare: Tare | None) -> Rest:
-    given = _given(recording, tare)
-    return of_frames(frames) if given is None else given
-
-
-def _given(recording: Recording, tare: Tare | None) -> Rest | None:
+def _measured(recording: Recording, tare: Tare | None) -> Rest | None:
     """Return the measured rest; NaN where a taxel has none."""
     if tare is not None:
         if tare.array.shape != recording.array.shape:
-            given, stated = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
-            raise ProblemError(f"the tare is of {given} taxels, {recording.path} of {stated}")
+            measured, stated = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
+            raise ProblemError(f"the tare is of {measured} taxels, {recording.path} of {stated}")
         return Rest("tare", tare.rest.reshape(-1))
-    of = recording.calibration
-    return None if of is None or of.rest is None else Rest("calibration", of.rest.reshape(-1))
+    calibration = recording.calibration
+    if calibration is None or calibration.rest is None:
+        return None
+    return Rest("calibration", calibration.rest.reshape(-1))

@@ -154,38 +154,39 @@ def _csv_events(path: Path, names: list[str], blocks: Iterator[_Block], array: A
         raise FormatError(f"{path}: {error}") from None
 
 
-def _sensor(path: Path, exists: NDArray[np.bool_], names: list[str] | None) -> Array:
-    """Return the sensor that the first line describes."""
-    try:
-        rows, columns = exists.shape
-        return Array(rows, columns, exists=None if exists.all() else exists, names=names)
-    except ProblemError as error:
-        raise FormatError(f"{path}, line 1: {error}") from None
+def sensor_of(x: NDArray[np.int64], y: NDArray[np.int64], names: list[str] | None = None) -> Array:
+    """Return the sensor whose taxels are these columns and rows."""
+    exists = np.zeros((int(y.max()) + 1, int(x.max()) + 1), bool)
+    exists[y, x] = True
+    return Array(*exists.shape, exists=None if exists.all() else exists, names=names)
+
+
+def _places(path: Path, names: list[str], array: Array | None) -> tuple[list[tuple[int, int]], list[str] | None]:
+    """Return column and row of each taxel, and their names where those do not say them."""
+    matches = [_TAXEL.fullmatch(name) for name in names]
+    if all(matches):
+        return [(int(m[1]), int(m[2])) for m in matches if m is not None], None
+    if any(matches):
+        odd = names[matches.index(None)]
+        raise FormatError(f"{path}, line 1: column {shown(odd)} among taxels: must be named like x3y5")
+    rows, columns = (1, len(names)) if array is None else array.shape
+    if rows * columns != len(names):
+        raise FormatError(f"{path}, line 1: {counted(len(names), 'column')} for an array of {rows} x {columns} taxels")
+    return [(k % columns, k // columns) for k in range(len(names))], names
 
 
 def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: Array | None) -> Frames:
-    matches, called = [_TAXEL.fullmatch(name) for name in names[1:]], None
-    if all(matches):
-        places = [(int(m[1]), int(m[2])) for m in matches if m is not None]
-    elif any(matches):
-        odd = next(name for name, m in zip(names[1:], matches, strict=True) if m is None)
-        raise FormatError(f"{path}, line 1: column {shown(odd)} among taxels: must be named like x3y5")
-    else:
-        shape = (1, len(names) - 1) if array is None else array.shape
-        if shape[0] * shape[1] != len(names) - 1:
-            raise FormatError(
-                f"{path}, line 1: {counted(len(names) - 1, 'column')} for an array of {shape[0]} x {shape[1]} taxels"
-            )
-        places, called = [(k % shape[1], k // shape[1]) for k in range(len(names) - 1)], names[1:]
+    places, called = _places(path, names[1:], array)
     x, y = np.array(places).T
     rows, columns = (int(y.max()) + 1, int(x.max()) + 1) if array is None else array.shape
     sparse = f"{path}, line 1: {counted(len(places), 'column')} for {rows} x {columns} taxels: most are missing"
     if array is None:
         if rows * columns > TAXELS:
             raise FormatError(sparse)
-        exists = np.zeros((rows, columns), bool)
-        exists[y, x] = True
-        sensor = _sensor(path, exists, called)
+        try:
+            sensor = sensor_of(x, y, called)
+        except ProblemError as error:
+            raise FormatError(f"{path}, line 1: {error}") from None
     elif x.max() >= columns or y.max() >= rows:
         k = int(np.flatnonzero((x >= columns) | (y >= rows))[0])
         raise FormatError(f"{path}, line 1: column {names[k + 1]!r} lies outside {rows} x {columns} taxels")

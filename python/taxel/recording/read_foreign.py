@@ -98,8 +98,8 @@ def read_foreign(path: Path, layout: Layout) -> Source:
     Returns
     -------
     Source
-        Readings as they are in the file: `taxel.recording.layout.laid_out` turns those that fall. Without a time column
-        and a rate the time of a frame is its number in us: 0, 1, 2 ...
+        Readings as they are in the file: `taxel.recording.layout.apply_layout` turns those that fall. Without a time
+        column and a rate the time of a frame is its number in us: 0, 1, 2 ...
 
     Raises
     ------
@@ -145,7 +145,7 @@ def unit_of(name: str) -> str | None:
     return None if found is None else (found["within"] or found["after"] or "").lower()
 
 
-def listed(shapes: Mapping[str, tuple[int, ...]]) -> str:
+def list_arrays(shapes: Mapping[str, tuple[int, ...]]) -> str:
     """Return the names and shapes of the first arrays, those that could hold frames before the others."""
     first = sorted(shapes.items(), key=lambda entry: len(entry[1]) not in (2, 3))[:8]
     names = [f"{_short(name) or 'an array'} ({' x '.join(map(str, shape)) or 'one number'})" for name, shape in first]
@@ -189,7 +189,7 @@ def _table(path: Path, layout: Layout) -> _Read:
     below = lines[1:] if named else lines
     # A line of units may stand between names and numbers.
     units = cells(below[0], how.separator) if named and len(below) > 1 else []
-    in_units = are_units(names, units) and (how.missing is None or _unquoted(how.missing) not in units)
+    in_units = are_units(names, units) and (how.missing is None or _unquote(how.missing) not in units)
     above = named + in_units
     begin = next(islice(_lines(path, how), above, None), None)
     # A last column may be empty everywhere, as of a taxel that is dead.
@@ -232,7 +232,7 @@ def _read(
     rows: Iterable[Sequence[str]], path: Path, first: int, names: Sequence[str], time: int | None, how: Table
 ) -> tuple[NDArray[np.float32], NDArray[np.int64] | None]:
     """Return the readings of a table and its times, us, which are the column `time`."""
-    missing = frozenset() if how.missing is None else frozenset({_unquoted(how.missing), "nan"})
+    missing = frozenset() if how.missing is None else frozenset({_unquote(how.missing), "nan"})
     read = Growing(str(path), values=((len(names) - (time is not None),), np.float32), t=((), np.int64))
     for line, block in text.blocks(rows, path, first, names, missing, unmarked=how.missing is None):
         if time is None:
@@ -269,10 +269,10 @@ def cells(line: str, separator: str) -> list[str]:
     if '"' in line and separator != " ":
         with suppress(csv.Error):
             parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    return [_unquoted(part.strip()) for part in parts]
+    return [_unquote(part.strip()) for part in parts]
 
 
-def _unquoted(cell: str) -> str:
+def _unquote(cell: str) -> str:
     return cell.strip("\"'")
 
 
@@ -338,7 +338,7 @@ def _is_number(cell: str, how: Table) -> bool:
     try:
         float_of(cell)
     except ValueError:
-        return how.missing is not None and cell == _unquoted(how.missing)
+        return how.missing is not None and cell == _unquote(how.missing)
     return True
 
 
@@ -375,7 +375,7 @@ def _data(path: Path, how: Data) -> _Read:
         every = shapes_of(path)
         stored_names = list(every)
         if how.array is None and len(stored_names) != 1:
-            raise FormatError(f"{path}: holds {listed(every)}; say which in the layout: [data] array")
+            raise FormatError(f"{path}: holds {list_arrays(every)}; say which in the layout: [data] array")
         # A path within a .h5 may begin at its root.
         named = [name if name in every else name.strip("/") for name in (how.array, how.time) if name is not None]
         wanted = [stored_names[0], *named] if how.array is None else named
@@ -385,7 +385,7 @@ def _data(path: Path, how: Data) -> _Read:
                 raise FormatError(f"{path}, {missing}: {why}")
             size = as_size(missing)
             hint = f"; a size is said by {size}" if size else ""
-            raise FormatError(f"{path}: holds no array {missing}; there are {listed(every)}{hint}")
+            raise FormatError(f"{path}: holds no array {missing}; there are {list_arrays(every)}{hint}")
         if len(wanted) > 1 and every[wanted[1]] != every[wanted[0]][:1]:
             count, frames = math.prod(every[wanted[1]]), math.prod(every[wanted[0]][:1])
             raise FormatError(f"{path}, {wanted[1]}: {counted(count, 'time')} for {counted(frames, 'frame')}")

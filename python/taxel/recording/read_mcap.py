@@ -74,7 +74,7 @@ class _Source:
         self.ending = ending or {}
         self.array = array_of(self.header["array"])
         # Those of the recording that a source was converted from.
-        self.before = _stated(path, "counts", counts_of, self.header.get("counts")) or {}
+        self.before = _read_entry(path, "counts", counts_of, self.header.get("counts")) or {}
         self.remarks = Once(lambda: self.reader().remarks())
         label = self.header.get("name", "board")
         self.origin = parts.Origin(path, path.name, "mcap", label, self.header["source"])
@@ -152,7 +152,7 @@ class _Source:
             damage = {"frames": len(t), "frames_that_could_not_be_read": bad}
             return {**damage, "received": self.counted().get("received"), **self.rebuilt()}
 
-        turned = _stated(path, "turned", turned_of, about.get("turned"))
+        turned = _read_entry(path, "turned", turned_of, about.get("turned"))
         frame_table = parts.FrameTable(Once(frames), not about.get("clock", True), turned)
         header: dict[str, Any] = {"settings": self.settings(), "marks": self.marks(), "losses": self.losses(counts)}
         if not about.get("columns"):
@@ -274,7 +274,7 @@ class _Source:
         return not self.header.get("converted") and any(counts["decoder"].get(cause, 0) for cause in causes)
 
 
-def _stated(path: Path, entry: str, read: Callable[[Any], Any], value: Any) -> Any:
+def _read_entry(path: Path, entry: str, read: Callable[[Any], Any], value: Any) -> Any:
     """Return what an entry of a header states; None if it is not there."""
     try:
         return None if value is None else read(value)

@@ -63,17 +63,17 @@ class Topics:
         """Return each topic with its field and its array."""
         topics, fields, arrays = _texts("topic", self.topic), _texts("field", self.field), _arrays(array)
         count = max(len(topics), len(fields), len(arrays))
-        for name, given in (("topic", len(topics)), ("field", len(fields)), ("array", len(arrays))):
-            if given not in (0, 1, count):
-                raise refused(name, f": given {given} times for {count} sources; must be once, or for each")
+        for name, times in (("topic", len(topics)), ("field", len(fields)), ("array", len(arrays))):
+            if times not in (0, 1, count):
+                raise refused(name, f": given {times} times for {count} sources; must be once, or for each")
         topics = topics * count if len(topics) == 1 else topics
         every_field: Sequence[str | None] = fields * count if len(fields) == 1 else fields or [None] * count
         every_array: Sequence[Array | None] = arrays * count if len(arrays) == 1 else arrays or [None] * count
         return [Chosen(*choice) for choice in zip(topics, every_field, every_array, strict=True)]
 
 
-def _texts(name: str, given: str | Sequence[str] | None) -> list[str]:
-    entries = [given] if isinstance(given, str) else [] if given is None else arguments.several(name, given)
+def _texts(name: str, texts: str | Sequence[str] | None) -> list[str]:
+    entries = [texts] if isinstance(texts, str) else [] if texts is None else arguments.several(name, texts)
     return [arguments.text(name, entry) for entry in entries]
 
 

@@ -26,7 +26,7 @@ from taxel.labels import Note
 from taxel.recording.between import Slices, between, inside
 from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Contents, S, Stream
-from taxel.recording.frames import as_frames, at_rate, calibrated
+from taxel.recording.frames import as_frames, at_rate, calibrate
 from taxel.recording.kinds import kind_of_file, verdict_of
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import UNKNOWN, Once
@@ -203,7 +203,7 @@ class Recording:
         ------
         ProblemError : no calibration lies beside it, or one of another array
         """
-        return calibrated(self._contents.main, rate_hz, rest).table
+        return calibrate(self._contents.main, rate_hz, rest).table
 
     @property
     def side(self) -> str:
@@ -516,11 +516,11 @@ def with_notes(of: Contents, more: tuple[Note, ...]) -> Contents:
     """Return the same contents with further notes."""
     label, sources = of.main.origin.label, of.sources
     if label in sources:
-        source = noted(inside(sources)[label], more)
+        source = add_notes(inside(sources)[label], more)
         sources = sources.but(label, source) if isinstance(sources, Slices) else {**sources, label: source}
-    return Contents(noted(of.main, more), sources)
+    return Contents(add_notes(of.main, more), sources)
 
 
-def noted(of: S, more: tuple[Note, ...]) -> S:
+def add_notes(of: S, more: tuple[Note, ...]) -> S:
     """Return the same source with further notes."""
     return replace(of, marks=replace(of.marks, notes=Once(lambda: of.marks.notes() + more)))

@@ -207,7 +207,7 @@ def _extremes(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray
     return least, most
 
 
-def found(
+def find_rest(
     blocks: Callable[[], Iterable[FrameBlock]],
     taxels: int,
     columns: int,
@@ -286,7 +286,7 @@ def of_quiet(frames: Frames) -> Rest:
 def _of_rising(frames: Frames, scale: float, *, falls: bool = False) -> Rest:
     """Return the rest that a quiet stretch of frames shows if their values rise with pressure, or if they fall."""
     blocks, columns = _blocks(frames), frames.array.columns
-    return found(lambda: blocks, frames.array.rows * columns, columns, scale, falls=falls)
+    return find_rest(lambda: blocks, frames.array.rows * columns, columns, scale, falls=falls)
 
 
 def _blocks(frames: Frames) -> list[FrameBlock]:
@@ -315,7 +315,7 @@ def _fall(frames: Frames, quiet_us: tuple[int, int], scale: float) -> bool:
     return bool(deepest > max(_FALLS * most, 2 * LOADED_TICKS / scale))
 
 
-def tracked(rest: Rest, blocks: Iterable[FrameBlock], columns: int, scale: float = 1.0) -> Iterable[FrameBlock]:
+def frames_above(rest: Rest, blocks: Iterable[FrameBlock], columns: int, scale: float = 1.0) -> Iterable[FrameBlock]:
     """Yield frames above a rest that is tracked, from a quiet stretch or from the first values; 0 below it."""
     at = _core.TrackedRest(columns, NOISE_FLOOR, rest.values * scale, rest.falls)
     for t, values in blocks:

@@ -8,8 +8,8 @@ from pathlib import Path
 from taxel._core import ProblemError
 from taxel.calibration import Calibration
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording.contents import Contents, FrameSource, Source, Stream, alone, together
-from taxel.recording.frames import calibrated
+from taxel.recording.contents import Contents, FrameSource, Source, Stream, alone, share_clock
+from taxel.recording.frames import calibrate
 from taxel.recording.once import Once, known
 from taxel.recording.parts import Origin
 from taxel.recording.recording import Recording
@@ -18,7 +18,7 @@ from taxel.recording.recording import Recording
 def with_sidecars(of: Contents) -> Contents:
     """Return the contents of a file with the labels of `NAME.notes.csv` and the calibration in its folder."""
     # Labels are by the clock of the file's first source, or of all.
-    labelled = set(of.sources) if together(of.sources) else {*list(of.sources)[:1]}
+    labelled = set(of.sources) if share_clock(of.sources) else {*list(of.sources)[:1]}
     return alone({name: _of_one(source, labelled=name in labelled) for name, source in of.sources.items()})
 
 
@@ -48,11 +48,6 @@ def labels_of(origin: Origin) -> tuple[Path, str, str]:
     return origin.path, origin.label, trial_of(origin.name, origin.label)
 
 
-def has_calibration(path: Path) -> bool:
-    """Return whether a calibration file lies beside a file."""
-    return Calibration.beside(path) is not None
-
-
 def calibration_beside(path: Path, of: Source) -> Once[Calibration | None]:
     """Return the calibration beside a file (`Calibration.beside`); None if there is none.
 
@@ -64,10 +59,10 @@ def calibration_beside(path: Path, of: Source) -> Once[Calibration | None]:
         place = Calibration.beside(path)
         return None if place is None else _fitting(place, of)
 
-    return Once(read, lambda: has_calibration(path))
+    return Once(read, lambda: Calibration.beside(path) is not None)
 
 
-def calibrated_by(recording: Recording, place: Path) -> Recording:
+def calibrate_by(recording: Recording, place: Path) -> Recording:
     """Return a recording, or each sensor of one with several, as frames in N or kPa by a calibration file.
 
     Raises
@@ -80,7 +75,7 @@ def calibrated_by(recording: Recording, place: Path) -> Recording:
         if isinstance(source, Stream):
             return source
         calibration: Once[Calibration | None] = known(_fitting(place, source))
-        return calibrated(replace(source, sensor=replace(source.sensor, calibration=calibration)))
+        return calibrate(replace(source, sensor=replace(source.sensor, calibration=calibration)))
 
     sources = recording._contents.sources
     return Recording(alone({name: with_calibration(source) for name, source in sources.items()}))

@@ -25,18 +25,18 @@ from taxel.recording.contents import (
     FrameSource,
     Source,
     Stream,
-    applied,
+    apply_rule,
     parts_of,
     several,
+    share_clock,
     source_from,
-    together,
     with_losses,
 )
 from taxel.recording.kinds import ENDINGS, verdict_of
 from taxel.recording.once import known
 from taxel.recording.sidecars import calibration_beside
 from taxel.recording.write_csv import array_in_csv
-from taxel.recording.write_mcap import cut_raw, encoded
+from taxel.recording.write_mcap import cut_raw, encode_events
 from taxel.wire import decode as wire_decode
 
 #: The unit of the stamps of wire version 1, us.
@@ -49,7 +49,7 @@ _MOST = 1_000_000
 _Kept = tuple[Source, list[str]]
 
 
-def stored(of: Contents, place: Path) -> Contents:
+def storable(of: Contents, place: Path) -> Contents:
     """Return the contents that a file can hold of a recording; the kind of file is the ending of its path.
 
     Raises
@@ -57,24 +57,24 @@ def stored(of: Contents, place: Path) -> Contents:
     ProblemError : contents that the kind of file cannot hold at all (frames in a .lsa)
     """
     ending, main = place.suffix.lower(), of.main
-    if of.is_several and ending == ".mcap" and together(of.sources):
-        sources = {name: _stored(source, ending, place) for name, source in of.sources.items()}
-        sources = {name: _named(source, f"{place.name} {name}", name) for name, source in sources.items()}
+    if of.is_several and ending == ".mcap" and share_clock(of.sources):
+        sources = {name: _storable(source, ending, place) for name, source in of.sources.items()}
+        sources = {name: _rename(source, f"{place.name} {name}", name) for name, source in sources.items()}
         return Contents(several(sources), sources)
     if of.is_several:
         # Reading the events raises the error that lists the sources.
         _ = main.table
-    source = _stored(main, ending, place)
+    source = _storable(main, ending, place)
     if not isinstance(main, FrameSource) or ending != ".mcap":
-        source = _named(source, place.name, "board")
+        source = _rename(source, place.name, "board")
     return Contents.of(with_losses(source, of.others))
 
 
-def _named(of: Source, name: str, label: str) -> Source:
+def _rename(of: Source, name: str, label: str) -> Source:
     return replace(of, origin=replace(of.origin, name=name, label=label))
 
 
-def _stored(of: Source, ending: str, place: Path) -> Source:
+def _storable(of: Source, ending: str, place: Path) -> Source:
     """Return what a file can hold of a source."""
     source, lines = {".mcap": _mcap, ".lsa": _lsa, ".csv": _csv, ".npz": _table, ".h5": _table}[ending](of, place)
     beside = calibration_beside(place, of)
@@ -134,7 +134,7 @@ def _table(of: Source, _: Path) -> _Kept:
             case _:
                 assert_never(part)
 
-    return applied(of, rule), [*_arrivals(of), *wire.lines(with_times=True), *stream.received()]
+    return apply_rule(of, rule), [*_arrivals(of), *wire.lines(with_times=True), *stream.received()]
 
 
 def _bare(of: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
@@ -243,7 +243,7 @@ def _mcap(of: Source, place: Path) -> _Kept:
             case _:
                 assert_never(part)
 
-    return applied(of, rule), lines
+    return apply_rule(of, rule), lines
 
 
 def _wire(of: Board, clock: Clock | None, lost: list[str]) -> parts.Wire:
@@ -255,7 +255,7 @@ def _wire(of: Board, clock: Clock | None, lost: list[str]) -> parts.Wire:
             datagrams = known(cut_raw(wire.payload))
         return replace(wire, datagrams=datagrams, payload=None)
     lost += wire.lines()
-    origin_us, made, unmarked = encoded(of.table, of.settings.held(), clock)
+    origin_us, made, unmarked = encode_events(of.table, of.settings.held(), clock)
     lost += [f"that {len(unmarked) - _MOST} of the events are repaired"] * (len(unmarked) > _MOST)
     return parts.Wire(
         known(made), version_2=known(True), origin_us=origin_us, unmarked=tuple(unmarked[:_MOST].tolist())

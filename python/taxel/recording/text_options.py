@@ -15,7 +15,7 @@ from taxel.array import Array, of_size
 from taxel.formats.layout import Layout
 from taxel.recording.contents import Contents
 from taxel.recording.layout import on_array
-from taxel.recording.opening import SharedOptions, joined, open_all, sensors
+from taxel.recording.opening import SharedOptions, join_feet, open_all, sensors
 from taxel.recording.read_foreign import is_lone_array
 from taxel.recording.recording import Recording
 
@@ -45,20 +45,21 @@ class TextOptions(SharedOptions):
         ProblemError : an `array` that differs from the sensor that a file holds; a `rate_hz` of one with times
         """
         place = Path(checked_path("path", path))
-        given = [] if self.array is None else several("array", self.array)
-        arrays = [of_size(text("array", size), of_wire=False) for size in given]
+        sizes = [] if self.array is None else several("array", self.array)
+        arrays = [of_size(text("array", size), of_wire=False) for size in sizes]
         options = {option.name: getattr(self, option.name) for option in fields(SharedOptions)}
         options["array"] = arrays if len(arrays) > 1 else arrays[0] if arrays else None
         options["layout"] = self.layout or self._instead_of_layout(place)
         opened = open_all(place, **options)
-        return [self._timed(self._on_array(recording)) for recording in opened]
+        placed = map(self._on_array, opened)
+        return [recording if self.rate_hz is None else recording.at_rate(self.rate_hz) for recording in placed]
 
     def given(self) -> dict[str, Any]:
         """Return the options that differ from their defaults, as JSON holds them."""
-        given = ((f.name, getattr(self, f.name)) for f in fields(self))
+        options = ((f.name, getattr(self, f.name)) for f in fields(self))
         return {
             name: str(value) if isinstance(value, Path) else value
-            for name, value in given
+            for name, value in options
             if value not in (None, [], ())
         }
 
@@ -86,11 +87,11 @@ class TextOptions(SharedOptions):
         # A bag holds no sensor, so that its messages are of the given one or are left out.
         if not self.array or recording.kind == "ros":
             return recording
-        stated, given = recording.array, of_size(self.array[0], of_wire=False)
-        if _is_row_of(recording, given):
-            return _laid_on(recording, given)
-        differs = given.pitch_mm is not None and (stated.pitch_mm, stated.places) != (given.pitch_mm, None)
-        if stated.shape != given.shape or differs:
+        stated, array = recording.array, of_size(self.array[0], of_wire=False)
+        if _is_row_of(recording, array):
+            return _place_on(recording, array)
+        differs = array.pitch_mm is not None and (stated.pitch_mm, stated.places) != (array.pitch_mm, None)
+        if stated.shape != array.shape or differs:
             sizes = ", ".join(self.array)
             raise refused("array", f" is {sizes}: {recording.path} holds its own sensor, {stated!r}; leave it out")
         # A .mcap holds its sensor, whose pitch may be unknown.
@@ -98,11 +99,11 @@ class TextOptions(SharedOptions):
             return recording
         # A size without a pitch says nothing of it, and events without one are of the board's wire.
         wire = of_size(self.array[0])
-        return _laid_on(recording, Array(*stated.shape, wire.pitch_mm, stated.exists, wire.name))
+        return _place_on(recording, Array(*stated.shape, wire.pitch_mm, stated.exists, wire.name))
 
     def open_joined(self, path: str | os.PathLike[str]) -> list[Recording]:
         """Open a file or a folder, with the feet of each trial joined as its sources."""
-        return joined(self.open_trials(path))
+        return join_feet(self.open_trials(path))
 
     def open_sensors(self, paths: Sequence[str | os.PathLike[str]]) -> list[Recording]:
         """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
@@ -111,9 +112,6 @@ class TextOptions(SharedOptions):
         """
         trials = (trial for path in several("paths", paths) for trial in self.open_trials(path))
         return [sensor for trial in trials for sensor in sensors(trial)]
-
-    def _timed(self, recording: Recording) -> Recording:
-        return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
 
     def open_one(self, path: str | os.PathLike[str]) -> Recording:
         """Open a file that holds one recording, with its feet joined.
@@ -129,14 +127,14 @@ class TextOptions(SharedOptions):
         return every[0]
 
 
-def _laid_on(recording: Recording, array: Array) -> Recording:
+def _place_on(recording: Recording, array: Array) -> Recording:
     """Return a recording on another description of its sensor."""
     contents = recording._contents
     return type(recording)(Contents(on_array(contents.main, array), contents.sources))
 
 
-def _is_row_of(recording: Recording, given: Array) -> bool:
+def _is_row_of(recording: Recording, array: Array) -> bool:
     """Return whether frames are a row of as many channels as a sensor has taxels, as tables and arrays may be."""
     stated, is_one = recording.array, len(recording.sources) < 2
-    row = stated.shape == (1, given.rows * given.columns) and given.rows > 1 and stated.taxels == stated.columns
+    row = stated.shape == (1, array.rows * array.columns) and array.rows > 1 and stated.taxels == stated.columns
     return is_one and row and not stated._is_measured and not recording.has_events and not recording.is_stream

@@ -177,7 +177,7 @@ class Verdict(str):
         >>> verdict, Verdict.from_dict(verdict.to_dict()) == verdict
         ('nothing lost', True)
         """
-        return cls._from(_stated(held))
+        return cls._from(_check(held))
 
 
 def _are_steps(steps: Any) -> bool:
@@ -191,37 +191,37 @@ def _are_steps(steps: Any) -> bool:
     )
 
 
-def _stated(held: Any) -> dict[str, Any]:
+def _check(held: Any) -> dict[str, Any]:
     """Return a verdict from `to_dict` as the compiled part states it."""
-    given = held if isinstance(held, Mapping) else {}
-    numbers, parts = [*(given.get(name, {}) for name in _NUMBERS)], given.get("parts", {})
+    values = held if isinstance(held, Mapping) else {}
+    numbers, parts = [*(values.get(name, {}) for name in _NUMBERS)], values.get("parts", {})
     doubtful = "doubtful_after_us"
     counts = [count for each in numbers if isinstance(each, Mapping) for count in each.values()]
     if (
-        given.get("status") not in STATUSES
-        or not isinstance(given.get("text"), str)
+        values.get("status") not in STATUSES
+        or not isinstance(values.get("text"), str)
         or not all(isinstance(each, Mapping) for each in (*numbers, parts))
         or not all(type(count) is int and 0 <= count < 2**64 for count in counts)
-        or type(given.get(doubtful, None)) not in (int, type(None))
-        or not isinstance(given.get("stretch_of"), str | None)
-        or not _are_steps(given.get("steps_back", []))
+        or type(values.get(doubtful, None)) not in (int, type(None))
+        or not isinstance(values.get("stretch_of"), str | None)
+        or not _are_steps(values.get("steps_back", []))
     ):
         raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict gives it")
     for name, least in (("lost", "lost"), ("damaged", "damaged")):
-        if STATUSES.index(given["status"]) < STATUSES.index(least) and any(given.get(name, {}).values()):
+        if STATUSES.index(values["status"]) < STATUSES.index(least) and any(values.get(name, {}).values()):
             raise ProblemError(
-                f"verdict: its status is {given['status']}, but its {name} is not empty: must be {least}, or worse"
+                f"verdict: its status is {values['status']}, but its {name} is not empty: must be {least}, or worse"
             )
-    if STATUSES.index(given["status"]) < STATUSES.index("damaged") and given.get(doubtful) is not None:
+    if STATUSES.index(values["status"]) < STATUSES.index("damaged") and values.get(doubtful) is not None:
         raise ProblemError(
-            f"verdict: its status is {given['status']}, but its times are doubtful: must be damaged, or worse"
+            f"verdict: its status is {values['status']}, but its times are doubtful: must be damaged, or worse"
         )
-    stated = {str(name): _stated(part) for name, part in parts.items()}
+    stated = {str(name): _check(part) for name, part in parts.items()}
     for name, part in stated.items():
         inner = part["status"]
-        if STATUSES.index(inner) > STATUSES.index(given["status"]):
+        if STATUSES.index(inner) > STATUSES.index(values["status"]):
             raise ProblemError(
-                f"verdict: its status is {given['status']}, that of {name} is {inner}: must be no better"
+                f"verdict: its status is {values['status']}, that of {name} is {inner}: must be no better"
             )
     for name, totals in zip(_NUMBERS, numbers, strict=True):
         for cause in {cause for part in stated.values() for cause in part[name]}:
@@ -231,8 +231,8 @@ def _stated(held: Any) -> dict[str, Any]:
                 raise ProblemError(
                     f"verdict: its {name} has {totals.get(cause, 0)} of {cause}, its parts {least}: must be no fewer"
                 )
-    made = {"status": given["status"], "text": given["text"], doubtful: given.get(doubtful)}
-    made |= {"steps_back": [dict(step) for step in given.get("steps_back", [])]}
-    made |= {"stretch_of": given.get("stretch_of")}
+    made = {"status": values["status"], "text": values["text"], doubtful: values.get(doubtful)}
+    made |= {"steps_back": [dict(step) for step in values.get("steps_back", [])]}
+    made |= {"stretch_of": values.get("stretch_of")}
     made |= {name: dict(each) for name, each in zip(_NUMBERS, numbers, strict=True)}
     return made | {"parts": list(stated.items())}

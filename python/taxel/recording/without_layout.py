@@ -27,7 +27,7 @@ from taxel.recording.read_foreign import (
     cells,
     ends_in_separator,
     is_of_another_program,
-    listed,
+    list_arrays,
     seconds_of,
     shapes_of,
     times_of,
@@ -72,10 +72,10 @@ def refuse_without_layout(path: Path) -> None:
         name = next((name for name, shape in shapes.items() if len(shape) in (2, 3)), None)
         if name is None:
             raise FormatError(
-                f"{path}: holds {listed(shapes)}; must be t, x, y, p (events), values, t (frames), or, with a layout "
-                "file, an array of frames x rows x columns or frames x taxels (docs/files.md)"
+                f"{path}: holds {list_arrays(shapes)}; must be t, x, y, p (events), values, t (frames), or, with a "
+                "layout file, an array of frames x rows x columns or frames x taxels (docs/files.md)"
             )
-        holds, lines = listed(shapes), _of_arrays(path, name, shapes)
+        holds, lines = list_arrays(shapes), _of_arrays(path, name, shapes)
         says = "says which are the frames" if len(shapes) > 1 else "or rate_hz, says what it is"
     raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
 
@@ -90,8 +90,8 @@ def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> 
     """Return the layout of the array of a name."""
     count, *shape = shapes[name]
     time = next((name for name, of in shapes.items() if of == (count,) and unit_of(name) is not None), None)
-    times = [] if time is None else [f"time = {_quoted(time)}", *_unit(time, arrays_of(path, [time])[time])]
-    data = [f"array = {_quoted(name)}"] * bool(name) + times
+    times = [] if time is None else [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time])]
+    data = [f"array = {_quote(name)}"] * bool(name) + times
     return [*_size(shape), *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
 
 
@@ -136,7 +136,7 @@ class _TextTable:
     def called(self, column: int) -> str:
         """Return how a layout names a column: by its name, or by its number from 1 without one of its own."""
         name = self.names[column] if self.names else ""
-        return _quoted(name) if name and list(self.names).count(name) == 1 else str(column + 1)
+        return _quote(name) if name and list(self.names).count(name) == 1 else str(column + 1)
 
     def time(self) -> tuple[int | None, list[str]]:
         """Return which column holds the times, and the lines that say so."""
@@ -144,11 +144,11 @@ class _TextTable:
         if named is not None and self.numeric[named]:
             unit = f"{self.names[named]} {self.units[named].strip('[]()')}" if self.units else self.names[named]
             unit = unit if unit_of(unit) else self.names[named]
-            return named, [f"time_column = {_quoted(self.names[named])}", *_unit(unit, self.numbers(named))]
+            return named, [f"time_column = {_quote(self.names[named])}", *_unit(unit, self.numbers(named))]
         for column in (k for k, is_numeric in enumerate(self.numeric) if not is_numeric):
             seconds = np.array([seconds_of(row[column]) for row in self.body])
             if np.isfinite(seconds).all() and (np.diff(seconds) > 0).all():
-                return column, [f"time_column = {self.called(column)}", f"time_unit = {_quoted(ISO)}"]
+                return column, [f"time_column = {self.called(column)}", f"time_unit = {_quote(ISO)}"]
         if self._ascends and len(self.numeric) > 1:
             lines = ["time_column = 1  # it ascends; leave this out if it is a taxel"]
             return 0, [*lines, *_unit("", self.numbers(0))]
@@ -173,14 +173,14 @@ def _of_table(found: _TextTable) -> tuple[str, list[str]]:
     time, of_time = found.time()
     left = found.left_out(time)
     taxels = [k for k in range(len(found.numeric)) if k not in left and k != time]
-    table = [f"separator = {_quoted(found.separator)}"] * (found.separator != ",")
+    table = [f"separator = {_quote(found.separator)}"] * (found.separator != ",")
     table += [f"skip_lines = {found.skipped}"] * (found.skipped > 0)
     table += of_time
     table += [f"leave_out = [{', '.join(map(found.called, left))}]"] * bool(left)
     missing = {row[k] for row in found.body for k in taxels if row[k] in MISSING}
-    table += [f"missing = {_quoted(cell)}" for cell in sorted(missing - {"nan"} or missing)[-1:]]
+    table += [f"missing = {_quote(cell)}" for cell in sorted(missing - {"nan"} or missing)[-1:]]
     units = {found.units[k].strip("[]()") for k in taxels} if found.units else set()
-    unit = [f"unit = {_quoted(name)}" for name in units if name and len(units) == 1]
+    unit = [f"unit = {_quote(name)}" for name in units if name and len(units) == 1]
     rate = [_NO_RATE] if time is None else []
     holds = f"a table of {counted(len(found.numeric), 'column')}"
     return holds, [*_size([len(taxels)]), *unit, *rate, *(["[table]", *table] if table else [])]
@@ -235,8 +235,8 @@ def _unit(name: str, times: NDArray[np.float64]) -> list[str]:
     unit = stated if stated in UNITS_US else next((u for u in UNITS_US if most * UNITS_US[u] <= TIME_US), "us")
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     notes = [f"{1e6 / (step * UNITS_US[unit]):.4g} frames/s"] if step > 0 else []
-    notes += [" ".join(f"or {_quoted(unit_name)}" for unit_name in UNITS_US if unit_name != unit)] * (not stated)
-    return [f"time_unit = {_quoted(unit)}" + "  # " * bool(notes) + ", ".join(notes)]
+    notes += [" ".join(f"or {_quote(unit_name)}" for unit_name in UNITS_US if unit_name != unit)] * (not stated)
+    return [f"time_unit = {_quote(unit)}" + "  # " * bool(notes) + ", ".join(notes)]
 
 
 def _are_numbers(cells: Sequence[str]) -> bool:
@@ -252,5 +252,5 @@ def _number(cell: str) -> float:
         return math.nan
 
 
-def _quoted(name: str) -> str:
+def _quote(name: str) -> str:
     return json.dumps(name, ensure_ascii=False)

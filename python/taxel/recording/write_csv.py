@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.read_csv import EVENTS, MORE
+from taxel.recording.read_csv import EVENTS, MORE, sensor_of
 from taxel.recording.read_npz import around
 
 #: Number of frames that are written at once.
@@ -21,11 +21,7 @@ def array_in_csv(table: Events | Frames) -> Array:
     """Return the sensor that a reader of the .csv assumes: the file holds neither name nor pitch."""
     if isinstance(table, Events):
         return around(table.x, table.y)
-    x, y = np.array(_places(table.array)).reshape(-1, 2).T
-    rows, columns = int(y.max()) + 1, int(x.max()) + 1
-    exists = np.zeros((rows, columns), bool)
-    exists[y, x] = True
-    return Array(rows, columns, exists=None if exists.all() else exists)
+    return sensor_of(*np.array(_places(table.array)).reshape(-1, 2).T)
 
 
 def write_csv(file: BinaryIO, table: Events | Frames) -> None:
@@ -39,7 +35,8 @@ def write_csv(file: BinaryIO, table: Events | Frames) -> None:
             values = table.values[k : k + _FRAMES, y, x]
             # Each value is written once; as bits, because 0 equals -0.
             bits, which = np.unique(values.view(np.uint32), return_inverse=True)
-            texts = np.array([_shortest(value) for value in bits.view(np.float32)], object)
+            # str of a float32 is the shortest text that reads back as the same value.
+            texts = np.array([str(value).removesuffix(".0") for value in bits.view(np.float32)], object)
             rows = texts[which.reshape(values.shape)].tolist()
             times = table.t[k : k + _FRAMES].tolist()
             file.writelines(f"{t},{','.join(row)}\n".encode() for t, row in zip(times, rows, strict=True))
@@ -62,9 +59,3 @@ def _places(array: Array) -> list[tuple[int, int]]:
     """Return column and row of each taxel that exists, row by row."""
     exists = np.ones(array.shape, bool) if array.exists is None else array.exists
     return [(int(x), int(y)) for y, x in np.argwhere(exists)]
-
-
-def _shortest(value: np.float32) -> str:
-    # str of a float32 is the shortest text that reads back as the same value.
-    text = str(value)
-    return text.removesuffix(".0")

@@ -24,7 +24,7 @@ from taxel.recording.raw import Datagrams
 from taxel.recording.recording import Recording
 from taxel.recording.rest import Rest, ticks_by_unit
 
-__all__ = ["RecordingWriter", "cut_raw", "encoded", "write_mcap"]
+__all__ = ["RecordingWriter", "cut_raw", "encode_events", "write_mcap"]
 
 #: Number of values of a block of frames: a chunk of the file.
 _BLOCK = 1 << 18
@@ -35,7 +35,7 @@ _RESTS = {"unit": "0", "quiet": "quiet stretch"}
 
 
 def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping[str, dict[str, Any]]) -> None:
-    """Write a .mcap of contents as it can hold them (`taxel.recording.stored`).
+    """Write a .mcap of contents as it can hold them (`taxel.recording.stored.storable`).
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
         return
     wire, events = whole.wire, whole.table
     datagrams = wire.datagrams()
-    assert datagrams is not None  # `stored` sets them
+    assert datagrams is not None  # `storable` sets them
     # Host times before 1970 are not possible, so all board times are shifted together.
     earliest = int(datagrams.arrived_ns[0]) if len(datagrams) else 0
     arrived = datagrams.arrived_ns - min(0, earliest)
@@ -197,7 +197,7 @@ def _blocks(tables: Mapping[str, Frames]) -> Iterator[tuple[str, int, Frames, bo
                 done[name] = stop
 
 
-def encoded(
+def encode_events(
     events: Events, held: NDArray[np.uint16] | None, clock: Clock | None
 ) -> tuple[int, Datagrams, NDArray[np.int64]]:
     """Return events as datagrams of wire version 2, without loss.

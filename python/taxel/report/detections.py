@@ -112,12 +112,12 @@ def write_detections(
         drawn = {
             label: {
                 **_of_neuron(readout, listened, label, moments[label], aligned.get(label)),
-                "errors": _drawn(_errors(listened, label)),
-                "moved": _drawn(_moved(aligned.get(label))),
+                "errors": _picture(_errors(listened, label)),
+                "moved": _picture(_moves(aligned.get(label))),
             }
             for label in readout.labels
         }
-        felt = _drawn(_sums(listened, readout.labels))
+        felt = _picture(_sums(listened, readout.labels))
     text = render(
         "report/listening.html.j2",
         felt=felt,
@@ -173,12 +173,12 @@ def _of_neuron(
     if isinstance(readout, PlainRule):
         return {"potential": None, "weights": None}
     return {
-        "potential": _drawn(_potential(readout, listened, label, moments, alignment)),
-        "weights": _drawn(_weights(readout, listened[0], label)),
+        "potential": _picture(_potential(readout, listened, label, moments, alignment)),
+        "weights": _picture(_weights(readout, listened[0], label)),
     }
 
 
-def _drawn(figure: Figure | None) -> Markup | None:
+def _picture(figure: Figure | None) -> Markup | None:
     if figure is None:
         return None
     drawn = picture(figure)
@@ -282,7 +282,7 @@ def _potential(
     return figure
 
 
-def _moved(aligned: Alignment | None) -> Figure | None:
+def _moves(aligned: Alignment | None) -> Figure | None:
     """Draw how far each label was moved to what the sensor felt, one recording after the other."""
     if aligned is None or aligned.train is None:
         return None
@@ -369,13 +369,9 @@ def _planes(
             crossing = half[: taxels * (levels - tonic)].reshape(taxels, levels - tonic)
             behind = [("tonic", half[-taxels:])] if tonic else []
             for name, plane in [*((_nth("level", levels - tonic, n), p) for n, p in enumerate(crossing.T)), *behind]:
-                words = (_sign(halves, s), name, _nth("delay", delays, d))
+                words = (("ON", "OFF")[s] if halves == 2 else "", name, _nth("delay", delays, d))
                 planes.append((" ".join(filter(None, words)), plane))
     return planes
-
-
-def _sign(halves: int, n: int) -> str:
-    return ("ON", "OFF")[n] if halves == 2 else ""
 
 
 def _nth(what: str, count: int, n: int) -> str:

@@ -13,7 +13,7 @@ from taxel._base.messages import escaped, escaped_lines
 __all__ = ["render"]
 
 
-def _shown(value: object) -> object:
+def _show(value: object) -> object:
     """Return what a template shows: texts as one line without control characters; figures are no texts."""
     return value if hasattr(value, "__html__") else escaped(value)
 
@@ -31,7 +31,7 @@ def _environment(package: str) -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
-        finalize=_shown,
+        finalize=_show,
     )
     made.filters["lines"] = _lines
     return made

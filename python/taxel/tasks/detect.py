@@ -16,7 +16,7 @@ from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, score
-from taxel.detect.advice import drifted
+from taxel.detect.advice import count_drifted
 from taxel.detect.detector import detector
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import score_together
@@ -269,7 +269,7 @@ def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
         floors += [float(part.noise_floor)] if isinstance(part, ContactArea | Moments) else []
     if tare is None or not floors or isinstance(source, SpikeTrains):
         return None
-    count = drifted(source, tare, max(floors))
+    count = count_drifted(source, tare, max(floors))
     what = (
         f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that lifts are missed"
     )

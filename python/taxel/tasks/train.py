@@ -17,8 +17,8 @@ from taxel._base.messages import collected, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
-from taxel.detect.advice import advised, fallen
-from taxel.detect.examples import checked
+from taxel.detect.advice import advise, fallen
+from taxel.detect.examples import check_examples
 from taxel.detect.floors import measured_floor
 from taxel.detect.folds import INNER, count_of_folds
 from taxel.detect.label_times import off_by
@@ -26,7 +26,7 @@ from taxel.detect.loads import clock_of
 from taxel.detect.plain_score import floor_of, plain_score
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import score_together
-from taxel.detect.training import Trained, trained
+from taxel.detect.training import Trained, fit_aligned
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.opening import sensors_of
@@ -184,7 +184,7 @@ class _Work:
             if fall and error.hint == "unfelt":
                 raise ProblemError(f"{error.args[0]}: {fall}") from None
             names = sorted({label for example in self.examples for label in example.labels})
-            off = off_by(checked(self.examples), names, floor_of(plan.encoder))
+            off = off_by(check_examples(self.examples), names, floor_of(plan.encoder))
             others = (f"{label}: {distance}" for label, distance in off.items())
             raise ProblemError("; ".join([str(error), *others])) from None
 
@@ -206,15 +206,15 @@ class _Work:
         if search:
             plan = choose(self.examples, plan, window_ms=window_ms, progress=self.update)
         begun = perf_counter()
-        made = trained(self.examples, plan, self.update)
+        made = fit_aligned(self.examples, plan, self.update)
         outcomes = self._outcomes(made)
         a_point_s = None if search else (perf_counter() - begun) * INNER * (count + 1)
         trained_on = _own(outcomes, window_ms)
         if scored is None:
-            truths, sound = [outcome.example.labels for outcome in outcomes], checked(self.examples)
+            truths, sound = [outcome.example.labels for outcome in outcomes], check_examples(self.examples)
             what = sound, list(truths[0]), [clock_of(example) for example in self.examples], floor_of(plan.encoder)
             scored = replace(trained_on, plain=plain_score(*what, [], truths, window_ms, self.update))
-        advice = advised(made, self.examples, scored.together, trained_on.together, a_point_s, scored.plain)
+        advice = advise(made, self.examples, scored.together, trained_on.together, a_point_s, scored.plain)
         taken = _taken(self.examples) if self.options.tare is None else ()
         return Training(self.options, self.opened, made, scored, why, advice, outcomes, taken)
 

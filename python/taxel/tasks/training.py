@@ -12,7 +12,7 @@ from taxel._base.messages import counted
 from taxel._base.times import beginning_us
 from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained
 from taxel.detect.advice import Advice
-from taxel.detect.recipe import changed, with_floor
+from taxel.detect.recipe import change_values, with_floor
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.spikes import to_ms
@@ -76,7 +76,7 @@ class TrainOptions:
     def _plan(self, labels: Sequence[str] | None = None, noise_floor: float | None = None) -> Recipe | None:
         """Return the recipe that is named, or that of the encoder that is; None of neither."""
         if self.recipe is None and "encoder.name" in self.changes:
-            values = changed({}, self.changes)
+            values = change_values({}, self.changes)
             return Recipe.from_dict(values if noise_floor is None else with_floor(values, noise_floor))
         return None if self.recipe is None else Recipe.load(self.recipe, self.changes, labels, noise_floor)
 

@@ -7,13 +7,15 @@ use std::sync::Arc;
 
 use taxel_core::Array;
 use taxel_core::array::Places;
+use taxel_core::frame_noise::FrameNoise;
 use taxel_core::held::UNKNOWN;
-use taxel_core::rest::{NOISE_FLOOR, above_noise};
-use taxel_core::tracked_rest::TrackedRest;
+use taxel_core::rest::above_noise;
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::Remarks;
 
+pub use super::stepped_frames::{FramePlace, FrameRest, FrameSource};
+use super::stepped_frames::{SteppedFrames, ValueSteps};
 use super::{ChangeReader, FrameSources, KeyframeIndex, ReadOutcome};
 use crate::array_state::{Keyframe, RestSource};
 use crate::centre::Coordinates;
@@ -24,9 +26,6 @@ use crate::weights::Weights;
 /// Memory that the curves may take, bytes.
 const TIME_COLUMN_BYTES: usize = 256 << 20;
 
-/// Most steps from the least value to the greatest.
-const MOST_STEPS: usize = 65_533;
-
 /// Bins of the overview.
 const BINS: i64 = 1000;
 
@@ -35,191 +34,6 @@ const MOST_SOURCES: usize = 4;
 
 /// Number of changes that are read at once.
 const AT_ONCE: usize = 4096;
-
-/// A tracked rest is stored where that of a taxel is further than this from the stored one, in ticks of the noise floor.
-const REST_MOVED: f64 = 0.5;
-
-/// Where a source's frames are in the array of the recording.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FramePlace {
-    /// Name of the source.
-    pub name: String,
-    /// Its first column in the array of the recording.
-    pub left: u16,
-    /// Its rows.
-    pub rows: u16,
-    /// Its columns.
-    pub columns: u16,
-}
-
-/// What the values of a source's frames are above.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FrameRest {
-    /// Where it is known from. That of a quiet stretch is tracked from its values on; without any the values are above 0.
-    pub source: RestSource,
-    /// The rest of each cell, in the unit; [`Value::NO_REST`](taxel_core::rest::Value::NO_REST) where it is unknown.
-    pub values: Vec<f64>,
-    /// Ticks, in which the noise floor is, by the unit.
-    pub ticks_by_unit: f64,
-    /// From how much above the rest on a value is a load, in the unit.
-    pub loaded_from: f64,
-    /// Whether values fall from that of a quiet stretch: less may mean more pressure.
-    pub falls: bool,
-    /// The cells that flicker: no value of theirs counts as above rest.
-    pub flickering: Vec<usize>,
-    /// Where something lay in the quiet stretch, for people; empty where nothing did.
-    pub preload_at: String,
-}
-
-/// The frames of a source as they are given.
-#[derive(Debug, Clone)]
-pub struct FrameSource<'a> {
-    /// Where they are in the array.
-    pub place: FramePlace,
-    /// Their times, us, ascending.
-    pub t: Vec<i64>,
-    /// Their values row by row, frame after frame; NaN where one is missing.
-    pub values: &'a [f32],
-    /// What they are above.
-    pub rest: FrameRest,
-}
-
-impl FrameSource<'_> {
-    /// The rest of the cells in steps, each from the frame of this number on: once where it is fixed, else where it moved.
-    #[allow(clippy::cast_possible_truncation)]
-    fn rests(&self, steps: ValueSteps) -> Vec<(usize, Vec<u16>)> {
-        let FrameRest { source, values, ticks_by_unit, falls, .. } = &self.rest;
-        let fixed = |values: &[f64]| values.iter().map(|&value| steps.of_rest(value)).collect();
-        match source {
-            RestSource::None => return vec![(0, vec![steps.zero; values.len()])],
-            RestSource::Given => return vec![(0, fixed(values))],
-            RestSource::Quiet => {}
-        }
-        let begins: Vec<f64> = values.iter().map(|rest| rest * ticks_by_unit).collect();
-        let mut tracked = TrackedRest::new(self.place.columns.into(), NOISE_FLOOR, begins);
-        if *falls {
-            tracked = tracked.falling();
-        }
-        let mut stored: Vec<Option<f64>> = vec![];
-        let mut rests: Vec<(usize, Vec<u16>)> = vec![];
-        for (k, (&t, frame)) in self.t.iter().zip(self.values.chunks_exact(values.len())).enumerate() {
-            tracked.take(t, frame.iter().map(|value| value * *ticks_by_unit as f32));
-            let moved = |(now, then): (Option<f64>, &Option<f64>)| match (now, then) {
-                (Some(now), Some(then)) => (now - then).abs() > REST_MOVED,
-                (now, then) => now.is_some() != then.is_some(),
-            };
-            if stored.is_empty() || tracked.rests().zip(&stored).any(moved) {
-                stored = tracked.rests().collect();
-                let of = |rest: &Option<f64>| rest.map_or(UNKNOWN, |rest| steps.of_rest(rest / ticks_by_unit));
-                rests.push((k, stored.iter().map(of).collect()));
-            }
-        }
-        if rests.is_empty() { vec![(0, fixed(values))] } else { rests }
-    }
-
-    /// The noise floor in steps: values further above the rest count as loaded.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn floor(&self, steps: ValueSteps) -> u16 {
-        (self.rest.loaded_from / steps.size) as u16
-    }
-}
-
-/// The frames of a source, in steps.
-#[derive(Debug, Clone)]
-struct SteppedFrames {
-    place: FramePlace,
-    t: Vec<i64>,
-    /// Row by row, frame after frame; [`UNKNOWN`] where a value is missing.
-    ticks: Vec<u16>,
-    rest_source: RestSource,
-    falls: bool,
-    flickering: Vec<usize>,
-    preload_at: String,
-    /// The rest of its cells, each from the frame of this number on; there is one at least.
-    rests: Vec<(usize, Vec<u16>)>,
-}
-
-impl SteppedFrames {
-    fn new(from: FrameSource<'_>, steps: ValueSteps) -> Self {
-        let (ticks, mut rests) = (steps.ticks(from.values), from.rests(steps));
-        let FrameRest { source: rest_source, falls, flickering, preload_at, .. } = from.rest;
-        for (_, rest) in &mut rests {
-            // No value is above the greatest; a taxel without a rest would get that of its first value.
-            flickering.iter().for_each(|&cell| rest[cell] = UNKNOWN - 1);
-        }
-        Self { place: from.place, t: from.t, ticks, rest_source, falls, flickering, preload_at, rests }
-    }
-
-    /// The rest of its cells at a frame; before the first one, that of the first.
-    fn rest(&self, k: usize) -> &[u16] {
-        &self.rests[self.rests.partition_point(|&(from, _)| from <= k).max(1) - 1].1
-    }
-
-    /// Whether another rest holds from this frame on.
-    fn rest_moves(&self, k: usize) -> bool {
-        k > 0 && self.rests.binary_search_by_key(&k, |&(from, _)| from).is_ok()
-    }
-
-    fn cells(&self) -> usize {
-        usize::from(self.place.rows) * usize::from(self.place.columns)
-    }
-
-    fn frame(&self, k: usize) -> &[u16] {
-        &self.ticks[k * self.cells()..(k + 1) * self.cells()]
-    }
-
-    /// Number of frames up to a time.
-    fn until(&self, t: i64) -> usize {
-        self.t.partition_point(|&at| at <= t)
-    }
-
-    /// The taxels of its cells in an array of `columns` columns, row by row.
-    fn taxels(&self, columns: u16) -> impl Iterator<Item = usize> + use<> {
-        let (left, width, columns) = (self.place.left, self.place.columns, usize::from(columns));
-        (0..usize::from(self.place.rows))
-            .flat_map(move |y| (0..usize::from(width)).map(move |x| y * columns + usize::from(left) + x))
-    }
-}
-
-/// The steps in which values are shown: a value is `(ticks - zero) * size`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct ValueSteps {
-    size: f64,
-    zero: u16,
-}
-
-impl ValueSteps {
-    /// Steps for these values: of 1 where all are whole and not too far apart, else as small as 16 bits allow.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn of<'a>(values: impl Iterator<Item = &'a [f32]>, taxels: usize) -> Self {
-        let (mut least, mut most, mut whole) = (0.0_f32, 0.0_f32, true);
-        for &value in values.flatten().filter(|value| value.is_finite()) {
-            (least, most) = (least.min(value), most.max(value));
-            whole &= value.fract() == 0.0;
-        }
-        let (least, range) = (f64::from(least), f64::from(most) - f64::from(least));
-        // The sum over the array has 32 bits.
-        let steps = MOST_STEPS.min(u32::MAX as usize / taxels.max(1)) as f64;
-        let size = if whole && range <= MOST_STEPS as f64 { 1.0 } else { range / steps };
-        Self { size, zero: (-least / size).ceil() as u16 }
-    }
-
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn ticks(self, values: &[f32]) -> Vec<u16> {
-        let (scale, zero) = (1.0 / self.size, f64::from(self.zero) + 0.5);
-        let tick = |&value: &f32| match value.is_nan() {
-            true => UNKNOWN,
-            false => (f64::from(value) * scale + zero).min(f64::from(UNKNOWN - 1)) as u16,
-        };
-        values.iter().map(tick).collect()
-    }
-
-    /// A rest, which no value is above where it is not finite.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn of_rest(self, value: f64) -> u16 {
-        if value.is_finite() { (value / self.size + f64::from(self.zero)).round() as u16 } else { UNKNOWN }
-    }
-}
 
 /// What a file of frames states beside them.
 #[derive(Debug, Clone, Default)]
@@ -302,12 +116,12 @@ impl FrameIndex {
     /// Column and row of the taxels that flicker, which never count as above rest.
     pub fn flickering(&self) -> impl Iterator<Item = (usize, usize)> {
         let columns = usize::from(self.array.columns);
-        let of = move |source: &SteppedFrames| {
+        let places_of = move |source: &SteppedFrames| {
             let taxels: Vec<usize> = source.taxels(self.array.columns).collect();
             let places = source.flickering.iter().map(|&cell| (taxels[cell] % columns, taxels[cell] / columns));
             places.collect::<Vec<_>>()
         };
-        self.sources.iter().flat_map(of)
+        self.sources.iter().flat_map(places_of)
     }
 
     /// Time of the last frame up to a time, us.
@@ -319,7 +133,7 @@ impl FrameIndex {
     /// The source and the number of the next frame, with its time.
     fn next(&self, cursor: &Cursor) -> Option<(usize, usize, i64)> {
         let ahead = self.sources.iter().zip(cursor).enumerate();
-        let ahead = ahead.filter_map(|(source, (of, &k))| of.t.get(k).map(|&t| (source, k, t)));
+        let ahead = ahead.filter_map(|(number, (source, &k))| source.t.get(k).map(|&t| (number, k, t)));
         ahead.min_by_key(|&(_, _, t)| t)
     }
 
@@ -348,7 +162,7 @@ impl FrameIndex {
         let mut values = vec![0; columns.value_count()];
         let channels = columns.channel_count();
         values[channels..].fill(MISSING_SUM);
-        let mut noise = vec![LeastNoise::default(); self.sources.len()];
+        let mut noise = vec![FrameNoise::default(); self.sources.len()];
         let mut cursor = vec![0; self.sources.len()];
         let mut loads = vec![None; self.sources.len()];
         let at = Coordinates::new(&self.array);
@@ -359,10 +173,10 @@ impl FrameIndex {
             let column = column_of(t, COLUMN_US);
             columns.extend_to(column);
             let curve = |load: Option<Load>| load.map_or(MISSING, |load| load.curve(&at, &self.weights));
-            columns.set_curve(column, curve(loads.iter().flatten().copied().reduce(|all, one| all.plus(&one))));
+            columns.set_curve(column, curve(loads.iter().flatten().copied().reduce(|sum, load| sum.plus(&load))));
             let curve = curve(loads[source]);
             if known {
-                noise[source].take(t - first, curve.sum);
+                noise[source].take(t, curve.sum.into());
             }
             if !values.is_empty() {
                 if channels > 0 {
@@ -376,8 +190,9 @@ impl FrameIndex {
         }
         let whole = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
         // Noise is what is above a rest that was found: above a given one any value is load.
-        let most = |(source, noise): (&SteppedFrames, LeastNoise)| match source.rest_source {
-            RestSource::Quiet => noise.most(self.floor),
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let most = |(source, noise): (&SteppedFrames, FrameNoise)| match source.rest_source {
+            RestSource::Quiet => noise.most(self.floor.into()) as u32,
             RestSource::Given | RestSource::None => 0,
         };
         let noise = self.sources.iter().zip(noise).map(most).collect();
@@ -404,37 +219,6 @@ impl FrameIndex {
             load.change(taxel, (0, above), self.floor, at, &self.weights);
         }
         load
-    }
-}
-
-/// Stretches of this length are told apart, us: a quiet one holds one of them at least.
-const STRETCH_US: i64 = 250_000;
-/// Noise is never more than one and a half times that of the quietest stretch and so many taxels just above the floor.
-const NOISY_TAXELS: u32 = 4;
-
-/// What the noise of a source adds up to: the greatest sum of the stretch in which it is least.
-#[derive(Debug, Clone, Copy, Default)]
-struct LeastNoise {
-    stretch: i64,
-    greatest: u32,
-    least: Option<u32>,
-}
-
-impl LeastNoise {
-    /// Takes the sum of a frame, whose time counts from the first one.
-    fn take(&mut self, t: i64, sum: u32) {
-        let stretch = t / STRETCH_US;
-        if stretch != self.stretch {
-            self.least = Some(self.least.map_or(self.greatest, |least| least.min(self.greatest)));
-            (self.stretch, self.greatest) = (stretch, 0);
-        }
-        self.greatest = self.greatest.max(sum);
-    }
-
-    /// The most that it adds up to, of values that count from a floor on.
-    fn most(self, floor: u16) -> u32 {
-        let least = self.least.unwrap_or(self.greatest);
-        (least + least / 2).saturating_add(NOISY_TAXELS * u32::from(floor))
     }
 }
 
@@ -481,7 +265,7 @@ impl ChangeReader for FrameChanges {
                 source
                     .taxels(self.index.array.columns)
                     .zip(source.rest(k))
-                    .for_each(|(of, &rest)| self.rest[of] = rest);
+                    .for_each(|(taxel, &rest)| self.rest[taxel] = rest);
             }
         }
         Ok(if out.len() == begun { ReadOutcome::End } else { ReadOutcome::Changes })
@@ -498,9 +282,9 @@ impl FrameSources for FrameIndex {
     }
 
     fn rest_source(&self) -> RestSource {
-        let mut all = self.sources.iter().map(|source| source.rest_source);
-        let first = all.next().unwrap_or(RestSource::None);
-        if all.all(|one| one == first) { first } else { RestSource::None }
+        let mut found = self.sources.iter().map(|source| source.rest_source);
+        let first = found.next().unwrap_or(RestSource::None);
+        if found.all(|rest_source| rest_source == first) { first } else { RestSource::None }
     }
 
     /// Forces and pressures are summed over all taxels; of others, above a rest that was found, the noise is no load.
@@ -518,14 +302,14 @@ impl FrameSources for FrameIndex {
             return Arc::default();
         }
         // An empty column between two sources counts as of the one before.
-        let of = |x| self.sources.partition_point(|source| source.place.left <= x).saturating_sub(1);
-        (0..self.array.columns).map(of).collect()
+        let source = |x| self.sources.partition_point(|source| source.place.left <= x).saturating_sub(1);
+        (0..self.array.columns).map(source).collect()
     }
 
     fn sensors(&self) -> Vec<Array> {
         let sensor = |source: &SteppedFrames| {
             let taxels: Vec<usize> = source.taxels(self.array.columns).collect();
-            let of = |all: &[f64]| taxels.iter().map(|&taxel| all[taxel]).collect::<Vec<f64>>();
+            let part = |values: &[f64]| taxels.iter().map(|&taxel| values[taxel]).collect::<Vec<f64>>();
             let place = &source.place;
             Array {
                 rows: place.rows,
@@ -534,9 +318,9 @@ impl FrameSources for FrameIndex {
                 name: place.name.clone(),
                 exists: self.array.exists.as_ref().map(|exists| taxels.iter().map(|&taxel| exists[taxel]).collect()),
                 places: self.array.places.as_ref().map(|places| Places {
-                    x: of(&places.x),
-                    y: of(&places.y),
-                    area: places.area.as_deref().map(of),
+                    x: part(&places.x),
+                    y: part(&places.y),
+                    area: places.area.as_deref().map(part),
                     unit: places.unit,
                 }),
                 names: self
@@ -555,12 +339,12 @@ impl FrameSources for FrameIndex {
 
     #[allow(clippy::cast_possible_truncation)]
     fn frame(&self, source: usize, k: usize) -> Option<(i64, Vec<f32>)> {
-        let of = &self.sources[source];
+        let source = &self.sources[source];
         let value = |&ticks: &u16| match ticks {
             UNKNOWN => f32::NAN,
             ticks => ((f64::from(ticks) - f64::from(self.zero)) * self.step) as f32,
         };
-        of.t.get(k).map(|&t| (t, of.frame(k).iter().map(value).collect()))
+        source.t.get(k).map(|&t| (t, source.frame(k).iter().map(value).collect()))
     }
 }
 
@@ -683,13 +467,13 @@ mod tests {
                     player.advance(t).unwrap();
                 }
                 let (mut expected, mut sums) = (vec![f32::NAN; 14], [None; 2]);
-                for (of, ((times, values), offset)) in [(&left, 0), (&right, 4)].into_iter().enumerate() {
+                for (source, ((times, values), offset)) in [(&left, 0), (&right, 4)].into_iter().enumerate() {
                     let Some(k) = times.partition_point(|&at| at <= t).checked_sub(1) else { continue };
                     for cell in 0..6 {
                         let value = values[6 * k + cell];
                         expected[cell / 3 * 7 + offset + cell % 3] = value;
                         if !value.is_nan() {
-                            *sums[of].get_or_insert(0.0) += value.max(0.0);
+                            *sums[source].get_or_insert(0.0) += value.max(0.0);
                         }
                     }
                 }
@@ -698,8 +482,8 @@ mod tests {
                     let held = player.state().held().iter();
                     held.map(|&ticks| if ticks == UNKNOWN { f64::NAN } else { value(ticks) }).collect()
                 };
-                for one in [&sought].into_iter().chain((player.t() == t).then_some(&player)) {
-                    for (ours, theirs) in shown(one).iter().zip(&expected) {
+                for player in [&sought].into_iter().chain((player.t() == t).then_some(&player)) {
+                    for (ours, theirs) in shown(player).iter().zip(&expected) {
                         let near = (ours - f64::from(*theirs)).abs() <= 0.51 * index.step;
                         assert!(near || ours.is_nan() && theirs.is_nan(), "{ours} {theirs}");
                     }
@@ -719,7 +503,8 @@ mod tests {
                 for (source, (ours, theirs)) in each(of_state).chunks(OF_SOURCE).zip(sums).enumerate() {
                     let (sum, x, y) = (ours[0], f32::from_bits(ours[1]), f32::from_bits(ours[2]));
                     assert_eq!(sum == MISSING_SUM, theirs.is_none());
-                    let near = |own: f32| (f64::from(sum) * index.step - f64::from(own)).abs() < 6.0 * index.step;
+                    let near =
+                        |expected: f32| (f64::from(sum) * index.step - f64::from(expected)).abs() < 6.0 * index.step;
                     assert!(theirs.is_none_or(near), "{sum} {theirs:?}");
                     assert_eq!(x.is_nan(), sum == 0 || theirs.is_none());
                     let (mut mass, mut at) = (0.0, [0.0; 2]);
@@ -777,6 +562,33 @@ mod tests {
                 assert_eq!(sum > noise, touches, "spread {spread}, frame {k}: {sum} of {noise}");
             }
         }
+    }
+
+    #[test]
+    fn a_source_that_begins_later_has_the_noise_of_its_own_frames() {
+        let values = vec![210.0; 600 * 6];
+        let noise = [0, 1_000_000].map(|late| {
+            let rest = FrameRest {
+                source: RestSource::Quiet,
+                values: vec![200.0; 6],
+                ticks_by_unit: 0.5,
+                loaded_from: 7.0,
+                falls: false,
+                flickering: vec![],
+                preload_at: String::new(),
+            };
+            let sources = [("left", 0, 0), ("right", 4, late)].map(|(name, left, begin)| FrameSource {
+                place: place(name, left),
+                t: (0..600).map(|k| begin + 10_000 * k).collect(),
+                values: &values,
+                rest: rest.clone(),
+            });
+            let array = Array::new(2, 7, 1.0, "feet").unwrap();
+            let index = FrameIndex::new(array, FrameFile::default(), sources.into());
+            index.time_columns.unwrap().source_noise().to_vec()
+        });
+        assert_eq!(noise[0], noise[1]);
+        assert!(noise[0][1] > 4 * 7);
     }
 
     #[test]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rosbags.interfaces import Connection
     from rosbags.typesys.store import Typestore
 
-__all__ = ["Bag", "is_bag", "opened"]
+__all__ = ["Bag", "is_bag", "open_bag"]
 
 #: The first bytes of a .bag and of a .db3, which is a database of SQLite.
 _ROS1, _SQLITE = b"#ROSBAG V", b"SQLite format 3\0"
@@ -118,8 +118,8 @@ class Bag:
         """Refuse a definition that was given for messages of another one, if the bag holds the digest of its own."""
         if sent.msgdef.data or not sent.digest:
             return
-        given = self.store.generate_msgdef(sent.msgtype)[1] if self.is_ros1 else self.store.hash_rihs01(sent.msgtype)
-        if given != sent.digest:
+        digest = self.store.generate_msgdef(sent.msgtype)[1] if self.is_ros1 else self.store.hash_rihs01(sent.msgtype)
+        if digest != sent.digest:
             raise FormatError(
                 f"{self.path}: was recorded with another definition of {sent.msgtype} than the one given; its digest "
                 f"is {sent.digest}"
@@ -127,7 +127,7 @@ class Bag:
 
 
 @contextmanager
-def opened(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
+def open_bag(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
     """Open a bag; parameters and errors are those of `taxel.formats.ros.topics`."""
     try:
         from rosbags import rosbag1, rosbag2  # noqa: PLC0415  an extra
@@ -166,7 +166,7 @@ def _bound(reader: Any, is_ros1: bool) -> None:
     if is_ros1:
         from rosbags.rosbag1.reader import decompressors  # noqa: PLC0415  an extra
 
-        bounded = {unpack: _bounded(name) for name, unpack in decompressors.items() if name in _UNPACKERS}
+        bounded = {unpack: _bounded_unpacker(name) for name, unpack in decompressors.items() if name in _UNPACKERS}
         reader.chunks = {
             at: chunk._replace(decompressor=bounded.get(chunk.decompressor, chunk.decompressor))
             for at, chunk in reader.chunks.items()
@@ -174,10 +174,10 @@ def _bound(reader: Any, is_ros1: bool) -> None:
     else:
         from rosbags.rosbag2 import storage_mcap  # noqa: PLC0415  an extra
 
-        storage_mcap.DECOMPRESSORS.update({name: _bounded(name) for name in ("lz4", "zstd")})
+        storage_mcap.DECOMPRESSORS.update({name: _bounded_unpacker(name) for name in ("lz4", "zstd")})
 
 
-def _bounded(name: str) -> Callable[..., bytes]:
+def _bounded_unpacker(name: str) -> Callable[..., bytes]:
     """Return a function that unpacks a chunk, and as many bytes of it as it says if that is known."""
 
     def unpack(data: bytes, size: int = CHUNK) -> bytes:

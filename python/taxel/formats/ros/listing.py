@@ -10,7 +10,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from taxel._core import FormatError
-from taxel.formats.ros.bag import Bag, opened
+from taxel.formats.ros.bag import Bag, open_bag
 from taxel.formats.ros.fields import grid, leaves
 
 __all__ = ["Topic", "topics"]
@@ -65,7 +65,7 @@ def topics(path: Path, types: Path | None = None, ros: str | None = None) -> lis
     FormatError : damaged, or of a kind that rosbags does not read
     ProblemError : an unknown release, or a folder without definitions
     """
-    with opened(path, types, ros) as bag:
+    with open_bag(path, types, ros) as bag:
         return [each for topic in sorted({c.topic for c in bag.reader.connections}) for each in _of_topic(bag, topic)]
 
 

@@ -23,7 +23,7 @@ from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats.checks import sensor
-from taxel.formats.ros.bag import Bag, opened
+from taxel.formats.ros.bag import Bag, open_bag
 from taxel.formats.ros.fields import grid, is_empty, leaves, values
 
 __all__ = ["Chosen", "Read", "read"]
@@ -106,7 +106,7 @@ def read(path: Path, chosen: Sequence[Chosen], types: Path | None = None, ros: s
     FormatError : damaged, no such topic or field, no definition of its messages, or no message of the array's length
     ProblemError : an unknown release, or a folder without definitions
     """
-    with opened(path, types, ros) as bag:
+    with open_bag(path, types, ros) as bag:
         connections = {choice.topic: bag.of_topic(choice.topic) for choice in chosen}
         held = [_Held(bag, choice) for choice in chosen]
         for connection, at, data in bag.messages([c for each in connections.values() for c in each]):

@@ -13,7 +13,7 @@ from taxel.live._requests.reasons import reasons
 from taxel.live._shown_files import Opening, ReadFrames, ShownFiles
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
-from taxel.recording.health import TaxelStatistics, Touches, judged
+from taxel.recording.health import TaxelStatistics, Touches, judge
 
 #: Taxels as (column, row).
 _Taxels = list[tuple[int, int]]
@@ -57,7 +57,7 @@ class FileRequests:
         activity, on, *known = (
             np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, *(values or ()))
         )
-        result = judged(sensor, TaxelStatistics(activity, on, Touches.of(*touches), *known))
+        result = judge(sensor, TaxelStatistics(activity, on, Touches.of(*touches), *known))
         taxels = result.named()
         return taxels["dead"], taxels["stuck"], taxels["noisy"], int(np.count_nonzero(result.untested))
 
