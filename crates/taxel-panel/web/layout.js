@@ -53,7 +53,7 @@ export class Layout {
       ["beside", Math.min((beside - (maps - 1) * GAP) / maps, (high - UNDER.beside - AROUND_MAP) * aspect)],
       ["column", Math.min(beside, ((high - UNDER.beside) / maps - AROUND_MAP) * aspect)],
     ];
-    const [place, width] = widths.reduce((one, other) => (other[1] > one[1] * 1.05 ? other : one));
+    const [place, width] = widths.reduce((best, next) => (next[1] > best[1] * 1.05 ? next : best));
     return { place, width };
   }
 

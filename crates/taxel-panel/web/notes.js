@@ -35,7 +35,7 @@ export class Notes {
   get unused() {
     const { labels } = this.labels;
     const used = (/** @type {{ t_us: number, text: string, source: string }} */ { t_us, text, source }) =>
-      labels.some((one) => one.source === source && (one.replaces_us === t_us || (one.t_us === t_us && one.label === text)));
+      labels.some((label) => label.source === source && (label.replaces_us === t_us || (label.t_us === t_us && label.label === text)));
     return this.timed.filter((note) => !used(note));
   }
 
