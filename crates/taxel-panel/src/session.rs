@@ -91,7 +91,7 @@ impl ClientSession {
                 tokio::time::sleep(FRAME_TIME).await;
             }
             if request.changes_labels() {
-                self.pending.begin(&self.hub, Value::Null, what, request, text.len(), self.viewport.shown());
+                self.pending.begin(&self.hub, Value::Null, what, request, text.len(), self.viewport.open_recording());
             } else if matches!(request, Request::Open { .. } | Request::Live {}) {
                 // The labels after it are of what it shows.
                 let _ = self.handle_own(request).await;
@@ -141,7 +141,12 @@ impl ClientSession {
                         return Err(Closing::With(GOING_AWAY, "the server ends"));
                     }
                 },
-                Some(answer) = answers.recv() => self.connection.send_message(&answer).await?,
+                Some(answer) = answers.recv() => {
+                    if let Message::Detections { source, encoders, .. } = &answer {
+                        self.viewport.set_readout(source, encoders).await;
+                    }
+                    self.connection.send_message(&answer).await?;
+                }
                 _ = frames.changed() => self.viewport.mark_dirty(),
                 () = tick => {}
             }
@@ -254,7 +259,7 @@ impl ClientSession {
             }
             Ok(Err(refusal)) => self.refuse(id, what, refusal).await,
             Err(request) => {
-                let shown = self.viewport.shown();
+                let shown = self.viewport.open_recording();
                 if let Some(busy) = self.pending.begin(&self.hub, id, what, request, text.len(), shown) {
                     self.count_refusal();
                     self.connection.send_message(&busy).await?;
@@ -294,7 +299,7 @@ impl ClientSession {
                 };
                 return Ok(moved.map(|()| vec![view.transport_message()]));
             }
-            other => return Err(other),
+            request => return Err(request),
         };
         Ok(done.map(|()| vec![]))
     }

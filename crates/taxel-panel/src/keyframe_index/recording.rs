@@ -335,7 +335,7 @@ impl RecordingIndex {
             for change in &piece.changes {
                 contents.activity.count(change);
             }
-            for together in piece.changes.chunk_by(|one, next| one.t == next.t) {
+            for together in piece.changes.chunk_by(|change, next| change.t == next.t) {
                 let t = together[0].t;
                 contents.first = Some(contents.first.map_or(t, |first: i64| first.min(t)));
                 contents.event_rate.add(t, together.len() as u64);
@@ -456,4 +456,4 @@ impl KeyframeIndex for Arc<RecordingIndex> {
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+pub(crate) mod tests;
