@@ -54,7 +54,7 @@ struct SourceEncoder {
 }
 
 impl EncodedSpikes {
-    fn begun(encoder: &ViewEncoder, sensors: &[Array], array: &Array, column_us: i64) -> Result<Self> {
+    fn begin(encoder: &ViewEncoder, sensors: &[Array], array: &Array, column_us: i64) -> Result<Self> {
         let ViewEncoder { encoder, name, of_readout } = encoder;
         let (mut encoders, mut first) = (vec![], 0);
         for sensor in sensors {
@@ -89,7 +89,7 @@ impl EncodedSpikes {
         held: &[u16],
         since: Option<i64>,
     ) -> Result<Self> {
-        let mut spikes = Self::begun(encoder, slice::from_ref(array), array, column_us)?;
+        let mut spikes = Self::begin(encoder, slice::from_ref(array), array, column_us)?;
         if let Some(t) = since {
             spikes.push_events(&as_events(held, t, array));
             spikes.forget();
@@ -113,7 +113,7 @@ impl EncodedSpikes {
             return Err(problem!("{text}").helped_by("rate_hz", Hint::Give).into());
         }
         let sensors = frames.sensors();
-        let mut spikes = Self::begun(encoder, &sensors, frames.array(), column_us)?;
+        let mut spikes = Self::begin(encoder, &sensors, frames.array(), column_us)?;
         spikes.frames = Some(Arc::clone(frames));
         if let Some(t) = since {
             for (source, encoder) in spikes.encoders.iter_mut().enumerate() {
@@ -175,7 +175,7 @@ impl EncodedSpikes {
         let from = self.pending.len();
         let push = |encoder| emit(&mut self.pending, encoder, |stream, out| stream.push_events(events.view(), out));
         let pushed = self.encoders.iter_mut().try_for_each(push);
-        self.pushed(pushed, from);
+        self.note_outcome(pushed, from);
     }
 
     /// Encodes the frames up to `t` (us) that have not been encoded yet.
@@ -190,10 +190,10 @@ impl EncodedSpikes {
                 pushed = emit(&mut self.pending, encoder, |stream, out| stream.push_frame(at, &values, out));
             }
         }
-        self.pushed(pushed, from);
+        self.note_outcome(pushed, from);
     }
 
-    fn pushed(&mut self, pushed: taxel_core::Result<()>, from: usize) {
+    fn note_outcome(&mut self, pushed: taxel_core::Result<()>, from: usize) {
         match pushed {
             Ok(()) => self.count(from),
             Err(error) => self.failed = Some(format!("encoder {}: {error}", self.name)),

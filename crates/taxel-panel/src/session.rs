@@ -94,7 +94,7 @@ impl ClientSession {
                 self.pending.begin(&self.hub, Value::Null, what, request, text.len(), self.viewport.open_recording());
             } else if matches!(request, Request::Open { .. } | Request::Live {}) {
                 // The labels after it are of what it shows.
-                let _ = self.handle_own(request).await;
+                let _ = self.handle_view_request(request).await;
             }
         }
     }
@@ -247,7 +247,7 @@ impl ClientSession {
             Ok(request) => request,
             Err(refusal) => return self.refuse(id, what, refusal).await,
         };
-        match self.handle_own(request).await {
+        match self.handle_view_request(request).await {
             Ok(Ok(messages)) => {
                 for message in messages {
                     self.connection.send_message(&message).await?;
@@ -271,7 +271,7 @@ impl ClientSession {
 
     /// Carries out a request that concerns this client's flow or view alone, and returns the messages before `done`; another
     /// request is returned.
-    async fn handle_own(&mut self, request: Request) -> Result<Answer<Vec<Message>>, Request> {
+    async fn handle_view_request(&mut self, request: Request) -> Result<Answer<Vec<Message>>, Request> {
         let view = &mut self.viewport;
         let done = match request {
             Request::Credit { n } => {

@@ -48,7 +48,7 @@ export class Channels {
    */
   draw(timeline, { sensor, taxel, values }) {
     if (sensor.kind !== "channels") return "";
-    const places = sensor.there;
+    const places = sensor.existing;
     const watched = taxel && Math.max(...taxel);
     if (this.sensor !== sensor) this.name(sensor, places);
     const { width, height, ratio } = fitted(this.canvas);

@@ -281,7 +281,7 @@ class Channels extends Sensor {
   }
 
   /** @returns {number[]} the places of those that exist */
-  get there() {
+  get existing() {
     return Array.from({ length: this.count }, (_, k) => k).filter((k) => !this.exists || this.exists[k] === "1");
   }
 
@@ -315,7 +315,7 @@ class Channels extends Sensor {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     const wide = width / this.count;
-    for (const k of this.there) {
+    for (const k of this.existing) {
       const high = Math.max(LEAST_BAR, levels[k]) * height;
       context.fillStyle = css(words[k]);
       context.fillRect((flips.x ? this.count - 1 - k : k) * wide + Math.min(1, wide / 8), height - high, Math.max(1, wide - Math.min(2, wide / 4)), high);

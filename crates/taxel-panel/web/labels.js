@@ -141,7 +141,7 @@ export class Labels {
 
   /** Marks at the cursor, or at the time shown. */
   markHere() {
-    this.player.meant(this.timeline()?.cursor_us).then((t_us) => this.mark(t_us));
+    this.player.timeToMark(this.timeline()?.cursor_us).then((t_us) => this.mark(t_us));
   }
 
   /** @param {number | null} t_us */
@@ -192,7 +192,7 @@ export class Labels {
 
   /** @param {number} by 1: the next label after the time shown, -1: the one before */
   go(by) {
-    const now = this.player.goal ?? 0;
+    const now = this.player.targetTime ?? 0;
     const others = this.labels.filter(({ t_us }) => (by > 0 ? t_us > now : t_us < now));
     const next = by > 0 ? others[0] : others[others.length - 1];
     if (!next) return;

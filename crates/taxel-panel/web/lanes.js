@@ -214,7 +214,7 @@ export class Lanes {
   }
 
   /** @returns {Lane[]} those that are shown */
-  get seen() {
+  get visible() {
     const shown = this.shown();
     return LANES.filter(({ setting, fits }) => this.settings.values[setting] && (!fits || fits(shown)));
   }
@@ -311,7 +311,7 @@ export class Lanes {
   }
 
   /** @returns {{ title: string, canvas: HTMLCanvasElement, inset: number }[]} the lanes of a saved picture */
-  pictured() {
+  saved() {
     return this.all.flatMap(({ lane, heading, place }) => {
       const canvas = place.querySelector("canvas");
       const said = heading.querySelector("output")?.textContent ?? "";

@@ -40,7 +40,7 @@ export class Layout {
   }
 
   /** @returns {{ place: Place, width: number }} of the maps, and of one map, CSS pixels */
-  best() {
+  widest() {
     const { aspect, maps, lanes } = this.shown();
     const { clientWidth: wide } = this.views;
     const banner = this.banner.offsetHeight;
@@ -58,7 +58,7 @@ export class Layout {
   }
 
   arrange() {
-    const { place, width } = matchMedia(NARROW).matches ? { place: /** @type {Place} */ ("above"), width: 0 } : this.best();
+    const { place, width } = matchMedia(NARROW).matches ? { place: /** @type {Place} */ ("above"), width: 0 } : this.widest();
     const chosen = `${place} ${Math.floor(width)}`;
     if (chosen === this.done) return;
     this.done = chosen;

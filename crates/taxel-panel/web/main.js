@@ -58,7 +58,7 @@ const layout = new Layout(arrangement, () => (lanesDue = true));
 const board = new Board(server, settings, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
 const recorder = new Recorder(server, failed, () => showTab("record"));
-const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, notes: notes.timed, cut: view.cut }));
+const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, notes: notes.withTime, cut: view.cut }));
 
 /** @type {Timeline | null} */
 let timeline = null;
@@ -143,7 +143,7 @@ function shown() {
 
 /** What the page has to place: see `Layout`. */
 function arrangement() {
-  return { aspect: maps.aspect, maps: mapsShown() === "both" ? 2 : 1, lanes: lanes.seen };
+  return { aspect: maps.aspect, maps: mapsShown() === "both" ? 2 : 1, lanes: lanes.visible };
 }
 
 /** Lists the recordings, with the labels as the page knows them. */

@@ -255,7 +255,7 @@ export class Maps {
     write(part("pressure-top", HTMLElement), `${rounded(scale * step)} ${unit}`);
     write(part("change-least", HTMLElement), `−${Math.round(changes)}`);
     write(part("change-top", HTMLElement), `+${Math.round(changes)} ticks`);
-    write(part("rest-from", HTMLElement), this.restFrom());
+    write(part("rest-from", HTMLElement), this.restWords());
     write(part("pressure-above", HTMLElement), !frames || this.sources.some(({ rest }) => rest === "quiet") ? "above rest" : "");
     const { unknown } = this.info;
     part("unknown", HTMLElement).hidden = unknown === 0;
@@ -268,7 +268,7 @@ export class Maps {
   }
 
   /** @returns {string} what the shown values are above, of each source where that differs */
-  restFrom() {
+  restWords() {
     if (!this.frame) return "";
     if (!this.values.frames) return REST_FROM[this.frame.restFrom];
     const all = new Set(this.sources.map(({ rest }) => REST_OF_FRAMES[rest]));
