@@ -221,8 +221,8 @@ export class Lanes {
 
   /** Shows the lanes that the settings ask for and the source has. */
   show() {
-    const { seen } = this;
-    for (const { lane, block } of this.all) block.hidden = !seen.includes(lane);
+    const { visible } = this;
+    for (const { lane, block } of this.all) block.hidden = !visible.includes(lane);
     this.renew();
   }
 

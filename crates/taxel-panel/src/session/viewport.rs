@@ -416,9 +416,11 @@ impl Viewport {
     }
 
     pub(super) async fn encode(&mut self, encoder: Option<Map<String, Value>>) -> Answer {
-        self.requested_encoder = encoder;
-        if self.requested_encoder.is_some() {
-            let chosen = self.choose_encoder(&self.index()?);
+        self.requested_encoder = None;
+        if encoder.is_some() {
+            let index = self.index()?;
+            self.requested_encoder = encoder;
+            let chosen = self.choose_encoder(&index);
             chosen.map_err(|error| Refusal { reason: error.to_string(), field: Some("encoder".to_owned()) })?;
         }
         self.reopen().await
