@@ -207,7 +207,7 @@ def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, 
         shows(page, "state-word", FOLLOWS)
         shows(page, "detections-none", "^None yet")
         press(page, "4")
-        assert page.locator("#encoder option[value=contact_area]").inner_text() == "contact area of the readout"
+        assert page.locator("#encoder option[value=contact_area]").inner_text() == "readout: contact area"
         page.locator("#encoder").select_option("contact_area")
         with running("emulate", "--replay", "played.mcap", "--port", port, folder=tmp_path) as board:
             board.process.wait(PATIENCE)

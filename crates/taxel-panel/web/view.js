@@ -94,7 +94,7 @@ export class View {
   offer(readout) {
     const names = [...new Set([...this.encoders, ...readout])];
     const { value } = this.encoder;
-    this.encoder.replaceChildren(make("option", { value: "" }, "none"), ...names.map((name) => make("option", { value: name }, `${name.replaceAll("_", " ")}${readout.includes(name) ? " of the readout" : ""}`)));
+    this.encoder.replaceChildren(make("option", { value: "" }, "none"), ...names.map((name) => make("option", { value: name }, `${readout.includes(name) ? "readout: " : ""}${name.replaceAll("_", " ")}`)));
     this.encoder.value = names.includes(value) ? value : "";
     if (!this.encoder.value) this.settings.set("raster", "changes");
   }
