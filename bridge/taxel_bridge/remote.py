@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from taxel import DeviceError, ProblemError
 from taxel.live import RemoteBoard
-from taxel.live.remote import Feed
+from taxel.live.remote import ParcelFeed
 
 __all__ = ["Address", "Remote", "wheel", "with_taxel_errors"]
 
@@ -180,13 +180,13 @@ class Remote(RemoteBoard):
                 return f"that computer is reached, but no program listens at this port; {begin}"
             return f"{(error.strerror or str(error)).lower()}; is the address right, are both on one network?"
 
-    def begin(self, feed: Feed) -> None:
+    def begin(self, feed: ParcelFeed) -> None:
         """Feed the pipeline of a `Live` from now on, which calls this."""
         self.in_use = True
         self._thread = threading.Thread(target=self._run, args=(feed,), name="taxel-bridge", daemon=True)
         self._thread.start()
 
-    def _run(self, feed: Feed) -> None:
+    def _run(self, feed: ParcelFeed) -> None:
         """Feed received parcels until the pipeline ends, or `stop` is called."""
         try:
             self._compare(feed, _AT_FIRST)
@@ -204,7 +204,7 @@ class Remote(RemoteBoard):
             # The pipeline raises it in its callers.
             feed.fail(str(error))
 
-    def _begin_session(self, feed: Feed) -> None:
+    def _begin_session(self, feed: ParcelFeed) -> None:
         """Begin another session: it must be of the same sensor, and the clocks are compared again."""
         about = dict(with_taxel_errors(self._zenoh.names, _ASK_S)).get(self.name)
         if about is not None and json.loads(about)["array"] != self._described:
@@ -212,13 +212,13 @@ class Remote(RemoteBoard):
         feed.begin_session()
         self._compare(feed, _AT_FIRST)
 
-    def _compare(self, feed: Feed, times: int) -> None:
+    def _compare(self, feed: ParcelFeed, times: int) -> None:
         for _ in range(times):
             trip = self._zenoh.compare(self.name)
             if trip is not None:
                 feed.compare(*trip)
 
-    def _clocks(self, feed: Feed) -> None:
+    def _clocks(self, feed: ParcelFeed) -> None:
         # A round trip takes up to a second if the other computer is gone: parcels must not wait for it.
         with contextlib.suppress(ConnectionError):
             while not (feed.is_over() or self._ending.wait(_COMPARE_S)):

@@ -8,7 +8,7 @@ import pytest
 import taxel
 from taxel.cli import main
 from taxel.live import Live, RemoteBoard
-from taxel.live.remote import Feed
+from taxel.live.remote import ParcelFeed
 from taxel.simulate import Silence, emulate
 
 from .boards import LOOPBACK
@@ -17,7 +17,7 @@ from .boards import LOOPBACK
 class There(RemoteBoard):
     """A board whose parcels the test passes on."""
 
-    def begin(self, feed: Feed) -> None:
+    def begin(self, feed: ParcelFeed) -> None:
         self.in_use, self.feed = True, feed
 
 

@@ -90,6 +90,9 @@ def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, 
     ):
         shows(page, "state-word", FOLLOWS)
         shows(page, "detections-none", "^None yet")
+        press(page, "4")
+        assert page.locator("#encoder option[value=contact_area]").inner_text() == "readout: contact area"
+        page.locator("#encoder").select_option("contact_area")
         with running("emulate", "--replay", "played.mcap", "--port", port, folder=tmp_path) as board:
             board.process.wait(PATIENCE)
 
@@ -108,6 +111,7 @@ def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, 
         assert np.diff(at[::-1]) == pytest.approx(np.diff([float(time) for time, _ in printed()]), abs=0.0021)
         until(lambda: page.locator("#detection-marks span").count() > 0, "detections are marked")
         until(lambda: page.locator("#latency").inner_text() != "–", "latency is counted")
+        shows(page, "spikes-info", "^contact area, parameters of the readout, latency")
         page.locator("#detection-list button").last.click()
         shows(page, "state-word", "^Held$")
     # If the machine delays the emulated board, detections that were output too early are in the list too, and counted

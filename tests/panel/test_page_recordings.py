@@ -119,7 +119,7 @@ def test_spikes_of_an_encoder_are_shown_in_a_recording(replay: Any) -> None:
     still(replay)
     changes = settled(replay, "raster")
     replay.locator("#encoder").select_option("change_events")
-    shows(replay, "spikes-info", "change events, latency")
+    shows(replay, "spikes-info", "change events, default parameters, latency")
     until(lambda: replay.evaluate(PIXELS, "raster") != changes, "the raster is of spikes")
     replay.locator("#encoder").select_option("")
     until(lambda: replay.evaluate(PIXELS, "raster") == changes, "and of changes again")

@@ -103,7 +103,13 @@ def test_labels_and_what_a_training_printed_are_in_sight_together(count: int, ch
     trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": printed}
     trained |= {"next": "taxel detect RECORDING", "options": []}
     found = [{"label": "contact", "t_us": 10**5 * k, "known_us": 10**5 * k} for k in range(40)]
-    detected = {"type": "detections", "source": recording.name, "readout": "walk.readout.json", "labels": ["contact"]}
+    detected = {
+        "type": "detections",
+        "source": recording.name,
+        "readout": "walk.readout.json",
+        "labels": ["contact"],
+        "encoders": [],
+    }
     answers = {"train": [trained, {"type": "done"}], "read_out": [{**detected, "detections": found}, {"type": "done"}]}
     with answered(chromium, recording, answers) as page:
         page.set_viewport_size({"width": 1400, "height": 900})
@@ -156,7 +162,13 @@ def test_detections_of_a_recording_are_in_order_and_the_time_stays_without_them(
     readout.write_text("{}")
     times = [400_000, 2_000_000, 2_500_000, 9_000_000]
     found = [{"label": "contact", "t_us": t, "known_us": t} for t in times]
-    message = {"type": "detections", "source": recording.name, "readout": readout.name, "labels": ["contact"]}
+    message = {
+        "type": "detections",
+        "source": recording.name,
+        "readout": readout.name,
+        "labels": ["contact"],
+        "encoders": [],
+    }
     listing = {"type": "recordings", "folder": "", "files": [], "readouts": [readout.name]}
     answers = {"read_out": [{**message, "detections": found}, {"type": "done"}], "recordings": [listing]}
     with answered(chromium, recording, answers) as page:
@@ -176,7 +188,13 @@ def test_where_not_all_detections_are_listed_it_is_said(count: int, chromium: An
     readout = recording.with_name("walk.readout.json")
     readout.write_text("{}")
     found = [{"label": "contact", "t_us": 50_000 * k, "known_us": 50_000 * k} for k in range(count)]
-    message = {"type": "detections", "source": recording.name, "readout": readout.name, "labels": ["contact"]}
+    message = {
+        "type": "detections",
+        "source": recording.name,
+        "readout": readout.name,
+        "labels": ["contact"],
+        "encoders": [],
+    }
     listing = {"type": "recordings", "folder": "", "files": [], "readouts": [readout.name]}
     answers = {"read_out": [{**message, "detections": found}, {"type": "done"}], "recordings": [listing]}
     with answered(chromium, recording, answers) as page:
@@ -191,7 +209,13 @@ def test_shapes_of_detections_follow_the_order_of_the_readout(order: list[str], 
     readout = recording.with_name("walk.readout.json")
     readout.write_text("{}")
     found = [{"label": order[k % 2], "t_us": 10**6 * (k + 1), "known_us": 10**6 * (k + 1)} for k in range(4)]
-    message = {"type": "detections", "source": recording.name, "readout": readout.name, "labels": ["contact", "lift"]}
+    message = {
+        "type": "detections",
+        "source": recording.name,
+        "readout": readout.name,
+        "labels": ["contact", "lift"],
+        "encoders": [],
+    }
     listing = {"type": "recordings", "folder": "", "files": [], "readouts": [readout.name]}
     answers = {"read_out": [{**message, "detections": found}, {"type": "done"}], "recordings": [listing]}
     with answered(chromium, recording, answers) as page:

@@ -8,6 +8,7 @@ import time
 import numpy as np
 import pytest
 from panel.protocol import SOON, Client, head, heard, parts_of, say, section, word
+from panel.test_frames import spikes_of, spikes_up_to
 from tests.detect.test_readout import recipe, tare, touches
 from tests.tasks.recordings import rested
 
@@ -149,12 +150,20 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
     ):
         assert page.until("recordings")["readouts"] == ["rule.json", "touch.json"]
         page.ask("open", name="played.mcap")
+        assert "without a tare" in page.ask("encode", encoder={"name": "contact_area"})["reason"]
         assert page.ask("read_out", readout="none.json")["type"] == "refused"
         assert page.ask("read_out", readout="touch.json")["type"] == "done"
         answer = next(m for m in page.said if m["type"] == "detections")
         assert answer["labels"] == ["contact", "lift"]
         found = answer["detections"]
         assert [one["label"] for one in found] == ["contact", "lift"] * 6
+        # The spikes of the readout's encoder are those that it read: its levels, not the defaults, with its tare.
+        assert answer["encoders"] == ["contact_area"]
+        assert page.ask("encode", encoder={"name": "contact_area"})["type"] == "done"
+        [detected] = taxel.tasks.detect(readout, taxel.open(tmp_path / "played.mcap")).each
+        read = readout.encoder.with_tare(detected.rest.tare)
+        assert sorted(spikes_up_to(page, int(events.t[-1]))) == sorted(spikes_of(read.encode(events)))
+        assert page.said[-1]["of_readout"]
         assert page.ask("train")["reason"].count("names no event")
         page.ask("live")
         address = live.address
@@ -165,6 +174,7 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
         time.sleep(0.2)
         assert page.ask("read_out", readout="touch.json")["type"] == "done"
         hello = page.since_asked("hello")
-        assert hello["readout"] == ["contact", "lift"]
+        assert (hello["readout"], hello["readout_encoders"]) == (["contact", "lift"], ["contact_area"])
+        assert page.ask("encode", encoder={"name": "contact_area"})["type"] == "done"
         assert panel.live is not live
         assert panel.live.address == address

@@ -58,10 +58,10 @@ def record(
     writer.note(at + 6_000_000, None, "somebody coughed")
     writer.detection(at + 7_000_000, "contact", 6000, 6192, 1.5, False)
     writer.registers(at, json.dumps(_core.registers_preset("5.2 kHz")))
-    writer.picture(at, 0, 64, np.full(4096, 75, np.uint16))
+    writer.preview(at, 0, 64, np.full(4096, 75, np.uint16))
     pressed = np.full(4096, 75, np.uint16)
     pressed[:2] = 135, 105
-    writer.picture(at + 100_000_000, 100_000, 64, pressed)
+    writer.preview(at + 100_000_000, 100_000, 64, pressed)
     writer.counts(at, json.dumps({"received": number, "recorded": number}))
     if finish:
         writer.finish(json.dumps({"received": number}))

@@ -335,7 +335,7 @@ def test_a_finished_writer_takes_no_more_and_nonsense_is_refused(tmp_path: Path)
     with pytest.raises(ProblemError, match="65507"):
         writer.datagram(0, 0, bytes(70_000))
     with pytest.raises(ProblemError, match="whole rows"):
-        writer.picture(0, 0, 64, np.zeros(63, np.uint16))
+        writer.preview(0, 0, 64, np.zeros(63, np.uint16))
     with pytest.raises(ProblemError, match="registers"):
         writer.registers(0, "[]")
     writer.finish("{}")

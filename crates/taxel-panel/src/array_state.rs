@@ -67,7 +67,7 @@ impl RestSource {
     /// The one of a name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
-        [Self::Given, Self::Quiet, Self::None].into_iter().find(|one| one.name() == name)
+        [Self::Given, Self::Quiet, Self::None].into_iter().find(|source| source.name() == name)
     }
 }
 
@@ -228,7 +228,7 @@ impl ArrayState {
 
     /// Applies changes in order; those of one time together, because most of the work is per time.
     pub fn apply(&mut self, changes: &[TaxelChange]) {
-        for together in changes.chunk_by(|one, next| one.t == next.t) {
+        for together in changes.chunk_by(|change, next| change.t == next.t) {
             let t = together[0].t;
             self.advance(t);
             self.events += if self.frames.is_some() { 1 } else { together.len() as u64 };
@@ -446,11 +446,11 @@ impl ArrayState {
     }
 
     /// Copies rest and noise floor from another state of the same source, where they differ.
-    pub fn copy_rest(&mut self, other: &Self) {
-        if self.floor != other.floor || self.rest != other.rest {
-            (self.floor, self.sum_floor) = (other.floor, other.sum_floor);
-            self.rest.clone_from(&other.rest);
-            self.tracked.clone_from(&other.tracked);
+    pub fn copy_rest(&mut self, from: &Self) {
+        if self.floor != from.floor || self.rest != from.rest {
+            (self.floor, self.sum_floor) = (from.floor, from.sum_floor);
+            self.rest.clone_from(&from.rest);
+            self.tracked.clone_from(&from.tracked);
             self.sum_above_rest();
         }
     }
@@ -577,11 +577,11 @@ mod tests {
         }
         let mut whole = ArrayState::new(&Array::unmeasured(3, 4, "small"), 3, &blank(taxels as usize), us, 1 << 20);
         let mut keyframes = vec![];
-        for (k, one) in changes.iter().enumerate() {
+        for (k, change) in changes.iter().enumerate() {
             if k % 100 == 0 {
                 keyframes.push((k, whole.keyframe()));
             }
-            whole.apply_one(one);
+            whole.apply_one(change);
         }
         for (k, keyframe) in keyframes {
             let mut fresh = ArrayState::new(&Array::unmeasured(3, 4, "small"), 3, &keyframe, us, 1 << 20);
@@ -596,10 +596,14 @@ mod tests {
             }
             fresh.update_curve();
             whole.update_curve();
-            let (one, other) = (fresh.time_columns(), whole.time_columns());
+            let (fresh, whole) = (fresh.time_columns(), whole.time_columns());
             for column in (begun + 30).max(now - SPAN)..=now {
-                assert_eq!(raster(one, column), raster(other, column), "column {column}");
-                assert_eq!(format!("{:?}", one.curve(column)), format!("{:?}", other.curve(column)), "column {column}");
+                assert_eq!(raster(fresh, column), raster(whole, column), "column {column}");
+                assert_eq!(
+                    format!("{:?}", fresh.curve(column)),
+                    format!("{:?}", whole.curve(column)),
+                    "column {column}"
+                );
             }
         }
     }

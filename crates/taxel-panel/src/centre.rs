@@ -11,7 +11,7 @@ const STEPS: f64 = 65_535.0;
 /// The coordinates of each taxel as whole numbers, so that the sums of a load times its coordinates stay exact.
 #[derive(Debug, Clone)]
 pub(crate) struct Coordinates {
-    of: Arc<[(u16, u16)]>,
+    places: Arc<[(u16, u16)]>,
     /// The place of coordinate 0, and the length of a step; `None` of channels, which have no centre.
     scale: Option<((f64, f64), f64)>,
 }
@@ -23,28 +23,28 @@ impl Coordinates {
             return Self::of_places(array, places);
         }
         // An array has 65 535 rows and columns at most.
-        let of = (0..array.rows).flat_map(|y| (0..array.columns).map(move |x| (x, y))).collect();
-        Self { of, scale: (!array.is_channels()).then_some(((0.0, 0.0), 1.0)) }
+        let places = (0..array.rows).flat_map(|y| (0..array.columns).map(move |x| (x, y))).collect();
+        Self { places, scale: (!array.is_channels()).then_some(((0.0, 0.0), 1.0)) }
     }
 
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     fn of_places(array: &Array, Places { x, y, .. }: &Places) -> Self {
         let range = |all: &[f64]| {
-            let there = all.iter().enumerate().filter(|&(taxel, _)| array.has(taxel)).map(|(_, &one)| one);
-            there.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), one| (least.min(one), most.max(one)))
+            let there = all.iter().enumerate().filter(|&(taxel, _)| array.has(taxel)).map(|(_, &place)| place);
+            there.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), place| (least.min(place), most.max(place)))
         };
         let ((left, right), (top, bottom)) = (range(x), range(y));
         let extent = (right - left).max(bottom - top);
         let step = if extent > 0.0 { extent / STEPS } else { 1.0 };
         let whole = |at: f64, from: f64| ((at - from) / step).round() as u16;
-        let of = x.iter().zip(y).map(|(&x, &y)| (whole(x, left), whole(y, top))).collect();
-        Self { of, scale: Some(((left, top), step)) }
+        let places = x.iter().zip(y).map(|(&x, &y)| (whole(x, left), whole(y, top))).collect();
+        Self { places, scale: Some(((left, top), step)) }
     }
 
     /// The coordinates of a taxel.
     #[inline(always)]
     pub(crate) fn get(&self, taxel: usize) -> (u64, u64) {
-        let (x, y) = self.of[taxel];
+        let (x, y) = self.places[taxel];
         (x.into(), y.into())
     }
 

@@ -5,12 +5,12 @@ use std::ops::Range;
 use std::slice;
 use std::sync::Arc;
 
-use serde_json::json;
-use taxel_core::encode::{Encoder, Stream};
+use taxel_core::encode::Stream;
 use taxel_core::{Array, Events, Hint, Intensities, Spike, SpikeKind, problem};
 
 use super::keyframe_index::FrameSources;
 use super::messages::Message;
+use super::readout_encoders::ViewEncoder;
 use super::time_columns::{SPAN, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
 use taxel_live::Result;
@@ -26,8 +26,9 @@ const PIECE: usize = 1 << 16;
 #[derive(Clone)]
 pub(super) struct EncodedSpikes {
     name: String,
+    of_readout: bool,
     /// One of a board; of frames one a source.
-    encoders: Vec<OfSource>,
+    encoders: Vec<SourceEncoder>,
     /// What is encoded, if it is frames.
     frames: Option<Arc<dyn FrameSources>>,
     array: Array,
@@ -43,7 +44,7 @@ pub(super) struct EncodedSpikes {
 
 /// The encoder of a source.
 #[derive(Clone)]
-struct OfSource {
+struct SourceEncoder {
     stream: Box<dyn Stream>,
     /// Number of its first train among those of all sources.
     first: u32,
@@ -53,17 +54,18 @@ struct OfSource {
 }
 
 impl EncodedSpikes {
-    fn begun(encoder: &Encoder, sensors: &[Array], array: &Array, column_us: i64) -> Result<Self> {
-        let name = json!(encoder)["name"].as_str().unwrap_or_default().to_owned();
+    fn begin(encoder: &ViewEncoder, sensors: &[Array], array: &Array, column_us: i64) -> Result<Self> {
+        let ViewEncoder { encoder, name, of_readout } = encoder;
         let (mut encoders, mut first) = (vec![], 0);
         for sensor in sensors {
             let stream = encoder.stream(sensor).map_err(|error| problem!("encoder {name}: {error}"))?;
             let trains = u32::try_from(stream.trains()).map_err(|_| problem!("encoder {name}: too many trains"))?;
-            encoders.push(OfSource { stream, first, rows: sensor.rows.into(), next: 0 });
+            encoders.push(SourceEncoder { stream, first, rows: sensor.rows.into(), next: 0 });
             first += trains;
         }
         Ok(Self {
-            name,
+            name: name.clone(),
+            of_readout: *of_readout,
             encoders,
             frames: None,
             array: array.clone(),
@@ -81,13 +83,13 @@ impl EncodedSpikes {
     ///
     /// `Core(Problem)` where the encoder does not fit the array.
     pub(super) fn new(
-        encoder: &Encoder,
+        encoder: &ViewEncoder,
         array: &Array,
         column_us: i64,
         held: &[u16],
         since: Option<i64>,
     ) -> Result<Self> {
-        let mut spikes = Self::begun(encoder, slice::from_ref(array), array, column_us)?;
+        let mut spikes = Self::begin(encoder, slice::from_ref(array), array, column_us)?;
         if let Some(t) = since {
             spikes.push_events(&as_events(held, t, array));
             spikes.forget();
@@ -101,7 +103,7 @@ impl EncodedSpikes {
     ///
     /// `Core(Problem)` where the encoder does not fit a sensor, or the frames have no times.
     pub(super) fn of_frames(
-        encoder: &Encoder,
+        encoder: &ViewEncoder,
         frames: &Arc<dyn FrameSources>,
         column_us: i64,
         since: Option<i64>,
@@ -111,11 +113,11 @@ impl EncodedSpikes {
             return Err(problem!("{text}").helped_by("rate_hz", Hint::Give).into());
         }
         let sensors = frames.sensors();
-        let mut spikes = Self::begun(encoder, &sensors, frames.array(), column_us)?;
+        let mut spikes = Self::begin(encoder, &sensors, frames.array(), column_us)?;
         spikes.frames = Some(Arc::clone(frames));
         if let Some(t) = since {
-            for (source, of) in spikes.encoders.iter_mut().enumerate() {
-                of.next = frames.until(source, t).saturating_sub(1);
+            for (source, encoder) in spikes.encoders.iter_mut().enumerate() {
+                encoder.next = frames.until(source, t).saturating_sub(1);
             }
             spikes.push_frames(t);
             spikes.forget();
@@ -160,7 +162,8 @@ impl EncodedSpikes {
         self.push_frames(t);
         if self.failed.is_none() {
             let from = self.pending.len();
-            self.encoders.iter_mut().for_each(|of| emit(&mut self.pending, of, |stream, out| stream.advance(t, out)));
+            let advance = |encoder| emit(&mut self.pending, encoder, |stream, out| stream.advance(t, out));
+            self.encoders.iter_mut().for_each(advance);
             self.count(from);
         }
     }
@@ -170,25 +173,27 @@ impl EncodedSpikes {
             return;
         }
         let from = self.pending.len();
-        let push = |of| emit(&mut self.pending, of, |stream, out| stream.push_events(events.view(), out));
+        let push = |encoder| emit(&mut self.pending, encoder, |stream, out| stream.push_events(events.view(), out));
         let pushed = self.encoders.iter_mut().try_for_each(push);
-        self.pushed(pushed, from);
+        self.note_outcome(pushed, from);
     }
 
     /// Encodes the frames up to `t` (us) that have not been encoded yet.
     fn push_frames(&mut self, t: i64) {
         let Some(frames) = self.frames.clone().filter(|_| self.failed.is_none()) else { return };
         let (from, mut pushed) = (self.pending.len(), Ok(()));
-        for (source, of) in self.encoders.iter_mut().enumerate() {
-            while let Some((at, values)) = frames.frame(source, of.next).filter(|&(at, _)| at <= t && pushed.is_ok()) {
-                of.next += 1;
-                pushed = emit(&mut self.pending, of, |stream, out| stream.push_frame(at, &values, out));
+        for (source, encoder) in self.encoders.iter_mut().enumerate() {
+            while let Some((at, values)) =
+                frames.frame(source, encoder.next).filter(|&(at, _)| at <= t && pushed.is_ok())
+            {
+                encoder.next += 1;
+                pushed = emit(&mut self.pending, encoder, |stream, out| stream.push_frame(at, &values, out));
             }
         }
-        self.pushed(pushed, from);
+        self.note_outcome(pushed, from);
     }
 
-    fn pushed(&mut self, pushed: taxel_core::Result<()>, from: usize) {
+    fn note_outcome(&mut self, pushed: taxel_core::Result<()>, from: usize) {
         match pushed {
             Ok(()) => self.count(from),
             Err(error) => self.failed = Some(format!("encoder {}: {error}", self.name)),
@@ -213,8 +218,9 @@ impl EncodedSpikes {
                 },
             };
             // The trains of a source are assigned to its rows evenly: with one train per taxel that is the row of the taxel.
-            let of = &self.encoders[self.encoders.partition_point(|of| of.first <= spike.train).saturating_sub(1)];
-            let row = (spike.train - of.first) as usize * of.rows / of.stream.trains().max(1);
+            let next = self.encoders.partition_point(|encoder| encoder.first <= spike.train);
+            let encoder = &self.encoders[next.saturating_sub(1)];
+            let row = (spike.train - encoder.first) as usize * encoder.rows / encoder.stream.trains().max(1);
             let row = row.min(rows - 1);
             let cell = &mut self.columns[place].1[row];
             let (ups, downs) = (*cell & 15, *cell >> 4);
@@ -256,7 +262,8 @@ impl EncodedSpikes {
         let stream = &self.encoders.first()?.stream;
         let message = Message::Spikes {
             encoder: self.name.clone(),
-            trains: self.encoders.iter().map(|of| of.stream.trains()).sum(),
+            of_readout: self.of_readout,
+            trains: self.encoders.iter().map(|encoder| encoder.stream.trains()).sum(),
             signed: stream.kind() == SpikeKind::Signed,
             latency_ms: stream.latency_ms(),
             t_ms: self.pending.iter().map(|spike| spike.t).collect(),
@@ -290,9 +297,13 @@ impl EncodedSpikes {
 }
 
 /// Appends the spikes that a source's encoder emits, with the numbers of their trains among those of all sources.
-fn emit<T>(pending: &mut Vec<Spike>, of: &mut OfSource, work: impl FnOnce(&mut dyn Stream, &mut Vec<Spike>) -> T) -> T {
+fn emit<T>(
+    pending: &mut Vec<Spike>,
+    encoder: &mut SourceEncoder,
+    work: impl FnOnce(&mut dyn Stream, &mut Vec<Spike>) -> T,
+) -> T {
     let from = pending.len();
-    let done = work(&mut *of.stream, pending);
-    pending[from..].iter_mut().for_each(|spike| spike.train += of.first);
+    let done = work(&mut *encoder.stream, pending);
+    pending[from..].iter_mut().for_each(|spike| spike.train += encoder.first);
     done
 }

@@ -97,7 +97,7 @@ impl<'a> ShownColumns<'a> {
     fn curve(&self, column: i64) -> Curve {
         let parts = self.parts(column).into_iter().filter(|(_, columns)| !columns.is_empty());
         let greatest =
-            |most: Curve, one: Curve| if one.sum > most.sum || most.area == MISSING.area { one } else { most };
+            |most: Curve, curve: Curve| if curve.sum > most.sum || most.area == MISSING.area { curve } else { most };
         let curve = parts.map(|(store, columns)| store.greatest(columns)).reduce(greatest).unwrap_or(NOTHING);
         if curve.sum > self.noise.0 { curve } else { Curve { x: f32::NAN, y: f32::NAN, ..curve } }
     }

@@ -141,6 +141,8 @@ pub struct UnhealthyTaxels {
 pub struct Detected {
     /// The readout's labels, in its order.
     pub labels: Vec<String>,
+    /// Its encoder as JSON, with the tare that it read with; `None` of a plain rule.
+    pub encoder: Option<String>,
     /// Label, time, and when it was known, us.
     pub detections: Vec<(String, i64, i64)>,
 }

@@ -46,8 +46,6 @@ pub(super) struct Hub {
     options: PanelOptions,
     handlers: Arc<RequestHandlers>,
     live: Mutex<Option<Arc<LiveSource>>>,
-    /// Labels of the readout that runs.
-    readout: Mutex<Option<Vec<String>>>,
     board: Mutex<KnownBoard>,
     presets: Mutex<UserPresets>,
     /// See [`Hub::file_turn`].
@@ -70,7 +68,6 @@ impl Hub {
             options,
             handlers: Arc::new(handlers),
             live: Mutex::default(),
-            readout: Mutex::default(),
             board: Mutex::new(board),
             presets: Mutex::default(),
             files: Arc::default(),
@@ -81,7 +78,7 @@ impl Hub {
             registers_unknown: Notify::new(),
         });
         if let Some(live) = live {
-            hub.attach(live, hub.options.readout.clone())?;
+            hub.attach(live)?;
         }
         Ok(hub)
     }
@@ -111,8 +108,8 @@ impl Hub {
         self.options.registers_stated || self.board().known
     }
 
-    /// Shows another live source from now on; `readout` are the labels of the readout that runs.
-    pub(super) fn attach(&self, handle: Handle, readout: Option<Vec<String>>) -> Result<()> {
+    /// Shows another live source from now on.
+    pub(super) fn attach(&self, handle: Handle) -> Result<()> {
         let noise_floor = {
             let mut board = self.board();
             if board.known {
@@ -124,7 +121,6 @@ impl Hub {
             board.registers.noise_floor
         };
         *lock(&self.live) = Some(Arc::new(LiveSource::new(handle, noise_floor)?));
-        *lock(&self.readout) = readout;
         self.clients.send(Broadcast::Hello);
         self.clients.send_message(&self.zeroed_message());
         Ok(())
@@ -244,7 +240,8 @@ impl Hub {
             control: self.board().control.clone(),
             folder: self.options.folder.display().to_string(),
             open: self.options.open.clone(),
-            readout: lock(&self.readout).clone(),
+            readout: live.and_then(|live| live.labels.clone()),
+            readout_encoders: live.map(|live| live.encoders.clone()).unwrap_or_default(),
             encoders: encode::NAMES,
             column_us: COLUMN_US,
             columns_us: COLUMNS_US,

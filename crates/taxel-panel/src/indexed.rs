@@ -7,7 +7,7 @@ use super::array_state::RestSource;
 use super::keyframe_index::KeyframeIndex;
 use super::keyframe_index::frames::{FrameIndex, FramePlace};
 use super::keyframe_index::recording::RecordingIndex;
-use super::messages::{FoundDetection, FrameRecording, FrameSource, Marker, Message, RecordedNote};
+use super::messages::{FoundDetection, FrameRecording, FrameSourceInfo, Marker, Message, RecordedNote};
 use super::time_columns::{COLUMN_US, TimeColumns};
 
 /// A label may lie so long before the first event or after the last one, us.
@@ -25,7 +25,7 @@ pub(super) enum Indexed {
 
 /// The recording that a client shows.
 #[derive(Debug, Clone)]
-pub(super) struct Shown {
+pub(super) struct OpenRecording {
     pub(super) name: String,
     /// Its trial, where the file holds several.
     pub(super) trial: Option<String>,
@@ -154,7 +154,7 @@ impl Indexed {
 /// What `opened` says of frames.
 fn about_frames(index: &FrameIndex) -> FrameRecording {
     let file = &index.file;
-    let source = |(place, rest, falls, preload_at): (&FramePlace, RestSource, bool, &str)| FrameSource {
+    let source = |(place, rest, falls, preload_at): (&FramePlace, RestSource, bool, &str)| FrameSourceInfo {
         name: place.name.clone(),
         left: place.left,
         rows: place.rows,

@@ -9,7 +9,7 @@ use tokio::sync::oneshot;
 use super::clients::Broadcast;
 use super::handler::{EditOutcome, LabelRow, LabelTable};
 use super::hub::Hub;
-use super::indexed::Shown;
+use super::indexed::OpenRecording;
 use super::labels::{LabelChange, NumberedEdit, WaitingChanges, file_of};
 use super::limited::{OneOrMore, Text};
 use super::limits::MOST_MARKS;
@@ -76,14 +76,14 @@ pub(super) async fn follow(hub: Arc<Hub>) {
 // ---------------------------------------------------------------------------------------------- changing
 
 /// A label of the trial that is shown.
-pub(super) fn row(shown: Option<&Shown>, label: Text<200>, t_us: i64, source: Option<Text<64>>) -> LabelRow {
+pub(super) fn row(shown: Option<&OpenRecording>, label: Text<200>, t_us: i64, source: Option<Text<64>>) -> LabelRow {
     let source = source.map(|source| source.0).unwrap_or_default();
     let trial = shown.and_then(|shown| shown.indexed.trial()).unwrap_or_default().to_owned();
     LabelRow { label: label.0, t_us, source, trial, replaces_us: None, host_ns: None }
 }
 
 /// The changes of `marks`: several labels, each at one time or more.
-pub(super) fn marks(shown: Option<&Shown>, labels: Vec<MarkedTimes>) -> Answer<Vec<LabelChange>> {
+pub(super) fn marks(shown: Option<&OpenRecording>, labels: Vec<MarkedTimes>) -> Answer<Vec<LabelChange>> {
     let mut changes = vec![];
     for MarkedTimes { label, t_us: OneOrMore(times), source, replaces_us } in labels {
         if replaces_us.as_ref().is_some_and(|replaced| replaced.0.len() != times.len()) {
@@ -102,14 +102,14 @@ pub(super) fn marks(shown: Option<&Shown>, labels: Vec<MarkedTimes>) -> Answer<V
 }
 
 /// The recording that is shown or being recorded, and one us of its file in the view.
-fn recording_of(hub: &Hub, shown: Option<&Shown>) -> Answer<(String, i64)> {
+fn recording_of(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<(String, i64)> {
     let name = shown.map(|shown| shown.name.clone()).or_else(|| hub.recorder.file());
     let name = name.ok_or("a label belongs to a recording: open one, or record")?;
     Ok((name, shown.map_or(1, |shown| shown.indexed.us())))
 }
 
 /// Changes labels of the recording that is shown or being recorded; returns when the table with all of the changes is on the disk.
-pub(super) async fn change(hub: &Hub, shown: Option<&Shown>, changes: Vec<LabelChange>) -> Answer {
+pub(super) async fn change(hub: &Hub, shown: Option<&OpenRecording>, changes: Vec<LabelChange>) -> Answer {
     let (name, us) = recording_of(hub, shown)?;
     let changes: Vec<_> = changes.into_iter().map(|change| change.at_whole(us)).collect();
     for (shown, t_us) in changes.iter().filter_map(|change| shown.zip(change.t_us())) {
@@ -137,9 +137,9 @@ async fn write_waiting(hub: &Hub, name: &str, us: i64) {
         Ok(answers) => answers,
         Err(refusal) => vec![Err(refusal); waiting.len()],
     };
-    for (one, answer) in waiting.into_iter().zip(answers) {
+    for (changes, answer) in waiting.into_iter().zip(answers) {
         // The client may have left in the meantime.
-        let _ = one.answer.send(answer);
+        let _ = changes.answer.send(answer);
     }
 }
 
@@ -170,7 +170,7 @@ async fn write(hub: &Hub, name: &str, us: i64, edits: Vec<Result<Vec<NumberedEdi
 }
 
 /// Ends the conflict of this number as the client chose.
-pub(super) async fn settle(hub: &Hub, shown: Option<&Shown>, id: u64, keep: Keep) -> Answer {
+pub(super) async fn settle(hub: &Hub, shown: Option<&OpenRecording>, id: u64, keep: Keep) -> Answer {
     let (name, us) = recording_of(hub, shown)?;
     let restore = keep == Keep::Acknowledged;
     let table = hub.folder.file(&file_of(&name))?;

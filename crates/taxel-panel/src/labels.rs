@@ -42,7 +42,7 @@ impl LabelChange {
         match self {
             Self::Mark(row) => Self::Mark(LabelRow { t_us: whole(row.t_us), ..row }),
             Self::Move { id, t_us } => Self::Move { id, t_us: whole(t_us) },
-            other => other,
+            change => change,
         }
     }
 
@@ -93,7 +93,7 @@ pub(super) struct LabelTables(Mutex<Tables>);
 
 #[derive(Default)]
 struct Tables {
-    of: HashMap<String, KnownTable>,
+    tables: HashMap<String, KnownTable>,
     last_id: u64,
     last_conflict: u64,
 }
@@ -121,19 +121,19 @@ pub(super) fn file_of(recording: &str) -> String {
 
 impl LabelTables {
     fn with<T>(&self, recording: &str, action: impl FnOnce(&mut KnownTable) -> T) -> T {
-        action(lock(&self.0).of.entry(recording.to_owned()).or_default())
+        action(lock(&self.0).tables.entry(recording.to_owned()).or_default())
     }
 
     /// Number of labels of a recording, once they have been read.
     pub(super) fn count(&self, recording: &str) -> Option<usize> {
         let counted = |labels: &Vec<Label>| labels.iter().filter(|label| !label.row.is_removal()).count();
-        lock(&self.0).of.get(recording)?.labels.as_ref().map(counted)
+        lock(&self.0).tables.get(recording)?.labels.as_ref().map(counted)
     }
 
     /// The recordings whose tables were opened, with one us of their files in the view.
     pub(super) fn opened(&self) -> Vec<(String, i64)> {
-        let tables = lock(&self.0);
-        tables.of.iter().filter(|(_, table)| table.us > 0).map(|(name, table)| (name.clone(), table.us)).collect()
+        let known = lock(&self.0);
+        known.tables.iter().filter(|(_, table)| table.us > 0).map(|(name, table)| (name.clone(), table.us)).collect()
     }
 
     /// Waits until no other request reads or writes the table of a recording.
@@ -168,9 +168,9 @@ impl LabelTables {
     /// The edits of requests, each made on what those before it leave.
     pub(super) fn edits(&self, recording: &str, waiting: &[WaitingChanges]) -> Vec<Result<Vec<NumberedEdit>, String>> {
         let mut labels = self.with(recording, |table| table.labels.clone().unwrap_or_default());
-        let mut edits = |one: &WaitingChanges| {
+        let mut edits = |waiting: &WaitingChanges| {
             let before = labels.clone();
-            let made = one.changes.iter().map(|change| change.clone().edit(&mut labels)).collect();
+            let made = waiting.changes.iter().map(|change| change.clone().edit(&mut labels)).collect();
             if Result::<Vec<NumberedEdit>, _>::is_err(&made) {
                 labels = before;
             }
@@ -190,9 +190,9 @@ impl LabelTables {
     /// Replaces the labels of a recording by those of its table, `None` where there is none; unchanged ones keep their numbers.
     /// Returns whether anything has changed.
     pub(super) fn replace(&self, recording: &str, read: Option<LabelTable>) -> bool {
-        let mut tables = lock(&self.0);
-        let Tables { of, last_id, last_conflict } = &mut *tables;
-        let table = of.entry(recording.to_owned()).or_default();
+        let mut known = lock(&self.0);
+        let Tables { tables, last_id, last_conflict } = &mut *known;
+        let table = tables.entry(recording.to_owned()).or_default();
         let (rows, conflict) = read.map(|read| (Some(read.rows), read.conflict)).unwrap_or_default();
         let mut before = table.labels.clone().unwrap_or_default();
         let mut number = |row: LabelRow| {

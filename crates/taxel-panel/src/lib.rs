@@ -28,6 +28,7 @@ mod opening;
 mod options;
 mod player;
 mod presets;
+mod readout_encoders;
 mod recorder;
 mod recording_session;
 mod refusal;

@@ -5,11 +5,13 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crossbeam_channel as channel;
 use taxel_core::Array;
+use taxel_core::detect::Detector;
+use taxel_core::encode::Tare;
 use taxel_core::held::UNKNOWN;
 use taxel_live::Result;
 use taxel_live::clock::Offset;
 use taxel_live::locked::lock;
-use taxel_live::pipeline::{Counters, Handle, OutputDetection, ViewerEvents};
+use taxel_live::pipeline::{Counters, Handle, LiveOptions, OutputDetection, StatedTare, ViewerEvents};
 use taxel_live::recording::now_ns;
 
 use super::array_state::{ArrayState, Keyframe};
@@ -17,6 +19,7 @@ use super::clients::MOST_WAITING;
 use super::keyframe_index::live::{LiveIndex, REACH_US};
 use super::keyframe_index::{Activity, KeyframeIndex};
 use super::messages::{Latency, Lost, Message};
+use super::readout_encoders::ReadoutEncoders;
 use super::time_columns::{COLUMN_US, TimeColumns};
 
 /// The time shown follows the host's clock this far behind it while no events arrive, ns: events arrive within that.
@@ -33,6 +36,10 @@ pub(super) struct LiveSource {
     pub(super) state: Mutex<ArrayState>,
     pub(super) index: LiveIndex,
     pub(super) activity: Mutex<Activity>,
+    /// The labels of the readout that runs.
+    pub(super) labels: Option<Vec<String>>,
+    /// The encoders of that readout.
+    pub(super) encoders: ReadoutEncoders,
     /// Events that found no room in the queue from the pipeline.
     missing: AtomicU64,
     /// Whether the state has the rest that was given with the readout.
@@ -49,6 +56,21 @@ struct SilentTime {
     latest: Option<(i64, i64)>,
     /// How far a stalled source is behind the host's clock, us.
     behind_us: i64,
+}
+
+/// The labels and the encoders of a live source's readout; a plain rule has no encoder. A tare that is measured is not known yet.
+fn labels_and_encoders(options: &LiveOptions) -> taxel_core::Result<Option<(Vec<String>, ReadoutEncoders)>> {
+    let Some(readout) = &options.readout else { return Ok(None) };
+    Ok(Some(match (Detector::from_json(readout)?, &options.tare) {
+        (Detector::PlainRule(rule), _) => (rule.labels.into_iter().flatten().collect(), ReadoutEncoders::default()),
+        (Detector::Readout(readout), tare) => {
+            let encoder = match tare {
+                Some(StatedTare::Saved(tare)) => readout.encoder.with_tare(&Tare::from_json(tare)?),
+                _ => readout.encoder,
+            };
+            (readout.neurons.into_keys().collect(), encoder.into())
+        }
+    }))
 }
 
 /// What arrived since the last call of [`LiveSource::receive`].
@@ -70,7 +92,9 @@ impl LiveSource {
     /// `Core(Problem)` where the source has ended.
     pub(super) fn new(handle: Handle, noise_floor: u8) -> Result<Self> {
         let (detections, events) = (handle.detections(MOST_WAITING), handle.events()?);
-        let array = handle.options().array.clone();
+        let options = handle.options();
+        let (labels, encoders) = labels_and_encoders(options)?.unzip();
+        let array = options.array.clone();
         let blank = Keyframe::blank(array.len());
         // Enough for all that a view of the past can show, at the widest columns too.
         let bytes = TimeColumns::bytes_for(&array, REACH_US / COLUMN_US);
@@ -79,6 +103,8 @@ impl LiveSource {
             activity: Mutex::new(Activity::new(&array)),
             index: LiveIndex::new(array, noise_floor.into()),
             events: Mutex::new(events),
+            labels,
+            encoders: encoders.unwrap_or_default(),
             handle,
             detections,
             missing: AtomicU64::new(0),
@@ -208,10 +234,10 @@ impl LiveSource {
         }
         let columns = usize::from(self.array().columns);
         let mut state = lock(&self.state);
-        for one in self.handle.zeroed().0 {
+        for zeroing in self.handle.zeroed().0 {
             // The rest is a held value, which has 16 bits.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            state.zero(usize::from(one.y) * columns + usize::from(one.x), one.rest as u16);
+            state.zero(usize::from(zeroing.y) * columns + usize::from(zeroing.x), zeroing.rest as u16);
         }
         true
     }

@@ -42,14 +42,14 @@ impl Load {
     }
 
     /// Both loads together.
-    pub(crate) fn plus(self, other: &Self) -> Self {
+    pub(crate) fn plus(self, more: &Self) -> Self {
         Self {
-            sum: self.sum + other.sum,
-            weighted: self.weighted + other.weighted,
-            loaded: self.loaded + other.loaded,
-            loaded_x: self.loaded_x + other.loaded_x,
-            loaded_y: self.loaded_y + other.loaded_y,
-            area: self.area + other.area,
+            sum: self.sum + more.sum,
+            weighted: self.weighted + more.weighted,
+            loaded: self.loaded + more.loaded,
+            loaded_x: self.loaded_x + more.loaded_x,
+            loaded_y: self.loaded_y + more.loaded_y,
+            area: self.area + more.area,
         }
     }
 

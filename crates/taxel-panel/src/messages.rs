@@ -14,6 +14,7 @@ use taxel_live::pipeline::{Arrival, LiveOptions, OutputDetection};
 use taxel_live::ports::Port;
 
 use super::handler::{LabelRow, UnhealthyTaxels, UserPreset};
+use super::readout_encoders::ReadoutEncoders;
 use super::refusal::Refusal;
 
 /// A message of the server.
@@ -47,6 +48,9 @@ pub(super) enum Message {
         open: Option<String>,
         /// The labels of the readout that runs.
         readout: Option<Vec<String>>,
+        /// The names of its encoders; empty without a readout, and of a plain rule.
+        #[cfg_attr(feature = "development", schemars(with = "Vec<String>"))]
+        readout_encoders: ReadoutEncoders,
         /// The names of the encoders.
         encoders: &'static [&'static str],
         /// Width of a column of time, us.
@@ -133,6 +137,9 @@ pub(super) enum Message {
     /// shown. An encoder that begins in the middle begins with the held values.
     Spikes {
         encoder: String,
+        /// Whether its parameters are those of the readout that reads what is shown; else they are those of the request, and the
+        /// defaults.
+        of_readout: bool,
         trains: usize,
         signed: bool,
         latency_ms: f64,
@@ -151,7 +158,7 @@ pub(super) enum Message {
         /// Serial ports that the system knows, USB devices first.
         serial: Vec<Port>,
         /// The IPv4 addresses of the machine.
-        addresses: Vec<Address>,
+        addresses: Vec<InterfaceAddress>,
     },
     /// The recorder, on each change and once a second while it counts or records.
     Recorder {
@@ -198,6 +205,9 @@ pub(super) enum Message {
         readout: String,
         /// The readout's, in its order.
         labels: Vec<String>,
+        /// The names of the readout's encoders; empty of a plain rule.
+        #[cfg_attr(feature = "development", schemars(with = "Vec<String>"))]
+        encoders: ReadoutEncoders,
         detections: Vec<FoundDetection>,
     },
     /// The answer to `open`, before its first frame; `labels` and `transport` follow.
@@ -388,7 +398,7 @@ impl From<&encode::Zeroing> for Zeroing {
 /// An IPv4 address and its network interface.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct Address {
+pub(super) struct InterfaceAddress {
     pub(super) host: String,
     pub(super) name: String,
 }
@@ -449,7 +459,7 @@ pub(super) struct FrameRecording {
     /// A number where the frames have no times: frame k is then at k times that many us, in all messages; show the number,
     /// no seconds. Tables of labels hold the numbers.
     pub(super) number_us: Option<i64>,
-    pub(super) sources: Vec<FrameSource>,
+    pub(super) sources: Vec<FrameSourceInfo>,
     /// Taxels that never count as above rest.
     pub(super) flickering: Vec<(usize, usize)>,
     pub(super) trial: Option<String>,
@@ -463,7 +473,7 @@ pub(super) struct FrameRecording {
 /// A source of frames; sources stand side by side in `array`.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct FrameSource {
+pub(super) struct FrameSourceInfo {
     pub(super) name: String,
     /// Its first column.
     pub(super) left: u16,
@@ -471,7 +481,7 @@ pub(super) struct FrameSource {
     pub(super) columns: u16,
     /// `given`: 0, as the unit is one of force or pressure; `quiet`: that of a quiet stretch, tracked from there; `none`: nothing
     /// was quiet, the values are above 0.
-    #[cfg_attr(feature = "development", schemars(with = "shapes::Rest"))]
+    #[cfg_attr(feature = "development", schemars(with = "shapes::RestSource"))]
     pub(super) rest: &'static str,
     /// Whether values fall from that of a quiet stretch, so that less may mean more pressure.
     pub(super) falls: bool,
@@ -548,7 +558,7 @@ mod shapes {
         rows: u16,
         columns: u16,
         /// A number of mm, or a pair for rows and columns; null where it is not known. A pitch of 1 mm is a pair.
-        pitch_mm: Option<Pitch>,
+        pitch_mm: Option<PitchShape>,
         name: String,
         /// Only where they are known instead of a pitch.
         #[schemars(default, skip_serializing_if = "Option::is_none")]
@@ -560,7 +570,7 @@ mod shapes {
 
     #[derive(JsonSchema)]
     #[schemars(untagged, inline)]
-    enum Pitch {
+    enum PitchShape {
         Square(f64),
         Pair(f64, f64),
     }
@@ -584,7 +594,7 @@ mod shapes {
 
     #[derive(JsonSchema)]
     #[schemars(rename_all = "snake_case", inline)]
-    pub(super) enum Rest {
+    pub(super) enum RestSource {
         Given,
         Quiet,
         None,

@@ -18,6 +18,4 @@ pub struct PanelOptions {
     pub control: Option<String>,
     /// Whether the board's registers were stated; otherwise they are assumed until they are read.
     pub registers_stated: bool,
-    /// Labels of the readout that runs, if one does.
-    pub readout: Option<Vec<String>>,
 }

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use taxel_core::encode::Encoder;
 use taxel_core::problem;
 
 use super::array_state::{ArrayState, FORGET};
 use super::encoded_spikes::EncodedSpikes;
 use super::keyframe_index::{ChangeReader, KeyframeIndex, ReadOutcome};
+use super::readout_encoders::ViewEncoder;
 use super::taxel_history::TaxelHistory;
 use super::time_columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
@@ -25,7 +25,7 @@ pub struct ViewOptions {
     /// The taxel whose history is shown.
     pub watched: Option<u32>,
     /// The encoder whose spikes are shown.
-    pub encoder: Option<Encoder>,
+    pub encoder: Option<ViewEncoder>,
     /// Raster and curves of the whole source, where its keyframe index does not store them.
     pub whole: Option<Arc<TimeColumns>>,
 }

@@ -32,7 +32,8 @@ pub(super) enum Request {
     /// without events, while a tare is taken, and while a `.lsa` is recorded. Answered at once; `zeroed` follows.
     Zero { taxels: OneOrMore<Taxel> },
     /// Spikes of this encoder (JSON as `Encoder.to_json` writes it) of what this view shows, live or in a recording; `null`
-    /// for none.
+    /// for none. A name without parameters is that of the encoder of the readout that reads what is shown, with its parameters
+    /// and its tare, where the readout has one of this name; else the parameters are the defaults.
     Encode { encoder: Option<Map<String, Value>> },
     /// Columns of time of this width, for this view: 125 us times a power of two, up to 131 072 000 (0.16 s to 45 hours in 1250
     /// columns). Counts of several narrow columns add up, to 15 at most. With `end_us`, in a view that does not follow the

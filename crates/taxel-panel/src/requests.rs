@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use taxel_core::Array;
+use taxel_core::encode::Encoder;
 use taxel_core::held::UNKNOWN;
 use taxel_live::locked::lock;
 use taxel_live::ports::ports;
@@ -11,10 +12,11 @@ use taxel_live::ports::ports;
 use super::clients::Broadcast;
 use super::handler::{Cut, Detected, LabelRow, TrainingResult};
 use super::hub::Hub;
-use super::indexed::{Indexed, Shown};
+use super::indexed::{Indexed, OpenRecording};
 use super::labels::LabelChange;
 use super::live_source::LiveSource;
-use super::messages::{Address, FoundDetection, Message};
+use super::messages::{FoundDetection, InterfaceAddress, Message};
+use super::readout_encoders::ReadoutEncoders;
 use super::recorder::RecordingPlan;
 use super::refusal::{Answer, Refusal};
 use super::request::{Id, RecordRequest, Request, RestHow, Taxel};
@@ -25,7 +27,11 @@ use super::{label_requests, recording_session, registers};
 /// # Errors
 ///
 /// The refusal, after which nothing has changed.
-pub(super) async fn carry_out(hub: Arc<Hub>, shown: Option<&Shown>, request: Request) -> Answer<Option<Message>> {
+pub(super) async fn carry_out(
+    hub: Arc<Hub>,
+    shown: Option<&OpenRecording>,
+    request: Request,
+) -> Answer<Option<Message>> {
     let change = |change| label_requests::change(&hub, shown, vec![change]);
     match request {
         Request::Set { values } => registers::set(&hub, &values).await?,
@@ -131,7 +137,7 @@ async fn control(hub: &Hub, place: Option<String>) -> Answer {
 async fn places(hub: &Hub) -> Answer<Message> {
     let serial = tokio::task::spawn_blocking(ports).await.map_err(|_| Refusal::bug("places:"))??;
     let addresses = hub.ask(|handlers| handlers.board.addresses()).await?;
-    let addresses = addresses.into_iter().map(|(host, name)| Address { host, name }).collect();
+    let addresses = addresses.into_iter().map(|(host, name)| InterfaceAddress { host, name }).collect();
     Ok(Message::Places { serial, addresses })
 }
 
@@ -183,7 +189,7 @@ fn record(hub: &Arc<Hub>, request: RecordRequest) -> Answer {
 // ---------------------------------------------------------------------------------------------- training
 
 /// Trains a readout on the labels of the recording that is shown.
-async fn train(hub: &Hub, shown: Option<&Shown>) -> Answer<Message> {
+async fn train(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<Message> {
     let name = shown.ok_or("train: open a recording with labels first")?.name.clone();
     let readout = readout_of(&name);
     let (recording, out) = (hub.folder.file(&name)?, hub.folder.file(&readout)?);
@@ -199,33 +205,37 @@ pub(super) fn readout_of(recording: &str) -> String {
 }
 
 /// Runs a readout: on the recording that is shown, or on the live source from now on.
-async fn read_out(hub: &Hub, shown: Option<&Shown>, readout: String) -> Answer<Option<Message>> {
+async fn read_out(hub: &Hub, shown: Option<&OpenRecording>, readout: String) -> Answer<Option<Message>> {
     let path = hub.folder.file(&readout).map_err(|error| Refusal::of("readout", error))?;
-    let Some(Shown { name, trial, .. }) = shown.cloned() else {
+    let Some(OpenRecording { name, trial, .. }) = shown.cloned() else {
         check_restart(hub)?;
         hub.ask(move |handlers| handlers.board.read_out(&path)).await?;
         return Ok(None);
     };
     let recording = hub.folder.file(&name)?;
-    let Detected { labels, detections } =
+    let Detected { labels, encoder, detections } =
         hub.ask(move |handlers| handlers.training.detect(&recording, trial.as_deref(), &path)).await?;
     let found = |(label, t_us, known_us)| FoundDetection { label, t_us, known_us };
     let detections = detections.into_iter().map(found).collect();
-    Ok(Some(Message::Detections { source: name, readout, labels, detections }))
+    let encoder = encoder.as_deref().map(Encoder::from_json).transpose().map_err(taxel_live::Error::from)?;
+    let encoders = encoder.map_or_else(ReadoutEncoders::default, ReadoutEncoders::from);
+    Ok(Some(Message::Detections { source: name, readout, labels, encoders, detections }))
 }
 
 // ---------------------------------------------------------------------------------------------- health, cutting
 
 /// Number of taxels that exist.
 fn taxels(array: &Array) -> usize {
-    array.exists.as_ref().map_or(array.len(), |exists| exists.iter().filter(|&&one| one).count())
+    array.exists.as_ref().map_or(array.len(), |exists| exists.iter().filter(|&&exists| exists).count())
 }
 
-async fn health(hub: &Hub, shown: Option<&Shown>) -> Answer<Message> {
+async fn health(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<Message> {
     let source = shown.map(|shown| shown.name.clone());
     let (array, activity) = match shown {
-        Some(Shown { indexed: Indexed::Events(index), .. }) => (index.header().array.clone(), index.activity.clone()),
-        Some(Shown { name, trial, indexed: indexed @ Indexed::Frames(_) }) => {
+        Some(OpenRecording { indexed: Indexed::Events(index), .. }) => {
+            (index.header().array.clone(), index.activity.clone())
+        }
+        Some(OpenRecording { name, trial, indexed: indexed @ Indexed::Frames(_) }) => {
             let (path, trial, taxels) = (hub.folder.file(name)?, trial.clone(), taxels(indexed.index().array()));
             let found = hub.ask(move |handlers| handlers.files.health_of_frames(&path, trial.as_deref())).await?;
             return Ok(Message::Health { source, taxels, active: taxels, found });
@@ -242,8 +252,8 @@ async fn health(hub: &Hub, shown: Option<&Shown>) -> Answer<Message> {
     Ok(Message::Health { source, taxels, active, found })
 }
 
-async fn cut(hub: &Hub, shown: Option<&Shown>, (start_us, stop_us): (i64, i64), to: &str) -> Answer<Message> {
-    let Shown { name, trial, indexed } = shown.ok_or("cut: open a recording first")?.clone();
+async fn cut(hub: &Hub, shown: Option<&OpenRecording>, (start_us, stop_us): (i64, i64), to: &str) -> Answer<Message> {
+    let OpenRecording { name, trial, indexed } = shown.ok_or("cut: open a recording first")?.clone();
     if start_us >= stop_us {
         return Err(Refusal::of("stop_us", "must lie after start_us"));
     }

@@ -105,13 +105,13 @@ impl Panel {
         format!("http://{}/#token={}{open}", shown(self.address), self.token)
     }
 
-    /// Shows another live source from now on; `readout` are the labels of the readout that runs.
+    /// Shows another live source from now on.
     ///
     /// # Errors
     ///
     /// `Core(Problem)` where it has ended.
-    pub fn attach(&self, live: Handle, readout: Option<Vec<String>>) -> Result<()> {
-        self.hub.attach(live, readout)
+    pub fn attach(&self, live: Handle) -> Result<()> {
+        self.hub.attach(live)
     }
 
     /// Notes that the request handler has connected the board's serial line, or disconnected it.
@@ -219,9 +219,9 @@ async fn respond(State(gate): State<Arc<Gate>>, request: Request) -> Response {
 
 /// The value of a header that occurs exactly once.
 fn header_value<'a>(headers: &'a HeaderMap, name: &header::HeaderName) -> Option<&'a str> {
-    let mut all = headers.get_all(name).iter();
-    let one = all.next()?.to_str().ok()?;
-    all.next().is_none().then_some(one)
+    let mut values = headers.get_all(name).iter();
+    let value = values.next()?.to_str().ok()?;
+    values.next().is_none().then_some(value)
 }
 
 impl Gate {

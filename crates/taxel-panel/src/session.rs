@@ -91,10 +91,10 @@ impl ClientSession {
                 tokio::time::sleep(FRAME_TIME).await;
             }
             if request.changes_labels() {
-                self.pending.begin(&self.hub, Value::Null, what, request, text.len(), self.viewport.shown());
+                self.pending.begin(&self.hub, Value::Null, what, request, text.len(), self.viewport.open_recording());
             } else if matches!(request, Request::Open { .. } | Request::Live {}) {
                 // The labels after it are of what it shows.
-                let _ = self.handle_own(request).await;
+                let _ = self.handle_view_request(request).await;
             }
         }
     }
@@ -141,7 +141,12 @@ impl ClientSession {
                         return Err(Closing::With(GOING_AWAY, "the server ends"));
                     }
                 },
-                Some(answer) = answers.recv() => self.connection.send_message(&answer).await?,
+                Some(answer) = answers.recv() => {
+                    if let Message::Detections { source, encoders, .. } = &answer {
+                        self.viewport.set_readout(source, encoders).await;
+                    }
+                    self.connection.send_message(&answer).await?;
+                }
                 _ = frames.changed() => self.viewport.mark_dirty(),
                 () = tick => {}
             }
@@ -242,7 +247,7 @@ impl ClientSession {
             Ok(request) => request,
             Err(refusal) => return self.refuse(id, what, refusal).await,
         };
-        match self.handle_own(request).await {
+        match self.handle_view_request(request).await {
             Ok(Ok(messages)) => {
                 for message in messages {
                     self.connection.send_message(&message).await?;
@@ -254,7 +259,7 @@ impl ClientSession {
             }
             Ok(Err(refusal)) => self.refuse(id, what, refusal).await,
             Err(request) => {
-                let shown = self.viewport.shown();
+                let shown = self.viewport.open_recording();
                 if let Some(busy) = self.pending.begin(&self.hub, id, what, request, text.len(), shown) {
                     self.count_refusal();
                     self.connection.send_message(&busy).await?;
@@ -266,7 +271,7 @@ impl ClientSession {
 
     /// Carries out a request that concerns this client's flow or view alone, and returns the messages before `done`; another
     /// request is returned.
-    async fn handle_own(&mut self, request: Request) -> Result<Answer<Vec<Message>>, Request> {
+    async fn handle_view_request(&mut self, request: Request) -> Result<Answer<Vec<Message>>, Request> {
         let view = &mut self.viewport;
         let done = match request {
             Request::Credit { n } => {
@@ -294,7 +299,7 @@ impl ClientSession {
                 };
                 return Ok(moved.map(|()| vec![view.transport_message()]));
             }
-            other => return Err(other),
+            request => return Err(request),
         };
         Ok(done.map(|()| vec![]))
     }

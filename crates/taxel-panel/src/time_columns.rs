@@ -148,7 +148,7 @@ impl TimeColumns {
     /// The same with these sums as the most that noise adds up to, of each source.
     #[must_use]
     pub(super) fn with_noise(mut self, each: Vec<u32>) -> Self {
-        self.noise = each.iter().fold(0, |all, &one| all.saturating_add(one));
+        self.noise = each.iter().fold(0, |sum, &noise| sum.saturating_add(noise));
         self.source_noise = each;
         self
     }
@@ -309,10 +309,10 @@ impl TimeColumns {
         for values in self.differing(columns).filter_map(|column| self.values_at(column)) {
             let (of_channels, of_sources) = values.split_at(self.shape.channels);
             channels.iter_mut().zip(of_channels).for_each(|(most, &value)| *most = value.max(*most));
-            for (most, one) in sources.chunks_exact_mut(OF_SOURCE).zip(of_sources.chunks_exact(OF_SOURCE)) {
+            for (most, source) in sources.chunks_exact_mut(OF_SOURCE).zip(of_sources.chunks_exact(OF_SOURCE)) {
                 // What is missing wraps to 0.
-                if one[0].wrapping_add(1) > most[0].wrapping_add(1) {
-                    most.copy_from_slice(one);
+                if source[0].wrapping_add(1) > most[0].wrapping_add(1) {
+                    most.copy_from_slice(source);
                 }
             }
         }

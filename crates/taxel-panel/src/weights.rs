@@ -18,7 +18,7 @@ pub(crate) struct Weights(Option<Uneven>);
 /// Weights that differ.
 #[derive(Debug, Clone)]
 struct Uneven {
-    of: Arc<[u16]>,
+    weights: Arc<[u16]>,
     /// What the weighted sum is divided by, as the sum of all taxels has 32 bits.
     divisor: u64,
 }
@@ -35,17 +35,16 @@ impl Weights {
         if least >= largest {
             return (Self::default(), Some(newtons));
         }
-        let of = areas.iter().map(|area| (area / largest * f64::from(LARGEST)).round() as u16).collect();
+        let weights = areas.iter().map(|area| (area / largest * f64::from(LARGEST)).round() as u16).collect();
         let most = array.len().max(1) as u64 * MOST_STEPS * u64::from(LARGEST);
         let divisor = most.div_ceil(u32::MAX.into()).min(LARGEST.into());
-        let weights = Self(Some(Uneven { of, divisor }));
-        (weights, Some(newtons * divisor as f64 / f64::from(LARGEST)))
+        (Self(Some(Uneven { weights, divisor })), Some(newtons * divisor as f64 / f64::from(LARGEST)))
     }
 
     /// What `steps` more at a taxel add to the weighted sum, modulo 2^64; nothing where all count alike.
     #[inline(always)]
     pub(crate) fn weighed(&self, taxel: usize, steps: u64) -> u64 {
-        self.0.as_ref().map_or(0, |weights| steps.wrapping_mul(weights.of[taxel].into()))
+        self.0.as_ref().map_or(0, |uneven| steps.wrapping_mul(uneven.weights[taxel].into()))
     }
 
     /// The sum that is shown, of the plain one and the weighted one.

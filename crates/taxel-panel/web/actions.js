@@ -30,10 +30,10 @@ import { seconds } from "./words.js";
  */
 export function bindActions({ server, player, settings, recorder, labels, view, maps, lanes, window }, timeline) {
   const help = part("help", HTMLDialogElement);
-  const cutHere = (/** @type {0 | 1} */ end) => player.meant(timeline()?.cursor_us).then((t_us) => view.setCut(end, t_us));
+  const cutHere = (/** @type {0 | 1} */ end) => player.timeToMark(timeline()?.cursor_us).then((t_us) => view.setCut(end, t_us));
   const step = (/** @type {KeyboardEvent} */ event) => (event.shiftKey ? 1e6 : 1e5);
   const moveBy = (/** @type {number} */ us) => {
-    if (player.goal !== null) player.seek(player.goal + us);
+    if (player.targetTime !== null) player.seek(player.targetTime + us);
   };
   const health = () => {
     showTab("view");
@@ -65,8 +65,8 @@ export function bindActions({ server, player, settings, recorder, labels, view, 
       last: () => (player.transport.source === null ? player.follow() : player.reach && player.seek(player.reach[1])),
       faster: () => player.faster(1),
       slower: () => player.faster(-1),
-      zoomIn: () => window.by(1),
-      zoomOut: () => window.by(-1),
+      zoomIn: () => window.halve(),
+      zoomOut: () => window.double(),
       showAll: () => window.showAll(),
       live: () => player.follow(),
       mark: () => labels.markHere(),
@@ -98,8 +98,8 @@ export function bindActions({ server, player, settings, recorder, labels, view, 
   onClick("picture", picture);
   onClick("health", health);
   onClick("zero", zero);
-  onClick("zoom-in", () => window.by(1));
-  onClick("zoom-out", () => window.by(-1));
+  onClick("zoom-in", () => window.halve());
+  onClick("zoom-out", () => window.double());
   for (const name of /** @type {const} */ (["pressure", "change"])) {
     onClick(`${name}-alone`, () => settings.set("maps", settings.values.maps === name ? "both" : name));
   }
@@ -115,5 +115,5 @@ export function bindActions({ server, player, settings, recorder, labels, view, 
 function pictureOf(player, lanes) {
   const source = player.transport.source ?? "live";
   const at = seconds(player.t_us ?? 0);
-  return { title: `${source}, ${at}`, file: `${source.replace(/\.[^.]+$/, "")}-${at.replace(/[ ,]/g, "")}.png`, lanes: lanes.pictured() };
+  return { title: `${source}, ${at}`, file: `${source.replace(/\.[^.]+$/, "")}-${at.replace(/[ ,]/g, "")}.png`, lanes: lanes.saved() };
 }

@@ -65,7 +65,7 @@ class Control {
         this.slider = make("input", { type: "range", min: 0, max: SLIDER, step: 1, "aria-label": `${SPOKEN[field.name]}, slider` });
         this.row.append(this.slider);
         this.slider.addEventListener("input", () => {
-          this.setTarget(this.slid(Number(this.slider?.value)), false);
+          this.setTarget(this.valueAt(Number(this.slider?.value)), false);
           this.showWanted();
         });
         this.slider.addEventListener("change", () => this.notify());
@@ -110,7 +110,7 @@ class Control {
   }
 
   /** @param {number} place of the slider @returns {number} even steps in ratio, as what is sensible spans decades */
-  slid(place) {
+  valueAt(place) {
     const { least } = this.field;
     const low = Math.max(1, least);
     if (this.field.bits <= 8) return Math.round(least + (place / SLIDER) * (this.top - least));
@@ -209,7 +209,7 @@ export class Board {
     this.controls = new Map();
     for (const field of FIELDS) {
       if (NOT_HERE.includes(field.name)) continue;
-      const control = new Control(field, (typed) => this.typed(typed));
+      const control = new Control(field, (changed) => this.send(changed));
       this.controls.set(field.name, control);
       part(TIMING.includes(field.name) ? "timing" : "more-registers", HTMLElement).append(control.row);
     }
@@ -348,7 +348,7 @@ export class Board {
    * stays as it was typed, with the reason.
    * @param {Control} control
    */
-  typed(control) {
+  send(control) {
     if (control.wanted === null) control.show();
     this.warn();
     if (!this.check() || !this.writable) return;

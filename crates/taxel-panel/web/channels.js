@@ -48,7 +48,7 @@ export class Channels {
    */
   draw(timeline, { sensor, taxel, values }) {
     if (sensor.kind !== "channels") return "";
-    const places = sensor.there;
+    const places = sensor.existing;
     const watched = taxel && Math.max(...taxel);
     if (this.sensor !== sensor) this.name(sensor, places);
     const { width, height, ratio } = fitted(this.canvas);
@@ -63,13 +63,13 @@ export class Channels {
     let most = LEAST;
     for (const place of shown) if (place >= 0) for (const channel of places) most = Math.max(most, channels[place * all + channel]);
     const high = height / places.length;
-    const [line, other, grid] = ["more", "less", "grid"].map(themed);
+    const [line, chosen, grid] = ["more", "less", "grid"].map(themed);
     context.lineWidth = 1.25;
     places.forEach((channel, k) => {
       const floor = (k + 1) * high - 0.5;
       context.fillStyle = grid;
       context.fillRect(0, floor, width, 0.5);
-      context.strokeStyle = context.fillStyle = channel === watched ? other : line;
+      context.strokeStyle = context.fillStyle = channel === watched ? chosen : line;
       const [curve, area] = [new Path2D(), new Path2D()];
       // Where the curve begins after a gap, and where it is.
       let [from, x] = [NaN, 0];

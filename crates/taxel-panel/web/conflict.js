@@ -35,8 +35,8 @@ export class LabelConflict {
     this.buttons.forEach((button, i) => {
       button.onclick = () => {
         if (this.id === null) return;
-        for (const one of this.buttons) one.disabled = true;
-        server.request({ type: "settle", conflict_id: this.id, keep: i ? "file" : "acknowledged" }).catch(failed).then(() => this.buttons.forEach((one) => (one.disabled = false)));
+        for (const choice of this.buttons) choice.disabled = true;
+        server.request({ type: "settle", conflict_id: this.id, keep: i ? "file" : "acknowledged" }).catch(failed).then(() => this.buttons.forEach((choice) => (choice.disabled = false)));
       };
     });
   }
@@ -59,8 +59,8 @@ export class LabelConflict {
     const again = returned.length ? `has ${counted(returned.length, "label")} again that ${were(returned.length)} deleted or changed on the page` : "";
     const what = `Another program saved ${message.path}: it ${[lacks, again].filter(Boolean).join(", and ")}.`;
     write(part("conflict-text", HTMLElement), `${what} Choose which version counts.${added.length ? " New labels of the file stay in both." : ""}`);
-    const line = (/** @type {string} */ here, /** @type {string} */ there, /** @type {string} */ kind) =>
-      make("tr", { class: kind }, make("td", {}, here), make("td", {}, there));
+    const line = (/** @type {string} */ acknowledged, /** @type {string} */ file, /** @type {string} */ kind) =>
+      make("tr", { class: kind }, make("td", {}, acknowledged), make("td", {}, file));
     part("conflict-rows", HTMLElement).replaceChildren(
       ...missing.map((row) => line(described(row), "missing", "missing")),
       ...returned.map((row) => line("deleted or changed", described(row), "returned")),

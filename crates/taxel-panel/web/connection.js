@@ -53,7 +53,7 @@ class PlaceForm {
 
   /** @param {string} place */
   remember(place) {
-    const before = this.before.filter((other) => other !== place);
+    const before = this.before.filter((earlier) => earlier !== place);
     this.settings.set(this.setting, [place, ...before].slice(0, REMEMBERED).join("\n"));
     this.show();
   }
@@ -144,9 +144,9 @@ export class Connection {
     const ports = serial.map((port) => ({ place: port.place, text: [port.place, described(port)].filter(Boolean).join(" · ") }));
     this.line.offer([{ label: "Serial ports", places: ports }], "no serial port found: type a place below");
     const port = address(this.udp)[1] || 5208;
-    const own = addresses.map(({ host, name }) => ({ place: `${host}:${port}`, text: `${host}:${port} · ${name}` }));
+    const each = addresses.map(({ host, name }) => ({ place: `${host}:${port}`, text: `${host}:${port} · ${name}` }));
     const every = { place: `0.0.0.0:${port}`, text: `0.0.0.0:${port} · every address` };
-    this.events.offer([{ label: "This machine", places: [every, ...own] }], "type an address below");
+    this.events.offer([{ label: "This machine", places: [every, ...each] }], "type an address below");
   }
 
   /** @param {string} text a line from the board */

@@ -4,7 +4,7 @@ import { fitted } from "./dom.js";
 import { counted, rounded } from "./words.js";
 
 /** @typedef {import("./messages.js").ArrayInfo} ArrayInfo */
-/** @typedef {import("./messages.js").FrameSource} FrameSource */
+/** @typedef {import("./messages.js").FrameSourceInfo} FrameSourceInfo */
 /** @typedef {[number, number]} Taxel column and row */
 /** @typedef {{ x: boolean, y: boolean }} Flips */
 /** @typedef {{ words: Uint32Array, levels: Float32Array, ground: string, edge: string }} Colours by taxel a pixel, and its height from 0 to 1;
@@ -19,7 +19,7 @@ const LEAST_BAR = 0.02;
 
 /** What all sensors have: rows, columns, and the sources that stand side by side. */
 class Sensor {
-  /** @param {ArrayInfo} array @param {FrameSource[]} sources */
+  /** @param {ArrayInfo} array @param {FrameSourceInfo[]} sources */
   constructor(array, sources) {
     this.array = array;
     this.sources = sources;
@@ -33,7 +33,7 @@ class Sensor {
     return x >= 0 && y >= 0 && x < this.columns && y < this.rows && (!this.exists || this.exists[y * this.columns + x] === "1");
   }
 
-  /** @param {number} x @returns {FrameSource | undefined} the source that a column is of, where there are several */
+  /** @param {number} x @returns {FrameSourceInfo | undefined} the source that a column is of, where there are several */
   source(x) {
     return this.sources.length < 2 ? undefined : this.sources.find(({ left, columns }) => x >= left && x < left + columns);
   }
@@ -91,7 +91,7 @@ class Grid extends Sensor {
   kind = /** @type {const} */ ("grid");
   axes = /** @type {[string, string]} */ (["column", "row"]);
 
-  /** @param {ArrayInfo} array @param {FrameSource[]} sources */
+  /** @param {ArrayInfo} array @param {FrameSourceInfo[]} sources */
   constructor(array, sources) {
     super(array, sources);
     /** @type {[number, number]} */
@@ -160,7 +160,7 @@ class Placed extends Sensor {
   kind = /** @type {const} */ ("places");
   axes = /** @type {[string, string]} */ (["x", "y"]);
 
-  /** @param {ArrayInfo} array @param {FrameSource[]} sources @param {import("./messages.js").TaxelPlaces} places */
+  /** @param {ArrayInfo} array @param {FrameSourceInfo[]} sources @param {import("./messages.js").TaxelPlaces} places */
   constructor(array, sources, places) {
     super(array, sources);
     this.places = places;
@@ -224,7 +224,7 @@ class Placed extends Sensor {
   /** @param {number} _ @param {[number, number]} at @returns {string} a centre, in `unit` */
   within(_, at) {
     // Coordinates are in steps of the extent.
-    return at.map((one) => rounded(Math.abs(one) < this.near / 100 ? 0 : one)).join(", ");
+    return at.map((coordinate) => rounded(Math.abs(coordinate) < this.near / 100 ? 0 : coordinate)).join(", ");
   }
 
   /** @returns {string} */
@@ -281,7 +281,7 @@ class Channels extends Sensor {
   }
 
   /** @returns {number[]} the places of those that exist */
-  get there() {
+  get existing() {
     return Array.from({ length: this.count }, (_, k) => k).filter((k) => !this.exists || this.exists[k] === "1");
   }
 
@@ -315,7 +315,7 @@ class Channels extends Sensor {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     const wide = width / this.count;
-    for (const k of this.there) {
+    for (const k of this.existing) {
       const high = Math.max(LEAST_BAR, levels[k]) * height;
       context.fillStyle = css(words[k]);
       context.fillRect((flips.x ? this.count - 1 - k : k) * wide + Math.min(1, wide / 8), height - high, Math.max(1, wide - Math.min(2, wide / 4)), high);
@@ -328,7 +328,7 @@ class Channels extends Sensor {
 /**
  * The geometry of a sensor.
  * @param {ArrayInfo} array
- * @param {FrameSource[]} sources that stand side by side in it
+ * @param {FrameSourceInfo[]} sources that stand side by side in it
  * @returns {Geometry}
  */
 export function geometry(array, sources) {

@@ -141,7 +141,7 @@ export class Labels {
 
   /** Marks at the cursor, or at the time shown. */
   markHere() {
-    this.player.meant(this.timeline()?.cursor_us).then((t_us) => this.mark(t_us));
+    this.player.timeToMark(this.timeline()?.cursor_us).then((t_us) => this.mark(t_us));
   }
 
   /** @param {number | null} t_us */
@@ -192,7 +192,7 @@ export class Labels {
 
   /** @param {number} by 1: the next label after the time shown, -1: the one before */
   go(by) {
-    const now = this.player.goal ?? 0;
+    const now = this.player.targetTime ?? 0;
     const others = this.labels.filter(({ t_us }) => (by > 0 ? t_us > now : t_us < now));
     const next = by > 0 ? others[0] : others[others.length - 1];
     if (!next) return;
@@ -245,7 +245,7 @@ export class Labels {
     const go = make("button", { type: "button", class: "small", "aria-label": `go to ${label}, ${seconds(t_us)}` }, "Go");
     const away = make("button", { type: "button", class: "small", "aria-label": `delete ${label}, ${seconds(t_us)}` }, "×");
     // Of a label whose time was just typed the row is an older one.
-    const held = () => this.labels.find((one) => one.label_id === label_id) ?? { label, t_us };
+    const held = () => this.labels.find((known) => known.label_id === label_id) ?? { label, t_us };
     const [heldName, heldTime] = [() => held().label, () => listedTime(held().t_us)];
     name.onchange = () => this.change(name, { type: "rename", label_id, label: name.value.trim() }, heldName);
     time.onchange = () => {
@@ -318,7 +318,7 @@ export class Labels {
       const level = ends.findIndex((end) => end <= x);
       if (level >= 0) ends[level] = x + handle;
       // The name stands where no other handle of its level follows.
-      const next = inside.slice(i + 1, i + 1 + LEVELS).reduce((least, other) => Math.min(least, other.share * clientWidth), clientWidth + handle);
+      const next = inside.slice(i + 1, i + 1 + LEVELS).reduce((least, later) => Math.min(least, later.share * clientWidth), clientWidth + handle);
       const named = level === 0 && next - x > handle + LETTER * Math.min(label.length, 14);
       if (named) ends.fill(x + handle + LETTER * Math.min(label.length, 14));
       flag.style.left = `${(100 * share).toFixed(3)}%`;

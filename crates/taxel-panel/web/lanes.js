@@ -214,15 +214,15 @@ export class Lanes {
   }
 
   /** @returns {Lane[]} those that are shown */
-  get seen() {
+  get visible() {
     const shown = this.shown();
     return LANES.filter(({ setting, fits }) => this.settings.values[setting] && (!fits || fits(shown)));
   }
 
   /** Shows the lanes that the settings ask for and the source has. */
   show() {
-    const { seen } = this;
-    for (const { lane, block } of this.all) block.hidden = !seen.includes(lane);
+    const { visible } = this;
+    for (const { lane, block } of this.all) block.hidden = !visible.includes(lane);
     this.renew();
   }
 
@@ -237,14 +237,14 @@ export class Lanes {
     const grid = { stroke: themed("grid"), width: 1 };
     /** @type {uPlot.Axis} */
     const time = { show: true, size: 0, values: () => [], grid, ticks: { show: false }, splits: () => this.splits };
-    for (const one of this.all) {
-      const { lane, heading, place, painter } = one;
+    for (const item of this.all) {
+      const { lane, heading, place, painter } = item;
       heading.replaceChildren(...lane.heading(shown, sources));
       painter?.colour?.();
-      one.plot?.destroy();
+      item.plot?.destroy();
       if (!lane.plan) continue;
       const { scales, series, axes, bands } = lane.plan(this.shown, sources);
-      one.plot = new uPlot(
+      item.plot = new uPlot(
         {
           bands, series: [{}, ...series], axes: [time, ...axes],
           width: Math.max(100, place.clientWidth), height: Math.max(40, place.clientHeight),
@@ -300,18 +300,18 @@ export class Lanes {
     for (const { lane, heading } of this.all) {
       if (!lane.says) continue;
       const said = timeline && place >= 0 ? lane.says(shown, timeline, place) : [];
-      heading.querySelectorAll("output").forEach((one, k) => write(one, said[k] ?? ""));
+      heading.querySelectorAll("output").forEach((output, k) => write(output, said[k] ?? ""));
     }
     if (!timeline || place < 0) return;
     const { sensor } = shown;
     const sums = sumsAt(shown, timeline, place);
-    const sum = sums.length > 1 ? sums.map((one, k) => `${sensor.sources[k].name} ${one}`).join(", ") : sums[0];
+    const sum = sums.length > 1 ? sums.map((text, k) => `${sensor.sources[k].name} ${text}`).join(", ") : sums[0];
     const more = sensor.kind === "channels" ? "" : ` over ${areaAt(shown, timeline, place)}, centre (${sensor.axes.join(", ")}): ${centreAt(shown, timeline, place)}`;
     write(part("shown-info", HTMLElement), Number.isNaN(timeline.sum[place]) ? "missing" : `${sum}${more}`);
   }
 
   /** @returns {{ title: string, canvas: HTMLCanvasElement, inset: number }[]} the lanes of a saved picture */
-  pictured() {
+  saved() {
     return this.all.flatMap(({ lane, heading, place }) => {
       const canvas = place.querySelector("canvas");
       const said = heading.querySelector("output")?.textContent ?? "";

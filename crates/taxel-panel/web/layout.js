@@ -40,7 +40,7 @@ export class Layout {
   }
 
   /** @returns {{ place: Place, width: number }} of the maps, and of one map, CSS pixels */
-  best() {
+  widest() {
     const { aspect, maps, lanes } = this.shown();
     const { clientWidth: wide } = this.views;
     const banner = this.banner.offsetHeight;
@@ -53,12 +53,12 @@ export class Layout {
       ["beside", Math.min((beside - (maps - 1) * GAP) / maps, (high - UNDER.beside - AROUND_MAP) * aspect)],
       ["column", Math.min(beside, ((high - UNDER.beside) / maps - AROUND_MAP) * aspect)],
     ];
-    const [place, width] = widths.reduce((one, other) => (other[1] > one[1] * 1.05 ? other : one));
+    const [place, width] = widths.reduce((best, next) => (next[1] > best[1] * 1.05 ? next : best));
     return { place, width };
   }
 
   arrange() {
-    const { place, width } = matchMedia(NARROW).matches ? { place: /** @type {Place} */ ("above"), width: 0 } : this.best();
+    const { place, width } = matchMedia(NARROW).matches ? { place: /** @type {Place} */ ("above"), width: 0 } : this.widest();
     const chosen = `${place} ${Math.floor(width)}`;
     if (chosen === this.done) return;
     this.done = chosen;

@@ -58,7 +58,7 @@ const layout = new Layout(arrangement, () => (lanesDue = true));
 const board = new Board(server, settings, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
 const recorder = new Recorder(server, failed, () => showTab("record"));
-const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, notes: notes.timed, cut: view.cut }));
+const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, notes: notes.withTime, cut: view.cut }));
 
 /** @type {Timeline | null} */
 let timeline = null;
@@ -143,7 +143,7 @@ function shown() {
 
 /** What the page has to place: see `Layout`. */
 function arrangement() {
-  return { aspect: maps.aspect, maps: mapsShown() === "both" ? 2 : 1, lanes: lanes.seen };
+  return { aspect: maps.aspect, maps: mapsShown() === "both" ? 2 : 1, lanes: lanes.visible };
 }
 
 /** Lists the recordings, with the labels as the page knows them. */
@@ -227,7 +227,10 @@ function receive(message) {
     case "training":
       return training.progress(message.text);
     case "detections":
-      if (message.source === player.transport.source) showDetections(recorded(message.detections), message.labels);
+      if (message.source === player.transport.source) {
+        view.offer(message.encoders);
+        showDetections(recorded(message.detections), message.labels);
+      }
       return;
     case "opened":
       return open(message);
@@ -270,8 +273,8 @@ function showZeroed() {
 }
 
 /** @param {import("./messages.js").Spikes} spikes @returns {string} */
-function spikesInfo({ encoder, latency_ms, left_out }) {
-  return `${encoder.replaceAll("_", " ")}, latency ${latency_ms.toFixed(1)} ms${left_out ? `, ${counted(left_out, "spike")} not shown` : ""}`;
+function spikesInfo({ encoder, of_readout, latency_ms, left_out }) {
+  return `${encoder.replaceAll("_", " ")}, ${of_readout ? "parameters of the readout" : "default parameters"}, latency ${latency_ms.toFixed(1)} ms${left_out ? `, ${counted(left_out, "spike")} not shown` : ""}`;
 }
 
 /** @param {Hello} message */
@@ -282,6 +285,7 @@ function greet(message) {
   if (message.array && player.transport.source === null) resize(message.array);
   board.greet(message);
   view.greet(message);
+  if (!opened) view.offer(message.readout_encoders);
   labels.offer(message.readout ?? []);
   showAssumed();
   recorder.able = message.live;
@@ -377,6 +381,7 @@ function open(message) {
   part("files", HTMLSelectElement).value = message.name;
   labels.choose(message.name, message.frames?.trial);
   view.choose(message.name);
+  view.offer([]);
   showDetections(recorded(message.detections), [...new Set(message.detections.map(({ label }) => label))].sort());
   notes.choose(message.notes);
   server.send({ type: "overview" });
@@ -404,6 +409,7 @@ function move(transport) {
     player.reach = counters?.reach_us ?? null;
     labels.choose(recorder.status?.state === "recording" ? recorder.status.file : null);
     view.choose(null);
+    view.offer(hello?.readout_encoders ?? []);
     showDetections(detections.live, hello?.readout ?? []);
     showRegisters();
     server.send({ type: "overview" });
@@ -505,7 +511,7 @@ settings.watch((name) => {
   if (name === "theme") applyTheme();
   if (name === "map" || name === "gamma") maps.colour();
   if (name === "flipX" || name === "flipY") maps.mark();
-  if (name === "tones") recorder.tones.on = settings.values.tones;
+  if (name === "tones") recorder.tones.enabled = settings.values.tones;
   if (name.startsWith("show") || name === "raster" || name === "maps") showLanes();
   mapsDue = true;
 });
@@ -541,7 +547,7 @@ const arrange = () => {
 narrow.addEventListener("change", arrange);
 arrange();
 
-recorder.tones.on = settings.values.tones;
+recorder.tones.enabled = settings.values.tones;
 showKeys();
 showTab("board");
 labels.show();

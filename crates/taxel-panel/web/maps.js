@@ -9,7 +9,7 @@ import { counted, rounded } from "./words.js";
 /** @typedef {import("./protocol.js").Frame} Frame */
 /** @typedef {import("./geometry.js").Geometry} Geometry */
 /** @typedef {import("./messages.js").Health} Health */
-/** @typedef {import("./messages.js").FrameSource} FrameSource */
+/** @typedef {import("./messages.js").FrameSourceInfo} FrameSourceInfo */
 /** @typedef {import("./messages.js").Zeroing} Zeroing */
 /** @typedef {import("./settings.js").Settings} Settings */
 
@@ -107,7 +107,7 @@ export class Maps {
     this.health = null;
     /** Unit of the values, size of a tick in it, and ticks of the value 0; `frames` have no events. */
     this.values = { unit: "ticks", step: 1, zero: 0, frames: false };
-    /** The sources that stand side by side, of frames. @type {FrameSource[]} */
+    /** The sources that stand side by side, of frames. @type {FrameSourceInfo[]} */
     this.sources = [];
     /** How many taxels of frames flicker, and never count as above rest. */
     this.flickering = 0;
@@ -143,7 +143,7 @@ export class Maps {
     this.point(null);
   }
 
-  /** @param {import("./messages.js").ArrayInfo} array @param {FrameSource[]} sources that stand side by side in it */
+  /** @param {import("./messages.js").ArrayInfo} array @param {FrameSourceInfo[]} sources that stand side by side in it */
   size(array, sources) {
     const known = JSON.stringify([array, sources]);
     if (known === this.known) return;
@@ -255,7 +255,7 @@ export class Maps {
     write(part("pressure-top", HTMLElement), `${rounded(scale * step)} ${unit}`);
     write(part("change-least", HTMLElement), `−${Math.round(changes)}`);
     write(part("change-top", HTMLElement), `+${Math.round(changes)} ticks`);
-    write(part("rest-from", HTMLElement), this.restFrom());
+    write(part("rest-from", HTMLElement), this.restWords());
     write(part("pressure-above", HTMLElement), !frames || this.sources.some(({ rest }) => rest === "quiet") ? "above rest" : "");
     const { unknown } = this.info;
     part("unknown", HTMLElement).hidden = unknown === 0;
@@ -268,7 +268,7 @@ export class Maps {
   }
 
   /** @returns {string} what the shown values are above, of each source where that differs */
-  restFrom() {
+  restWords() {
     if (!this.frame) return "";
     if (!this.values.frames) return REST_FROM[this.frame.restFrom];
     const all = new Set(this.sources.map(({ rest }) => REST_OF_FRAMES[rest]));
@@ -324,7 +324,7 @@ export class Maps {
     write(part("taxel-info", HTMLElement), taxel ? this.named() : "no taxel watched");
   }
 
-  /** The name of a source, over its taxels. @param {FrameSource} source @returns {HTMLElement} */
+  /** The name of a source, over its taxels. @param {FrameSourceInfo} source @returns {HTMLElement} */
   nameOf({ name, left, columns }) {
     const ends = [left, left + columns - 1].map((x) => this.geometry.place([x, 0], this.flips)[0]);
     const label = make("span", {}, name);

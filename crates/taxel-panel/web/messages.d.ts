@@ -8,12 +8,6 @@ export interface MarkedTimes {
   source?: string | null;
 }
 
-/** An IPv4 address and its network interface. */
-export interface Address {
-  host: string;
-  name: string;
-}
-
 /** A sensor. */
 export interface ArrayInfo {
   rows: number;
@@ -81,7 +75,7 @@ export interface FrameRecording {
   newtons: number | null;
   /** A number where the frames have no times: frame k is then at k times that many us, in all messages; show the number, no seconds. Tables of labels hold the numbers. */
   number_us: number | null;
-  sources: FrameSource[];
+  sources: FrameSourceInfo[];
   /** Taxels that never count as above rest. */
   flickering: [number, number][];
   trial: string | null;
@@ -92,7 +86,7 @@ export interface FrameRecording {
 }
 
 /** A source of frames; sources stand side by side in `array`. */
-export interface FrameSource {
+export interface FrameSourceInfo {
   name: string;
   /** Its first column. */
   left: number;
@@ -104,6 +98,12 @@ export interface FrameSource {
   falls: boolean;
   /** Where something lay in that stretch and was taken away later, as text (`rows 2 to 4, columns 5 to 7 (up to 41 above rest)`); empty where nothing did. */
   preload_at: string;
+}
+
+/** An IPv4 address and its network interface. */
+export interface InterfaceAddress {
+  host: string;
+  name: string;
 }
 
 /** A label of a recording. */
@@ -263,6 +263,8 @@ export interface Hello {
   open: string | null;
   /** The labels of the readout that runs. */
   readout: string[] | null;
+  /** The names of its encoders; empty without a readout, and of a plain rule. */
+  readout_encoders: string[];
   /** The names of the encoders. */
   encoders: string[];
   /** Width of a column of time, us. */
@@ -355,6 +357,8 @@ export interface Detection {
 export interface Spikes {
   type: "spikes";
   encoder: string;
+  /** Whether its parameters are those of the readout that reads what is shown; else they are those of the request, and the defaults. */
+  of_readout: boolean;
   trains: number;
   signed: boolean;
   latency_ms: number;
@@ -384,7 +388,7 @@ export interface Places {
   /** Serial ports that the system knows, USB devices first. */
   serial: Port[];
   /** The IPv4 addresses of the machine. */
-  addresses: Address[];
+  addresses: InterfaceAddress[];
 }
 
 /** The recorder, on each change and once a second while it counts or records. */
@@ -443,6 +447,8 @@ export interface Detections {
   readout: string;
   /** The readout's, in its order. */
   labels: string[];
+  /** The names of the readout's encoders; empty of a plain rule. */
+  encoders: string[];
   detections: FoundDetection[];
 }
 
@@ -597,7 +603,7 @@ export interface ZeroRequest {
   taxels: [number, number][];
 }
 
-/** Spikes of this encoder (JSON as `Encoder.to_json` writes it) of what this view shows, live or in a recording; `null` for none. */
+/** Spikes of this encoder (JSON as `Encoder.to_json` writes it) of what this view shows, live or in a recording; `null` for none. A name without parameters is that of the encoder of the readout that reads what is shown, with its parameters and its tare, where the readout has one of this name; else the parameters are the defaults. */
 export interface EncodeRequest {
   type: "encode";
   id?: number;

@@ -27,7 +27,7 @@ export class Notes {
   }
 
   /** @returns {{ t_us: number, text: string, source: string }[]} those with a time; another is about the whole recording */
-  get timed() {
+  get withTime() {
     return this.notes.flatMap(({ t_us, ...note }) => (t_us === null ? [] : [{ t_us, ...note }]));
   }
 
@@ -35,8 +35,8 @@ export class Notes {
   get unused() {
     const { labels } = this.labels;
     const used = (/** @type {{ t_us: number, text: string, source: string }} */ { t_us, text, source }) =>
-      labels.some((one) => one.source === source && (one.replaces_us === t_us || (one.t_us === t_us && one.label === text)));
-    return this.timed.filter((note) => !used(note));
+      labels.some((label) => label.source === source && (label.replaces_us === t_us || (label.t_us === t_us && label.label === text)));
+    return this.withTime.filter((note) => !used(note));
   }
 
   /** @param {RecordedNote[]} notes of the recording that is shown */

@@ -109,7 +109,7 @@ export class Player {
   }
 
   /** @returns {number | null} us: where the view will be when what was asked for is done */
-  get goal() {
+  get targetTime() {
     return this.seeking ? this.asked : this.t_us;
   }
 
@@ -138,7 +138,7 @@ export class Player {
    * @param {number | null} [pointed_us]
    * @returns {Promise<number | null>} us
    */
-  async meant(pointed_us = null) {
+  async timeToMark(pointed_us = null) {
     return pointed_us ?? (this.moves ? this.arrival : this.t_us);
   }
 

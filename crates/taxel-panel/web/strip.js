@@ -45,7 +45,7 @@ export class Strip {
 
   /** @param {KeyboardEvent} event */
   key(event) {
-    const { reach, goal: t_us } = this.player;
+    const { reach, targetTime: t_us } = this.player;
     if (!reach || t_us === null || event.ctrlKey || event.altKey || event.metaKey) return;
     const [from, to] = reach;
     /** @type {Record<string, number>} */

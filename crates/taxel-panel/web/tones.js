@@ -9,12 +9,12 @@ export class Tones {
   constructor() {
     /** @type {AudioContext | null} */
     this.context = null;
-    this.on = true;
+    this.enabled = true;
   }
 
   /** Browsers let a page sound only after a person has done something: called from every key and click. */
   wake() {
-    if (!this.on) return;
+    if (!this.enabled) return;
     this.context ??= new AudioContext();
     if (this.context.state === "suspended") this.context.resume().catch(() => {});
   }
@@ -33,7 +33,7 @@ export class Tones {
 
   /** @param {number} hz @param {number} length_s */
   play(hz, length_s) {
-    if (this.on && this.context?.state === "running") sound(this.context, hz, length_s);
+    if (this.enabled && this.context?.state === "running") sound(this.context, hz, length_s);
   }
 }
 

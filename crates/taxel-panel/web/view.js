@@ -50,6 +50,8 @@ export class View {
       part("raster-what", HTMLSelectElement).value = settings.values.raster;
       part("map-choice", HTMLSelectElement).value = settings.values.maps;
     });
+    /** @type {string[]} */
+    this.encoders = [];
     this.encoder = part("encoder", HTMLSelectElement);
     this.encoder.onchange = () => this.encode();
     part("rest-now", HTMLButtonElement).onclick = () => this.rest("now");
@@ -84,12 +86,17 @@ export class View {
 
   /** @param {Hello} hello */
   greet(hello) {
-    const encoder = part("encoder", HTMLSelectElement);
-    const now = encoder.value;
-    encoder.replaceChildren(make("option", { value: "" }, "none"), ...hello.encoders.map((name) => make("option", { value: name }, name.replaceAll("_", " "))));
-    encoder.value = hello.encoders.includes(now) ? now : "";
-    if (!encoder.value) this.settings.set("raster", "changes");
+    this.encoders = hello.encoders;
     part("live-view", HTMLElement).hidden = !hello.live;
+  }
+
+  /** Offers the encoders. @param {string[]} readout the names of those of the readout that reads what is shown */
+  offer(readout) {
+    const names = [...new Set([...this.encoders, ...readout])];
+    const { value } = this.encoder;
+    this.encoder.replaceChildren(make("option", { value: "" }, "none"), ...names.map((name) => make("option", { value: name }, `${readout.includes(name) ? "readout: " : ""}${name.replaceAll("_", " ")}`)));
+    this.encoder.value = names.includes(value) ? value : "";
+    if (!this.encoder.value) this.settings.set("raster", "changes");
   }
 
   /** Asks for the spikes of the encoder that is chosen, or for none. */

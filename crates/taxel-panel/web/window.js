@@ -55,12 +55,14 @@ export class TimeWindow {
     return column_us;
   }
 
-  /**
-   * Shows half or twice the stretch of time, around the cursor, or around the time shown.
-   * @param {1 | -1} by 1: half, -1: twice
-   */
-  by(by) {
-    this.scale(by > 0 ? 0.5 : 2);
+  /** Shows half the stretch of time, around the cursor, or around the time shown. */
+  halve() {
+    this.scale(0.5);
+  }
+
+  /** Shows twice the stretch of time. */
+  double() {
+    this.scale(2);
   }
 
   /** @param {number} times as long a stretch of time as now, around the cursor */

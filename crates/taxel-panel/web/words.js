@@ -42,11 +42,11 @@ export const whole = (value) => (Math.round(value) || 0).toLocaleString("en");
 
 /**
  * @param {number} count
- * @param {string} one
- * @param {string} [many]
+ * @param {string} singular
+ * @param {string} [plural]
  * @returns {string}
  */
-export const counted = (count, one, many = `${one}s`) => `${whole(count)} ${count === 1 ? one : many}`;
+export const counted = (count, singular, plural = `${singular}s`) => `${whole(count)} ${count === 1 ? singular : plural}`;
 
 /** @param {number} us @returns {string} a short time in the unit that suits */
 export function short(us) {

@@ -15,13 +15,13 @@ use taxel_border::errors::ProblemError;
 
 /// The entrance for parcels of another computer.
 #[pyclass(frozen)]
-pub struct Feed {
+pub struct ParcelFeed {
     feed: capture::ParcelFeed,
     /// `None` once a pipeline has it.
     receiver: Mutex<Option<Receiver>>,
 }
 
-impl Feed {
+impl ParcelFeed {
     /// The pipeline's end; it can be had once.
     pub(crate) fn receiver(&self) -> taxel_live::Result<Receiver> {
         let taken = self.receiver.lock().unwrap_or_else(PoisonError::into_inner).take();
@@ -30,7 +30,7 @@ impl Feed {
 }
 
 #[pymethods]
-impl Feed {
+impl ParcelFeed {
     /// A feed from `place`; so many bytes may wait for the decoder.
     #[new]
     fn new(place: &str, queue_bytes: usize) -> Self {

@@ -35,17 +35,17 @@ pub fn law_of<'py>(
     py: Python<'py>,
     json: &str,
     ramp: f64,
-    given: PyReadonlyArray1<'py, f64>,
+    values: PyReadonlyArray1<'py, f64>,
     rest: PyReadonlyArray1<'py, f64>,
     back: bool,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let (given, rest) = (slice("given", &given)?, slice("rest", &rest)?);
+    let (values, rest) = (slice("values", &values)?, slice("rest", &rest)?);
     let out = enter(py, |_| -> Result<Vec<f64>> {
         let sensor = law(json)?;
         let convert = |(&value, &rest): (&f64, &f64)| {
             if back { sensor.reading(value, rest, ramp) } else { sensor.force(value, rest, ramp) }
         };
-        Ok(given.iter().zip(rest).map(convert).collect())
+        Ok(values.iter().zip(rest).map(convert).collect())
     })?;
     Ok(array(py, out))
 }

@@ -26,12 +26,12 @@ pub(crate) struct TraceOut<'py> {
 pub fn fabric<'py>(
     py: Python<'py>,
     json: &str,
-    given: PyReadonlyArray1<'py, f64>,
+    values: PyReadonlyArray1<'py, f64>,
     back: bool,
 ) -> PyResult<Values<'py>> {
-    let (fabric, given): (Fabric, _) = (parsed("Fabric", json)?, slice("given", &given)?);
+    let (fabric, values): (Fabric, _) = (parsed("Fabric", json)?, slice("values", &values)?);
     let convert = |&value: &f64| if back { fabric.force_n(value) } else { fabric.conductance_us(value) };
-    Ok(array(py, given.iter().map(convert).collect()))
+    Ok(array(py, values.iter().map(convert).collect()))
 }
 
 enum Lines {
@@ -100,8 +100,8 @@ pub fn circuit_volts_alone<'py>(
     json: &str,
     conductance_us: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Values<'py>> {
-    let (lines, given) = (Lines::of(kind, json)?, slice("conductance", &conductance_us)?);
-    Ok(array(py, given.iter().map(|&g| lines.volts_alone(g)).collect()))
+    let (lines, values) = (Lines::of(kind, json)?, slice("conductance", &conductance_us)?);
+    Ok(array(py, values.iter().map(|&g| lines.volts_alone(g)).collect()))
 }
 
 /// Gives ticks of frame after frame of voltages; not a number where a comparator had not returned.
@@ -132,12 +132,12 @@ pub fn converter_ticks<'py>(
 pub fn converter_ramp<'py>(
     py: Python<'py>,
     json: &str,
-    given: PyReadonlyArray1<'py, f64>,
+    values: PyReadonlyArray1<'py, f64>,
     back: bool,
 ) -> PyResult<Values<'py>> {
-    let (ramp, given) = (parsed::<Converter>("Converter", json)?.ramp(), slice("given", &given)?);
+    let (ramp, values) = (parsed::<Converter>("Converter", json)?.ramp(), slice("values", &values)?);
     let convert = |&value: &f64| if back { ramp.ticks(value) } else { ramp.volts(value) };
-    Ok(array(py, given.iter().map(convert).collect()))
+    Ok(array(py, values.iter().map(convert).collect()))
 }
 
 /// Gives the signals of one comparator, as an oscilloscope would show them.
@@ -151,9 +151,10 @@ pub fn converter_trace<'py>(
 ) -> PyResult<TraceOut<'py>> {
     let converter: Converter = parsed("Converter", json)?;
     let seen = enter(py, |_| converter.trace(&line_v, every_us, stop_us))?;
-    let of = |value: fn(&taxel_core::circuit::Moment) -> f64| array(py, seen.iter().map(value).collect());
+    let column = |value: fn(&taxel_core::circuit::Moment) -> f64| array(py, seen.iter().map(value).collect());
     let high = array(py, seen.iter().map(|m| m.high).collect());
-    let (t_us, line_v, input_v, ramp_v) = (of(|m| m.t_us), of(|m| m.line_v), of(|m| m.input_v), of(|m| m.ramp_v));
+    let (t_us, line_v, input_v, ramp_v) =
+        (column(|m| m.t_us), column(|m| m.line_v), column(|m| m.input_v), column(|m| m.ramp_v));
     Ok(TraceOut { t_us, line_v, input_v, ramp_v, high })
 }
 

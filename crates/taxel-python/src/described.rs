@@ -15,12 +15,12 @@ use taxel_border::parameters::{Plain, checked, unknown};
 
 /// What is known of a noun's parameters: defaults, what must be given, ranges.
 #[pyfunction]
-pub fn parameters(of: &str) -> PyResult<Plain<Value>> {
-    described(of).map(|d| Plain(d.to_json())).ok_or_else(|| unknown(of))
+pub fn parameters(name: &str) -> PyResult<Plain<Value>> {
+    described(name).map(|d| Plain(d.to_json())).ok_or_else(|| unknown(name))
 }
 
-fn described(of: &str) -> Option<Described> {
-    match of {
+fn described(name: &str) -> Option<Described> {
+    match name {
         "neuron" => Some(Neuron::described()),
         "running_range" => Some(RunningRange::described()),
         "cone_x" => Some(ConeX::described()),
@@ -33,14 +33,14 @@ fn described(of: &str) -> Option<Described> {
         "converter" => Some(Converter::described()),
         "circuit" => Some(Chain::described()),
         "adaptive_ramp" => Some(Adaptive::described()),
-        _ => Encoder::described(of).or_else(|| Metric::described(of)),
+        _ => Encoder::described(name).or_else(|| Metric::described(name)),
     }
 }
 
 /// Checks a noun's parameters, which are JSON; gives them back with every default filled in.
 #[pyfunction]
-pub fn check_parameters(of: &str, parameters: &str) -> PyResult<Plain<Value>> {
-    match of {
+pub fn check_parameters(name: &str, parameters: &str) -> PyResult<Plain<Value>> {
+    match name {
         "neuron" => checked("neuron", parameters, Neuron::check),
         "running_range" => checked("running_range", parameters, RunningRange::check),
         "cone_x" => checked("ConeX", parameters, ConeX::check),
@@ -56,8 +56,8 @@ pub fn check_parameters(of: &str, parameters: &str) -> PyResult<Plain<Value>> {
         "converter" => checked("Converter", parameters, Converter::check),
         "circuit" => checked("Circuit", parameters, Chain::check),
         "adaptive_ramp" => checked("AdaptiveRamp", parameters, Adaptive::check),
-        _ if Encoder::described(of).is_some() => Ok(json!(Encoder::from_json(parameters).map_err(core)?)),
-        _ => Err(unknown(of)),
+        _ if Encoder::described(name).is_some() => Ok(json!(Encoder::from_json(parameters).map_err(core)?)),
+        _ => Err(unknown(name)),
     }
     .map(Plain)
 }

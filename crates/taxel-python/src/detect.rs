@@ -258,7 +258,7 @@ impl ReadoutStream {
 type DecisionsOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>);
 
 fn from_decisions<'py>(py: Python<'py>, found: &[Decision]) -> DecisionsOut<'py> {
-    let column = |of: fn(&Decision) -> i64| array(py, found.iter().map(of).collect());
+    let column = |value: fn(&Decision) -> i64| array(py, found.iter().map(value).collect());
     (column(|d| d.t), column(|d| d.known), array(py, found.iter().map(|d| d.value).collect()))
 }
 
@@ -314,7 +314,7 @@ impl LoadCurve {
         frames: u32,
     ) -> PyResult<(DecisionsOut<'py>, DecisionsOut<'py>)> {
         let found = enter(py, |_| Ok::<_, taxel_core::Error>(self.0.edges(threshold, release, frames)))?;
-        let (begins, ends): (Vec<_>, Vec<_>) = found.into_iter().partition(|one| one.which == 0);
+        let (begins, ends): (Vec<_>, Vec<_>) = found.into_iter().partition(|decision| decision.which == 0);
         Ok((from_decisions(py, &begins), from_decisions(py, &ends)))
     }
 

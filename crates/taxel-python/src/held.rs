@@ -71,9 +71,9 @@ pub fn held_as_events<'py>(
     py: Python<'py>,
     held: PyReadonlyArray1<'py, u16>,
     t: i64,
-    of: ArrayParts,
+    sensor: ArrayParts,
 ) -> PyResult<EventsOut<'py>> {
-    Ok(from_events(py, as_events(slice("held", &held)?, t, &to_array(of)?)))
+    Ok(from_events(py, as_events(slice("held", &held)?, t, &to_array(sensor)?)))
 }
 
 /// What frames, one after the other in `values`, read above the rest of each taxel, infinite where that is unknown.
@@ -165,9 +165,9 @@ impl PyTrackedRest {
 pub(crate) type TouchesOut<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>);
 
 /// Counts of touches for Python; taxels that are not among them have none.
-pub(crate) fn from_touches<'py>(py: Python<'py>, of: &TouchCounts) -> TouchesOut<'py> {
-    let counts = of.counts().iter().flat_map(|c| [c.touches, c.missed, c.pressed, c.changed, c.by_itself]);
-    (array(py, of.taxels().to_vec()), array(py, counts.collect()))
+pub(crate) fn from_touches<'py>(py: Python<'py>, touches: &TouchCounts) -> TouchesOut<'py> {
+    let counts = touches.counts().iter().flat_map(|c| [c.touches, c.missed, c.pressed, c.changed, c.by_itself]);
+    (array(py, touches.taxels().to_vec()), array(py, counts.collect()))
 }
 
 /// The counts of touches of events.
@@ -181,7 +181,7 @@ pub fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResul
             if k % 4096 == 0 {
                 stop.check()?;
             }
-            let ticks = events.intensity.map_or(UNKNOWN, |of| if of.present[k] { of.ticks[k] } else { UNKNOWN });
+            let ticks = events.intensity.map_or(UNKNOWN, |sent| if sent.present[k] { sent.ticks[k] } else { UNKNOWN });
             let is_change = events.repaired.is_none_or(|repaired| !repaired[k]);
             counts.event(events.t[k], events.array.index(events.x[k], events.y[k]), ticks, events.p[k], is_change);
         }

@@ -21,11 +21,11 @@ pub(crate) fn to_cone_r(json: &str) -> PyResult<ConeR> {
 
 /// The parameters of [`ConeR`], and how many patterns the window holds.
 pub(crate) fn to_online(json: &str) -> PyResult<(ConeR, usize)> {
-    let mut given: Map<String, Value> = parsed("OnlineConeR", json)?;
-    let window = given.remove("window").unwrap_or(Value::Null);
+    let mut parameters: Map<String, Value> = parsed("OnlineConeR", json)?;
+    let window = parameters.remove("window").unwrap_or(Value::Null);
     let window = window.as_u64().and_then(|window| usize::try_from(window).ok());
     let window = window.ok_or_else(|| core(problem!("window"; ": must be a whole number, 1 or more")))?;
-    Ok((to_cone_r(&Value::Object(given).to_string())?, window))
+    Ok((to_cone_r(&Value::Object(parameters).to_string())?, window))
 }
 
 /// Multipliers of a start as Python holds them: rows, and a share each.

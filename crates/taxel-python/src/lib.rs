@@ -21,7 +21,7 @@ mod metrics;
 mod neuron;
 mod nouns;
 mod panel;
-mod pictures;
+mod previews;
 mod recording;
 mod simulate;
 mod wire;
@@ -35,7 +35,7 @@ mod _core {
     use taxel_core::preload::LOADED_TICKS;
 
     #[pymodule_export]
-    use crate::bridge::{Copies, Feed};
+    use crate::bridge::{Copies, ParcelFeed};
     #[pymodule_export]
     use crate::calibration::{check_law, law_of, law_rest};
     #[pymodule_export]
@@ -76,14 +76,14 @@ mod _core {
     #[pymodule_export]
     use crate::panel::Panel;
     #[pymodule_export]
-    use crate::pictures::RecordingPictures;
+    use crate::previews::RecordingPreviews;
     #[pymodule_export]
     use crate::recording::{
-        Decoded, DecodedLsa, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines,
+        DecodedDatagrams, DecodedLsa, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines,
         numbered_path, open_regular, read_lsa, recording_damage, recording_verdict, whole_frames, write_lsa,
     };
     #[pymodule_export]
-    use crate::simulate::{Layer, Played, Source, check_scene, draw_scene, emulate, motion, play, truth};
+    use crate::simulate::{Layer, Played, SendingBoard, check_scene, draw_scene, emulate, motion, play, truth};
     #[cfg(feature = "test-hooks")]
     #[pymodule_export]
     use crate::test_hooks::{message_schemas, test_hook};

@@ -18,7 +18,7 @@ use taxel_live::pipeline::{
 };
 use taxel_live::ports;
 
-use crate::bridge::{Copies, Feed};
+use crate::bridge::{Copies, ParcelFeed};
 use crate::thread_state;
 use crate::threaded::Threaded;
 use taxel_border::convert::array;
@@ -109,7 +109,7 @@ impl Live {
         options: &str,
         record: Option<PathBuf>,
         say: Option<Py<PyAny>>,
-        feed: Option<PyRef<'_, Feed>>,
+        feed: Option<PyRef<'_, ParcelFeed>>,
     ) -> PyResult<Self> {
         let options = LiveOptions { record, ..parsed("options", options)? };
         options.array.check().map_err(core)?;

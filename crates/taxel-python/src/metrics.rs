@@ -19,18 +19,18 @@ type PatternsIn<'py> =
 
 /// Patterns with their offsets as the core wants them.
 struct OffsetPatterns<'py> {
-    given: PatternsIn<'py>,
+    parts: PatternsIn<'py>,
     offsets: Vec<usize>,
 }
 
 impl<'py> OffsetPatterns<'py> {
-    fn new(given: PatternsIn<'py>) -> PyResult<Self> {
-        let offsets = slice("offsets", &given.4)?.iter().map(|&o| usize::try_from(o).unwrap_or(usize::MAX)).collect();
-        Ok(Self { given, offsets })
+    fn new(parts: PatternsIn<'py>) -> PyResult<Self> {
+        let offsets = slice("offsets", &parts.4)?.iter().map(|&o| usize::try_from(o).unwrap_or(usize::MAX)).collect();
+        Ok(Self { parts, offsets })
     }
 
     fn patterns(&self) -> PyResult<Patterns<'_>> {
-        let (name, count, trains, times, _, window, listed) = &self.given;
+        let (name, count, trains, times, _, window, listed) = &self.parts;
         Ok(Patterns {
             name,
             count: *count,

@@ -30,7 +30,6 @@ impl Panel {
         open_by_handler: bool,
         control: Option<String>,
         registers_stated: bool,
-        readout: Option<Vec<String>>,
         live: Option<&Live>,
         requests: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
@@ -38,8 +37,7 @@ impl Panel {
         let handlers = handlers(requests)?;
         let server = enter(py, |_| {
             let address = of_host(host, port)?;
-            let options =
-                PanelOptions { address, folder, open: opened, open_by_handler, control, registers_stated, readout };
+            let options = PanelOptions { address, folder, open: opened, open_by_handler, control, registers_stated };
             Server::start(options, handle, handlers)
         })?;
         Ok(Self(Threaded::new("panel", "panel: has been stopped; begin a new one", server)))
@@ -67,9 +65,9 @@ impl Panel {
     }
 
     /// Shows another live source from now on.
-    fn attach(&self, py: Python<'_>, live: &Live, readout: Option<Vec<String>>) -> PyResult<()> {
+    fn attach(&self, py: Python<'_>, live: &Live) -> PyResult<()> {
         let handle = live.handle(py)?;
-        self.0.with(py, |server| server.attach(handle, readout))
+        self.0.with(py, |server| server.attach(handle))
     }
 
     /// Notes that the handler has connected the board's serial line, or disconnected it.

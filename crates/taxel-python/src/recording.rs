@@ -26,7 +26,7 @@ use taxel_border::parameters::{Plain, parsed};
 
 /// The decoded datagrams of a board.
 #[pyclass(frozen, get_all)]
-pub struct Decoded {
+pub struct DecodedDatagrams {
     /// The parts of the events.
     events: Py<PyTuple>,
     /// The decoder's counts.
@@ -161,10 +161,10 @@ impl RecordingReader {
     }
 
     /// Decodes all datagrams.
-    fn decode(&self, py: Python<'_>, pairing: &str) -> PyResult<Decoded> {
+    fn decode(&self, py: Python<'_>, pairing: &str) -> PyResult<DecodedDatagrams> {
         let pairing: wire::Pairing = parsed("pairing", &json!(pairing).to_string())?;
         let decoded = enter(py, |stop| self.reader.decode(pairing, stop))?;
-        Ok(Decoded {
+        Ok(DecodedDatagrams {
             events: from_events(py, decoded.events).into_pyobject(py)?.unbind(),
             counts: Plain(json!(decoded.counts)),
             version_2: Plain(json!(decoded.version_2)),
@@ -320,8 +320,8 @@ impl RecordingWriter {
         self.with(py, |writer| writer.counts(at_ns, &counts))
     }
 
-    /// Writes a picture of held ticks, row by row.
-    fn picture(
+    /// Writes a preview of held ticks, row by row.
+    fn preview(
         &self,
         py: Python<'_>,
         at_ns: i64,
@@ -333,8 +333,8 @@ impl RecordingWriter {
         self.with(py, |writer| writer.picture(at_ns, t_us, columns, ticks))
     }
 
-    /// Writes a picture for viewers of values above rest, row by row; white is at least `least`.
-    fn picture_above(
+    /// Writes a preview of values above rest, row by row; white is at least `least`.
+    fn preview_above(
         &self,
         py: Python<'_>,
         at_ns: i64,

@@ -396,10 +396,10 @@ impl Layer {
 
 /// A board that scans frames as they are pushed, and sends what it makes of them.
 #[pyclass(frozen, module = "taxel._core")]
-pub struct Source(Exclusive<(Board, Sender)>);
+pub struct SendingBoard(Exclusive<(Board, Sender)>);
 
 #[pymethods]
-impl Source {
+impl SendingBoard {
     /// `registers` and `version_2` are JSON.
     #[new]
     fn new(py: Python<'_>, to: &str, parts: ArrayParts, registers: &str, version_2: &str) -> PyResult<Self> {

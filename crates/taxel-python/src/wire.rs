@@ -340,10 +340,10 @@ impl WireBoard {
         most: usize,
         accepted: Option<PyReadonlyArray1<'py, bool>>,
     ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
-        let (given, mut sent) = (slice("ticks", &ticks)?, vec![]);
+        let (ticks, mut sent) = (slice("ticks", &ticks)?, vec![]);
         let accepted = accepted.as_ref().map(|accepted| slice("accepted", accepted)).transpose()?;
         let datagrams = self.0.enter(py, |(board, crossed), stop| {
-            let mut ticks = Cow::from(given);
+            let mut ticks = Cow::from(ticks);
             // The board refuses a frame of another length.
             if let Some(crossed) = crossed
                 && ticks.len() == crossed.taxels()

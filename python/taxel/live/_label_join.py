@@ -147,7 +147,7 @@ class _Rows:
         rows = self._of.get(_key(row))
         if not rows:
             return None
-        taken = rows.pop(next((k for k, one in enumerate(rows) if one.at_ns == row.at_ns), 0))
+        taken = rows.pop(next((k for k, same in enumerate(rows) if same.at_ns == row.at_ns), 0))
         if not taken.text:
             self._removals[taken.source, taken.recording, taken.replaces].remove(taken)
         return taken

@@ -37,7 +37,8 @@ def to_json(known: Acknowledged) -> dict[str, Any]:
         if notes is None:
             return None
         return [
-            [n.text, n.t, n.source, n.recording, n.replaces, n.at_ns, [list(one) for one in n.others]] for n in notes
+            [n.text, n.t, n.source, n.recording, n.replaces, n.at_ns, [list(column) for column in n.others]]
+            for n in notes
         ]
 
     return {"labels": rows(known.labels), "deleted": rows(known.deleted), "table": rows(known.table)}
@@ -87,9 +88,9 @@ def not_saved(place: Path, error: Exception) -> FormatError:
 def newest_of(place: Path, link: Path | None) -> Path:
     """Return the table by whose name the newest state is saved: the file itself, or a link to it."""
     times = []
-    for one in (place, link):
+    for name in (place, link):
         try:
-            times.append(-1 if one is None else os.stat(state_place(one)).st_mtime_ns)
+            times.append(-1 if name is None else os.stat(state_place(name)).st_mtime_ns)
         except FileNotFoundError:
             times.append(-1)
     # A state that is saved by the link's name is saved beside the file just before.

@@ -102,7 +102,7 @@ class _File:
 
     place: Path
     link: Path | None
-    own: frozenset[str]
+    names: frozenset[str]
     recording: Path | None
     descriptor: int | None
     text: bytes | None
@@ -110,16 +110,16 @@ class _File:
     columns: tuple[str, ...]
 
     @classmethod
-    def read(cls, table: Path, own: frozenset[str], *, final: bool) -> _File:
+    def read(cls, table: Path, names: frozenset[str], *, final: bool) -> _File:
         """Read a table; `final` if it is not waited for any longer."""
         place, link = _places(table)
-        recording = _recording_of(table, own)
+        recording = _recording_of(table, names)
         try:
             descriptor = open_regular(place)
         except FileNotFoundError:
-            return cls(place, link, own, recording, None, None, (), ())
+            return cls(place, link, names, recording, None, None, (), ())
         try:
-            return cls(place, link, own, recording, descriptor, None, (), ()).again(final=final)
+            return cls(place, link, names, recording, descriptor, None, (), ()).again(final=final)
         except BaseException:
             os.close(descriptor)
             raise
@@ -131,7 +131,7 @@ class _File:
         # A time in the future is none at which it was written.
         is_new = 0 <= time.time() - os.fstat(self.descriptor).st_mtime <= _WRITTEN_S
         try:
-            rows, columns = _parsed(self.place, self.own, text)
+            rows, columns = _parsed(self.place, self.names, text)
         except FormatError as error:
             if final or not is_new:
                 raise
@@ -161,8 +161,8 @@ class _File:
             return self.descriptor is None
         if self.descriptor is None:
             return False
-        here = os.fstat(self.descriptor)
-        same = (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
+        opened = os.fstat(self.descriptor)
+        same = (opened.st_dev, opened.st_ino) == (there.st_dev, there.st_ino)
         return same and bytes_of(self.descriptor) == self.text
 
     def close(self) -> None:
@@ -176,14 +176,14 @@ def _places(table: Path) -> tuple[Path, Path | None]:
     return place, None if named == place else named
 
 
-def _parsed(place: Path, own: frozenset[str], text: bytes) -> tuple[tuple[Note, ...], tuple[str, ...]]:
+def _parsed(place: Path, names: frozenset[str], text: bytes) -> tuple[tuple[Note, ...], tuple[str, ...]]:
     rows, columns = rows_of(place, lines_of(decoded(place, text)))
-    return tuple(replace(row, recording="") if row.recording in own else row for row in rows), columns
+    return tuple(replace(row, recording="") if row.recording in names else row for row in rows), columns
 
 
-def _recording_of(table: Path, own: frozenset[str]) -> Path | None:
+def _recording_of(table: Path, names: frozenset[str]) -> Path | None:
     """Return the recording beside a table, where it is a file."""
-    places = (table.with_name(name) for name in sorted(own, key=len, reverse=True) if name)
+    places = (table.with_name(name) for name in sorted(names, key=len, reverse=True) if name)
     return next((place for place in places if place.is_file()), None)
 
 
@@ -199,18 +199,18 @@ def _sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def _exchange(one: str, other: Path) -> bool:
+def _exchange(first: str, second: Path) -> bool:
     """Exchange two files in one step; return False where the file system cannot."""
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except AttributeError:
         return False
-    if not rename(_HERE, os.fsencode(one), _HERE, os.fsencode(other), ctypes.c_uint(_EXCHANGE)):
+    if not rename(_HERE, os.fsencode(first), _HERE, os.fsencode(second), ctypes.c_uint(_EXCHANGE)):
         return True
     code = ctypes.get_errno()
     if code in _NO_EXCHANGE:
         return False
-    raise OSError(code, os.strerror(code), str(other))
+    raise OSError(code, os.strerror(code), str(second))
 
 
 # ---------------------------------------------------------------------------------------------- what was acknowledged
@@ -223,7 +223,7 @@ def _clean(place: Path) -> None:
     """
     beside = state_place(place)
     names = re.compile(f"\\.({re.escape(beside.name)}|{re.escape(place.name)})\\.[0-9a-f]{{8}}\\.new")
-    for left, found in [(one, found) for one in os.listdir(place.parent) if (found := names.fullmatch(one))]:
+    for left, found in [(name, found) for name in os.listdir(place.parent) if (found := names.fullmatch(name))]:
         path = place.with_name(left)
         if found[1] == place.name:
             saved = saved_of(place) or {}
@@ -351,34 +351,34 @@ class LabelTables:
 
     def close(self) -> None:
         """Take in what other programs wrote to replaced tables, and close them."""
-        self._take_in()
+        self._merge_written()
         with self._watched_lock:
-            watched, self._watched = self._watched, []
-        for one in watched:
-            one.file.close()
+            every, self._watched = self._watched, []
+        for watched in every:
+            watched.file.close()
 
     def stamp(self, table: Path) -> str:
         """Return a text that changes when a table, or what was acknowledged of it, may have changed."""
         place, link = _places(table)
-        self._take_in(link or place)
-        while self._let_go():
+        self._merge_written(link or place)
+        while self._close_oldest():
             pass
         parts = []
-        for one in (place, state_place(place), state_place(link or place)):
+        for path in (place, state_place(place), state_place(link or place)):
             try:
-                about = os.stat(one)
+                about = os.stat(path)
                 parts.append(f"{about.st_ino}.{about.st_size}.{about.st_mtime_ns}.{about.st_ctime_ns}")
             except FileNotFoundError:
                 parts.append("-")
         return " ".join(parts)
 
-    def read(self, table: Path, own: frozenset[str]) -> TableRead:
+    def read(self, table: Path, names: frozenset[str]) -> TableRead:
         """Read a table, which need not exist.
 
         Parameters
         ----------
         table : Path
-        own : set of str
+        names : set of str
             Names of the recording in the table.
 
         Raises
@@ -394,7 +394,7 @@ class LabelTables:
                     if is_mine:
                         _clean(place)
             try:
-                file = _File.read(table, own, final=final)
+                file = _File.read(table, names, final=final)
             except _BeingWritten:
                 continue
             try:
@@ -407,7 +407,7 @@ class LabelTables:
         raise AssertionError
 
     def change(
-        self, table: Path, own: frozenset[str], requests: Sequence[Sequence[Edit]]
+        self, table: Path, names: frozenset[str], requests: Sequence[Sequence[Edit]]
     ) -> tuple[tuple[tuple[Note | None, ...] | str, ...], TableRead]:
         """Carry out requests in one write; return what became of each, and the table.
 
@@ -417,42 +417,42 @@ class LabelTables:
         ------
         ProblemError : the table is no table of labels or cannot be written, or another program holds the lock
         """
-        joined = self._write(table, own, lambda known, theirs: join(known, theirs, requests))
+        joined = self._write(table, names, lambda known, theirs: join(known, theirs, requests))
         return joined.outcomes, TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
 
-    def settle(self, table: Path, own: frozenset[str], conflict: Conflict, *, restore: bool) -> TableRead:
+    def settle(self, table: Path, names: frozenset[str], conflict: Conflict, *, restore: bool) -> TableRead:
         """End a conflict: restore what was acknowledged, or accept the table as it is.
 
         Raises
         ------
         ProblemError : as of `change`, or nothing is left of the conflict
         """
-        joined = self._write(table, own, lambda known, theirs: settled(known, theirs, conflict, restore=restore))
+        joined = self._write(table, names, lambda known, theirs: settled(known, theirs, conflict, restore=restore))
         return TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
 
-    def _write(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
+    def _write(self, table: Path, names: frozenset[str], action: _Action) -> Joined:
         while True:
             try:
-                joined = self._try_write(table, own, action)
+                joined = self._try_write(table, names, action)
             except OSError as error:
-                if error.errno in _FULL and self._let_go(most=0):
+                if error.errno in _FULL and self._close_oldest(most=0):
                     continue
                 place, _ = _places(table)
                 reason = (error.strerror or str(error)).removeprefix("is ").lower()
                 beside = state_place(place)
                 where = f"{beside.name}: " if error.filename == str(beside) else ""
                 raise ProblemError(f"{place.name} cannot be saved: {where}{reason}") from error
-            while self._let_go():
+            while self._close_oldest():
                 pass
             return joined
 
-    def _try_write(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
+    def _try_write(self, table: Path, names: frozenset[str], action: _Action) -> Joined:
         for final in _attempts():
             place, _ = _places(table)
             with locked(place.parent):
                 _clean(place)
                 try:
-                    file = _File.read(table, own, final=final)
+                    file = _File.read(table, names, final=final)
                 except _BeingWritten:
                     continue
                 except FormatError as error:
@@ -487,7 +487,7 @@ class LabelTables:
         try_whole(place, overwrite=True)
         text = file.text_with(joined.rows)
         try:
-            again, _ = _parsed(place, file.own, text)
+            again, _ = _parsed(place, file.names, text)
         except FormatError as error:
             raise ProblemError(f"{error}; nothing was saved") from None
         if unlike := minus(joined.rows, again):
@@ -512,25 +512,25 @@ class LabelTables:
         return replaced
 
     def _watch(self, file: _File) -> None:
-        one = _Watched(replace(file, rows=()), (-1, 0))
+        watched = _Watched(replace(file, rows=()), (-1, 0))
         with self._watched_lock:
-            self._watched.append(one)
+            self._watched.append(watched)
 
-    def _let_go(self, most: int = _MOST_WATCHED) -> bool:
+    def _close_oldest(self, most: int = _MOST_WATCHED) -> bool:
         """Close the table that was replaced or written to longest ago, if they are too many or too large; say whether.
 
         What was written to it is taken in. The last one stays, as a program may write to it this moment, but for
         `most` 0, where the disk is full: then those stay that have something which cannot be taken in.
         """
         with self._watched_lock:
-            count, size = len(self._watched), sum(len(one.file.text or b"") for one in self._watched)
+            count, size = len(self._watched), sum(len(watched.file.text or b"") for watched in self._watched)
             if count <= most and (count <= 1 or size <= _MOST_WATCHED_BYTES):
                 return False
-            oldest = next((one for one in self._watched if most or not one.is_written()), None)
+            oldest = next((watched for watched in self._watched if most or not watched.is_written()), None)
             if oldest is None:
                 return False
             self._watched.remove(oldest)
-        now = self._taken_in(oldest)
+        now = self._merge_watched(oldest)
         if most and now.file is not oldest.file:
             with self._watched_lock:
                 self._watched.append(now)
@@ -538,39 +538,39 @@ class LabelTables:
             now.file.close()
         return True
 
-    def _take_in(self, table: Path | None = None) -> None:
+    def _merge_written(self, table: Path | None = None) -> None:
         """Take in what programs wrote to a table that they had opened before it was replaced; `None`: to any table."""
         with self._watched_lock:
-            mine = [one for one in self._watched if table in (None, one.file.table)]
-            self._watched = [one for one in self._watched if one not in mine]
-        found = [(one.file, self._taken_in(one)) for one in mine]
+            mine = [watched for watched in self._watched if table in (None, watched.file.table)]
+            self._watched = [watched for watched in self._watched if watched not in mine]
+        found = [(watched.file, self._merge_watched(watched)) for watched in mine]
         written = [now for file, now in found if now.file is not file]
         with self._watched_lock:
             # That of a program that holds its table open stays the newest.
             self._watched = [*(now for file, now in found if now.file is file), *self._watched, *written]
 
-    def _taken_in(self, one: _Watched) -> _Watched:
-        file = one.file
+    def _merge_watched(self, watched: _Watched) -> _Watched:
+        file = watched.file
         assert file.descriptor is not None
         about = os.fstat(file.descriptor)
         seen = about.st_size, about.st_mtime_ns
-        if seen == one.seen:
-            return one
+        if seen == watched.seen:
+            return watched
         try:
             now = file if bytes_of(file.descriptor) == file.text else file.again(final=False)
         except _BeingWritten:
-            return one
+            return watched
         except FormatError:
             # A text that is being written becomes one that can be read.
-            return replace(one, seen=seen)
+            return replace(watched, seen=seen)
         if now is file:
-            return replace(one, seen=seen)
+            return replace(watched, seen=seen)
         try:
-            before, _ = _parsed(file.place, file.own, file.text or b"")
+            before, _ = _parsed(file.place, file.names, file.text or b"")
             action = functools.partial(fold, before=before, after=now.rows)
-            self._try_write(file.table, file.own, action)
+            self._try_write(file.table, file.names, action)
         except (FormatError, ProblemError, OSError):
-            return one
+            return watched
         return _Watched(replace(now, rows=()), seen)
 
 

@@ -184,7 +184,7 @@ class ShownFiles:
             return every[0], []
         with self._lock:
             self._trials = key, every
-        names = [one.name for one in every]
+        names = [recording.name for recording in every]
         if trial is not None and trial not in names:
             raise ProblemError(f"{path.name}: holds no trial {trial}")
         return every[0 if trial is None else names.index(trial)], names
@@ -204,12 +204,12 @@ class ShownFiles:
     def health(self, path: Path, trial: str | None) -> tuple[_Taxels, _Taxels, _Taxels, int]:
         """Return the taxels that are dead, stuck, noisy, in the array that is shown, and how many cannot be judged."""
         recording, _ = self.opened(path, trial)
-        frames = {name: one.frames() for name, one in _sources(recording).items()}
+        frames = {name: sensor.frames() for name, sensor in _sources(recording).items()}
         _, lefts = _array_of(frames)
         found: dict[str, _Taxels] = {"dead": [], "stuck": [], "noisy": []}
         untested = 0
-        for left, one in zip(lefts, frames.values(), strict=True):
-            judged = health(one)
+        for left, sensor in zip(lefts, frames.values(), strict=True):
+            judged = health(sensor)
             untested += int(np.count_nonzero(judged.untested))
             for kind, places in judged.named().items():
                 if kind in found:
@@ -257,33 +257,37 @@ def _sources(recording: Recording) -> dict[str, Recording]:
     """Return the sensors of a recording of frames: its sources, or itself."""
     several = recording.is_several
     every = recording.sources if several else {recording.label or "board": recording}
-    return {name: one for name, one in every.items() if not one.has_events and not one.is_stream} if several else every
+    return (
+        {n: sensor for n, sensor in every.items() if not sensor.has_events and not sensor.is_stream}
+        if several
+        else every
+    )
 
 
 def _array_of(frames: dict[str, Frames]) -> tuple[Array, list[int]]:
     """Return the array that shows those of all sensors, and the first column of each."""
-    return Array._beside([one.array for one in frames.values()], gap=1)
+    return Array._beside([sensor.array for sensor in frames.values()], gap=1)
 
 
 def _frames(recording: Recording) -> ReadFrames:
     sources = _sources(recording)
-    frames = {name: _in_its_unit(one) for name, one in sources.items()}
-    units = {one.unit for one in frames.values()}
+    frames = {name: _in_its_unit(sensor) for name, sensor in sources.items()}
+    units = {sensor.unit for sensor in frames.values()}
     if len(units) > 1:
         raise ProblemError(f"{recording.path}: its sources are in {', '.join(sorted(units))}; must be in one unit")
     array, lefts = _array_of(frames)
     us = 1 if recording.timed else _NUMBER_US
     parts = [
-        ReadSource(name, left, one.array.rows, one.array.columns, _times(one.t, us), _values(one), _rest(one))
-        for (name, one), left in zip(frames.items(), lefts, strict=True)
+        ReadSource(name, left, read.array.rows, read.array.columns, _times(read.t, us), _values(read), _rest(read))
+        for (name, read), left in zip(frames.items(), lefts, strict=True)
     ]
-    noted = {name: {(note.t, note.text) for note in one.notes} for name, one in sources.items()}
+    noted = {name: {(note.t, note.text) for note in sensor.notes} for name, sensor in sources.items()}
     of_all = set.intersection(*noted.values())
     notes = {(t, text, "") for t, text in of_all}
-    notes |= {(t, text, name) for name, own in noted.items() for t, text in own - of_all}
+    notes |= {(t, text, name) for name, of_source in noted.items() for t, text in of_source - of_all}
     labels = {(row.t, row.text) for row in _labels_beside(recording)}
     notes = {note for note in notes if note[:2] not in labels}
-    found = [(d.label, d.t, d.known) for one in sources.values() for d in one.detections]
+    found = [(d.label, d.t, d.known) for sensor in sources.values() for d in sensor.detections]
     sorted_notes = sorted(notes, key=lambda note: (note[0] or 0, note[1]))
     verdict = "" if recording.verdict.status == "unknown" else recording.verdict
     number_us = None if us == 1 else us

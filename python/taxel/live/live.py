@@ -139,7 +139,7 @@ class Live:
         #: Whether the registers were stated; the panel shows no frame rate that is only assumed.
         self._registers_stated = options.registers is not None or options.remote is not None
         options = options.completed()
-        remote, readout, say = options.remote, options.readout, options.say
+        remote, say = options.remote, options.say
         self.array = Array._of(options.array)
         #: To begin another one on another address.
         self._options = replace(options, array=self.array)
@@ -147,14 +147,13 @@ class Live:
         outlets = [LslOutlet(to.removeprefix(_LSL)) for to in destinations if to.startswith(_LSL)]
         inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in sources if how.startswith(_LSL)}
         self._inlets = list(inlets.values())
-        self._labels = None if readout is None else list(readout.labels)
         receivers: list[Callable[[Detection], object]] = [*outlets, *([] if say is None else [say])]
         self._summary: Summary | None = None
         stated = options.for_rust(
             send=[to for to in destinations if not to.startswith(_LSL)],
-            sources=[(what, _given(inlets[what]) if what in inlets else how) for what, how in sources],
+            sources=[(what, _source_of(inlets[what]) if what in inlets else how) for what, how in sources],
         )
-        feed = None if remote is None else _core.Feed(remote.place, options.queue_bytes)
+        feed = None if remote is None else _core.ParcelFeed(remote.place, options.queue_bytes)
         self._core = _core.Live(
             stated,
             None if options.record is None else checked_path("record", options.record),
@@ -351,12 +350,10 @@ class Live:
         OSError : the disk is full
         """
         arrival = None if arrived_ns is None else whole("arrived_ns", arrived_ns, 0)
-        given = numbers("values", values, np.float64).reshape(-1)
-        for k in np.flatnonzero(np.abs(given) > VALUE)[:1]:
-            raise refused(
-                "values", f"[{k}] is {shown(given[k].item())}: must fit 32 bits, or be NaN where it is missing"
-            )
-        self._core.sample(text("name", name), given.tolist(), arrival)
+        row = numbers("values", values, np.float64).reshape(-1)
+        for k in np.flatnonzero(np.abs(row) > VALUE)[:1]:
+            raise refused("values", f"[{k}] is {shown(row[k].item())}: must fit 32 bits, or be NaN where it is missing")
+        self._core.sample(text("name", name), row.tolist(), arrival)
 
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
         """Use the values that taxels hold now as their rest from now on: for taxels that drift.
@@ -385,12 +382,14 @@ class Live:
             if len(places) and (places.min() < 0 or places.max() > _MOST_PLACE):
                 wrong = places.min() if places.min() < 0 else places.max()
                 raise ProblemError(f"{name}: holds {wrong}, must be a taxel's")
-        return tuple(Zeroing(**one) for one in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True))))
+        return tuple(
+            Zeroing(**zeroing) for zeroing in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True)))
+        )
 
     @property
     def zeroed(self) -> tuple[Zeroing, ...]:
         """The latest zeroing of each taxel that was zeroed, by `zero` or a panel."""
-        return tuple(Zeroing(**one) for one in self._core.zeroed())
+        return tuple(Zeroing(**zeroing) for zeroing in self._core.zeroed())
 
     def note(self, message: str) -> None:
         """Write a note into the recording, with the current time.
@@ -499,5 +498,5 @@ class Live:
         return escaped(f"Live({self.place}, {self.array.rows} x {self.array.columns} taxels)")
 
 
-def _given(inlet: LslInlet) -> str:
+def _source_of(inlet: LslInlet) -> str:
     return f"given,columns={':'.join(inlet.columns)}"

@@ -67,7 +67,7 @@ class LslInlet:
             raise ProblemError(f"lsl:{name}: does not name its channels ({error})") from None
         count = streams[0].channel_count()
         names = [str(label) for label in labels if label]
-        plain = len(set(names)) == count and not any(set(one) & set(",:=") for one in names) and "t_s" not in names
+        plain = len(set(names)) == count and not any(set(name) & set(",:=") for name in names) and "t_s" not in names
         self.columns = ["t_s", *(names if plain else [f"channel_{k}" for k in range(count)])]
         self._ends = threading.Event()
         self._thread: threading.Thread | None = None

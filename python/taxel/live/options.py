@@ -73,17 +73,15 @@ class LiveOptions(StatedOptions):
 
     def for_rust(self, *, send: list[str], sources: list[tuple[str, str]]) -> str:
         """Return the options as the compiled part reads them; it opens `send` and `sources` itself."""
-        own = {
-            one.name: _plain(one, getattr(self, one.name)) for one in fields(StatedOptions) if one.name not in _APART
-        }
-        return parameters(own | {"send": send, "sources": sources})
+        plain = {o.name: _plain(o, getattr(self, o.name)) for o in fields(StatedOptions) if o.name not in _APART}
+        return parameters(plain | {"send": send, "sources": sources})
 
 
 #: Options that are passed in another form: the name of a file may be no text.
 _APART = ("record", "send", "sources")
 
 
-def _plain(one: Field[Any], value: object) -> object:
+def _plain(option: Field[Any], value: object) -> object:
     """Return the value of an option as JSON holds it; refuse a value of another type."""
     match value:
         case Array():
@@ -94,11 +92,11 @@ def _plain(one: Field[Any], value: object) -> object:
             return value.to_json()
         case RemoteBoard():
             return value.place
-    if value is None and "None" in one.type:
+    if value is None and "None" in option.type:
         return None
     checks: dict[Any, Callable[[], object]] = {
-        "bool": lambda: flag(one.name, value),
-        "int": lambda: whole(one.name, value, one.metadata["min"], one.metadata["max"]),
-        "str": lambda: text(one.name, value),
+        "bool": lambda: flag(option.name, value),
+        "int": lambda: whole(option.name, value, option.metadata["min"], option.metadata["max"]),
+        "str": lambda: text(option.name, value),
     }
-    return checks.get(one.type, lambda: number(one.name, value))()
+    return checks.get(option.type, lambda: number(option.name, value))()

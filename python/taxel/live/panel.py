@@ -88,7 +88,7 @@ class Panel:
                 raise refused("control", ": a recording has no board; give a taxel.live.Live")
             if folder is not None:
                 raise refused("folder", ": is the recording's own")
-            folder, opened = _shown(place, how.layout)
+            folder, opened = _folder_and_name(place, how.layout)
             opens = how.open_joined if opens is None and how.given() else opens
             shown = None if place.is_dir() and not is_bag(place) else folder / opened
         if how.rate_hz is not None:
@@ -97,7 +97,6 @@ class Panel:
         cable = None if control is None else Cable(text("control", control))
         board = BoardRequests(self.listen, self.delta_intensity, self.read_out, cable)
         self._requests = Requests(opening, board)
-        readout = None if self._live is None else self._live._labels
         stated = self._live is not None and self._live._registers_stated
         try:
             self._core = _core.Panel(
@@ -108,7 +107,6 @@ class Panel:
                 opens is not None,
                 control,
                 stated,
-                readout,
                 None if self._live is None else self._live._core,
                 self._requests,
             )
@@ -212,7 +210,7 @@ class Panel:
             host, port = before.address
             tare = before.tare or (before._options.tare if before._options.readout is not None else None)
             if tare is None:
-                tare = _held(before)
+                tare = _rest_of_held(before)
             before.stop()
             try:
                 after = before._again(port, host, readout=loaded, tare=tare)
@@ -224,7 +222,7 @@ class Panel:
 
     def _attach(self, live: Live) -> None:
         """Show another `Live` from now on."""
-        self._core.attach(live._core, live._labels)
+        self._core.attach(live._core)
         self._live = live
 
     def _connect(self, control: str) -> None:
@@ -266,7 +264,7 @@ class Panel:
         return f"Panel({'ended' if self._stopped else self._url.partition('#')[0]})"
 
 
-def _shown(place: Path, layout: str | os.PathLike[str] | None) -> tuple[Path, str]:
+def _folder_and_name(place: Path, layout: str | os.PathLike[str] | None) -> tuple[Path, str]:
     """Return the folder of a recording and its name there; of a folder its first recording.
 
     The server indexes it when a client opens it; what is no recording is refused now.
@@ -287,7 +285,7 @@ def _shown(place: Path, layout: str | os.PathLike[str] | None) -> tuple[Path, st
     return place.parent, place.name
 
 
-def _held(live: Live) -> Tare:
+def _rest_of_held(live: Live) -> Tare:
     """Return the values that the taxels of a board hold now as their rest."""
     held = live.frame.astype(float)
     if not held.any():

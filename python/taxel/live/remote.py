@@ -8,10 +8,10 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from taxel._base.arguments import text
-from taxel._core import DeviceError, Feed, ProblemError
+from taxel._core import DeviceError, ParcelFeed, ProblemError
 from taxel.array import Array
 
-__all__ = ["Feed", "RemoteBoard", "receiver_of"]
+__all__ = ["ParcelFeed", "RemoteBoard", "receiver_of"]
 
 
 class RemoteBoard(ABC):
@@ -37,12 +37,12 @@ class RemoteBoard(ABC):
         self.in_use = False
 
     @abstractmethod
-    def begin(self, feed: Feed) -> None:
+    def begin(self, feed: ParcelFeed) -> None:
         """Set `in_use`, and pass what arrives to a pipeline from now on, from a thread of its own.
 
         Parameters
         ----------
-        feed : Feed
+        feed : ParcelFeed
             Takes parcels of datagrams (``take``), the beginning of a session of the other computer and round trips to
             its clock (``begin_session``, ``compare``), and an error that ends the pipeline (``fail``).
         """

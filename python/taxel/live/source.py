@@ -71,7 +71,7 @@ class Source:
         options = parameters(
             {"board": whole("board", board, 0, 65_535), "seed": int.from_bytes(os.urandom(2), "little")}
         )
-        self._core = _core.Source(text("to", to), array._parts(), self.registers._json(), options)
+        self._core = _core.SendingBoard(text("to", to), array._parts(), self.registers._json(), options)
 
     def push(self, frame: ArrayLike) -> int:
         """Send the events of the next frame; return how many there are.

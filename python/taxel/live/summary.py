@@ -49,8 +49,10 @@ class Summary:
 
         For a board of another computer with the losses there and between the two computers.
         """
-        boards = [self.counters, *(one for one in self.counters["sources"].values() if "capture" in one)]
-        lost = sum(int(one["capture"]["dropped_by_kernel"] + one["capture"]["dropped_by_queue"]) for one in boards)
+        boards = [self.counters, *(source for source in self.counters["sources"].values() if "capture" in source)]
+        lost = sum(
+            int(board["capture"]["dropped_by_kernel"] + board["capture"]["dropped_by_queue"]) for board in boards
+        )
         bridged = self.counters["bridged"] or {}
         return lost + sum(int(bridged.get(cause, 0)) for cause in ("missing", "dropped", "dropped_by_kernel"))
 

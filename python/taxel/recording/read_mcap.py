@@ -227,7 +227,7 @@ class _Source:
             return Once(read, lambda: True)
         return Once(lambda: {**self.before, **{cause: n for cause, n in self.rebuilt().items() if n}}, lambda: True)
 
-    def counts_of_board(self, decoded: _core.Decoded) -> dict[str, Any]:
+    def counts_of_board(self, decoded: _core.DecodedDatagrams) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and events of a board, by cause and version of the wire."""
         remarks = self.remarks()
         counts = self.counted() or remarks.counts or {}
@@ -282,7 +282,7 @@ def _read_entry(path: Path, entry: str, read: Callable[[Any], Any], value: Any) 
         raise FormatError(f"{path}, header, {entry}: {error}") from None
 
 
-def _clock(decoded: _core.Decoded) -> Clock:
+def _clock(decoded: _core.DecodedDatagrams) -> Clock:
     has = decoded.left > np.iinfo(np.int64).min
     return Clock(np.ascontiguousarray(decoded.left[has]), np.ascontiguousarray(decoded.arrived_ns[has]))
 

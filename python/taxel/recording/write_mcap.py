@@ -156,7 +156,7 @@ def _write_frames(
         stop = int(np.searchsorted(few.t, t[-1], side="right"))
         for k in range(drawn[name], stop):
             above = np.ascontiguousarray(few.values[k]).reshape(-1)
-            tracks[name].picture_above(at_ns(int(few.t[k])), int(few.t[k]), above, *about)
+            tracks[name].preview_above(at_ns(int(few.t[k])), int(few.t[k]), above, *about)
         drawn[name] = stop
     for name, source in sources.items():
         _add_small(tracks[name], source, at_ns)
@@ -254,8 +254,8 @@ def _add_remarks(writer: Any, events: Events, of: Source) -> None:
     )
     for t, start in events.markers:
         writer.marker(at_ns(t), t, start)
-    for t, ticks in _core.RecordingPictures(events._parts(), around):
-        writer.picture(at_ns(t), t, events.array.columns, ticks)
+    for t, ticks in _core.RecordingPreviews(events._parts(), around):
+        writer.preview(at_ns(t), t, events.array.columns, ticks)
     _add_small(writer, of, at_ns)
 
 

@@ -456,4 +456,4 @@ impl KeyframeIndex for Arc<RecordingIndex> {
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+pub(crate) mod tests;

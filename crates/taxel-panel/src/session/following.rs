@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use taxel_core::encode::Encoder;
 use taxel_live::Result;
 use taxel_live::locked::lock;
 
@@ -10,6 +9,7 @@ use crate::encoded_spikes::EncodedSpikes;
 use crate::frame::{self, About};
 use crate::live_source::LiveSource;
 use crate::player::{Player, ViewOptions};
+use crate::readout_encoders::ViewEncoder;
 use crate::refusal::{Answer, Refusal};
 use crate::taxel_history::TaxelHistory;
 use crate::time_columns::{COLUMN_US, column_of};
@@ -44,7 +44,7 @@ impl Following {
     }
 
     /// Begins to encode from now on.
-    pub(super) fn start_encoding(&mut self, live: &LiveSource, encoder: &Encoder, column_us: i64) -> Result<()> {
+    pub(super) fn start_encoding(&mut self, live: &LiveSource, encoder: &ViewEncoder, column_us: i64) -> Result<()> {
         let state = lock(&live.state);
         let spikes = EncodedSpikes::new(encoder, live.array(), column_us, state.held(), state.latest())?;
         self.spikes = Some((spikes, live.index.next_piece()));
@@ -91,7 +91,7 @@ impl Following {
     ) -> (Vec<u8>, i64, Option<u64>) {
         if let Some(watched) = about.watched {
             let (history, next) = self.history.get_or_insert_with(|| live.index.history(watched, about.column_us));
-            *next = live.index.changes_from(*next, |changes| changes.iter().for_each(|one| history.apply(one)));
+            *next = live.index.changes_from(*next, |changes| changes.iter().for_each(|change| history.apply(change)));
         }
         let mut state = lock(&live.state);
         let rests = Some(state.rests()).filter(|rests| needs_rest(*rests));

@@ -7,7 +7,7 @@ use serde_json::Value;
 use tokio::sync::{Semaphore, mpsc};
 
 use crate::hub::Hub;
-use crate::indexed::Shown;
+use crate::indexed::OpenRecording;
 use crate::limits::MOST_BYTES;
 use crate::messages::Message;
 use crate::refusal::Refusal;
@@ -62,7 +62,7 @@ impl PendingRequests {
         what: String,
         request: Request,
         bytes: usize,
-        shown: Option<Shown>,
+        shown: Option<OpenRecording>,
     ) -> Option<Message> {
         let (permits, count) = match request.changes_labels() {
             true => (&self.label_permits, bytes.div_ceil(PART).clamp(1, MOST_BYTES / PART)),

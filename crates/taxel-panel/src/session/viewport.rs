@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Map, Value};
-use taxel_core::encode::Encoder;
 use taxel_live::locked::lock;
 
 use super::delivered::Delivered;
@@ -14,13 +13,14 @@ use crate::encoded_spikes::EncodedSpikes;
 use crate::folder::size;
 use crate::frame::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
 use crate::hub::Hub;
-use crate::indexed::Shown;
+use crate::indexed::OpenRecording;
 use crate::keyframe_index::KeyframeIndex;
 use crate::label_requests;
 use crate::live_source::LiveSource;
 use crate::messages::{Message, ViewState};
 use crate::opening;
 use crate::player::{Player, ViewOptions};
+use crate::readout_encoders::{ReadoutEncoders, ViewEncoder};
 use crate::refusal::{Answer, Refusal};
 use crate::request::Taxel;
 use crate::requests::readout_of;
@@ -45,10 +45,14 @@ struct SourcePosition {
 pub(super) struct Viewport {
     live: Option<Arc<LiveSource>>,
     /// The recording that is shown, in place of the live source.
-    recording: Option<Shown>,
+    recording: Option<OpenRecording>,
     position: Position,
     playback: Playback,
     options: ViewOptions,
+    /// The encoder that the client has requested.
+    requested_encoder: Option<Map<String, Value>>,
+    /// The encoders of the readout that reads the recording.
+    recording_encoders: ReadoutEncoders,
     /// Where the window of columns ends, us; `None`: at the time of the view.
     window_us: Option<i64>,
     following: Following,
@@ -67,6 +71,8 @@ impl Viewport {
             position: Position::Following,
             playback: Playback::paused(),
             options: ViewOptions::plain(COLUMN_US),
+            requested_encoder: None,
+            recording_encoders: ReadoutEncoders::default(),
             window_us: None,
             following: Following::default(),
             delivered: Delivered::nothing(),
@@ -80,7 +86,7 @@ impl Viewport {
     }
 
     /// The recording that is shown.
-    pub(super) fn shown(&self) -> Option<Shown> {
+    pub(super) fn open_recording(&self) -> Option<OpenRecording> {
         self.recording.clone()
     }
 
@@ -240,7 +246,7 @@ impl Viewport {
         }?;
         let (message, failed) = (spikes.message(), spikes.failed().map(str::to_owned));
         if let Some(reason) = failed {
-            self.options.encoder = None;
+            (self.options.encoder, self.requested_encoder) = (None, None);
             self.following.stop_encoding();
             self.warnings.push(reason);
         }
@@ -275,8 +281,7 @@ impl Viewport {
     /// Moves the view to a time.
     async fn seek(&mut self, t: i64) -> Answer {
         let index = self.index()?;
-        if let Some(Err(error)) = self.options.encoder.as_ref().map(|encoder| encodes(&index, encoder)) {
-            self.options.encoder = None;
+        if let Err(error) = self.choose_encoder(&index) {
             self.warnings.push(error.to_string());
         }
         // For the past of a live source at wide columns, the shared state has them all.
@@ -325,6 +330,7 @@ impl Viewport {
     /// Shows the newest state of the live source from now on.
     fn follow(&mut self) {
         (self.position, self.recording, self.window_us) = (Position::Following, None, None);
+        self.recording_encoders = ReadoutEncoders::default();
         self.playback.pause();
         self.restart();
         self.start_encoding();
@@ -333,13 +339,47 @@ impl Viewport {
     /// While following: begins the encoder anew.
     fn start_encoding(&mut self) {
         self.following.stop_encoding();
-        let (Position::Following, Some(encoder), Some(live)) = (&self.position, &self.options.encoder, &self.live)
-        else {
+        let (Position::Following, Ok(index), Some(live)) = (&self.position, self.index(), self.live.clone()) else {
             return;
         };
-        if let Err(error) = self.following.start_encoding(live, encoder, self.options.column_us) {
-            self.options.encoder = None;
+        let started = self.choose_encoder(&index).and_then(|()| match &self.options.encoder {
+            Some(encoder) => self.following.start_encoding(&live, encoder, self.options.column_us),
+            None => Ok(()),
+        });
+        if let Err(error) = started {
+            (self.options.encoder, self.requested_encoder) = (None, None);
             self.warnings.push(error.to_string());
+        }
+    }
+
+    /// Chooses the encoder that the client has requested, of the readout that reads what is shown; none where it does not
+    /// encode what an index holds.
+    fn choose_encoder(&mut self, index: &Arc<dyn KeyframeIndex>) -> taxel_live::Result<()> {
+        self.options.encoder = None;
+        let Some(request) = self.requested_encoder.take() else { return Ok(()) };
+        let encoders = match (&self.recording, &self.live) {
+            (None, Some(live)) => &live.encoders,
+            _ => &self.recording_encoders,
+        };
+        let encoder = ViewEncoder::requested(&request, encoders)?;
+        match index.frames() {
+            Some(frames) => EncodedSpikes::of_frames(&encoder, &frames, COLUMN_US, None)?.check()?,
+            None => drop(encoder.encoder.stream(index.array())?),
+        }
+        (self.options.encoder, self.requested_encoder) = (Some(encoder), Some(request));
+        Ok(())
+    }
+
+    /// These are the encoders of the readout that reads a recording from now on, if it is the one that is shown.
+    pub(super) async fn set_readout(&mut self, recording: &str, encoders: &ReadoutEncoders) {
+        if self.recording_name() != Some(recording) {
+            return;
+        }
+        self.recording_encoders = encoders.clone();
+        if self.requested_encoder.is_some()
+            && let Err(refusal) = self.reopen().await
+        {
+            self.warnings.push(refusal.reason);
         }
     }
 
@@ -376,14 +416,12 @@ impl Viewport {
     }
 
     pub(super) async fn encode(&mut self, encoder: Option<Map<String, Value>>) -> Answer {
-        self.options.encoder = None;
-        if let Some(wanted) = encoder.map(Value::Object) {
+        self.requested_encoder = None;
+        if encoder.is_some() {
             let index = self.index()?;
-            let encoder = Encoder::from_json(&wanted.to_string()).map_err(taxel_live::Error::from);
-            let encoder = encoder.and_then(|encoder| encodes(&index, &encoder).map(|()| encoder));
-            let refused =
-                |error: taxel_live::Error| Refusal { reason: error.to_string(), field: Some("encoder".to_owned()) };
-            self.options.encoder = Some(encoder.map_err(refused)?);
+            self.requested_encoder = encoder;
+            let chosen = self.choose_encoder(&index);
+            chosen.map_err(|error| Refusal { reason: error.to_string(), field: Some("encoder".to_owned()) })?;
         }
         self.reopen().await
     }
@@ -497,7 +535,8 @@ impl Viewport {
         let mut answer = vec![indexed.opened(&name, bytes, train, begun)];
         let index = indexed.index();
         self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.array().len());
-        (self.recording, self.window_us) = (Some(Shown { name: name.clone(), trial, indexed }), None);
+        (self.recording, self.window_us) = (Some(OpenRecording { name: name.clone(), trial, indexed }), None);
+        self.recording_encoders = ReadoutEncoders::default();
         self.playback.pause();
         match index.range() {
             Some((first, _)) => self.seek(t.unwrap_or(first)).await?,
@@ -512,10 +551,63 @@ impl Viewport {
     }
 }
 
-/// Refuses an encoder that does not encode what an index holds.
-fn encodes(index: &Arc<dyn KeyframeIndex>, encoder: &Encoder) -> taxel_live::Result<()> {
-    match index.frames() {
-        Some(frames) => EncodedSpikes::of_frames(encoder, &frames, COLUMN_US, None)?.check(),
-        None => Ok(encoder.stream(index.array()).map(drop)?),
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+    use taxel_core::encode::{ChangeEvents, Composite, Encoder, Fa1};
+
+    use super::*;
+    use crate::indexed::Indexed;
+    use crate::keyframe_index::recording::{RecordingIndex, tests::recorded};
+
+    /// The `spikes` message, and whether it is of the readout's encoder.
+    fn spikes(view: &mut Viewport) -> (Value, bool) {
+        let mut message = json!(view.spikes_message().unwrap());
+        let of_readout = message["of_readout"].take();
+        (message, of_readout.as_bool().unwrap())
+    }
+
+    async fn encode(view: &mut Viewport, encoder: Value) -> (Value, bool) {
+        view.encode(encoder.as_object().cloned()).await.unwrap();
+        spikes(view)
+    }
+
+    #[test]
+    fn an_encoder_by_its_name_alone_is_the_readout_s() {
+        let path = recorded("readout-encoder", "mcap", 3);
+        let index = RecordingIndex::open(&path).unwrap();
+        let last = index.range().unwrap().1;
+        let mut view = Viewport::new(None);
+        let (name, indexed) = ("walk.mcap".to_owned(), Indexed::Events(index));
+        view.recording = Some(OpenRecording { name, trial: None, indexed });
+        let coarse = Encoder::ChangeEvents(ChangeEvents { noise_floor: 20.0, ..ChangeEvents::default() });
+        let by_name = || json!({ "name": "change_events" });
+        tokio::runtime::Builder::new_current_thread().build().unwrap().block_on(async {
+            view.seek(last).await.unwrap();
+            let (defaults, of_readout) = encode(&mut view, by_name()).await;
+            assert!(!of_readout);
+            let (stated, _) = encode(&mut view, json!(coarse)).await;
+            assert_ne!(stated, defaults);
+            view.set_readout("other.mcap", &coarse.clone().into()).await;
+            assert_eq!(encode(&mut view, by_name()).await, (defaults.clone(), false));
+            // A readout that reads from now on gives its parameters without another request.
+            view.set_readout("walk.mcap", &coarse.clone().into()).await;
+            assert_eq!(spikes(&mut view), (stated.clone(), true));
+            // Stated parameters are those of the request.
+            assert!(!encode(&mut view, json!(Encoder::ChangeEvents(ChangeEvents::default()))).await.1);
+            // A part of a composite, and the whole.
+            let parts = [("on", coarse), ("afferent", Encoder::Fa1(Fa1::default()))];
+            let parts = parts.map(|(name, part)| (name.to_owned(), part)).into();
+            let composite = Encoder::Composite(Composite { parts });
+            let encoders = ReadoutEncoders::from(composite.clone());
+            assert_eq!(json!(encoders), json!(["change_events", "composite", "fa1"]));
+            view.set_readout("walk.mcap", &encoders).await;
+            assert_eq!(encode(&mut view, by_name()).await, (stated, true));
+            let (whole, _) = encode(&mut view, json!(composite)).await;
+            assert_eq!(encode(&mut view, json!({ "name": "composite" })).await, (whole, true));
+            view.set_readout("walk.mcap", &ReadoutEncoders::default()).await;
+            assert!(view.take_warnings()[0].contains("no readout with several encoders"));
+        });
+        std::fs::remove_file(&path).unwrap();
     }
 }

@@ -165,8 +165,8 @@ impl LabelRequests for PythonHandler {
         restore: bool,
     ) -> Reply<LabelTable> {
         let conflict = Conflict::from(conflict.clone());
-        let given = (table, recording, us, conflict, restore);
-        let read: TableRead = self.call(|handler| handler.call_method1("settle", given)?.extract())?;
+        let arguments = (table, recording, us, conflict, restore);
+        let read: TableRead = self.call(|handler| handler.call_method1("settle", arguments)?.extract())?;
         Ok(read.into())
     }
 }
@@ -190,9 +190,9 @@ impl TrainingRequests for PythonHandler {
     }
 
     fn detect(&self, recording: &Path, trial: Option<&str>, readout: &Path) -> Reply<Detected> {
-        let (labels, detections) =
+        let (labels, encoder, detections) =
             self.call(|handler| handler.call_method1("detect", (recording, trial, readout))?.extract())?;
-        Ok(Detected { labels, detections })
+        Ok(Detected { labels, encoder, detections })
     }
 }
 

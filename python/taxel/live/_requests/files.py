@@ -54,10 +54,10 @@ class FileRequests:
             Number of different values; least and greatest held value, -1 where unknown.
         """
         sensor = Array._from_parts(array)
-        activity, on, *known = (
+        activity, repeated, *known = (
             np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, *(values or ()))
         )
-        result = judge(sensor, TaxelStatistics(activity, on, Touches.of(*touches), *known))
+        result = judge(sensor, TaxelStatistics(activity, repeated, Touches.of(*touches), *known))
         taxels = result.named()
         return taxels["dead"], taxels["stuck"], taxels["noisy"], int(np.count_nonzero(result.untested))
 

@@ -57,7 +57,7 @@ class LabelRequests:
     def read(self, table: Path, recording: str, us: int) -> TableRead:
         """Return the labels of a recording from a table, and where the table lacks what was acknowledged."""
         with reasons():
-            return self._shown(table, us, self._labels.read(table, _own_names(recording)))
+            return self._to_view(table, us, self._labels.read(table, _own_names(recording)))
 
     def change(
         self,
@@ -94,23 +94,25 @@ class LabelRequests:
         with reasons():
             outcomes, read = self._labels.change(table, _own_names(recording), edits)
         written: list[str | list[Note | None]] = [
-            one if isinstance(one, str) else [None if note is None else _in_view(note, unit_us) for note in one]
-            for one in outcomes
+            outcome
+            if isinstance(outcome, str)
+            else [None if note is None else _in_view(note, unit_us) for note in outcome]
+            for outcome in outcomes
         ]
-        return written, self._shown(table, us, read)
+        return written, self._to_view(table, us, read)
 
     def settle(self, table: Path, recording: str, us: int, conflict: Mapping[str, Any], restore: bool) -> TableRead:
         """End a conflict: restore what was acknowledged, or accept the table as it is."""
         unit_us = self._unit_us(table, us)
-        seen = Conflict(**{kind: tuple(_in_file(one, unit_us) for one in notes) for kind, notes in conflict.items()})
+        seen = Conflict(**{kind: tuple(_in_file(note, unit_us) for note in notes) for kind, notes in conflict.items()})
         with reasons():
-            return self._shown(table, us, self._labels.settle(table, _own_names(recording), seen, restore=restore))
+            return self._to_view(table, us, self._labels.settle(table, _own_names(recording), seen, restore=restore))
 
     def _unit_us(self, table: Path, us: int) -> float:
         """Return how long one us of a table is in the view."""
         return us * self._opening.unit_us(table)
 
-    def _shown(self, table: Path, us: int, read: TableRead) -> TableRead:
+    def _to_view(self, table: Path, us: int, read: TableRead) -> TableRead:
         unit_us = self._unit_us(table, us)
 
         def in_view(notes: tuple[Note, ...]) -> tuple[Note, ...]:

@@ -28,8 +28,8 @@ class PresetRequests:
         """Return the file of the user's presets, and the presets: value by register name."""
         place = _path()
         with reasons():
-            own = read_toml(place) if place.exists() else {}
-        return place, {name: values for name, values in own.items() if isinstance(values, dict)}
+            presets = read_toml(place) if place.exists() else {}
+        return place, {name: values for name, values in presets.items() if isinstance(values, dict)}
 
     def write(self, presets: Mapping[str, Mapping[str, object]]) -> None:
         """Write the user's presets."""

@@ -6,6 +6,7 @@ import contextlib
 import json
 import shlex
 import threading
+from operator import itemgetter
 from pathlib import Path
 from subprocess import PIPE
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 from taxel._base.child_process import ChildProcess
 from taxel._base.progress import Steps
 from taxel._core import ProblemError
-from taxel.detect import load
+from taxel.detect import Readout, load
 from taxel.live._requests.reasons import reasons
 from taxel.live._shown_files import Opening, ShownFiles
 from taxel.tasks import detect
@@ -120,10 +121,23 @@ class TrainingRequests:
         if training is not None:
             training.end()
 
-    def detect(self, recording: Path, trial: str | None, readout: Path) -> tuple[list[str], list[tuple[str, int, int]]]:
-        """Return a readout's labels, and its detections in a recording or its trial: label, time, when known."""
+    def detect(
+        self, recording: Path, trial: str | None, readout: Path
+    ) -> tuple[list[str], str | None, list[tuple[str, int, int]]]:
+        """Detect by a readout in a recording or its trial.
+
+        Returns
+        -------
+        tuple of list of str, str or None, and list of (str, int, int)
+            The readout's labels; its encoder, as JSON, with the tare that it read with (none for several sensors, each
+            of which has its own); the detections: label, time, when known, in order of the last.
+        """
         with reasons():
             loaded = load(readout)
             opened, _ = self._files.opened(recording, trial)
-            found = [one for each in detect(loaded, opened).outcomes for one in each.found]
-        return list(loaded.labels), sorted(((one.label, one.t, one.known) for one in found), key=lambda one: one[2])
+            detected = detect(loaded, opened).each
+        encoder = loaded.encoder if isinstance(loaded, Readout) else None
+        if encoder is not None and len(detected) == 1 and detected[0].rest is not None:
+            encoder = encoder.with_tare(detected[0].rest.tare)
+        found = [(found.label, found.t, found.known) for each in detected for found in each.outcome.found]
+        return list(loaded.labels), None if encoder is None else encoder.to_json(), sorted(found, key=itemgetter(2))

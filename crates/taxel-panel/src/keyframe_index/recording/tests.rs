@@ -9,6 +9,7 @@ use super::*;
 use crate::encoded_spikes::EncodedSpikes;
 use crate::frame::{About, of_player};
 use crate::player::{Player, ViewOptions};
+use crate::readout_encoders::ViewEncoder;
 use crate::time_columns::SPAN;
 use taxel_live::recording::{Writer, WriterOptions};
 
@@ -16,7 +17,7 @@ use taxel_live::recording::{Writer, WriterOptions};
 const WATCHED: u32 = 2080;
 
 /// Recording of a simulated board, with pauses longer than a turn of its clock and changes of the wire version.
-fn recorded(name: &str, ending: &str, seed: u64) -> PathBuf {
+pub(crate) fn recorded(name: &str, ending: &str, seed: u64) -> PathBuf {
     let path = std::env::temp_dir().join(format!("taxel-{name}-{}.{ending}", std::process::id()));
     let array = Array::thesis();
     let mut random = StdRng::seed_from_u64(seed);
@@ -129,7 +130,7 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             let us = [COLUMN_US, 500, 64_000][turn % 3];
             // With this floor every change counts, so that the held value is the one that was sent last.
             let spiking = ChangeEvents { noise_floor: 0.5, ..ChangeEvents::default() };
-            let spiking = Encoder::ChangeEvents(spiking);
+            let spiking = ViewEncoder::from(Encoder::ChangeEvents(spiking));
             let options =
                 ViewOptions { watched: Some(WATCHED), encoder: Some(spiking.clone()), ..ViewOptions::plain(us) };
             let mut player = Player::open(Arc::new(Arc::clone(&index)), t, options).unwrap();
@@ -160,7 +161,7 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             for column in columns.clone() {
                 let last = (((column + 1) * us - 1).div_euclid(part_us)).min(column_of(t, part_us));
                 let of_parts = (column * us / part_us..=last).map(|part| parts.time_columns().curve(part));
-                let curve = of_parts.reduce(|most, one| if one.sum > most.sum { one } else { most }).unwrap();
+                let curve = of_parts.reduce(|most, curve| if curve.sum > most.sum { curve } else { most }).unwrap();
                 same.extend_from_slice(&curve.sum.to_le_bytes());
                 same.extend_from_slice(&curve.area.to_le_bytes());
                 same.extend_from_slice(&curve.x.to_le_bytes());
@@ -183,8 +184,9 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             let edges = [begin * us, t];
             let at_edge = |t: i64| edges.iter().any(|edge| (t - edge).abs() <= 100);
             for row in 0..rows {
-                let of = |change: &&TaxelChange| change.taxel as usize / usize::from(index.header.array.columns) == row;
-                let may = changes.iter().filter(|change| at_edge(change.t)).filter(of).count() as i64;
+                let is_of_row =
+                    |change: &&TaxelChange| change.taxel as usize / usize::from(index.header.array.columns) == row;
+                let may = changes.iter().filter(|change| at_edge(change.t)).filter(is_of_row).count() as i64;
                 let differ = (of_row(&spikes, row) - of_row(&all, row)).abs();
                 assert!(differ <= may, "{ending}: spikes of row {row} at {t} us by {us} us: {differ}, not {may}");
             }

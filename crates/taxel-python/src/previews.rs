@@ -1,4 +1,4 @@
-//! The low-rate pictures of a recording.
+//! The low-rate previews of a recording.
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -8,15 +8,15 @@ use taxel_live::recording::EventPreviews;
 use taxel_border::convert::{EventsIn, array, slice};
 use taxel_border::enter::{Exclusive, enter};
 
-/// The pictures that a recording of events gets, one by one.
+/// The previews that a recording of events gets, in order of time.
 #[pyclass(frozen, module = "taxel._core")]
-pub struct RecordingPictures(Exclusive<EventPreviews>);
+pub struct RecordingPreviews(Exclusive<EventPreviews>);
 
 /// Time, us, and ticks by taxel index.
-type PictureOut<'py> = (i64, Bound<'py, PyArray1<u16>>);
+type PreviewOut<'py> = (i64, Bound<'py, PyArray1<u16>>);
 
 #[pymethods]
-impl RecordingPictures {
+impl RecordingPreviews {
     /// `around` are times of interest, us.
     #[new]
     fn new(py: Python<'_>, events: EventsIn<'_>, around: PyReadonlyArray1<'_, i64>) -> PyResult<Self> {
@@ -29,9 +29,9 @@ impl RecordingPictures {
         slf
     }
 
-    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<PictureOut<'py>>> {
-        let picture = |pictures: &mut EventPreviews| pictures.next_picture().map(|(t, held)| (t, held.to_vec()));
-        let found = self.0.enter(py, |pictures, _| Ok::<_, Error>(picture(pictures)))?;
+    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<PreviewOut<'py>>> {
+        let next = |previews: &mut EventPreviews| previews.next_picture().map(|(t, held)| (t, held.to_vec()));
+        let found = self.0.enter(py, |previews, _| Ok::<_, Error>(next(previews)))?;
         Ok(found.map(|(t, held)| (t, array(py, held))))
     }
 }
