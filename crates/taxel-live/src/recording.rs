@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
-pub(crate) use damage::{ADDRESS, EMPTY, REFUSED, add_order};
+pub(crate) use damage::ADDRESS;
 pub use damage::{DamageCounts, LeftOut, damage, damage_of_version_1};
 pub use event_pictures::EventPreviews;
 pub use frames::{FrameEncoding, FrameProperties, Frames};

@@ -282,7 +282,7 @@ fn all_that_a_decoder_of_version_2_could_not_use_is_damage() {
         unknown_value: 11,
         ..v2::Counts::default()
     };
-    let (decoder, missing) = damage(&wire::Counts::default(), 0, 0, &found);
+    let (decoder, missing) = damage(&wire::Counts::default(), &found, &wire::SenderTotals::default());
     let verdict =
         RecordingCounts { received: 9, recorded: 9, missing, decoder, ..RecordingCounts::default() }.verdict();
     let expected = [
