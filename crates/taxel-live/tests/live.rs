@@ -88,20 +88,20 @@ fn emulate(to: SocketAddr, real_time: bool, mut touch: impl Touch) -> Report {
 /// Reads every event and fires after some forty within `tau` ms, which is how slowly its kernel rises.
 fn readout(tau: f64) -> Readout {
     let neuron = Neuron { tau, refractory: 15.0, theta_0: 0.4, ..Neuron::default() };
-    let one = TrainedNeuron { delay_ms: 0.0, inputs: vec![], weights: vec![0.03; 2 * 4096], neuron };
-    of(r#"{"name": "change_events"}"#, one)
+    let cell = TrainedNeuron { delay_ms: 0.0, inputs: vec![], weights: vec![0.03; 2 * 4096], neuron };
+    readout_of(r#"{"name": "change_events"}"#, cell)
 }
 
-fn of(encoder: &str, one: TrainedNeuron) -> Readout {
+fn readout_of(encoder: &str, cell: TrainedNeuron) -> Readout {
     Readout {
         encoder: Encoder::from_json(encoder).expect("an encoder"),
         array: None,
         unit: None,
         time: Time::Continuous,
-        after_spike: one.neuron.after_spike,
+        after_spike: cell.neuron.after_spike,
         run_threshold: 1.0,
         delays_ms: vec![0.0],
-        neurons: [("touch".to_owned(), one)].into(),
+        neurons: [("touch".to_owned(), cell)].into(),
         seen: BTreeMap::new(),
     }
 }
@@ -403,7 +403,8 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
     let mut weights = vec![0.0; 10];
     weights[0] = 3.0;
     let neuron = Neuron { tau: 0.5, refractory: 15.0, ..Neuron::default() };
-    let readout = of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, inputs: vec![], weights });
+    let readout =
+        readout_of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, inputs: vec![], weights });
     let path = Scratch::new("tare.mcap");
     let setup = ReadoutSetup::Taring(1_000_000, Box::new(readout.clone().into()));
     let live = Live::start(ANY, options(Some(&path)), setup, vec![]).expect("a port");

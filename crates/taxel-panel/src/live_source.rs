@@ -208,7 +208,7 @@ impl LiveSource {
         }
         let columns = usize::from(self.array().columns);
         let mut state = lock(&self.state);
-        for one in self.handle.zeroed().0 {
+        for one in self.handle.latest_zeroings().0 {
             // The rest is a held value, which has 16 bits.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             state.zero(usize::from(one.y) * columns + usize::from(one.x), one.rest as u16);

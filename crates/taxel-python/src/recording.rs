@@ -385,7 +385,7 @@ impl RecordingWriter {
 /// The verdict on what is known of a recording, which is JSON.
 #[pyfunction]
 pub fn recording_verdict(basis: &str) -> PyResult<Plain<Value>> {
-    Ok(Plain(json!(Verdict::of(parsed::<Basis>("verdict", basis)?))))
+    Ok(Plain(json!(Verdict::new(parsed::<Basis>("verdict", basis)?))))
 }
 
 /// The damage among a decoder's counts, which are JSON.
@@ -473,5 +473,5 @@ pub fn numbered_path(path: PathBuf, index: u32) -> PathBuf {
 #[pyfunction]
 pub fn whole_frames(py: Python<'_>, values: PyReadonlyArray1<'_, f32>) -> PyResult<bool> {
     let values = slice("values", &values)?;
-    enter(py, |_| Ok::<_, taxel_core::Error>(FrameEncoding::of(values) == FrameEncoding::Whole))
+    enter(py, |_| Ok::<_, taxel_core::Error>(FrameEncoding::choose(values) == FrameEncoding::Whole))
 }

@@ -101,7 +101,7 @@ impl<'a> Trajectory<'a> {
         let body = self.body;
         match &body.motion {
             Move::Dropped { height_mm, ending } => {
-                self.let_go(*height_mm);
+                self.release_body(*height_mm);
                 match ending {
                     Ending::Caught { after, press } => {
                         self.fall_until_caught(*after)?;
@@ -178,12 +178,12 @@ impl<'a> Trajectory<'a> {
             _ => return Ok(()),
         };
         let pitch_mm = pitch_of(array)?;
-        let on = |at: f32, count: u16| (-0.01..=f64::from(count - 1) * pitch_mm + 0.01).contains(&f64::from(at));
+        let is_inside = |at: f32, count: u16| (-0.01..=f64::from(count - 1) * pitch_mm + 0.01).contains(&f64::from(at));
         let track = &self.track;
         let touches = |k: &usize| track.force_n[*k] > 0.0;
         let off = (0..track.force_n.len())
             .filter(touches)
-            .find(|&k| !(on(track.x_mm[k], array.columns) && on(track.y_mm[k], array.rows)));
+            .find(|&k| !(is_inside(track.x_mm[k], array.columns) && is_inside(track.y_mm[k], array.rows)));
         match (off, self.contacts.first()) {
             (Some(k), Some(first)) => Err(Error::scene(format!(
                 "the body {does} off the array {:.0} ms after it was set down, at x {:.0} mm, y {:.0} mm; begin further in, or stop earlier (for_ms)",
@@ -244,7 +244,7 @@ impl<'a> Trajectory<'a> {
     }
 
     /// Lets the body go so high above where it will touch.
-    fn let_go(&mut self, height_mm: f64) {
+    fn release_body(&mut self, height_mm: f64) {
         let (sin, cos) = self.scene.slant_deg.to_radians().sin_cos();
         let (down_y, down_x) = self.scene.downhill_deg.to_radians().sin_cos();
         self.depth = -height_mm * cos;

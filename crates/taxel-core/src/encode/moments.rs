@@ -328,7 +328,7 @@ impl LevelPass {
     }
 
     /// Emits the tonic spikes before `t` (with `at_too` also at `t`).
-    fn speak(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
+    fn emit_tonic(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
         let Some(every) = self.every else { return };
         while let Some(&(due, level, since)) = self.due.front()
             && (due < t || (at_too && due == t))
@@ -380,13 +380,13 @@ impl Rule for LevelPass {
             }
         }
         self.emit_sample(t, out);
-        self.speak(t, true, out);
+        self.emit_tonic(t, true, out);
         sort_from(out, from);
     }
 
     fn pass(&mut self, t: i64, out: &mut Vec<Spike>) {
         let from = out.len();
-        self.speak(t, false, out);
+        self.emit_tonic(t, false, out);
         sort_from(out, from);
     }
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::distance::{Distance, Pattern, Ready, summed};
+use super::distance::{Distance, Pattern, Ready, sum_over_trains};
 use super::merged::merged;
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
@@ -46,7 +46,7 @@ impl Distance for VanRossumAbsolute {
 
 impl Ready for &VanRossumAbsolute {
     fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
-        summed(a, b, stop, |a, b| Ok(VanRossumAbsolute::between(self, a, b)))
+        sum_over_trains(a, b, stop, |a, b| Ok(VanRossumAbsolute::between(self, a, b)))
     }
 }
 

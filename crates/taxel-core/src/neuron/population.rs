@@ -43,8 +43,8 @@ impl Neuron {
         self.check_inputs(&vec![0.0; trains.len()], trains)?;
         self.stream(&[], threshold, trains.start)?;
         if neurons.checked_mul(trains.len()) != Some(weights.len()) {
-            let (given, inputs) = (weights.len(), trains.len());
-            return Err(problem!("weights"; ": {given} for {neurons} neurons of {inputs} trains, must be one each"));
+            let (count, inputs) = (weights.len(), trains.len());
+            return Err(problem!("weights"; ": {count} for {neurons} neurons of {inputs} trains, must be one each"));
         }
         if self.time == Time::Grid {
             self.check_rows(self.points(trains.start, trains.stop))?;

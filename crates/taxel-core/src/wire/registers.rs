@@ -256,7 +256,7 @@ impl Registers {
     /// Warnings about values that are allowed but probably a mistake, one line each.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
-        rules::warned(self).into_iter().map(|(_, text)| text).collect()
+        rules::warnings(self).into_iter().map(|(_, text)| text).collect()
     }
 
     /// The value of a field, in the register's own unit.

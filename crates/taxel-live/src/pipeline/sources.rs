@@ -183,7 +183,7 @@ impl NumberStream {
                 Ok(ended) => ended,
                 Err(error) => {
                     *lock(&self.trouble) = Some(reader.broken(error).to_string());
-                    reader.again();
+                    reader.reopen();
                     first = true;
                     continue;
                 }

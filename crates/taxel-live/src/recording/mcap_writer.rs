@@ -339,7 +339,7 @@ impl SourceWriter {
     ///
     /// As [`SourceWriter::datagram`].
     pub fn counts(&self, at_ns: i64, counts: &RecordingCounts) -> Result<()> {
-        let counts = self.queue.lock().written[self.source].so_far(counts.clone());
+        let counts = self.queue.lock().written[self.source].counts_so_far(counts.clone());
         self.push_json(Topic::Counts, at_ns, &json!(counts))
     }
 

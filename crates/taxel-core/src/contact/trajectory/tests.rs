@@ -33,7 +33,7 @@ fn dropped(foam: Foam, radius_mm: f64, height_mm: f64, after: u32) -> Scene {
 }
 
 fn play(scene: &Scene, step_us: f64) -> Result<Motion> {
-    Motion::of(scene, &Array::thesis(), step_us, Stop::never())
+    Motion::compute(scene, &Array::thesis(), step_us, Stop::never())
 }
 
 fn undamped() -> Foam {
@@ -156,7 +156,7 @@ fn a_step_that_would_not_end_is_refused_before_or_on_the_way_and_ctrl_c_is_answe
     let text = play(&long, 1.001 * least_us).unwrap_err().to_string();
     assert!(text.contains("must be longer"), "{text}");
     let asked = || true;
-    let stopped = Motion::of(&scene, &Array::thesis(), QUARTER_US, Stop::when(&asked));
+    let stopped = Motion::compute(&scene, &Array::thesis(), QUARTER_US, Stop::when(&asked));
     assert_eq!(stopped.unwrap_err(), Error::Interrupted);
 }
 

@@ -113,7 +113,7 @@ struct Dense {
     names: Vec<Row>,
     /// The target whose row was subtracted from a row of silence beside it, and the factor of the difference.
     beside: Vec<Option<(usize, f64)>>,
-    there: HashSet<(usize, u64)>,
+    silent: HashSet<(usize, u64)>,
     slopes: Slopes,
 }
 
@@ -128,7 +128,7 @@ impl Dense {
             limit: vec![],
             names: vec![],
             beside: vec![],
-            there: HashSet::new(),
+            silent: HashSet::new(),
             slopes,
         };
         for row in rows {
@@ -152,7 +152,7 @@ impl Dense {
     }
 
     fn add_silence(&mut self, problem: &Exact, pattern: usize, t: f64) -> Result<()> {
-        if self.there.insert((pattern, t.to_bits())) {
+        if self.silent.insert((pattern, t.to_bits())) {
             let row = Row::Silence { pattern, t };
             let StatedRow { mut coefficients, mut limit } = problem.statement.state(row)?;
             // Near a target the two rows are parallel to within rounding. Their difference divided by the time between
@@ -211,7 +211,7 @@ impl Dense {
         self.beside = (0..keep.len()).filter(kept).map(|k| self.beside[k]).collect();
         let silent =
             |row: &Row| if let Row::Silence { pattern, t } = row { Some((*pattern, t.to_bits())) } else { None };
-        self.there = self.names.iter().filter_map(silent).collect();
+        self.silent = self.names.iter().filter_map(silent).collect();
         keep
     }
 

@@ -171,11 +171,11 @@ impl Objective {
 
     /// The terms l1 and l2 at these weights.
     pub(crate) fn norms(&self, weights: &[f64]) -> (f64, f64) {
-        (self.l1 * weights.iter().map(|w| w.abs()).sum::<f64>(), self.of_square(dot(weights, weights)))
+        (self.l1 * weights.iter().map(|w| w.abs()).sum::<f64>(), self.l2_term(dot(weights, weights)))
     }
 
     /// The l2 term, given the sum of squared weights.
-    pub(crate) fn of_square(&self, square: f64) -> f64 {
+    pub(crate) fn l2_term(&self, square: f64) -> f64 {
         self.l2 * if self.norm == Norm::Norm { square.sqrt() } else { square }
     }
 
@@ -201,12 +201,12 @@ impl Objective {
 
     /// The potentials that B requires, mV; none if it counts both sides and so needs no kink.
     pub(crate) fn kinks_of_b(&self, targets: &Targets) -> Vec<f64> {
-        let of = |threshold| self.kappa * threshold;
-        if self.sides_b == Sides::Both { vec![] } else { targets.thresholds.iter().map(of).collect() }
+        let kink = |threshold| self.kappa * threshold;
+        if self.sides_b == Sides::Both { vec![] } else { targets.thresholds.iter().map(kink).collect() }
     }
 
     /// The factor of the thresholds in B's mixed term; 0 if B has kinks.
-    pub(crate) fn mixed_of_b(&self) -> f64 {
+    pub(crate) fn mixed_factor(&self) -> f64 {
         if self.sides_b == Sides::Both { -2.0 * self.b * self.kappa } else { 0.0 }
     }
 

@@ -67,7 +67,7 @@ impl Relaxed {
 
     /// Removes the rows of the first pattern.
     pub(crate) fn drop_first(&mut self) {
-        for k in 0..self.targets.of_first() {
+        for k in 0..self.targets.count_of_first() {
             self.lift(k, -1.0);
         }
         Arc::make_mut(&mut self.targets).drop_first();
@@ -75,7 +75,7 @@ impl Relaxed {
     }
 
     /// A copy with the given silent rows only, as coefficients; for solving, since its value leaves out the other rows.
-    pub(crate) fn of_rows(&self, rows: &[usize]) -> Self {
+    pub(crate) fn with_silent_rows(&self, rows: &[usize]) -> Self {
         Self {
             targets: Arc::clone(&self.targets),
             silent: self.silent.written_out(rows),
@@ -97,7 +97,7 @@ impl Relaxed {
     /// inputs of both signs are present; then D cannot exceed it.
     pub(crate) fn most_broken_silence(&self, weights: &[f64]) -> f64 {
         let mut potential = Vec::new();
-        self.silent.without_signs().potential(weights, &mut potential);
+        self.silent.unsigned_rows().potential(weights, &mut potential);
         potential.iter().zip(&self.silent.limit).map(|(u, limit)| (u - limit).max(0.0)).sum()
     }
 }

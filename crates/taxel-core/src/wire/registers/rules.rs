@@ -77,7 +77,7 @@ pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, S
 }
 
 /// Warnings about values that are allowed but probably a mistake.
-pub(super) fn warned(registers: &Registers) -> Vec<(u8, String)> {
+pub(super) fn warnings(registers: &Registers) -> Vec<(u8, String)> {
     let mut warnings = vec![];
     let random_lines = i64::from(registers.random_lines);
     let step_period = i64::from(registers.step_period);

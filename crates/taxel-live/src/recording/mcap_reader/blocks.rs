@@ -98,16 +98,16 @@ pub(super) fn records(
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(length.max(limits::CHUNK as usize));
     let mut reader = LinearReader::new_with_options(options);
-    let mut given = 0;
+    let mut position = 0;
     while let Some(event) = reader.next_event() {
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
                 // At the end of the block no bytes are available: the reader then ends, or reports that data are
                 // missing.
-                let more = wanted.min(length - given);
-                reader.insert(more).copy_from_slice(&bytes[given..given + more]);
+                let more = wanted.min(length - position);
+                reader.insert(more).copy_from_slice(&bytes[position..position + more]);
                 reader.notify_read(more);
-                given += more;
+                position += more;
             }
             // The content of other records is not used, so an error in them is ignored.
             Ok(LinearReadEvent::Record { opcode, .. }) if !matches!(opcode, op::CHANNEL | op::MESSAGE) => {}

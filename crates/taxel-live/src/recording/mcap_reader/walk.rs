@@ -56,7 +56,7 @@ pub(super) struct FileWalk<'a> {
 }
 
 impl<'a> FileWalk<'a> {
-    pub(super) fn of(path: &'a Path, file: &'a File, length: u64, memory: u64) -> Self {
+    pub(super) fn new(path: &'a Path, file: &'a File, length: u64, memory: u64) -> Self {
         let rebuilt = Rebuilt { unfinished: true, ..Rebuilt::default() };
         Self {
             path,
@@ -193,7 +193,7 @@ impl<'a> FileWalk<'a> {
                 op::CHUNK => {
                     self.next_block();
                     self.unpacked += size;
-                    let most = limits::unpacked(self.length, self.memory);
+                    let most = limits::most_unpacked(self.length, self.memory);
                     if self.unpacked > most {
                         let claim = format!("the chunks up to byte {at} say that they unpack to {}", self.unpacked);
                         let right = "(1000 times the file and 256 MiB)";
@@ -225,7 +225,7 @@ impl<'a> FileWalk<'a> {
     fn ends_at(&self, at: u64, end: u64) -> Result<bool> {
         let head = self.bytes(at, 80)?;
         let length = number(&head, 1).and_then(|length| length.checked_add(RECORD_HEAD));
-        let packed = packed(&head).and_then(|(before, packed)| packed.checked_add(before));
+        let packed = packed_range(&head).and_then(|(before, packed)| packed.checked_add(before));
         Ok([length, packed].into_iter().flatten().any(|length| at.checked_add(length) == Some(end)))
     }
 
@@ -338,12 +338,12 @@ impl<'a> FileWalk<'a> {
 
 /// The unpacked size that a chunk states, if the lengths inside its header agree with the record's length.
 fn chunk(head: &[u8], length: u64) -> Option<u64> {
-    let (before, packed) = packed(head)?;
+    let (before, packed) = packed_range(head)?;
     if packed.checked_add(before - RECORD_HEAD) == Some(length) { number(head, 25) } else { None }
 }
 
 /// Where the packed messages of a chunk begin, and their size, as its header states.
-fn packed(head: &[u8]) -> Option<(u64, u64)> {
+fn packed_range(head: &[u8]) -> Option<(u64, u64)> {
     // opcode 1, length 8, start 8, end 8, size 8, checksum 4, name of the compression, packed size 8
     const NAME: usize = 37;
     let name_bytes = head.get(NAME..NAME + 4).map(|b| word(b) as usize).filter(|&n| n <= 16)?;

@@ -157,7 +157,7 @@ impl Verdict {
             }
         }
         if verdict.steps_back.is_empty() && !is_converted {
-            verdict = verdict.stepped(decoded.steps_back);
+            verdict = verdict.with_steps(decoded.steps_back);
         }
         verdict.doubtful(decoded.doubtful_after_us)
     }

@@ -190,7 +190,7 @@ impl Program {
     }
 
     /// The least value of `slope v + l1 |v|` between the bounds of weight `j`.
-    pub(super) fn least(&self, j: usize, slope: f64) -> f64 {
+    pub(super) fn least_cost(&self, j: usize, slope: f64) -> f64 {
         let cost = |v: f64| slope * v + self.l1 * v.abs();
         let (lower, upper) = (self.lower[j], self.upper[j]);
         let ends = cost(lower).min(cost(upper));
@@ -217,7 +217,7 @@ impl Program {
         equal.chain(below).chain(bounds).fold(0.0, f64::max)
     }
 
-    pub(super) fn met(&self, w: &[f64]) -> bool {
+    pub(super) fn meets_rows(&self, w: &[f64]) -> bool {
         w.iter().all(|w| w.is_finite()) && self.missing(w) <= MET * (self.width() as f64).sqrt().max(10.0)
     }
 
@@ -360,7 +360,7 @@ impl Program {
         }
         let mut rounding = 0.0;
         for k in 0..n {
-            let least = self.least(k, slope[k]);
+            let least = self.least_cost(k, slope[k]);
             let most = self.lower[k].abs().max(self.upper[k].abs());
             value += least;
             size += least.abs();

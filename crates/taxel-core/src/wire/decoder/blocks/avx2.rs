@@ -66,7 +66,7 @@ impl SelectedLanes {
     /// Moves the selected lanes of a vector to the front of each half.
     #[inline]
     #[target_feature(enable = "avx2")]
-    fn of(&self, lanes: __m256i) -> [__m128i; 2] {
+    fn look_up(&self, lanes: __m256i) -> [__m128i; 2] {
         let lanes = _mm256_shuffle_epi8(lanes, self.shuffle);
         [_mm256_castsi256_si128(lanes), _mm256_extracti128_si256::<1>(lanes)]
     }
@@ -206,7 +206,7 @@ pub(super) unsafe fn blocks(
             }
             filling.begin_pairs();
             if open == 1 {
-                filling.without_intensity();
+                filling.clear_intensity();
             }
             let p = changes(polarity);
             // SAFETY: at least 16 words are left, so 8 rows fit after `first`.
@@ -255,8 +255,8 @@ pub(super) unsafe fn blocks(
                 filling.begin_pairs();
             }
             let rows = SelectedLanes::new(changes);
-            let ([t_early, t_late], [early, late]) = (rows.of(ahead), rows.of(place));
-            let [p_early, p_late] = rows.of(polarity);
+            let ([t_early, t_late], [early, late]) = (rows.look_up(ahead), rows.look_up(place));
+            let [p_early, p_late] = rows.look_up(polarity);
             let (columns, row_bits) = (_mm_set1_epi16(0x3f), |place| _mm_srli_epi16::<8>(place));
             // SAFETY: at least 16 words are left, so 16 rows fit after `first`: up to 8 for each half.
             unsafe {
@@ -278,8 +278,8 @@ pub(super) unsafe fn blocks(
             if filling.paired {
                 // For each change, from the open one before the block on, the lane after it: its intensity, or none.
                 let behind = SelectedLanes::new(changes << 1 | open);
-                let [ticks_early, ticks_late] = behind.of(_mm256_and_si256(values, pair));
-                let [there_early, there_late] = behind.of(_mm256_srli_epi16::<15>(pair));
+                let [ticks_early, ticks_late] = behind.look_up(_mm256_and_si256(values, pair));
+                let [there_early, there_late] = behind.look_up(_mm256_srli_epi16::<15>(pair));
                 // SAFETY: as above; if a change is open, a row precedes `first`.
                 unsafe {
                     let ticks = filling.room.ticks.as_mut_ptr().add(first - open as usize);
@@ -301,7 +301,7 @@ pub(super) unsafe fn blocks(
     }
     filling.open = open == 1;
     if filling.open && filling.paired {
-        filling.without_intensity();
+        filling.clear_intensity();
     }
     at
 }

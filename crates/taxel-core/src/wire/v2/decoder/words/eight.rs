@@ -202,26 +202,26 @@ impl Eight {
     /// The machine must have the features below; `held` must be the one passed to [`Self::read`].
     #[inline]
     #[target_feature(enable = "avx2")]
-    pub(crate) unsafe fn hold(&self, t: i64, held: &mut ValuesByLine) {
+    pub(crate) unsafe fn store(&self, t: i64, held: &mut ValuesByLine) {
         held.newest = t;
         // Lanes without an event repeat the last one, so that no branch depends on the number of events, which no
         // processor can predict.
         // SAFETY: the positions are those of events on the array.
-        unsafe { hold_eight(self.position, self.ticks, t, held) }
+        unsafe { store_eight(self.position, self.ticks, t, held) }
     }
 
-    /// As [`Self::hold`], with a faster path for eight events at consecutive positions.
+    /// As [`Self::store`], with a faster path for eight events at consecutive positions.
     ///
     /// # Safety
     ///
-    /// As for [`Self::hold`].
+    /// As for [`Self::store`].
     #[inline]
     #[target_feature(enable = "avx2")]
-    pub(crate) unsafe fn hold_neighbours(&self, t: i64, held: &mut ValuesByLine) {
+    pub(crate) unsafe fn store_neighbours(&self, t: i64, held: &mut ValuesByLine) {
         let begin = usize::from(_mm_cvtsi128_si32(self.position) as u16);
         if self.n < EIGHT || usize::from(_mm_extract_epi16::<7>(self.position) as u16) - begin >= EIGHT {
             // SAFETY: the caller guarantees this.
-            return unsafe { self.hold(t, held) };
+            return unsafe { self.store(t, held) };
         }
         held.newest = t;
         let times = _mm256_set1_epi64x(t);
@@ -242,7 +242,7 @@ impl Eight {
 /// The machine must have SSE 4.1; all eight places must be in `held`.
 #[inline]
 #[target_feature(enable = "sse4.1")]
-pub(super) unsafe fn hold_eight(places: __m128i, values: __m128i, t: i64, held: &mut ValuesByLine) {
+pub(super) unsafe fn store_eight(places: __m128i, values: __m128i, t: i64, held: &mut ValuesByLine) {
     // Extracts the lanes from registers: loads from memory would wait for the store.
     let halves = |lanes| [_mm_cvtsi128_si64(lanes) as u64, _mm_extract_epi64::<1>(lanes) as u64];
     for (places, values) in halves(places).into_iter().zip(halves(values)) {
