@@ -7,7 +7,6 @@
 //! does not fit is counted where it was lost. Viewers receive copies ([`Live::counters`], [`Live::frame`]) and cannot
 //! slow the pipeline.
 
-mod ahead;
 mod copies;
 mod counters;
 mod decode;
@@ -22,14 +21,15 @@ mod receive;
 mod record;
 mod recorder;
 mod recordings;
-mod rest;
 mod running_readout;
 mod sending;
 mod shared;
 mod sink;
 mod source;
 mod sources;
+mod speculative_readout;
 mod stages;
+mod tare_measurement;
 mod threads;
 mod viewer_queue;
 

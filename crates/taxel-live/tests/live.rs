@@ -216,15 +216,15 @@ fn detections_live_are_those_of_the_recording() {
     assert!(delivered.iter().all(|s| s.reported_us >= s.detection.known - 192), "{delivered:?}");
 }
 
-/// The board's times of a recording's pictures, us.
-fn pictured(path: &Scratch) -> Vec<i64> {
+/// The board's times of a recording's previews, us.
+fn preview_times(path: &Scratch) -> Vec<i64> {
     let mut times = vec![];
     let reader = Reader::open(&path.0).expect("a recording");
     reader
         .messages(Stop::never(), |message| {
             if message.topic == Topic::Pressure {
-                let picture: serde_json::Value = serde_json::from_slice(message.data).expect("JSON");
-                times.push(picture["t_us"].as_i64().expect("a time"));
+                let preview: serde_json::Value = serde_json::from_slice(message.data).expect("JSON");
+                times.push(preview["t_us"].as_i64().expect("a time"));
             }
             Ok(())
         })
@@ -233,19 +233,19 @@ fn pictured(path: &Scratch) -> Vec<i64> {
 }
 
 #[test]
-fn a_recording_has_pictures_around_detections_beside_ten_a_second() {
-    let path = Scratch::new("pictured.mcap");
+fn a_recording_has_previews_around_detections_beside_ten_a_second() {
+    let path = Scratch::new("preview_times.mcap");
     let begun = Instant::now();
     let live = Live::start(ANY, options(Some(&path)), reading(&readout(2.0)), vec![]).expect("a port and a file");
-    // A press begins each 40 ms; ten pictures a second would miss more than half of them.
+    // A press begins each 40 ms; ten previews a second would miss more than half of them.
     emulate(live.address(), true, presses(6000, 6000));
     while live.next(Duration::from_millis(200)).expect("no error").is_some() {}
     live.stop().expect("no error");
     let tenths = begun.elapsed().as_millis() / 100;
-    let (times, detections) = (pictured(&path), recorded(&path).1);
+    let (times, detections) = (preview_times(&path), recorded(&path).1);
     assert!(detections.len() > 20, "{}", detections.len());
-    assert!(times.len() as u128 > 2 * tenths, "{} pictures in {tenths} tenths of a second", times.len());
-    assert!(times.len() as u128 <= 10 * tenths + 12, "{} pictures in {tenths} tenths of a second", times.len());
+    assert!(times.len() as u128 > 2 * tenths, "{} previews in {tenths} tenths of a second", times.len());
+    assert!(times.len() as u128 <= 10 * tenths + 12, "{} previews in {tenths} tenths of a second", times.len());
 }
 
 #[test]

@@ -30,7 +30,7 @@ impl RecordingPictures {
     }
 
     fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<PictureOut<'py>>> {
-        let picture = |pictures: &mut EventPreviews| pictures.next_picture().map(|(t, held)| (t, held.to_vec()));
+        let picture = |pictures: &mut EventPreviews| pictures.next_preview().map(|(t, held)| (t, held.to_vec()));
         let found = self.0.enter(py, |pictures, _| Ok::<_, Error>(picture(pictures)))?;
         Ok(found.map(|(t, held)| (t, array(py, held))))
     }

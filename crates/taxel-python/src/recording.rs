@@ -330,7 +330,7 @@ impl RecordingWriter {
         ticks: PyReadonlyArray1<'_, u16>,
     ) -> PyResult<()> {
         let ticks = slice("ticks", &ticks)?;
-        self.with(py, |writer| writer.picture(at_ns, t_us, columns, ticks))
+        self.with(py, |writer| writer.preview(at_ns, t_us, columns, ticks))
     }
 
     /// Writes a picture for viewers of values above rest, row by row; white is at least `least`.
@@ -345,7 +345,7 @@ impl RecordingWriter {
         unit: &str,
     ) -> PyResult<()> {
         let above = slice("above", &above)?;
-        self.with(py, |writer| writer.picture_above((at_ns, t_us), above, least, rest, unit))
+        self.with(py, |writer| writer.preview_above((at_ns, t_us), above, least, rest, unit))
     }
 
     /// Writes the values that the taxels held when it began, ticks by index, 65 535 of a taxel without any event so far.

@@ -1,6 +1,6 @@
 //! Decodes one sender's datagrams to events, whichever version of the wire it sends.
 
-mod ahead;
+mod clock_jumps;
 mod order;
 mod recent;
 mod totals;
@@ -10,7 +10,7 @@ use crate::wire::silence;
 use crate::wire::v1::{FIRST, WORD_BYTES};
 use crate::wire::v2::{self, DatagramHeader, DatagramOutcome};
 use crate::{Array, Events};
-use ahead::ClockJumps;
+use clock_jumps::ClockJumps;
 use order::Order;
 pub use order::StepBack;
 use recent::RecentDatagrams;

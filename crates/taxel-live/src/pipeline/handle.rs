@@ -155,7 +155,7 @@ impl Handle {
     }
 
     /// Makes the values that these taxels (column, row) hold their rest from now on, in the readout and in the recording's
-    /// pictures; the recording states when that was, and the rests before and after. Only done on request.
+    /// previews; the recording states when that was, and the rests before and after. Only done on request.
     ///
     /// # Errors
     ///

@@ -337,7 +337,7 @@ impl Recorder {
         self.with_track(|track| track.detection(output.reported_ns, &Detection { t, known, ..found.clone() }))
     }
 
-    /// Sets the rest that is subtracted from the pictures from now on.
+    /// Sets the rest that is subtracted from the previews from now on.
     pub(super) fn tare(&self, tare: &Tare) -> Result<()> {
         self.with_track(|track| {
             track.tare(tare);
@@ -345,11 +345,11 @@ impl Recorder {
         })
     }
 
-    pub(super) fn picture(&self, at_ns: i64, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
-        // A file that is not begun has no pictures.
+    pub(super) fn preview(&self, at_ns: i64, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
+        // A file that is not begun has no previews.
         let has_begun = !matches!(self.create_once()?, RecordingFile::Mcap(writer) if !writer.has_begun());
         let Some(t_us) = self.timed(board_us).filter(|_| has_begun) else { return Ok(()) };
-        self.with_track(|track| track.picture(at_ns, t_us, columns, held))
+        self.with_track(|track| track.preview(at_ns, t_us, columns, held))
     }
 
     /// Writes the losses so far, which an unfinished recording then states; a raw file cannot store them.

@@ -5,12 +5,12 @@ use taxel_core::detect::{Detection, Detector, FrameTime, ReadoutStream};
 use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::problem;
 
-use super::ahead::SpeculativeReadout;
 use super::options::{LiveOptions, StatedTare};
 use super::output::DetectionOutput;
 use super::readout_queue::{BatchEnd, QuietUntil};
-use super::rest::TareMeasurement;
 use super::shared::PipelineShared;
+use super::speculative_readout::SpeculativeReadout;
+use super::tare_measurement::TareMeasurement;
 
 /// What is to read the events out.
 pub enum ReadoutSetup {

@@ -126,7 +126,7 @@ impl Stages {
         self.observers.datagrams(&batch, silent_until);
         self.receive.reuse(batch);
         self.observers.tick(self.decode.held());
-        self.record.pictures(self.decode.decoded(), self.decode.held(), false)?;
+        self.record.previews(self.decode.decoded(), self.decode.held(), false)?;
         if self.observers.frame(self.decode.held()) {
             self.record.progress()?;
         }
@@ -182,7 +182,7 @@ impl Stages {
     fn finish(&mut self) -> Result<()> {
         self.decode.finish();
         self.flush_events()?;
-        self.record.pictures(self.decode.decoded(), self.decode.held(), true)?;
+        self.record.previews(self.decode.decoded(), self.decode.held(), true)?;
         let quiet = self.decode.quiet_until(self.receive.silent_until()).filter(|_| self.read_out.is_on());
         self.observers.finish(self.decode.held());
         self.read_out.close(&self.shared, quiet);
@@ -209,7 +209,7 @@ impl Stages {
     }
 
     fn switch_recording(&mut self, next: Option<Box<Recorder>>) -> Result<EndedRecording> {
-        self.record.pictures(self.decode.decoded(), self.decode.held(), true)?;
+        self.record.previews(self.decode.decoded(), self.decode.held(), true)?;
         if next.is_some() {
             self.move_to_threads()?;
         }
@@ -261,7 +261,7 @@ impl Stages {
         published.zeroed.extend(zeroings.iter().map(|zeroing| (array.index(zeroing.x, zeroing.y), *zeroing)));
         published.zeroings += 1;
         drop(published);
-        self.shared.picture_around([t]);
+        self.shared.preview_around([t]);
         self.read_out.zero(&self.shared, &zeroings);
         Ok(zeroings)
     }
