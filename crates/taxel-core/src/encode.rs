@@ -248,7 +248,7 @@ impl Composite {
     /// # Errors
     ///
     /// `Problem` if there is no such part, or if a name comes twice.
-    pub fn named(&self, names: &[String]) -> Result<Vec<(&str, &Encoder)>> {
+    pub fn parts_named(&self, names: &[String]) -> Result<Vec<(&str, &Encoder)>> {
         for (n, name) in names.iter().enumerate() {
             if !self.parts.contains_key(name) {
                 let known: Vec<&str> = self.parts.keys().map(String::as_str).collect();
@@ -266,9 +266,9 @@ impl Composite {
     ///
     /// # Errors
     ///
-    /// As [`Composite::named`].
+    /// As [`Composite::parts_named`].
     pub fn of_parts(&self, names: &[String], array: &Array) -> Result<Vec<bool>> {
-        let named = self.named(names)?;
+        let named = self.parts_named(names)?;
         let chosen = |name: &str| named.iter().any(|(part, _)| *part == name);
         let parts = self.parts.iter();
         Ok(parts.flat_map(|(name, part)| std::iter::repeat_n(chosen(name), inputs(part, array))).collect())

@@ -100,7 +100,7 @@ fn names<T: DeserializeOwned>(value: &Value, pointer: &str, message: &str) -> Op
 fn in_words(place: String, value: Option<&Value>, message: &str) -> Unfit {
     let quoted = |start: &str| message.strip_prefix(start).and_then(|rest| rest.split('`').nth(1));
     let wanted = message.split_once(", expected ").map_or("", |(_, wanted)| wanted);
-    let must = |right: &str| value.map_or(format!(": {right}"), |value| format!(" is {}: {right}", shown(value)));
+    let must = |right: &str| value.map_or(format!(": {right}"), |value| format!(" is {}: {right}", value_text(value)));
     if let Some(name) = quoted("unknown field ") {
         let meant = nearest(name, wanted).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
         return Unfit {
@@ -141,7 +141,7 @@ fn nearest<'a>(name: &str, wanted: &'a str) -> Option<&'a str> {
 }
 
 /// A value as an error shows it: as JSON, shortened, with None for null.
-fn shown(value: &Value) -> String {
+fn value_text(value: &Value) -> String {
     let message = match value {
         Value::Null => "None".to_owned(),
         other => other.to_string(),

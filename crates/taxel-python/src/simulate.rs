@@ -380,7 +380,7 @@ impl Layer {
             let pressure = layer.press(&cells, stop)?.to_vec();
             let mut base = vec![];
             layer.arrive(&cells, &pressure, &mut base, stop)?;
-            Ok::<_, Error>((layer.on_array(&cells, &pressure), base))
+            Ok::<_, Error>((layer.taxel_pressures(&cells, &pressure), base))
         })?;
         Ok((array(py, pressure), array(py, base)))
     }

@@ -102,7 +102,7 @@ impl Rule for HtpRule {
                 out.push(Correction { after: self.after(presented, t), ..Correction::new(t, -1.0) });
             }
         };
-        presented.neuron.forced(weights, presented.laid, presented.targets, |t, v| {
+        presented.neuron.run_forced(weights, presented.laid, presented.targets, |t, v| {
             while next < presented.targets.len() && presented.targets[next] < t {
                 next += 1;
                 lower(&mut peak, out);

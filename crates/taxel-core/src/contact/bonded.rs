@@ -212,7 +212,7 @@ impl Bonded {
 
     /// The mean pressure on each taxel of the array, row by row, MPa, of pressures on cells.
     #[must_use]
-    pub fn on_array(&self, cells: &[Cell], pressure: &[f64]) -> Vec<f64> {
+    pub fn taxel_pressures(&self, cells: &[Cell], pressure: &[f64]) -> Vec<f64> {
         let ((rows, columns), n) = (self.array, self.per_pitch);
         let mut pressures = vec![0.0; rows * columns];
         for (cell, pressure) in cells.iter().zip(pressure) {

@@ -92,11 +92,11 @@ impl BodyShape {
         match self {
             Self::Sphere { radius_mm } => arc(*radius_mm, x.hypot(y)),
             Self::Cylinder { radius_mm, length_mm, axis_deg } => {
-                let (along, across) = turned(x, y, *axis_deg);
+                let (along, across) = rotate(x, y, *axis_deg);
                 if along.abs() <= length_mm / 2.0 { arc(*radius_mm, across.abs()) } else { f64::INFINITY }
             }
             Self::Edge { slope_deg, length_mm, axis_deg } => {
-                let (along, across) = turned(x, y, *axis_deg);
+                let (along, across) = rotate(x, y, *axis_deg);
                 let slope = slope_deg.to_radians().tan();
                 if along.abs() <= length_mm / 2.0 { across.abs() * slope } else { f64::INFINITY }
             }
@@ -212,7 +212,7 @@ fn arc(radius: f64, off: f64) -> f64 {
 }
 
 /// A place by an axis: along it and across it.
-pub(super) fn turned(x: f64, y: f64, axis_deg: f64) -> (f64, f64) {
+pub(super) fn rotate(x: f64, y: f64, axis_deg: f64) -> (f64, f64) {
     let (sin, cos) = axis_deg.to_radians().sin_cos();
     (x * cos + y * sin, y * cos - x * sin)
 }

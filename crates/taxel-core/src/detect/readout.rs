@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::{above_0, is_weight, no_weight};
+use crate::allowed::{above_0, is_weight, weight_error};
 use crate::detect::stream::{DelayedNeurons, NamedNeuron, Ranges, ReceivedTrains};
 use crate::detect::{self, FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeuron};
 use crate::encode::{Composite, Encoder, Tare};
@@ -94,7 +94,7 @@ impl Readout {
                 return Err(problem!("{label}: delay_ms is {}: must be from 0 to {LONGEST_DELAY_MS}", cell.delay_ms));
             }
             if let Some(n) = cell.weights.iter().position(|&w| !is_weight(w)) {
-                return Err(no_weight(&format!("{label}: weights[{n}]"), cell.weights[n]));
+                return Err(weight_error(&format!("{label}: weights[{n}]"), cell.weights[n]));
             }
             if let Some(array) = &self.array {
                 self.check_weights(label, cell, array)?;
@@ -131,7 +131,7 @@ impl Readout {
         match (&self.encoder, &*cell.inputs) {
             (encoder, []) => Ok(Cow::Borrowed(encoder)),
             (Encoder::Composite(encoder), names) => {
-                let parts = encoder.named(names)?.into_iter().map(|(name, part)| (name.to_owned(), part.clone()));
+                let parts = encoder.parts_named(names)?.into_iter().map(|(name, part)| (name.to_owned(), part.clone()));
                 Ok(Cow::Owned(Encoder::Composite(Composite { parts: parts.collect() })))
             }
             (_, names) => {

@@ -156,17 +156,17 @@ impl Loaded {
         let rest = require_tare(what, tare)?.rest_of(array)?;
         let places = Paired::new(usize::from(array.rows), usize::from(array.columns));
         let mut fresh = Self { places, noise_floor, rest };
-        (0..array.len()).for_each(|place| fresh.rest_changed(place));
+        (0..array.len()).for_each(|place| fresh.update_threshold(place));
         Ok(fresh)
     }
 
     /// Changes the rest of a place; the caller must pass its value again.
     pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
         self.rest.set(place, rest);
-        self.rest_changed(place);
+        self.update_threshold(place);
     }
 
-    fn rest_changed(&mut self, place: usize) {
+    fn update_threshold(&mut self, place: usize) {
         self.places.set_from(place, touched_from(self.rest.values()[place], self.noise_floor));
     }
 

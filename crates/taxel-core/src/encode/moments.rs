@@ -90,7 +90,7 @@ impl Moments {
         let [area, total, peak, way] = self.ranges().map(|(_, range)| range);
         for (moment, range) in [area, total, peak, way, way].into_iter().enumerate() {
             let Some([least, most]) = range else { continue };
-            let levels = in_equal_ratios(least, most, self.levels);
+            let levels = geometric_levels(least, most, self.levels);
             all.extend(levels.iter().map(|&at| MomentLevel { moment, at }));
             if moment >= 3 {
                 all.extend(levels.iter().map(|&at| MomentLevel { moment, at: -at }));
@@ -194,7 +194,7 @@ impl Encoding for Moments {
 
 /// `n` levels in a geometric series, rounded to 12 digits, so that differences between machines' `powf` do not move a
 /// level off a whole number.
-fn in_equal_ratios(least: f64, most: f64, n: usize) -> Vec<f64> {
+fn geometric_levels(least: f64, most: f64, n: usize) -> Vec<f64> {
     let level = |k: usize| {
         let exact = least * (most / least).powf(k as f64 / (n.max(2) - 1) as f64);
         format!("{exact:.11e}").parse().unwrap_or(exact)

@@ -95,7 +95,7 @@ pub(super) struct IntervalWalk<'s> {
 
 impl<'s> IntervalWalk<'s> {
     fn new(spikes: &'s [f64], window: ObservationWindow) -> Self {
-        let k = begun(spikes, window);
+        let k = spikes_at_start(spikes, window);
         Self { spikes, window, k, interval: interval(spikes, k, window) }
     }
 
@@ -165,6 +165,6 @@ fn interval(spikes: &[f64], k: usize, window: ObservationWindow) -> f64 {
 }
 
 /// The number of spikes at the window's start: 0 or 1.
-pub(super) fn begun(spikes: &[f64], window: ObservationWindow) -> usize {
+pub(super) fn spikes_at_start(spikes: &[f64], window: ObservationWindow) -> usize {
     usize::from(spikes[0] <= window.start)
 }

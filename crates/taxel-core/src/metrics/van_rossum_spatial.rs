@@ -209,7 +209,7 @@ impl SmoothingKernel {
     ) -> Result<()> {
         let mut steps: Vec<(f64, usize, f64)> = Vec::new();
         for n in 0..a.trains {
-            steps.extend(super::merged::merged(a.train(p, n), b.train(q, n)).map(|(t, more)| (t, n, more)));
+            steps.extend(super::merged::merge_spikes(a.train(p, n), b.train(q, n)).map(|(t, more)| (t, n, more)));
         }
         steps.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         let Some(&(first, ..)) = steps.first() else { return Ok(()) };

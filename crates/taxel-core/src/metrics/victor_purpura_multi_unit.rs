@@ -71,7 +71,7 @@ impl VictorPurpuraMultiUnit {
             // Equal spikes of both patterns match at no cost, and some cheapest matching contains these pairs: the
             // costs satisfy the triangle inequality, so the partners of two equal spikes may be matched with each other
             // instead.
-            for (t, more) in super::merged::merged(a.train(p, unit), b.train(q, unit)) {
+            for (t, more) in super::merged::merge_spikes(a.train(p, unit), b.train(q, unit)) {
                 let side = if more > 0.0 { &mut rows } else { &mut columns };
                 side.extend(std::iter::repeat_n(Labelled { t, unit }, more.abs() as usize));
             }

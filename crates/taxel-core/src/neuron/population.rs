@@ -13,7 +13,7 @@ pub use lanes::Weight;
 use lanes::LANES;
 
 use super::model::{Neuron, Time};
-use crate::allowed::{is_weight, no_weight};
+use crate::allowed::{is_weight, weight_error};
 use crate::{Result, SpikeKind, SpikeTrains, Stop, problem};
 
 /// The input sequence, computed once for all neurons.
@@ -71,7 +71,7 @@ impl Neuron {
                 block.iter().enumerate().find(|(_, row)| !row.iter().all(|&w| is_weight(w.into())))
             {
                 let lane = row.iter().position(|&w| !is_weight(w.into())).unwrap_or(0);
-                return Err(no_weight(&format!("weights[{}, {train}]", first + lane), row[lane].into()));
+                return Err(weight_error(&format!("weights[{}, {train}]", first + lane), row[lane].into()));
             }
             match &script {
                 Script::Continuous(script) => continuous::run(self, script, &block, &mut fired, stop)?,

@@ -211,7 +211,7 @@ impl Recorder {
 
     /// Restarts the recording if it is still empty; returns whether it does.
     pub(super) fn restart_if_empty(&mut self, now: &Counters) -> bool {
-        if self.holds_anything() {
+        if self.has_content() {
             return false;
         }
         self.since = Some(Box::new(now.clone()));
@@ -222,8 +222,8 @@ impl Recorder {
     }
 
     /// Whether any source passed data, or bytes that are in no line, or a note was written.
-    pub(super) fn holds_anything(&self) -> bool {
-        let others = matches!(self.file.get(), Some(RecordingFile::Mcap(writer)) if writer.holds_anything());
+    pub(super) fn has_content(&self) -> bool {
+        let others = matches!(self.file.get(), Some(RecordingFile::Mcap(writer)) if writer.has_content());
         others || self.has_data.load(Ordering::Relaxed) || self.has_notes.load(Ordering::Relaxed)
     }
 
@@ -397,7 +397,7 @@ impl Recorder {
             }
             return Ok(None);
         }
-        let nothing = !self.holds_anything() && (self.since.is_some() || counters.nothing_came());
+        let nothing = !self.has_content() && (self.since.is_some() || counters.nothing_came());
         let refused = self.refused.into_inner();
         if nothing || (refused && !self.has_data.into_inner()) {
             match self.file.into_inner() {

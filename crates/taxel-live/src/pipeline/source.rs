@@ -140,12 +140,12 @@ impl FromStr for SourceKind {
                     },
                 };
                 let place = LineInput::Serial(path.into(), baud);
-                let (stream, opened) = named_or_read(stream_of(text, &mut options)?, &place)?;
+                let (stream, opened) = columns_or_first_line(stream_of(text, &mut options)?, &place)?;
                 Self::Lines(place, stream, opened)
             }
             Some(("pipe", place)) if !place.is_empty() => {
                 let place = LineInput::Pipe(place.into());
-                let (stream, opened) = named_or_read(stream_of(text, &mut options)?, &place)?;
+                let (stream, opened) = columns_or_first_line(stream_of(text, &mut options)?, &place)?;
                 Self::Lines(place, stream, opened)
             }
             None if input == "given" => match stream_of(text, &mut options)? {
@@ -206,7 +206,7 @@ fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<St
 }
 
 /// The given columns, or those of the first line.
-fn named_or_read(named: Option<StreamColumns>, place: &LineInput) -> Result<(StreamColumns, Opened)> {
+fn columns_or_first_line(named: Option<StreamColumns>, place: &LineInput) -> Result<(StreamColumns, Opened)> {
     named.map_or_else(|| first_line(place), |stream| Ok((stream, Opened::default())))
 }
 

@@ -401,7 +401,7 @@ impl Reader {
         let mut unread = match (skipped, sound) {
             (Ok(k), _) => self.unread_chunks(place, self.blocks.skipped[k].1.as_ref(), &read),
             (Err(_), true) => Unread::default(),
-            (Err(_), false) => match self.blocks.indexed(block)? {
+            (Err(_), false) => match self.blocks.message_indexes(block)? {
                 Some(indexed) => Unread { unknown: false, ..self.unread_chunks(place, Some(&indexed), &read) },
                 None => Unread { unknown: true, ..Unread::default() },
             },

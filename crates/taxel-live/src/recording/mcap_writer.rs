@@ -128,7 +128,7 @@ impl Writer {
 
     /// Whether any source has passed data, or bytes that are in no line.
     #[must_use]
-    pub fn holds_anything(&self) -> bool {
+    pub fn has_content(&self) -> bool {
         self.track.queue.lock().written.iter().any(|written| written.data > 0 || written.left_out)
     }
 
@@ -222,7 +222,7 @@ impl SourceWriter {
     }
 
     /// States that bytes arrived that are in no line; a recording with nothing else is kept, for their count.
-    pub fn left_out(&self) {
+    pub fn note_left_out(&self) {
         self.queue.lock().written[self.source].left_out = true;
     }
 

@@ -200,7 +200,7 @@ impl StreamFaults {
     }
 
     /// Counts bytes that are in no line.
-    pub fn left_out(&mut self, bytes: LeftOut) {
+    pub fn count_left_out(&mut self, bytes: LeftOut) {
         self.left_out.in_no_line += bytes.in_no_line;
         self.left_out.unfinished += bytes.unfinished;
     }

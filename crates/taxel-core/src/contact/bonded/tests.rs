@@ -164,7 +164,8 @@ fn all_of_the_force_arrives_at_the_base() {
         let up = pressure.iter().sum::<f64>() * layer.area_mm2();
         let down = near.iter().map(|s| f64::from(*s)).sum::<f64>() * array.square_pitch("foam").unwrap().powi(2);
         assert!((down / up - 1.0).abs() < 1e-2, "nu {nu}, {per_pitch}: {down} of {up} N");
-        let total = layer.on_array(&found, &pressure).iter().sum::<f64>() * array.square_pitch("foam").unwrap().powi(2);
+        let total =
+            layer.taxel_pressures(&found, &pressure).iter().sum::<f64>() * array.square_pitch("foam").unwrap().powi(2);
         assert!((total / up - 1.0).abs() < 1e-9, "nu {nu}, {per_pitch}: {total} of {up} N");
     }
 }

@@ -336,7 +336,7 @@ impl ConeRProblem {
             multipliers: Shares { rows: kept().map(|s| s.0).collect(), values: kept().map(|s| *s.1).collect() },
             unreachable: self.unreachable(&objective),
             refires: self.refires(&weights, pattern)?,
-            proof: self.named(found.proof),
+            proof: self.name_rows(found.proof),
             fit: Fit {
                 status: if found.gap <= parameters.tolerance { Status::Solved } else { Status::Stopped },
                 weights,
@@ -350,7 +350,7 @@ impl ConeRProblem {
     }
 
     /// The nonzero multipliers of a proof, by the names of their rows.
-    fn named(&self, mut proof: RelaxedProof) -> GapMultipliers {
+    fn name_rows(&self, mut proof: RelaxedProof) -> GapMultipliers {
         proof.divide(1.0, self.statement.unit);
         let (silent, targets) = proof.multipliers.split_at(self.rows.silent.len());
         let names = || self.rows.targets.names.iter().copied();

@@ -433,7 +433,7 @@ impl Exact {
             (Some(why), Some(reason)) => Some(format!("{why}; {reason}")),
             (_, reason) => reason,
         };
-        let violation = largest([self.missed(&weights), self.worst(&weights), 0.0]);
+        let violation = largest([self.worst_target(&weights), self.worst(&weights), 0.0]);
         Ok(ConeXFit {
             margin: self.kept_margin(&weights),
             fit: Fit { status, weights, objective, parts, gap, rounds, engine },

@@ -75,7 +75,7 @@ impl Exact {
     }
 
     /// The largest violation of a target row, mV.
-    pub(super) fn missed(&self, weights: &[f64]) -> f64 {
+    pub(super) fn worst_target(&self, weights: &[f64]) -> f64 {
         let missed = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
         largest(missed.chain([0.0]))
     }

@@ -55,13 +55,13 @@ impl Exact {
             let found =
                 mixed::minimise(&terms, &rows.hard(), &objective.bounds, size, going.as_ref(), tolerance, stop)?;
             if found.bound > best.least {
-                (best.least, best.proof) = (found.bound, rows.named(found.proof));
+                (best.least, best.proof) = (found.bound, rows.name_rows(found.proof));
             }
             if found.stopped || best.rounds >= MOST_ROUNDS {
                 return Ok(best);
             }
             let mut weights = found.weights;
-            let met = rows.missed(&weights) <= 0.5 * MET;
+            let met = rows.worst_row(&weights) <= 0.5 * MET;
             if !near
                 && !met
                 && let Some(meets) = nearest(&weights, &rows.hard(), lower, upper, stop)?
@@ -93,7 +93,7 @@ impl Exact {
                     best.held.push((name, 0.0));
                 }
             }
-            if self.missed(&weights) <= MET
+            if self.worst_target(&weights) <= MET
                 && self.worst(&weights) <= self.rounding(&weights)
                 && value < self.parts(&best.weights).sum()
             {
@@ -216,7 +216,7 @@ impl Dense {
     }
 
     /// The nonzero multipliers of a proof, by the names of their rows; those of a difference go to both of its rows.
-    fn named(&self, proof: MixedProof) -> GapMultipliers {
+    fn name_rows(&self, proof: MixedProof) -> GapMultipliers {
         let MixedProof { mut equality, inequality, behind, pull } = proof;
         let mut rows = vec![];
         for ((&row, beside), z) in self.names.iter().zip(&self.beside).zip(inequality) {
@@ -236,7 +236,7 @@ impl Dense {
     }
 
     /// The largest violation of any row of the working set.
-    fn missed(&self, weights: &[f64]) -> f64 {
+    fn worst_row(&self, weights: &[f64]) -> f64 {
         let n = weights.len();
         let equal = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
         let below = self.below.chunks_exact(n).zip(&self.limit).map(|(row, limit)| dot(row, weights) - limit);

@@ -51,7 +51,7 @@ impl Exact {
             let before = std::mem::replace(&mut weights, working.engine.weights().to_vec());
             let end = match verdict {
                 SolveOutcome::Infeasible(ray) => self
-                    .refutation(working.named(&ray.multipliers), stop)?
+                    .refutation(working.name_rows(&ray.multipliers), stop)?
                     .map_or(RowGenerationEnd::Stopped, RowGenerationEnd::Infeasible),
                 SolveOutcome::Stopped => RowGenerationEnd::Stopped,
                 SolveOutcome::Optimal => {
@@ -73,7 +73,7 @@ impl Exact {
                     }
                 }
             };
-            let held = working.named(&working.engine.multipliers());
+            let held = working.name_rows(&working.engine.multipliers());
             return Ok(Shortest { weights, held, rounds, end });
         }
     }
@@ -125,7 +125,7 @@ impl Exact {
             }
         }
         let SolveOutcome::Infeasible(ray) = engine.solve(stop)? else { return Ok(None) };
-        Certificate::check(&self.statement, &self.objective.bounds, named(&targets, &others, &ray.multipliers))
+        Certificate::check(&self.statement, &self.objective.bounds, name_rows(&targets, &others, &ray.multipliers))
     }
 
     /// A lower bound on the l2 term by any multipliers, from the minimum of the Lagrangian of `|w|^2 / 2` within the
@@ -270,13 +270,13 @@ impl Working {
         Ok(true)
     }
 
-    fn named(&self, multipliers: &Multipliers) -> Vec<(Row, f64)> {
-        named(&self.targets, &self.names, multipliers)
+    fn name_rows(&self, multipliers: &Multipliers) -> Vec<(Row, f64)> {
+        name_rows(&self.targets, &self.names, multipliers)
     }
 }
 
 /// The multipliers with the names of their rows.
-fn named(targets: &[Row], others: &[Row], multipliers: &Multipliers) -> Vec<(Row, f64)> {
+fn name_rows(targets: &[Row], others: &[Row], multipliers: &Multipliers) -> Vec<(Row, f64)> {
     let targets = targets.iter().copied().zip(multipliers.equalities.iter().copied());
     let others = multipliers.inequalities.iter().map(|&(id, z)| (others[id.index()], z));
     targets.chain(others).filter(|(_, u)| *u != 0.0).collect()

@@ -165,7 +165,8 @@ impl<'a> Lagrangian<'a> {
         shares.resize(total, 0.0);
         let widest =
             objective.bounds.upper.iter().zip(&objective.bounds.lower).fold(0.0_f64, |m, (u, l)| m.max(u.max(-l)));
-        let width = widest.min(FAR * problem.needed()).max(zero.weights.iter().fold(0.0, |m, w| w.abs().max(m)));
+        let width =
+            widest.min(FAR * problem.typical_weight()).max(zero.weights.iter().fold(0.0, |m, w| w.abs().max(m)));
         let scratch = cholesky_in_place_scratch::<f64>(n, Par::Seq, faer::Spec::default());
         let mut engine = Self {
             started,

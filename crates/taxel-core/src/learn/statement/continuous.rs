@@ -83,7 +83,7 @@ impl SilentTimes {
                     found.extend(worst.take());
                     continue;
                 }
-                let (t, excess, last) = self.largest(asked, state, share);
+                let (t, excess, last) = self.largest_excess(asked, state, share);
                 if exceeds(excess, tolerance) && worst.is_none_or(|w| exceeds(excess, w.excess)) {
                     worst = Some(SilencePeak { pattern, t, excess });
                 }
@@ -97,7 +97,7 @@ impl SilentTimes {
     }
 
     /// The time and value of the largest excess between a node and the next, and the excess at the next node.
-    fn largest(&self, asked: &SilenceLimit, state: KernelSum, share: f64) -> (f64, f64, f64) {
+    fn largest_excess(&self, asked: &SilenceLimit, state: KernelSum, share: f64) -> (f64, f64, f64) {
         let KernelSum { a, b } = asked.taper;
         let state = KernelSum { a: state.a + share * a, b: state.b + share * b };
         let limit = asked.theta - share * asked.height;

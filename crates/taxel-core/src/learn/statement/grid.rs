@@ -182,7 +182,7 @@ impl SilentRows {
     }
 
     /// A copy with the given rows only (ascending), as coefficients.
-    pub(crate) fn written_out(&self, rows: &[usize]) -> Self {
+    pub(crate) fn with_rows(&self, rows: &[usize]) -> Self {
         Self {
             lanes: vec![],
             steps: self.steps.clone(),

@@ -180,7 +180,7 @@ impl Objective {
     }
 
     /// The distance of the potential after each target to `kappa` thresholds, mV.
-    pub(crate) fn unlifted(&self, targets: &Targets, weights: &[f64]) -> Vec<f64> {
+    pub(crate) fn missing_lift(&self, targets: &Targets, weights: &[f64]) -> Vec<f64> {
         targets.iter().map(|row| dot(row.behind, weights) - self.kappa * row.threshold).collect()
     }
 
@@ -190,7 +190,7 @@ impl Objective {
     }
 
     /// C at one target without its factor, given the distance of the potential to the threshold, mV.
-    pub(crate) fn missed(&self, distance: f64) -> f64 {
+    pub(crate) fn c_at_distance(&self, distance: f64) -> f64 {
         if self.sides_c == Sides::Both { distance.abs() } else { (-distance).max(0.0) }
     }
 
@@ -213,7 +213,7 @@ impl Objective {
     /// The terms of 6.11 at these weights.
     pub(crate) fn exact_parts(&self, targets: &Targets, weights: &[f64]) -> Parts {
         let (l1, l2) = self.norms(weights);
-        let missed = if self.b > 0.0 { self.unlifted(targets, weights) } else { vec![] };
+        let missed = if self.b > 0.0 { self.missing_lift(targets, weights) } else { vec![] };
         Parts { l1, l2, B: self.b * dot(&missed, &missed), ..Parts::default() }
     }
 

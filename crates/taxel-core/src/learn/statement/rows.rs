@@ -228,7 +228,7 @@ impl Statement {
             end,
             targets: targets.to_vec(),
             silence: silence.map(<[_]>::to_vec),
-            forgotten: self.shape.forgotten() + self.shape.tau * spread(&inputs).ln(),
+            forgotten: self.shape.negligible_age() + self.shape.tau * spread(&inputs).ln(),
             inputs,
         });
         Ok(())

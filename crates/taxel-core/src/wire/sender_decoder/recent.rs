@@ -32,7 +32,7 @@ impl RecentDatagrams {
             let events = |datagram| decode(datagram, array.clone(), Pairing::Direct).0;
             let again = events(datagram);
             let since = self.0.iter().take(before).map(|(known, _)| events(known));
-            if has_two_times(&again) || (values && has_values(&again) && touches_none(&again, since)) {
+            if has_two_times(&again) || (values && has_values(&again) && has_no_repeated_taxel(&again, since)) {
                 return true;
             }
         }
@@ -54,7 +54,7 @@ fn has_values(events: &Events) -> bool {
 }
 
 /// Whether no taxel has a second event, among these or those that came since.
-fn touches_none(events: &Events, since: impl Iterator<Item = Events>) -> bool {
+fn has_no_repeated_taxel(events: &Events, since: impl Iterator<Item = Events>) -> bool {
     let taxels = |events: &Events| events.x.iter().copied().zip(events.y.iter().copied()).collect::<Vec<_>>();
     let mut touched = taxels(events);
     touched.sort_unstable();

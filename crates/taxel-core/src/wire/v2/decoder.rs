@@ -239,7 +239,7 @@ impl Decoder {
     ) -> DatagramOutcome {
         self.counts.datagrams += 1;
         if *self.board.get_or_insert(header.board) != header.board {
-            return self.other_board();
+            return self.refuse_other_board();
         }
         let sum = split(datagram).1;
         let (index, reset) = match self.sessions.last() {
@@ -260,7 +260,7 @@ impl Decoder {
                 self.again = (number + 1, in_turn);
                 if noted == Noted::Unlike {
                     session.unlike += 1;
-                    return self.other_board();
+                    return self.refuse_other_board();
                 }
                 self.counts.repeated += 1;
                 return DatagramOutcome::Repeated;
@@ -294,7 +294,7 @@ impl Decoder {
     }
 
     /// Leaves out an intact datagram of another board.
-    fn other_board(&mut self) -> DatagramOutcome {
+    fn refuse_other_board(&mut self) -> DatagramOutcome {
         self.counts.foreign += 1;
         self.counts.other_board += 1;
         DatagramOutcome::Refused(Refused::Foreign)
@@ -317,7 +317,7 @@ impl Decoder {
             && session.unlike == 0
             && let Self { held, counts, latest, again, .. } = self
             && let Some((mut run, value)) = RunDecoder::new(first, board, session, held, latest, counts)
-            && (value == 0 || out.paired())
+            && (value == 0 || out.writes_intensity())
         {
             // SAFETY: `instructions` and `best` select a set only if the machine has it. A run writes each row that it
             // counts, and with `paired` its ticks and present.

@@ -8,7 +8,7 @@ use std::path::Path;
 use mcap::records::{Record, op};
 use mcap::{MAGIC, parse_record};
 
-use super::blocks::{FileBlock, IndexedChunks, indexed, indexed_from, records};
+use super::blocks::{FileBlock, IndexedChunks, index_entry, message_indexes_from, records};
 use super::summary::FileSummary;
 use crate::recording::metadata::{BEGIN, CHECK, END, check};
 use crate::recording::{FileEnding, Header, Rebuilt, RecordingCounts, limits};
@@ -128,7 +128,7 @@ impl<'a> FileWalk<'a> {
 
     /// Where what cannot be read begins: at `at`, or at the chunk that ends there, if that is damaged. In it bytes may be
     /// missing or too many, so that it ends elsewhere.
-    fn unless_damaged(&mut self, at: u64) -> Result<u64> {
+    fn damage_start(&mut self, at: u64) -> Result<u64> {
         let Some(&block) = self.blocks.last().filter(|block| !block.bare && block.offset + block.length == at) else {
             return Ok(at);
         };
@@ -144,7 +144,7 @@ impl<'a> FileWalk<'a> {
                 (indexed.unwrap_or_default(), skipped)
             }
             (None, Some(block)) => {
-                let indexed = indexed_from(self.path, self.file, self.length, block.offset + block.length)?;
+                let indexed = message_indexes_from(self.path, self.file, self.length, block.offset + block.length)?;
                 (indexed, Skipped::Nothing)
             }
             (None, None) => (IndexedChunks::new(), Skipped::Nothing),
@@ -155,9 +155,9 @@ impl<'a> FileWalk<'a> {
     fn data(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
         while at < self.length {
-            let Some((opcode, length, size)) = self.sound(at)? else {
-                let from = self.unless_damaged(at)?;
-                match self.next_sound(from + 1)? {
+            let Some((opcode, length, size)) = self.readable_record(at)? else {
+                let from = self.damage_start(at)?;
+                match self.next_readable(from + 1)? {
                     Some(next) => {
                         self.rebuilt.gaps += 1;
                         self.rebuilt.skipped_bytes += next - from;
@@ -186,7 +186,7 @@ impl<'a> FileWalk<'a> {
                     self.since.1 = self.since.1.max(Skipped::Records);
                 }
                 op::MESSAGE_INDEX => {
-                    if let Some((channel, messages)) = indexed(&self.bytes(at, 15)?) {
+                    if let Some((channel, messages)) = index_entry(&self.bytes(at, 15)?) {
                         *self.since.0.entry(channel).or_default() += messages;
                     }
                 }
@@ -230,7 +230,7 @@ impl<'a> FileWalk<'a> {
     }
 
     /// Opcode and length of the record at `at`, where they make sense, and the size that it states to unpack to.
-    fn sound(&self, at: u64) -> Result<Option<(u8, u64, u64)>> {
+    fn readable_record(&self, at: u64) -> Result<Option<(u8, u64, u64)>> {
         let head = self.bytes(at, 80)?;
         let (Some(&opcode), Some(length)) = (head.first(), number(&head, 1)) else { return Ok(None) };
         let fits = at.checked_add(RECORD_HEAD).and_then(|a| a.checked_add(length)).is_some_and(|e| e <= self.length);
@@ -269,7 +269,7 @@ impl<'a> FileWalk<'a> {
         let next = at + RECORD_HEAD + length;
         Ok(match opcode {
             op::CHUNK => true,
-            op::MESSAGE_INDEX => length > 6 && self.sound(next)?.is_some(),
+            op::MESSAGE_INDEX => length > 6 && self.readable_record(next)?.is_some(),
             op::METADATA => {
                 length < limits::METADATA && self.bytes(at + RECORD_HEAD + 4, BEGIN.len() as u64)? == BEGIN.as_bytes()
             }
@@ -283,7 +283,7 @@ impl<'a> FileWalk<'a> {
     }
 
     /// The next position from `at` on where the walk may continue.
-    fn next_sound(&self, mut at: u64) -> Result<Option<u64>> {
+    fn next_readable(&self, mut at: u64) -> Result<Option<u64>> {
         const WINDOW: u64 = 1 << 20;
         while at < self.length {
             let window = self.bytes(at, WINDOW)?;
@@ -292,7 +292,7 @@ impl<'a> FileWalk<'a> {
                     continue;
                 }
                 let place = at + k as u64;
-                if let Some((opcode, length, _)) = self.sound(place)?
+                if let Some((opcode, length, _)) = self.readable_record(place)?
                     && self.resumes(place, opcode, length)?
                 {
                     return Ok(Some(place));

@@ -92,7 +92,7 @@ kernel! {
 
 /// The inverse of the eight by eight triangle at k, by columns.
 #[inline(always)]
-fn inverted(l: &[f64], stride: usize, inverse: &[f64], k: usize) -> [[f64; LANES]; LANES] {
+fn inverse_triangle(l: &[f64], stride: usize, inverse: &[f64], k: usize) -> [[f64; LANES]; LANES] {
     let mut columns = [[0.0; LANES]; LANES];
     for (j, column) in columns.iter_mut().enumerate() {
         column[j] = inverse[k + j];
@@ -120,7 +120,7 @@ kernel! {
                     }
                     continue;
                 }
-                let inverse_block = inverted(l, stride, inverse, k);
+                let inverse_block = inverse_triangle(l, stride, inverse, k);
                 for x in x.chunks_exact_mut(x_stride) {
                     let unknowns = &mut lines_mut(&mut x[k..k + LANES])[0];
                     let (mut even, mut odd) = (V::splat(0.0), V::splat(0.0));

@@ -151,7 +151,7 @@ impl Program {
         HardRows { equal: &self.equal, equal_to: &self.equal_to, below: &self.below, limit: &self.limit }
     }
 
-    pub(super) fn missed(&self, w: &[f64]) -> Vec<f64> {
+    pub(super) fn shortfalls(&self, w: &[f64]) -> Vec<f64> {
         if self.lift > 0.0 {
             times(&self.behind, w).iter().zip(&self.wanted).map(|(u, m)| u - m).collect()
         } else {
@@ -161,7 +161,7 @@ impl Program {
 
     pub(super) fn objective(&self, w: &[f64]) -> f64 {
         let square = dot(w, w);
-        let missed = self.missed(w);
+        let missed = self.shortfalls(w);
         self.l1 * w.iter().map(|w| w.abs()).sum::<f64>()
             + self.l2 * if self.norm == Norm::Square { square } else { square.sqrt() }
             + self.lift * dot(&missed, &missed)
@@ -171,7 +171,7 @@ impl Program {
     pub(super) fn slope(&self, w: &[f64]) -> Vec<f64> {
         let mut slope = vec![0.0; w.len()];
         if self.lift > 0.0 {
-            let mut missed = self.missed(w);
+            let mut missed = self.shortfalls(w);
             missed.iter_mut().for_each(|m| *m *= 2.0 * self.lift);
             add_sum(&self.behind, &missed, &mut slope);
         }
@@ -183,7 +183,7 @@ impl Program {
 
     /// The amount by which the tangent of the smooth terms at `w` is below 0 at weights of 0.
     pub(super) fn tangent(&self, w: &[f64]) -> f64 {
-        let missed = self.missed(w);
+        let missed = self.shortfalls(w);
         let lift: f64 = missed.iter().zip(&self.wanted).map(|(x, m)| x * (2.0 * m + x)).sum();
         let square = if self.norm == Norm::Square { self.l2 * dot(w, w) } else { 0.0 };
         self.lift * lift + square
@@ -302,7 +302,7 @@ impl Program {
                 .zip(&self.of_below)
                 .map(|(z, scale)| z.max(0.0) * self.cost / scale)
                 .collect(),
-            behind: self.missed(weights).into_iter().map(lifted).collect(),
+            behind: self.shortfalls(weights).into_iter().map(lifted).collect(),
             pull: pull.iter().zip(weights).map(pulled).collect(),
         }
     }
@@ -338,7 +338,7 @@ impl Program {
         add(&self.below, &inequality, &self.limit);
         if self.lift > 0.0 {
             // x^2 >= 2 m x - m^2 for any m; here x = behind.w - wanted.
-            let missed = self.missed(w);
+            let missed = self.shortfalls(w);
             let factors: Vec<f64> = missed.iter().map(|m| 2.0 * self.lift * m).collect();
             let values: Vec<f64> = missed.iter().zip(&self.wanted).map(|(m, wanted)| wanted + 0.5 * m).collect();
             add(&self.behind, &factors, &values);

@@ -75,7 +75,7 @@ impl SelectedLanes {
 /// Shifts the 16-bit lanes up by one; lane 0 becomes the last lane of `before`.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn one_up(before: __m256i, lanes: __m256i) -> __m256i {
+fn shift_lane_up(before: __m256i, lanes: __m256i) -> __m256i {
     _mm256_alignr_epi8::<14>(lanes, _mm256_permute2x128_si256::<0x21>(before, lanes))
 }
 
@@ -166,10 +166,10 @@ pub(super) unsafe fn blocks(
         let farthest;
         if intensities == 0 {
             // The stamps do not fall, so each is ahead of the latest time if it is ahead of the stamp before it.
-            let before = one_up(zero, ahead);
+            let before = shift_lane_up(zero, ahead);
             let rising = low_bits(_mm256_cmpeq_epi16(_mm256_max_epu16(ahead, before), ahead)) == u32::MAX;
             farthest = value(bytes, at + WORD_BYTES * (WORDS - 1)).wrapping_sub(base);
-            if !rising || farthest > state.farthest() {
+            if !rising || farthest > state.largest_lead() {
                 break;
             }
             let p = _mm_packus_epi16(_mm256_castsi256_si128(polarity), _mm256_extracti128_si256::<1>(polarity));
@@ -201,7 +201,7 @@ pub(super) unsafe fn blocks(
             let before = _mm_slli_si128::<2>(ahead);
             let rising = _mm_movemask_epi8(_mm_cmpeq_epi16(_mm_max_epu16(ahead, before), ahead)) == 0xffff;
             farthest = value(bytes, at + WORD_BYTES * (WORDS - 2)).wrapping_sub(base);
-            if !rising || farthest > state.farthest() {
+            if !rising || farthest > state.largest_lead() {
                 break;
             }
             filling.begin_pairs();
@@ -237,12 +237,12 @@ pub(super) unsafe fn blocks(
             greatest = _mm256_max_epu16(greatest, _mm256_shuffle_epi8(half, last_lane));
             let rising = _mm256_or_si256(_mm256_cmpeq_epi16(greatest, ahead), intensity);
             farthest = _mm256_extract_epi16::<15>(greatest) as u16;
-            if low_bits(rising) != u32::MAX || farthest > state.farthest() {
+            if low_bits(rising) != u32::MAX || farthest > state.largest_lead() {
                 break;
             }
             // An intensity is paired if the word before it is a change of the same taxel.
-            let same = _mm256_cmpeq_epi16(place, one_up(place_before, place));
-            let behind_change = one_up(_mm256_set1_epi16(-(open as i16)), change);
+            let same = _mm256_cmpeq_epi16(place, shift_lane_up(place_before, place));
+            let behind_change = shift_lane_up(_mm256_set1_epi16(-(open as i16)), change);
             let pair = _mm256_and_si256(_mm256_and_si256(intensity, behind_change), same);
             let pairs = mask(pair);
             if pairs == SPLIT_PAIRS {
