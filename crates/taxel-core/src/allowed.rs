@@ -199,8 +199,8 @@ macro_rules! ranges {
         ];
 
         fn check_ranges(&self) -> $crate::Result<()> {
-            let mut of = Self::RANGES.iter();
-            $(if let Some(parameter) = of.next() {
+            let mut ranges = Self::RANGES.iter();
+            $(if let Some(parameter) = ranges.next() {
                 parameter.check(&$crate::allowed::ranges!(@ self $name $($method)?))?;
             })*
             Ok(())

@@ -250,9 +250,9 @@ mod tests {
         other.exchanged(&mut clock, 0, 10, &mut chance);
         let before = clock.offset().expect("some came").ahead_ns;
         let set = Other { ahead_ns: -5_000_000_000, drift: 0.0 };
-        let mut one = clock.clone();
-        set.exchanged(&mut one, 10, 0, &mut chance);
-        assert_eq!(one.offset().expect("some came").ahead_ns, before);
+        let mut after_one = clock.clone();
+        set.exchanged(&mut after_one, 10, 0, &mut chance);
+        assert_eq!(after_one.offset().expect("some came").ahead_ns, before);
         set.exchanged(&mut clock, 10, 2, &mut chance);
         assert!((clock.offset().expect("some came").ahead_ns + 5_000_000_000).abs() < 100_000);
     }

@@ -224,10 +224,10 @@ mod tests {
                 }
             }
             for channel in 0..channels {
-                let of = |(afferent, field): (usize, &Vec<(u32, f32)>)| {
+                let weight_on = |(afferent, field): (usize, &Vec<(u32, f32)>)| {
                     field.iter().find(|felt| felt.0 as usize == channel).map(|felt| (afferent, felt.1))
                 };
-                let wanted: Vec<(usize, f32)> = fields.iter().enumerate().filter_map(of).collect();
+                let wanted: Vec<(usize, f32)> = fields.iter().enumerate().filter_map(weight_on).collect();
                 let mut feeling: Vec<(usize, f32)> =
                     new.lanes_of_channel(channel).map(|(lane, weight)| (new.afferent(lane) as usize, weight)).collect();
                 feeling.sort_by_key(|&(afferent, _)| afferent);

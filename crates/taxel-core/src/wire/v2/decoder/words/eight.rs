@@ -84,7 +84,7 @@ impl Eight {
             }
             let ending = _mm_loadu_si128(words.add(2 * count).sub(REGISTER).cast());
             let to_start = _mm_loadu_si128(TO_START.as_ptr().add(REGISTER - 2 * count).cast());
-            Self::of::<VALUE>(_mm_shuffle_epi8(ending, to_start), _mm_setzero_si128(), lanes, passed, held)
+            Self::from_halves::<VALUE>(_mm_shuffle_epi8(ending, to_start), _mm_setzero_si128(), lanes, passed, held)
         }
     }
 
@@ -102,7 +102,7 @@ impl Eight {
             if VALUE == 16 {
                 return Self::of_large(_mm256_loadu_si256(words.cast()), lanes, passed, held);
             }
-            Self::of::<VALUE>(_mm_loadu_si128(words.cast()), _mm_setzero_si128(), lanes, passed, held)
+            Self::from_halves::<VALUE>(_mm_loadu_si128(words.cast()), _mm_setzero_si128(), lanes, passed, held)
         }
     }
 
@@ -112,14 +112,14 @@ impl Eight {
     fn of_large(words: __m256i, lanes: __m128i, passed: u16, held: &ValuesByLine) -> Option<Self> {
         let halves = |lanes| _mm_packus_epi32(_mm256_castsi256_si128(lanes), _mm256_extracti128_si256::<1>(lanes));
         let value = _mm256_blend_epi16::<0xaa>(words, _mm256_setzero_si256());
-        Self::of::<16>(halves(_mm256_srli_epi32::<16>(words)), halves(value), lanes, passed, held)
+        Self::from_halves::<16>(halves(_mm256_srli_epi32::<16>(words)), halves(value), lanes, passed, held)
     }
 
     /// Decodes the words' halves with polarity and skip, and the values if the halves have none; lanes outside `lanes`
     /// are zero.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
-    fn of<const VALUE: u32>(
+    fn from_halves<const VALUE: u32>(
         head: __m128i,
         value: __m128i,
         lanes: __m128i,
