@@ -40,7 +40,7 @@ fuzz_target!(|input: &[u8]| {
     assert_eq!(two.datagrams, two.intact + two.repeated + two.old + two.short + two.foreign + two.checksum);
     assert_eq!(one.bytes, 5 * one.words + one.skipped);
     assert_eq!(events.len() as u64, one.changes + two.events);
-    assert!(one.bytes + decoder.refused() <= bytes);
+    assert!(one.bytes + decoder.totals().refused <= bytes);
 });
 
 /// A datagram of version 2 whose checksum holds: its header's first bytes from the piece, few boards and sessions.

@@ -52,12 +52,12 @@ fn to_targets(targets: &[PyReadonlyArray1<'_, f64>]) -> PyResult<Vec<Vec<f64>>> 
 
 /// A rule with its neuron and its training, from its name and all parameters in one list.
 fn to_epoch_learner(json: &str) -> PyResult<EpochLearner> {
-    let mut given: Map<String, Value> = parsed("rule", json)?;
-    let name = match given.remove("name") {
+    let mut parameters: Map<String, Value> = parsed("rule", json)?;
+    let name = match parameters.remove("name") {
         Some(Value::String(name)) => name,
         _ => return Err(core(problem!("rule without a name"))),
     };
-    let parts = EpochLearner::parts(&name, given).map_err(core)?;
+    let parts = EpochLearner::parts(&name, parameters).map_err(core)?;
     let learner: EpochLearner = parsed(&name, &parts.to_string())?;
     learner.check().map_err(core)?;
     Ok(learner)
@@ -255,27 +255,27 @@ impl Plastic {
 
 /// What is known of the parameters of a learner: defaults, what must be given, ranges.
 #[pyfunction]
-pub fn parameters(of: &str) -> PyResult<Plain<Value>> {
-    described(of).map(|d| Plain(d.to_json())).ok_or_else(|| unknown(of))
+pub fn parameters(name: &str) -> PyResult<Plain<Value>> {
+    described(name).map(|d| Plain(d.to_json())).ok_or_else(|| unknown(name))
 }
 
-fn described(of: &str) -> Option<Described> {
-    match of {
+fn described(name: &str) -> Option<Described> {
+    match name {
         "stdp" => Some(Stdp::described()),
         "tempotron" => Some(Tempotron::described()),
-        _ => EpochLearner::described(of).or_else(|| Batch::described(of)),
+        _ => EpochLearner::described(name).or_else(|| Batch::described(name)),
     }
 }
 
 /// Checks the parameters of a learner, which are JSON; gives them back with every default filled in.
 #[pyfunction]
-pub fn check_parameters(of: &str, parameters: &str) -> PyResult<Plain<Value>> {
-    match of {
+pub fn check_parameters(name: &str, parameters: &str) -> PyResult<Plain<Value>> {
+    match name {
         "stdp" => checked("STDP", parameters, Stdp::check),
         "tempotron" => checked("Tempotron", parameters, Tempotron::check),
-        _ if EpochLearner::described(of).is_some() => Ok(json!(to_epoch_learner(parameters)?)),
-        _ if Batch::described(of).is_some() => Ok(json!(Batch::from_json(of, parameters).map_err(core)?)),
-        _ => Err(unknown(of)),
+        _ if EpochLearner::described(name).is_some() => Ok(json!(to_epoch_learner(parameters)?)),
+        _ if Batch::described(name).is_some() => Ok(json!(Batch::from_json(name, parameters).map_err(core)?)),
+        _ => Err(unknown(name)),
     }
     .map(Plain)
 }

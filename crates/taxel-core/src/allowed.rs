@@ -84,7 +84,7 @@ impl Range {
 /// The range as an error message writes it after "must be".
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (least, most) = (written(self.least), written(self.most));
+        let (least, most) = (number_text(self.least), number_text(self.most));
         let lower = if self.least_in { format!("{least} or more") } else { format!("above {least}") };
         let upper = if self.most_in { format!("at most {most}") } else { format!("below {most}") };
         match (self.least.is_finite(), self.most.is_finite()) {
@@ -100,7 +100,7 @@ impl fmt::Display for Range {
 }
 
 /// A number as a person writes it.
-fn written(value: f64) -> String {
+fn number_text(value: f64) -> String {
     if value != 0.0 && value.is_finite() && !(1e-3..1e7).contains(&value.abs()) {
         format!("{value:e}")
     } else {
@@ -132,7 +132,7 @@ impl Parameter {
                 let place = place.map_or(String::new(), |k| format!("[{k}]"));
                 let (name, unit, range) = (self.name, self.unit, self.range);
                 let near = if range.spans(value) { format!(", {LEAST:e} at least") } else { String::new() };
-                let value = written(value);
+                let value = number_text(value);
                 outcome = Err(match unit.strip_prefix('1') {
                     Some(per) => problem!(name; "{place} is {value}{per}: must be {range}{near}"),
                     None if unit.is_empty() => problem!(name; "{place} is {value}: must be {range}{near}"),
@@ -199,8 +199,8 @@ macro_rules! ranges {
         ];
 
         fn check_ranges(&self) -> $crate::Result<()> {
-            let mut of = Self::RANGES.iter();
-            $(if let Some(parameter) = of.next() {
+            let mut ranges = Self::RANGES.iter();
+            $(if let Some(parameter) = ranges.next() {
                 parameter.check(&$crate::allowed::ranges!(@ self $name $($method)?))?;
             })*
             Ok(())
@@ -235,18 +235,21 @@ pub fn one_weight_a_train(weights: &[f64], trains: usize) -> Result<()> {
     if weights.len() != trains {
         return Err(problem!("weights"; ": {} for {trains} trains, must be one a train", weights.len()));
     }
-    weights.iter().position(|&w| !is_weight(w)).map_or(Ok(()), |n| Err(no_weight(&format!("weights[{n}]"), weights[n])))
+    weights
+        .iter()
+        .position(|&w| !is_weight(w))
+        .map_or(Ok(()), |n| Err(weight_error(&format!("weights[{n}]"), weights[n])))
 }
 
 /// The error of what is no weight.
 #[must_use]
-pub fn no_weight(place: &str, weight: f64) -> Error {
+pub fn weight_error(place: &str, weight: f64) -> Error {
     let right = if weight.is_finite() {
         format!("from -{LARGEST_WEIGHT:e} to {LARGEST_WEIGHT:e}")
     } else {
         "finite".to_owned()
     };
-    problem!("{place} is {}: must be {right}", written(weight))
+    problem!("{place} is {}: must be {right}", number_text(weight))
 }
 
 #[cfg(test)]

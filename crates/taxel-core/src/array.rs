@@ -233,7 +233,7 @@ impl Array {
     pub fn pitch(&self, what: &str) -> Result<Pitch> {
         let name = &self.name;
         self.pitch_mm.ok_or_else(|| match self.places {
-            None => problem!("{what} needs mm, and the pitch of {name} is not known").helped_by("array", Hint::Pitch),
+            None => problem!("{what} needs mm, and the pitch of {name} is not known").with_hint("array", Hint::Pitch),
             Some(_) => problem!("{what} needs one pitch, and {name} has a place for each taxel"),
         })
     }
@@ -269,7 +269,7 @@ impl Array {
             self.rows,
             self.columns
         )
-        .helped_by("array", Hint::LayOut))
+        .with_hint("array", Hint::LayOut))
     }
 }
 
@@ -283,12 +283,12 @@ mod tests {
 
     #[test]
     fn a_pitch_is_a_number_a_pair_or_unknown() {
-        let of = |pitch: &str| read(&format!(r#"{{"rows": 2, "columns": 3, "pitch_mm": {pitch}, "name": "a"}}"#));
-        assert_eq!(of("1").pitch_mm, Some(Pitch::square(1.0)));
-        assert_eq!(of("[1, 1]").pitch_mm, Some(Pitch::square(1.0)));
-        assert_eq!(of("null").pitch_mm, None);
-        assert_eq!(of("2.67").pitch_mm, Some(Pitch::square(2.67)));
-        assert_eq!(of("[7.62, 5.08]").pitch_mm, Some(Pitch { rows: 7.62, columns: 5.08 }));
+        let pitch_of = |pitch: &str| read(&format!(r#"{{"rows": 2, "columns": 3, "pitch_mm": {pitch}, "name": "a"}}"#));
+        assert_eq!(pitch_of("1").pitch_mm, Some(Pitch::square(1.0)));
+        assert_eq!(pitch_of("[1, 1]").pitch_mm, Some(Pitch::square(1.0)));
+        assert_eq!(pitch_of("null").pitch_mm, None);
+        assert_eq!(pitch_of("2.67").pitch_mm, Some(Pitch::square(2.67)));
+        assert_eq!(pitch_of("[7.62, 5.08]").pitch_mm, Some(Pitch { rows: 7.62, columns: 5.08 }));
         assert!(
             serde_json::from_str::<Array>(r#"{"rows": 2, "columns": 3, "pitch_mm": "wide", "name": "a"}"#).is_err()
         );

@@ -48,7 +48,7 @@ pub struct Baseline {
     above: Vec<f32>,
     /// The difference from the baseline from which a value is far.
     far: Vec<f32>,
-    /// Whether the baseline is held: see [`Baseline::hold`].
+    /// Whether the baseline is held: see [`Baseline::freeze`].
     held: Vec<bool>,
     /// Time constants of near values, of far ones, and of far ones of a baseline that is held, us.
     tau_us: [f64; 3],
@@ -143,7 +143,7 @@ impl Baseline {
     }
 
     /// Holds a taxel's baseline from now on: it follows far values with [`HELD_S`].
-    pub fn hold(&mut self, taxel: usize) {
+    pub fn freeze(&mut self, taxel: usize) {
         self.held[taxel] = true;
     }
 }

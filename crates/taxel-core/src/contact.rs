@@ -55,7 +55,7 @@ fn within(place: &str, name: &'static str, value: f64, unit: &'static str, range
 
 /// The outcome of a check as that of a scene; `place` names its owner in the error.
 fn of_scene(place: &str, outcome: Result<()>) -> Result<()> {
-    outcome.map_err(|error| scene(error).of(place))
+    outcome.map_err(|error| scene(error).in_part(place))
 }
 
 /// The same error as one of the scene.

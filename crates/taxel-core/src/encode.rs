@@ -123,20 +123,20 @@ impl Encoder {
     ///
     /// `Problem`, naming the parameter.
     pub fn from_json(json: &str) -> Result<Self> {
-        let mut given: Map<String, Value> = reading::from_text(json).map_err(|unfit| unfit.problem("encoder"))?;
+        let mut parameters: Map<String, Value> = reading::from_text(json).map_err(|unfit| unfit.problem("encoder"))?;
         let names = NAMES.join(", ");
-        let name = match given.remove("name") {
+        let name = match parameters.remove("name") {
             Some(Value::String(name)) => name,
             Some(other) => return Err(problem!("encoder {other}: must be one of {names}")),
             None => return Err(problem!("encoder without a name: must be one of {names}")),
         };
         // Errors of an encoder inside of another would not name its parameters, so each part is also read by itself.
-        if let (true, Some(Value::Object(parts))) = (name == "composite", given.get("parts")) {
+        if let (true, Some(Value::Object(parts))) = (name == "composite", parameters.get("parts")) {
             for (part, encoder) in parts {
-                Self::from_json(&encoder.to_string()).map_err(|error| error.of(part))?;
+                Self::from_json(&encoder.to_string()).map_err(|error| error.in_part(part))?;
             }
         }
-        let encoder = Self::read(&name, given.into())
+        let encoder = Self::read(&name, parameters.into())
             .ok_or_else(|| problem!("encoder {name}: must be one of {names}"))?
             .map_err(|unfit| unfit.problem(&format!("encoder {name}")))?;
         encoder.check()?;
@@ -248,7 +248,7 @@ impl Composite {
     /// # Errors
     ///
     /// `Problem` if there is no such part, or if a name comes twice.
-    pub fn named(&self, names: &[String]) -> Result<Vec<(&str, &Encoder)>> {
+    pub fn parts_named(&self, names: &[String]) -> Result<Vec<(&str, &Encoder)>> {
         for (n, name) in names.iter().enumerate() {
             if !self.parts.contains_key(name) {
                 let known: Vec<&str> = self.parts.keys().map(String::as_str).collect();
@@ -258,7 +258,7 @@ impl Composite {
                 return Err(problem!("inputs"; ": {name:?} comes twice"));
             }
         }
-        let chosen = |name: &str| names.is_empty() || names.iter().any(|given| given == name);
+        let chosen = |name: &str| names.is_empty() || names.iter().any(|wanted| wanted == name);
         Ok(self.parts.iter().map(|(name, part)| (name.as_str(), part)).filter(|(name, _)| chosen(name)).collect())
     }
 
@@ -266,10 +266,10 @@ impl Composite {
     ///
     /// # Errors
     ///
-    /// As [`Composite::named`].
+    /// As [`Composite::parts_named`].
     pub fn of_parts(&self, names: &[String], array: &Array) -> Result<Vec<bool>> {
-        let named = self.named(names)?;
-        let chosen = |name: &str| named.iter().any(|(given, _)| *given == name);
+        let named = self.parts_named(names)?;
+        let chosen = |name: &str| named.iter().any(|(part, _)| *part == name);
         let parts = self.parts.iter();
         Ok(parts.flat_map(|(name, part)| std::iter::repeat_n(chosen(name), inputs(part, array))).collect())
     }
@@ -292,7 +292,7 @@ impl Encoding for Composite {
             if matches!(part, Encoder::Composite(_)) {
                 return Err(problem!("composite: {name} is a composite itself: must be another encoder"));
             }
-            part.check().map_err(|error| error.of(name))?;
+            part.check().map_err(|error| error.in_part(name))?;
         }
         Ok(())
     }
@@ -301,7 +301,7 @@ impl Encoding for Composite {
         let mut trains = 0;
         let mut parts = vec![];
         for (name, part) in &self.parts {
-            parts.push((trains, part.stream(array).map_err(|error| error.of(name))?));
+            parts.push((trains, part.stream(array).map_err(|error| error.in_part(name))?));
             trains += inputs(part, array);
         }
         Ok(Box::new(SideBySide::new(parts, trains, self.kind())))

@@ -53,14 +53,14 @@ impl Error {
 
     /// The same error with a remedy, of which `argument` is the parameter that helps.
     #[must_use]
-    pub fn helped_by(self, argument: &str, hint: Hint) -> Self {
+    pub fn with_hint(self, argument: &str, hint: Hint) -> Self {
         self.with(|reason| Reason { argument: Some(argument.to_owned()), hint: Some(hint), ..reason })
     }
 
     /// The same error, with the name of the part that it is of in front of its text.
     #[must_use]
-    pub fn of(self, part: &str) -> Self {
-        self.with(|reason| reason.of(part))
+    pub fn in_part(self, part: &str) -> Self {
+        self.with(|reason| reason.in_part(part))
     }
 
     fn with(self, change: impl FnOnce(Reason) -> Reason) -> Self {
@@ -107,7 +107,7 @@ impl Reason {
     }
 
     /// The parameter is one of the part, so that a caller of the whole has no argument of that name; a remedy stays.
-    fn of(self, part: &str) -> Self {
+    fn in_part(self, part: &str) -> Self {
         match self.hint {
             None => Self { text: format!("{part}: {self}"), argument: None, hint: None },
             Some(_) => Self { text: format!("{part}: {}", self.text), ..self },

@@ -134,10 +134,10 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
     pub fn new(events: EventsView<'_>, chosen: Option<&[u32]>, begins: Vec<V>) -> Result<Self> {
         events.check()?;
         let values = events.values().map(|(k, taxel, ticks)| (events.t[k], taxel, V::from(ticks)));
-        Self::of(events.array, values, chosen, begins)
+        Self::from_values(events.array, values, chosen, begins)
     }
 
-    fn of(
+    fn from_values(
         array: &Array,
         values: impl Iterator<Item = (i64, usize, V)>,
         chosen: Option<&[u32]>,
@@ -148,8 +148,8 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
         let places = chosen.map(|chosen| {
             let mut places = vec![NONE; array.len()];
             for (place, &taxel) in (0..).zip(chosen) {
-                if let Some(of) = places.get_mut(taxel as usize) {
-                    *of = place;
+                if let Some(entry) = places.get_mut(taxel as usize) {
+                    *entry = place;
                 }
             }
             places
@@ -211,7 +211,7 @@ impl HeldOverTime<f32> {
         let taxel = |k: usize| events.array.index(events.x[k], events.y[k]);
         let steps = (0..events.len()).map(|k| (events.t[k], taxel(k), if events.p[k] { 1.0 } else { -1.0 }));
         let mut stepped =
-            Self::of(events.array, steps, chosen, vec![0.0; chosen.map_or(events.array.len(), <[u32]>::len)])?;
+            Self::from_values(events.array, steps, chosen, vec![0.0; chosen.map_or(events.array.len(), <[u32]>::len)])?;
         let mut level = stepped.held.clone();
         for change in &mut stepped.changes {
             change.value += level.values[change.place as usize];

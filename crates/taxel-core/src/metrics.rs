@@ -96,8 +96,8 @@ impl Metric {
     ///
     /// `Problem`, naming the parameter.
     pub fn from_json(json: &str) -> Result<Self> {
-        let mut given: Map<String, Value> = reading::from_text(json).map_err(|unfit| unfit.problem("metric"))?;
-        let name = given.remove("name").unwrap_or_default();
+        let mut parameters: Map<String, Value> = reading::from_text(json).map_err(|unfit| unfit.problem("metric"))?;
+        let name = parameters.remove("name").unwrap_or_default();
         let name = name.as_str().unwrap_or_default();
         let Some(Described { defaults, required, .. }) = Self::described(name) else {
             let names: Vec<String> = NAMES.iter().map(|name| format!("'{name}'")).collect();
@@ -106,10 +106,10 @@ impl Metric {
         // A metric may contain the parameters of another type, whose reader ignores unknown keys, so all keys are
         // checked here.
         let known: Vec<&str> = required.iter().copied().chain(defaults.keys().map(String::as_str)).collect();
-        if let Some(unknown) = given.keys().find(|key| !known.contains(&key.as_str())) {
+        if let Some(unknown) = parameters.keys().find(|key| !known.contains(&key.as_str())) {
             return Err(problem!(unknown.as_str(); " is not known: {name} takes {}", known.join(", ")));
         }
-        Self::read(name, given.into())
+        Self::read(name, parameters.into())
             .ok_or_else(|| problem!("metric {name}: cannot be read"))?
             .map_err(|unfit| unfit.problem(name))
     }

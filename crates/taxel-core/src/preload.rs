@@ -35,7 +35,7 @@ pub fn preload(less: &[f64], columns: usize, above: f64) -> Vec<f64> {
 /// empty without a preload.
 #[must_use]
 pub fn place(preload: &[f64], columns: usize, corner: (usize, usize)) -> String {
-    let on = || (0..preload.len()).filter(|&k| preload[k] > 0.0);
+    let loaded = || (0..preload.len()).filter(|&k| preload[k] > 0.0);
     let span = |name: &str, places: &mut dyn Iterator<Item = usize>| {
         let (least, most) = places.fold((usize::MAX, 0), |(least, most), at| (least.min(at), most.max(at)));
         if least == most { format!("{name} {least}") } else { format!("{name}s {least} to {most}") }
@@ -44,8 +44,8 @@ pub fn place(preload: &[f64], columns: usize, corner: (usize, usize)) -> String 
     if most == 0.0 {
         return String::new();
     }
-    let down = span("row", &mut on().map(|k| corner.0 + k / columns));
-    let across = span("column", &mut on().map(|k| corner.1 + k % columns));
+    let down = span("row", &mut loaded().map(|k| corner.0 + k / columns));
+    let across = span("column", &mut loaded().map(|k| corner.1 + k % columns));
     // Three digits that count.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let digits = (2.0 - most.log10().floor()).clamp(0.0, 12.0) as usize;

@@ -18,7 +18,7 @@ pub struct Unfit {
 impl Unfit {
     /// The whole error for a text that describes `what`.
     #[must_use]
-    pub fn of(&self, what: &str) -> String {
+    pub fn text(&self, what: &str) -> String {
         let colon = if self.message.starts_with(" is ") && self.place.is_empty() { "" } else { ": " };
         format!("{what}{colon}{}{}", self.place, self.message)
     }
@@ -27,7 +27,7 @@ impl Unfit {
     #[must_use]
     pub fn problem(self, what: &str) -> Error {
         match self.place.find(['.', '[']).map_or((self.place.as_str(), ""), |end| self.place.split_at(end)) {
-            ("", _) => Error::Problem(self.of(what).into()),
+            ("", _) => Error::Problem(self.text(what).into()),
             (argument, rest) => Error::argument(argument, &format!("{rest}{}", self.message)),
         }
     }
@@ -97,10 +97,10 @@ fn names<T: DeserializeOwned>(value: &Value, pointer: &str, message: &str) -> Op
 }
 
 /// Rewrites an error of serde_json in plain terms; its text is the only information that serde_json gives.
-fn in_words(place: String, there: Option<&Value>, message: &str) -> Unfit {
+fn in_words(place: String, value: Option<&Value>, message: &str) -> Unfit {
     let quoted = |start: &str| message.strip_prefix(start).and_then(|rest| rest.split('`').nth(1));
     let wanted = message.split_once(", expected ").map_or("", |(_, wanted)| wanted);
-    let is = |right: &str| there.map_or(format!(": {right}"), |value| format!(" is {}: {right}", shown(value)));
+    let must = |right: &str| value.map_or(format!(": {right}"), |value| format!(" is {}: {right}", value_text(value)));
     if let Some(name) = quoted("unknown field ") {
         let meant = nearest(name, wanted).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
         return Unfit {
@@ -113,11 +113,11 @@ fn in_words(place: String, there: Option<&Value>, message: &str) -> Unfit {
         return Unfit { place: format!("{place}{dot}{name}"), message: " is missing".to_owned() };
     }
     let message = if message.starts_with("unknown variant ") {
-        is(&format!("must be {}", choice(wanted)))
+        must(&format!("must be {}", choice(wanted)))
     } else if message.starts_with("invalid ") {
-        is(&format!("must be {}", kind(wanted, there)))
+        must(&format!("must be {}", kind(wanted, value)))
     } else if message.starts_with("must be ") {
-        is(message)
+        must(message)
     } else {
         format!(": {message}")
     };
@@ -141,7 +141,7 @@ fn nearest<'a>(name: &str, wanted: &'a str) -> Option<&'a str> {
 }
 
 /// A value as an error shows it: as JSON, shortened, with None for null.
-fn shown(value: &Value) -> String {
+fn value_text(value: &Value) -> String {
     let message = match value {
         Value::Null => "None".to_owned(),
         other => other.to_string(),
@@ -160,7 +160,7 @@ fn choice(wanted: &str) -> String {
 }
 
 /// The expected type, without the names of Rust's types.
-fn kind(wanted: &str, there: Option<&Value>) -> String {
+fn kind(wanted: &str, value: Option<&Value>) -> String {
     let most = match wanted {
         "u8" => Some(u64::from(u8::MAX)),
         "u16" => Some(u64::from(u16::MAX)),
@@ -168,7 +168,7 @@ fn kind(wanted: &str, there: Option<&Value>) -> String {
         "u64" | "usize" => Some(u64::MAX),
         _ => None,
     };
-    let too_many = there.and_then(Value::as_u64);
+    let too_many = value.and_then(Value::as_u64);
     match (wanted, most, too_many) {
         (_, Some(most), Some(_)) => format!("a whole number, at most {most}"),
         (_, Some(_), None) => "a whole number, 0 or more".to_owned(),
@@ -218,7 +218,7 @@ mod tests {
     }
 
     fn message(text: &str) -> String {
-        from_text::<Whole>(text).unwrap_err().of("whole")
+        from_text::<Whole>(text).unwrap_err().text("whole")
     }
 
     #[test]
@@ -272,6 +272,6 @@ mod tests {
     fn a_long_value_is_cut_and_a_name_can_stand_alone() {
         let text = format!("{{\"tau\": 1, \"inner\": {{\"tau\": \"{}\"}}}}", "é".repeat(100));
         let unfit = from_text::<Whole>(&text).unwrap_err().by_name();
-        assert_eq!(unfit.of("whole"), format!("whole: tau is \"{}...: must be a number", "é".repeat(56)));
+        assert_eq!(unfit.text("whole"), format!("whole: tau is \"{}...: must be a number", "é".repeat(56)));
     }
 }

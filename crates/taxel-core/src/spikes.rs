@@ -232,10 +232,10 @@ impl SpikeTrains {
         }
         let Some(values) = &self.values else { return Ok(self.clone()) };
         let (mut times, mut offsets) = (Vec::with_capacity(self.times.len()), vec![0]);
-        for on in [true, false] {
+        for positive in [true, false] {
             for n in 0..self.len() {
                 let range = self.offsets[n]..self.offsets[n + 1];
-                times.extend(range.filter(|&k| (values[k] > 0.0) == on).map(|k| self.times[k]));
+                times.extend(range.filter(|&k| (values[k] > 0.0) == positive).map(|k| self.times[k]));
                 offsets.push(times.len());
             }
         }

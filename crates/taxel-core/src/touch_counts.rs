@@ -116,19 +116,19 @@ impl TouchCounts {
 
     /// Reads an event: its time (us), the taxel, the value ([`UNKNOWN`] if it has none: then a step of 4 ticks), and
     /// whether the taxel itself changed, not what a state of version 2 says of it.
-    pub fn event(&mut self, t: i64, taxel: usize, ticks: u16, up: bool, own: bool) {
+    pub fn event(&mut self, t: i64, taxel: usize, ticks: u16, up: bool, changed: bool) {
         let value = if ticks == UNKNOWN {
             let held = self.place(taxel).map_or(f32::NAN, |place| self.bins[place].held);
             (if held.is_nan() { 0.0 } else { held }) + if up { 4.0 } else { -4.0 }
         } else {
             ticks.into()
         };
-        self.value(t, taxel, value, own);
+        self.value(t, taxel, value, changed);
     }
 
     /// Reads a taxel's value, ticks, at `t` us.
     #[inline]
-    pub fn value(&mut self, t: i64, taxel: usize, value: f32, own: bool) {
+    pub fn value(&mut self, t: i64, taxel: usize, value: f32, changed: bool) {
         if self.end.is_none_or(|end| t >= end) {
             self.advance(t);
         }
@@ -139,7 +139,7 @@ impl TouchCounts {
         let bin = &mut self.bins[place];
         bin.held = value;
         bin.greatest = bin.greatest.max(value);
-        bin.changes += u32::from(own);
+        bin.changes += u32::from(changed);
     }
 
     /// Ends the bins before `t` us.
@@ -186,7 +186,7 @@ impl TouchCounts {
     /// The places of the counted taxels up to `reach` rows and columns around that at `place`.
     fn around(&self, place: usize, reach: usize) -> impl Iterator<Item = usize> {
         let others = self.grid.around(self.taxels[place] as usize, reach);
-        others.filter_map(|other| self.place(other)).filter(move |&other| other != place)
+        others.filter_map(|neighbour| self.place(neighbour)).filter(move |&neighbour| neighbour != place)
     }
 
     fn end_bin(&mut self, t: i64) {
@@ -200,9 +200,9 @@ impl TouchCounts {
                 continue;
             }
             self.counts[place].pressed += 1;
-            for other in self.around(place, 1) {
-                near[other] += 1;
-                down[other] += u8::from(bin.held - rest >= TOUCH);
+            for neighbour in self.around(place, 1) {
+                near[neighbour] += 1;
+                down[neighbour] += u8::from(bin.held - rest >= TOUCH);
             }
         }
         for (place, &neighbours) in self.neighbours.iter().enumerate() {
@@ -231,9 +231,9 @@ impl TouchCounts {
                 continue;
             }
             let (mut most, mut second) = (0, 0);
-            for other in self.around(place, 2) {
-                let others = self.bins[other].changes;
-                (most, second) = if others > most { (others, most) } else { (most, second.max(others)) };
+            for neighbour in self.around(place, 2) {
+                let nearby = self.bins[neighbour].changes;
+                (most, second) = if nearby > most { (nearby, most) } else { (most, second.max(nearby)) };
             }
             self.counts[place].changed += 1;
             self.counts[place].by_itself += u32::from(changes >= OFTEN && changes > BY_ITSELF * second);

@@ -1,6 +1,6 @@
 //! The rest of a sensor whose rest was not measured: found in a quiet stretch, and tracked from there on.
 //!
-//! A taxel's rest is held ([`Baseline::hold`]) once it is known, so that a press that is held for long stays one: from a
+//! A taxel's rest is held ([`Baseline::freeze`]) once it is known, so that a press that is held for long stays one: from a
 //! given rest on; where none is given, from the first quiet stretch on; and from where it is set anew.
 //!
 //! Reading: a stretch is quiet if no taxel was further from its mean than the tracked rest calls far; on a grid, if no
@@ -88,7 +88,7 @@ impl RestStretch {
     }
 
     /// Whether it was quiet: see the module. `index` is that of a tracked taxel.
-    fn quiet(&self, far: f64, known: &[bool], grid: TaxelGrid, index: impl Fn(usize) -> usize) -> bool {
+    fn is_quiet(&self, far: f64, known: &[bool], grid: TaxelGrid, index: impl Fn(usize) -> usize) -> bool {
         let moved = |taxel: usize| {
             let mean = self.mean(taxel) - f64::from(self.first[taxel]);
             known[taxel] && (f64::from(self.greatest[taxel]) - mean).max(mean - f64::from(self.least[taxel])) >= far
@@ -149,7 +149,7 @@ pub struct TrackedRest {
     /// Whether a taxel had a value so far, or its rest was given.
     known: Vec<bool>,
     /// Whether the rest of any taxel was given: then the quiet stretch found none of the others, which were loaded.
-    given: bool,
+    rest_given: bool,
     stretch: Option<RestStretch>,
     far: f64,
     /// The first quiet stretch, us.
@@ -169,13 +169,13 @@ impl TrackedRest {
         let rest = begins.into_iter().map(|rest| if rest == f64::NO_REST { 0.0 } else { rest }).collect();
         #[allow(clippy::cast_possible_truncation)]
         let mut baseline = Baseline::tracked(rest, vec![far as f32; n]);
-        (0..n).filter(|&taxel| known[taxel]).for_each(|taxel| baseline.hold(taxel));
-        let given = known.contains(&true);
+        (0..n).filter(|&taxel| known[taxel]).for_each(|taxel| baseline.freeze(taxel));
+        let rest_given = known.contains(&true);
         let (grid, begins) = (TaxelGrid { taxels: n, columns: columns.max(1) }, vec![f64::NO_REST; n]);
         let (values, tracked) = (vec![0.0; n], None);
         let falls = false;
         let (stretch, quiet) = (None, None);
-        Self { grid, tracked, noise_floor, falls, baseline, values, known, given, stretch, far, quiet, begins }
+        Self { grid, tracked, noise_floor, falls, baseline, values, known, rest_given, stretch, far, quiet, begins }
     }
 
     /// The same of values that fall from their rest with pressure: what lies far above it was loaded before.
@@ -248,7 +248,7 @@ impl TrackedRest {
         let far = stands_out_from(FAR_NOISE, noise, self.noise_floor);
         let any = self.known.contains(&true);
         let index = |taxel: usize| self.tracked.as_ref().map_or(taxel, |tracked| tracked[taxel] as usize);
-        if stretch.samples < LEAST_SAMPLES || !any || !stretch.quiet(far, &self.known, self.grid, index) {
+        if stretch.samples < LEAST_SAMPLES || !any || !stretch.is_quiet(far, &self.known, self.grid, index) {
             return;
         }
         let first = self.quiet.is_none();
@@ -269,8 +269,8 @@ impl TrackedRest {
             if released || first && load < far {
                 self.baseline.set(taxel, mean);
             }
-            if released || !self.given {
-                self.baseline.hold(taxel);
+            if released || !self.rest_given {
+                self.baseline.freeze(taxel);
             }
             let (rest, begins) = (self.baseline.values()[taxel], &mut self.begins[taxel]);
             if *begins == f64::NO_REST {

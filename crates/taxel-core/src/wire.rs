@@ -17,7 +17,7 @@ pub use command::{Command, CommandReader};
 pub use cut::{CutDatagrams, cut};
 pub use decoder::{Counts, Decoder, Pairing, decode, most_rows};
 pub use registers::{Registers, WriteRefusal};
-pub use sender_decoder::{ClockJumps, DatagramInfo, Order, SenderDecoder, StepBack};
+pub use sender_decoder::{DatagramInfo, SenderDecoder, SenderTotals, StepBack};
 pub use v1::{STAMP_US, WORD_BYTES, Word, encode};
 
 /// A year, us: bounds a silence, so that no arrival time can overflow a board's 64-bit clock.
@@ -26,4 +26,13 @@ const LONGEST: i64 = 365 * 86_400 * 1_000_000;
 /// Time between two arrivals, us; 0 if the host's clock stepped back.
 fn silence(before: i64, now: i64) -> i64 {
     now.saturating_sub(before).clamp(0, LONGEST)
+}
+
+/// The counts of `$now` less those of `$earlier`, both of this type: the fields named first are subtracted, the others have
+/// the values after the semicolon.
+#[macro_export]
+macro_rules! counts_since {
+    ($now:expr, $earlier:expr; $($field:ident),+; $($other:tt)*) => {
+        Self { $($field: $now.$field - $earlier.$field,)+ $($other)* }
+    };
 }

@@ -109,7 +109,7 @@ struct Module {
 struct House(BTreeMap<Name, Module>);
 
 impl House {
-    fn of(package: &str) -> Self {
+    fn read(package: &str) -> Self {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join(package).join("src");
         let mut texts = BTreeMap::new();
         for file in files(&root) {
@@ -165,10 +165,10 @@ fn code(text: &str) -> String {
 }
 
 fn read(name: &Name, text: &str, names: &BTreeSet<Name>) -> Module {
-    let (mut module, mut rest, mut other) = (Module::default(), text, String::new());
+    let (mut module, mut rest, mut outside) = (Module::default(), text, String::new());
     while let Some(at) = next_use(rest) {
         let (before, after) = rest.split_at(at);
-        other.push_str(before);
+        outside.push_str(before);
         let (declared, left) = after.split_once(';').unwrap_or((after, ""));
         rest = left;
         let public = before.trim_end().ends_with("pub")
@@ -177,22 +177,22 @@ fn read(name: &Name, text: &str, names: &BTreeSet<Name>) -> Module {
             };
         for path in spread(declared.trim_start_matches("use").trim()) {
             let Some(path) = absolute(name, &path, names) else { continue };
-            let own = path.len() > name.len() && path.starts_with(name);
+            let is_own = path.len() > name.len() && path.starts_with(name);
             match path.last() {
-                Some(last) if public && own => drop(module.exports.insert(last.clone(), path.clone())),
+                Some(last) if public && is_own => drop(module.exports.insert(last.clone(), path.clone())),
                 _ => module.uses.push(path),
             }
         }
     }
-    other.push_str(rest);
+    outside.push_str(rest);
     let path_like = |c: char| c.is_alphanumeric() || c == '_' || c == ':' || c == '$';
-    for word in other.split(|c| !path_like(c)).filter(|word| word.contains("::")) {
+    for word in outside.split(|c| !path_like(c)).filter(|word| word.contains("::")) {
         module.uses.extend(absolute(name, word.trim_matches(':'), names));
     }
-    module.uses.extend(named(&other).filter_map(|word| module.exports.get(word).cloned()));
-    if other.contains("mod $") {
+    module.uses.extend(named(&outside).filter_map(|word| module.exports.get(word).cloned()));
+    if outside.contains("mod $") {
         let child = |word: &str| [name.as_slice(), &[word.to_owned()]].concat();
-        module.uses.extend(listed(&other).map(child).filter(|child| names.contains(child)));
+        module.uses.extend(listed(&outside).map(child).filter(|child| names.contains(child)));
     }
     module
 }
@@ -274,15 +274,15 @@ fn absolute(name: &Name, path: &str, names: &BTreeSet<Name>) -> Option<Name> {
 /// Groups of modules that depend on each other in a circle, ordered by name.
 fn circles(edges: &BTreeMap<Name, BTreeSet<Name>>) -> BTreeSet<Vec<String>> {
     let reach = |from: &Name| {
-        let (mut seen, mut next) = (BTreeSet::new(), vec![from.clone()]);
+        let (mut reached, mut next) = (BTreeSet::new(), vec![from.clone()]);
         while let Some(module) = next.pop() {
             for to in edges.get(&module).into_iter().flatten() {
-                if seen.insert(to.clone()) {
+                if reached.insert(to.clone()) {
                     next.push(to.clone());
                 }
             }
         }
-        seen
+        reached
     };
     let reached: BTreeMap<&Name, BTreeSet<Name>> = edges.keys().map(|name| (name, reach(name))).collect();
     let ring = |name: &Name| {
@@ -296,11 +296,11 @@ fn circles(edges: &BTreeMap<Name, BTreeSet<Name>>) -> BTreeSet<Vec<String>> {
 fn a_module_imports_only_from_floors_below() {
     for (package, floors) in FLOORS {
         let floor = |name: &str| floors.iter().position(|floor| floor.contains(&name));
-        for (module, used) in House::of(package).edges() {
+        for (module, used) in House::read(package).edges() {
             let Some(from) = module.first() else { continue };
-            let own = floor(from).unwrap_or_else(|| panic!("{package}: {from} stands on no floor of FLOORS"));
+            let floor_from = floor(from).unwrap_or_else(|| panic!("{package}: {from} stands on no floor of FLOORS"));
             for to in used.iter().filter(|to| to[0] != *from) {
-                let below = floor(&to[0]).is_some_and(|other| other < own);
+                let below = floor(&to[0]).is_some_and(|other| other < floor_from);
                 assert!(below, "{package}: {} imports {}, which is not below it", module.join("::"), to.join("::"));
             }
         }
@@ -310,7 +310,7 @@ fn a_module_imports_only_from_floors_below() {
 #[test]
 fn no_modules_import_in_a_circle() {
     let found: BTreeSet<Vec<String>> =
-        FLOORS.iter().flat_map(|(package, _)| circles(&House::of(package).edges())).collect();
+        FLOORS.iter().flat_map(|(package, _)| circles(&House::read(package).edges())).collect();
     assert!(found.is_empty(), "modules import each other in a circle: {found:?}");
 }
 

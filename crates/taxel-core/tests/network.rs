@@ -100,9 +100,9 @@ fn of_version_2_every_intact_datagram_is_decoded_once_and_all_counts_close() {
         assert_eq!(c.intact + c.missing + ends, sent.len() as u64, "seed {seed}");
         // The events of one datagram decoded alone; states only give events for values that differ.
         let alone = |k: u32| {
-            let mut one = Events::empty(Array::thesis());
-            v2::Decoder::new(Array::thesis()).push(&sent[k as usize], None, &mut one);
-            one
+            let mut events = Events::empty(Array::thesis());
+            v2::Decoder::new(Array::thesis()).push(&sent[k as usize], None, &mut events);
+            events
         };
         let plain = |events: &Events| -> Vec<Row> {
             rows(events).into_iter().enumerate().filter(|(k, _)| !events.is_repaired(*k)).map(|(_, row)| row).collect()

@@ -96,14 +96,14 @@ fn every_step_back_is_listed_over_any_restarts_and_any_network() {
             behind += u64::from(second && t < latest && latest - t > FARTHEST_BACK_US);
             latest = latest.max(t);
         }
-        let (order, expected) = (sender.order(), steps_of(&events.t));
-        assert_eq!((order.overtaken(), order.far()), (overtaken, behind), "seed {seed}");
-        assert_eq!(order.count(), expected.len() as u64, "seed {seed}");
+        let (totals, steps, expected) = (sender.totals(), sender.steps_back(), steps_of(&events.t));
+        assert_eq!((totals.overtaken, totals.far_behind), (overtaken, behind), "seed {seed}");
+        assert_eq!(totals.steps_back, expected.len() as u64, "seed {seed}");
         if expected.len() <= 256 {
-            assert_eq!(order.steps(), expected, "seed {seed}");
+            assert_eq!(steps, expected, "seed {seed}");
         } else {
-            let least = order.steps().iter().map(|step| step.by_us).min().unwrap();
-            assert_eq!(order.steps().len(), 256);
+            let least = steps.iter().map(|step| step.by_us).min().unwrap();
+            assert_eq!(steps.len(), 256);
             assert!(expected.iter().filter(|step| step.by_us > least).count() <= 256, "seed {seed}: the largest");
         }
         far += behind;
@@ -126,9 +126,10 @@ fn a_killed_board_that_starts_again_with_the_same_session_makes_no_step_back() {
         arriving.drain(..random.random_range(1..30));
         let mut sender = SenderDecoder::new(Decoder::new(Array::thesis()), 1);
         let mut events = Events::empty(Array::thesis());
-        let resets = arriving.iter().filter(|(at, one)| sender.push(one, Some(*at), &mut events).reset).count();
+        let resets =
+            arriving.iter().filter(|(at, datagram)| sender.push(datagram, Some(*at), &mut events).reset).count();
         assert!(events.t.is_sorted(), "seed {seed}");
-        assert_eq!((sender.order().count(), resets), (0, lives - 1), "seed {seed}");
+        assert_eq!((sender.totals().steps_back, resets), (0, lives - 1), "seed {seed}");
     }
 }
 
@@ -143,8 +144,8 @@ fn one_delayed_datagram_is_no_restart() {
         arriving.insert(at, (arriving[at].0, datagram));
         let mut sender = SenderDecoder::new(Decoder::new(Array::thesis()), 1);
         let mut events = Events::empty(Array::thesis());
-        for (at, one) in &arriving[1..] {
-            sender.push(one, Some(9_000_000 + at), &mut events);
+        for (at, datagram) in &arriving[1..] {
+            sender.push(datagram, Some(9_000_000 + at), &mut events);
         }
         assert_eq!((sender.version_2().counts().resets, sender.version_2().counts().missing), (0, 0), "seed {seed}");
     }

@@ -21,9 +21,9 @@ fn of_patch(array: &Array, row: usize, column: usize, patch: (usize, usize), see
     }
     counts.advance(5_000_000);
     let mut all = vec![TaxelCounts::default(); array.len()];
-    for (&taxel, &of) in counts.taxels().iter().zip(counts.counts()) {
+    for (&taxel, &counts) in counts.taxels().iter().zip(counts.counts()) {
         assert_eq!(all[taxel as usize], TaxelCounts::default(), "taxel {taxel} is counted twice");
-        all[taxel as usize] = of;
+        all[taxel as usize] = counts;
     }
     all
 }
@@ -43,7 +43,7 @@ fn a_patch_inside_a_larger_array_counts_as_the_patch_with_a_border_does() {
             }
         }
     }
-    assert!(outside.iter().all(|&of| of == TaxelCounts::default()));
+    assert!(outside.iter().all(|&counts| counts == TaxelCounts::default()));
     let dead = inside[122 * 300 + 202];
     assert!(dead.touches >= 3 && dead.missed == dead.touches, "{dead:?}");
 }

@@ -28,7 +28,7 @@ fn rows(events: &Events) -> Vec<Row> {
 #[test]
 fn a_vector_means_what_its_json_says() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/wire");
-    let mut seen = 0;
+    let mut vectors = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_none_or(|e| e != "json") {
@@ -57,7 +57,7 @@ fn a_vector_means_what_its_json_says() {
             assert_eq!(markers, vector.markers, "{path:?}, {set:?}");
             assert_eq!(decoder.counts(), &vector.counts, "{path:?}, {set:?}");
         }
-        seen += 1;
+        vectors += 1;
     }
-    assert!(seen >= 16, "{seen} vectors");
+    assert!(vectors >= 16, "{vectors} vectors");
 }

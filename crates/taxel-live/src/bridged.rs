@@ -39,15 +39,9 @@ impl Bridged {
     /// The difference from earlier counts.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
-        Self {
-            parcels: self.parcels - earlier.parcels,
-            missing: self.missing - earlier.missing,
-            dropped: self.dropped - earlier.dropped,
-            dropped_by_kernel: self.dropped_by_kernel - earlier.dropped_by_kernel,
-            repeated: self.repeated - earlier.repeated,
-            refused: self.refused - earlier.refused,
-            restarts: self.restarts - earlier.restarts,
-            silences: self.silences - earlier.silences,
+        taxel_core::counts_since! {
+            self, earlier;
+            parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences;
             ..*self
         }
     }

@@ -2,7 +2,7 @@
 //! queue. Datagrams from another computer ([`ParcelFeed`]) pass through the same queue.
 //!
 //! By default the caller receives in its own thread, which saves a wake-up and a copy. A caller that may wait for a disk requests a
-//! separate thread ([`Receiver::apart`]), which receives in the meantime.
+//! separate thread ([`Receiver::receive_in_thread`]), which receives in the meantime.
 //!
 //! All datagrams are accounted for. At the socket: arrived messages = [`CaptureCounts::messages`] + [`CaptureCounts::dropped_by_kernel`]. Behind it:
 //! [`CaptureCounts::datagrams`] = datagrams read + datagrams waiting + [`CaptureCounts::dropped_by_queue`].
@@ -118,7 +118,7 @@ impl Receiver {
     /// # Errors
     ///
     /// `Socket` if the system cannot create a thread.
-    pub fn apart(&self, gather: Duration) -> Result<()> {
+    pub fn receive_in_thread(&self, gather: Duration) -> Result<()> {
         let From::Socket(socket, thread) = &self.from else { return Ok(()) };
         let Some(socket) = lock(socket).take() else { return Ok(()) };
         let queue = Arc::clone(&self.queue);
@@ -186,14 +186,14 @@ impl Receiver {
             From::Socket(socket, _) => {
                 let mut socket = lock(socket);
                 match &mut *socket {
-                    Some(own) => {
-                        let came = self.receive_here(own, batch, timeout);
+                    Some(open) => {
+                        let received = self.receive_here(open, batch, timeout);
                         if self.queue.is_done() {
                             // Closing the socket lets another receiver bind the address while the counts are still
                             // read.
                             *socket = None;
                         }
-                        came
+                        received
                     }
                     None => self.queue.pop(batch, timeout),
                 }

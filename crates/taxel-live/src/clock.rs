@@ -203,9 +203,9 @@ impl BoardClock {
         let middle = self.middle();
         let from_middle = |&(t, late): &ArrivalPoint| ((t - middle) as f64, (late - zero.1) as f64);
         let all = self.stretches.iter().flat_map(|stretch| stretch.quick.iter().map(from_middle)).collect();
-        let points = Points { all, early: self.stretches.iter().map(ArrivalStretch::early).sum() };
+        let points = Points { all, early: self.stretches.iter().map(ArrivalStretch::early_points).sum() };
         let slope = points.slope(self.offset.map_or(0.0, |offset| offset.drift_ppm * 1e-3), most);
-        let height = points.under(slope).0 + slope * (origin - middle) as f64;
+        let height = points.line_below(slope).0 + slope * (origin - middle) as f64;
         // The slope is in ns per us, that is, in thousandths.
         let host_ns = origin * 1000 + zero.1 + height as i64;
         self.offset = Some(Offset { board_us: origin, host_ns, drift_ppm: slope * 1e3 });
@@ -348,15 +348,15 @@ mod tests {
 
     #[test]
     fn datagrams_that_leave_together_are_one_point() {
-        let (mut one, mut many) = (BoardClock::default(), BoardClock::default());
+        let (mut each, mut batch) = (BoardClock::default(), BoardClock::default());
         for k in 0..4000_i64 {
             let arrived = k * 1_000_000 + (k * 7919 % 97) * 1000;
-            one.note(k * 1000, arrived);
+            each.note(k * 1000, arrived);
             for behind in [40_000, 0, 20_000, 60_000] {
-                many.note(k * 1000, arrived + behind);
+                batch.note(k * 1000, arrived + behind);
             }
         }
-        assert_eq!(one.offset(), many.offset());
+        assert_eq!(each.offset(), batch.offset());
     }
 
     #[test]
@@ -477,6 +477,6 @@ mod tests {
         let most = usize::try_from(STRETCH_US / PART_US).expect("some") * QUICK;
         assert!(clock.stretches.iter().chain([&clock.running]).all(|stretch| stretch.quick.len() <= most));
         assert!(clock.stretches.len() <= STRETCHES);
-        assert_eq!(clock.arrivals.remembered(), STRETCHES);
+        assert_eq!(clock.arrivals.fastest_count(), STRETCHES);
     }
 }

@@ -47,7 +47,7 @@ pub trait Touch: Send {
     /// # Errors
     ///
     /// As [`Touch::frame`].
-    fn is_there(&mut self) -> Result<bool> {
+    fn has_frame(&mut self) -> Result<bool> {
         Ok(true)
     }
 
@@ -218,7 +218,7 @@ impl Emulator {
         let mut run = self.begin();
         let mut last = false;
         while !last {
-            while !stop.asked() && !touch.is_there()? {
+            while !stop.asked() && !touch.has_frame()? {
                 self.control.serve(&mut self.board);
             }
             last = stop.asked() || !touch.frame(&mut ticks, stop)? || stop.asked();
@@ -274,7 +274,7 @@ impl Emulator {
             run.before_reset_us = since_us;
             run.resets += 1;
             self.board.reset()?;
-            self.control.greet(&self.board);
+            self.control.send_greeting(&self.board);
         }
         Ok(())
     }

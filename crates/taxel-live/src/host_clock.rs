@@ -70,7 +70,7 @@ pub struct RoundTrip {
 /// The offsets that a round trip allows.
 #[derive(Debug, Clone, Copy)]
 struct Allowed {
-    here: i64,
+    here_ns: i64,
     least: i64,
     most: i64,
 }
@@ -103,8 +103,8 @@ impl HostClock {
         else {
             return;
         };
-        let Some(here) = trip.back.checked_sub(trip.asked).map(|passed| trip.asked + passed / 2) else { return };
-        let allowed = Allowed { here, least, most };
+        let Some(here_ns) = trip.back.checked_sub(trip.asked).map(|passed| trip.asked + passed / 2) else { return };
+        let allowed = Allowed { here_ns, least, most };
         if !(0..=LONGEST_NS).contains(&most.saturating_sub(least)) {
             return;
         }
@@ -117,7 +117,7 @@ impl HostClock {
         }
         self.astray = 0;
         match self.narrowest {
-            Some(before) if allowed.here.div_euclid(STRETCH_NS) == before.here.div_euclid(STRETCH_NS) => {
+            Some(before) if allowed.here_ns.div_euclid(STRETCH_NS) == before.here_ns.div_euclid(STRETCH_NS) => {
                 if allowed.width() < before.width() {
                     self.narrowest = Some(allowed);
                 }
@@ -142,7 +142,7 @@ impl HostClock {
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
     fn contradicts(&self, allowed: &Allowed) -> bool {
         let Some(offset) = self.offset else { return false };
-        let since = allowed.here - offset.here_ns;
+        let since = allowed.here_ns - offset.here_ns;
         let expected = offset.ahead_ns + (since as f64 * offset.drift_ppm * 1e-6) as i64;
         let slack = ASTRAY_NS + (since.abs() as f64 * MOST_DRIFT) as i64;
         expected < allowed.least - slack || expected > allowed.most + slack
@@ -158,8 +158,8 @@ impl HostClock {
                 .iter()
                 .enumerate()
                 .flat_map(|(k, a)| narrow.iter().skip(k + 1).map(move |b| (a, b)))
-                .filter(|(a, b)| b.here > a.here)
-                .map(|(a, b)| (b.middle() - a.middle()) as f64 / (b.here - a.here) as f64)
+                .filter(|(a, b)| b.here_ns > a.here_ns)
+                .map(|(a, b)| (b.middle() - a.middle()) as f64 / (b.here_ns - a.here_ns) as f64)
                 .collect();
             if !slopes.is_empty() {
                 let middle = slopes.len() / 2;
@@ -168,11 +168,11 @@ impl HostClock {
             }
         }
         let newest = narrow.iter().rev().take(counts);
-        let moved = |bound: i64, at: i64| bound - ((at - last.here) as f64 * drift) as i64;
-        let least = newest.clone().map(|a| moved(a.least, a.here)).max().unwrap_or(last.least);
-        let most = newest.map(|a| moved(a.most, a.here)).min().unwrap_or(last.most);
+        let moved = |bound: i64, at: i64| bound - ((at - last.here_ns) as f64 * drift) as i64;
+        let least = newest.clone().map(|a| moved(a.least, a.here_ns)).max().unwrap_or(last.least);
+        let most = newest.map(|a| moved(a.most, a.here_ns)).min().unwrap_or(last.most);
         self.offset = Some(HostOffset {
-            here_ns: last.here,
+            here_ns: last.here_ns,
             ahead_ns: least + (most - least) / 2,
             drift_ppm: drift * 1e6,
             within_ns: (most - least).abs() / 2,
@@ -250,9 +250,9 @@ mod tests {
         other.exchanged(&mut clock, 0, 10, &mut chance);
         let before = clock.offset().expect("some came").ahead_ns;
         let set = Other { ahead_ns: -5_000_000_000, drift: 0.0 };
-        let mut one = clock.clone();
-        set.exchanged(&mut one, 10, 0, &mut chance);
-        assert_eq!(one.offset().expect("some came").ahead_ns, before);
+        let mut after_one = clock.clone();
+        set.exchanged(&mut after_one, 10, 0, &mut chance);
+        assert_eq!(after_one.offset().expect("some came").ahead_ns, before);
         set.exchanged(&mut clock, 10, 2, &mut chance);
         assert!((clock.offset().expect("some came").ahead_ns + 5_000_000_000).abs() < 100_000);
     }

@@ -48,10 +48,10 @@ impl Latencies {
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn quantile(&self, q: f64) -> u64 {
         let wanted = (q * self.count as f64).ceil().max(1.0) as u64;
-        let mut seen = 0;
+        let mut sum = 0;
         for (k, &n) in self.buckets.iter().enumerate() {
-            seen += n;
-            if seen >= wanted {
+            sum += n;
+            if sum >= wanted {
                 return top(k).min(self.max_ns);
             }
         }

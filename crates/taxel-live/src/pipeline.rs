@@ -7,7 +7,6 @@
 //! does not fit is counted where it was lost. Viewers receive copies ([`Live::counters`], [`Live::frame`]) and cannot
 //! slow the pipeline.
 
-mod ahead;
 mod copies;
 mod counters;
 mod decode;
@@ -22,14 +21,15 @@ mod receive;
 mod record;
 mod recorder;
 mod recordings;
-mod rest;
 mod running_readout;
 mod sending;
 mod shared;
 mod sink;
 mod source;
 mod sources;
+mod speculative_readout;
 mod stages;
+mod tare_measurement;
 mod threads;
 mod viewer_queue;
 
@@ -132,7 +132,7 @@ impl Live {
             return Err(taxel_core::problem!("source {name} without a recording: nothing would keep it").into());
         }
         let sources = options.sources.iter();
-        let sources = sources.map(|(name, what)| Ok(FurtherSource { name: name.clone(), kind: what.parse()? }));
+        let sources = sources.map(|(name, source)| Ok(FurtherSource { name: name.clone(), kind: source.parse()? }));
         let sources = sources.collect::<Result<_>>()?;
         Self::begin(Box::new(receiver), options, sources, readout, sinks, None)
     }
@@ -193,10 +193,10 @@ impl Live {
         });
         let (queue, detections) = channel::bounded(OUTPUT_WAITING);
         let reads_out = !matches!(readout, ReadoutSetup::None);
-        let board = |address, own: LiveOptions, part| {
-            let capture = own.capture();
+        let board = |address, options: LiveOptions, part| {
+            let capture = options.capture();
             let receiver = move || Receiver::bind(address, capture);
-            Self::begin(Box::new(receiver), own, vec![], ReadoutSetup::None, vec![], Some(part))
+            Self::begin(Box::new(receiver), options, vec![], ReadoutSetup::None, vec![], Some(part))
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
             // Nothing arrived: a new file is removed.
@@ -209,7 +209,7 @@ impl Live {
         let mut live =
             Self { shared: Arc::clone(&shared), detections, threads: vec![], others, recordings: Arc::new(recordings) };
         // The destinations come first: a device that detections drive must not wait for a callback.
-        let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
+        let sending = sending.into_iter().map(|sending| Box::new(sending) as Box<dyn Sink>);
         let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
         let readout = reads_out.then(|| RunningReadout::new(readout, &options));
         let stages = Stages::new(&shared, readout);

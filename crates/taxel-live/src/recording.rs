@@ -2,15 +2,15 @@
 //!
 //! A recording contains the datagrams as they arrived, not decoded events, with the host's arrival time and an arrival
 //! number. It also contains the board's registers, markers, notes, detections, counts of what was lost, and a low-rate
-//! picture in a standard schema, so that any MCAP viewer shows something.
+//! preview in a standard schema, so that any MCAP viewer shows something.
 //!
 //! A file is readable at any time: chunks are written whole, at the latest [`FLUSH_EVERY`] after their first datagram,
 //! and the reader rebuilds the index by walking the records, whether the file was finished or not.
 
 mod damage;
-mod event_pictures;
+mod event_previews;
 mod frames;
-mod grey_picture;
+mod grey_preview;
 mod limits;
 mod lsa;
 mod mcap_reader;
@@ -27,9 +27,9 @@ use serde::{Deserialize, Serialize};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
-pub(crate) use damage::{ADDRESS, EMPTY, REFUSED, add_order};
+pub(crate) use damage::ADDRESS;
 pub use damage::{DamageCounts, LeftOut, damage, damage_of_version_1};
-pub use event_pictures::EventPreviews;
+pub use event_previews::EventPreviews;
 pub use frames::{FrameEncoding, FrameProperties, Frames};
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub use mcap_reader::{

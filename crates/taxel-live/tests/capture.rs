@@ -12,7 +12,7 @@ const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST
 /// A receiver with a thread of its own, which queues datagrams until they are read.
 fn bind(options: ReceiverOptions) -> Receiver {
     let receiver = Receiver::bind(ANY, options).expect("loopback binds");
-    receiver.apart(Duration::from_millis(1)).expect("a thread");
+    receiver.receive_in_thread(Duration::from_millis(1)).expect("a thread");
     receiver
 }
 
@@ -77,7 +77,7 @@ fn who_takes_receives_by_himself_until_a_thread_does() {
         assert!(!receiver.receive(&mut batch, Duration::from_millis(1)).expect("a sound socket"), "nothing came");
         for round in 0..60 {
             if round == apart {
-                receiver.apart(Duration::from_millis(apart % 2)).expect("a thread");
+                receiver.receive_in_thread(Duration::from_millis(apart % 2)).expect("a thread");
             }
             for k in 10 * round..10 * round + 10 {
                 sender.push(&datagram(k)).expect("sent");
@@ -105,7 +105,7 @@ fn an_address_is_free_again_when_all_was_read_though_the_receiver_lives() {
     for apart in [false, true] {
         let receiver = bind(ReceiverOptions::default());
         if apart {
-            receiver.apart(Duration::ZERO).expect("a thread");
+            receiver.receive_in_thread(Duration::ZERO).expect("a thread");
         }
         send(receiver.address(), 3, false);
         assert_eq!(drain(&receiver).0.len(), 3);
@@ -118,7 +118,7 @@ fn what_came_after_the_stop_is_left() {
     for apart in [false, true] {
         let receiver = Receiver::bind(ANY, ReceiverOptions::default()).expect("a port");
         if apart {
-            receiver.apart(Duration::ZERO).expect("a thread");
+            receiver.receive_in_thread(Duration::ZERO).expect("a thread");
         }
         let to = receiver.address();
         let ended = AtomicBool::new(false);

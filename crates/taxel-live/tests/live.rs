@@ -88,20 +88,20 @@ fn emulate(to: SocketAddr, real_time: bool, mut touch: impl Touch) -> Report {
 /// Reads every event and fires after some forty within `tau` ms, which is how slowly its kernel rises.
 fn readout(tau: f64) -> Readout {
     let neuron = Neuron { tau, refractory: 15.0, theta_0: 0.4, ..Neuron::default() };
-    let one = TrainedNeuron { delay_ms: 0.0, inputs: vec![], weights: vec![0.03; 2 * 4096], neuron };
-    of(r#"{"name": "change_events"}"#, one)
+    let cell = TrainedNeuron { delay_ms: 0.0, inputs: vec![], weights: vec![0.03; 2 * 4096], neuron };
+    readout_of(r#"{"name": "change_events"}"#, cell)
 }
 
-fn of(encoder: &str, one: TrainedNeuron) -> Readout {
+fn readout_of(encoder: &str, cell: TrainedNeuron) -> Readout {
     Readout {
         encoder: Encoder::from_json(encoder).expect("an encoder"),
         array: None,
         unit: None,
         time: Time::Continuous,
-        after_spike: one.neuron.after_spike,
+        after_spike: cell.neuron.after_spike,
         run_threshold: 1.0,
         delays_ms: vec![0.0],
-        neurons: [("touch".to_owned(), one)].into(),
+        neurons: [("touch".to_owned(), cell)].into(),
         seen: BTreeMap::new(),
     }
 }
@@ -216,15 +216,15 @@ fn detections_live_are_those_of_the_recording() {
     assert!(delivered.iter().all(|s| s.reported_us >= s.detection.known - 192), "{delivered:?}");
 }
 
-/// The board's times of a recording's pictures, us.
-fn pictured(path: &Scratch) -> Vec<i64> {
+/// The board's times of a recording's previews, us.
+fn preview_times(path: &Scratch) -> Vec<i64> {
     let mut times = vec![];
     let reader = Reader::open(&path.0).expect("a recording");
     reader
         .messages(Stop::never(), |message| {
             if message.topic == Topic::Pressure {
-                let picture: serde_json::Value = serde_json::from_slice(message.data).expect("JSON");
-                times.push(picture["t_us"].as_i64().expect("a time"));
+                let preview: serde_json::Value = serde_json::from_slice(message.data).expect("JSON");
+                times.push(preview["t_us"].as_i64().expect("a time"));
             }
             Ok(())
         })
@@ -233,19 +233,19 @@ fn pictured(path: &Scratch) -> Vec<i64> {
 }
 
 #[test]
-fn a_recording_has_pictures_around_detections_beside_ten_a_second() {
-    let path = Scratch::new("pictured.mcap");
+fn a_recording_has_previews_around_detections_beside_ten_a_second() {
+    let path = Scratch::new("preview_times.mcap");
     let begun = Instant::now();
     let live = Live::start(ANY, options(Some(&path)), reading(&readout(2.0)), vec![]).expect("a port and a file");
-    // A press begins each 40 ms; ten pictures a second would miss more than half of them.
+    // A press begins each 40 ms; ten previews a second would miss more than half of them.
     emulate(live.address(), true, presses(6000, 6000));
     while live.next(Duration::from_millis(200)).expect("no error").is_some() {}
     live.stop().expect("no error");
     let tenths = begun.elapsed().as_millis() / 100;
-    let (times, detections) = (pictured(&path), recorded(&path).1);
+    let (times, detections) = (preview_times(&path), recorded(&path).1);
     assert!(detections.len() > 20, "{}", detections.len());
-    assert!(times.len() as u128 > 2 * tenths, "{} pictures in {tenths} tenths of a second", times.len());
-    assert!(times.len() as u128 <= 10 * tenths + 12, "{} pictures in {tenths} tenths of a second", times.len());
+    assert!(times.len() as u128 > 2 * tenths, "{} previews in {tenths} tenths of a second", times.len());
+    assert!(times.len() as u128 <= 10 * tenths + 12, "{} previews in {tenths} tenths of a second", times.len());
 }
 
 #[test]
@@ -403,7 +403,8 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
     let mut weights = vec![0.0; 10];
     weights[0] = 3.0;
     let neuron = Neuron { tau: 0.5, refractory: 15.0, ..Neuron::default() };
-    let readout = of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, inputs: vec![], weights });
+    let readout =
+        readout_of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, inputs: vec![], weights });
     let path = Scratch::new("tare.mcap");
     let setup = ReadoutSetup::Taring(1_000_000, Box::new(readout.clone().into()));
     let live = Live::start(ANY, options(Some(&path)), setup, vec![]).expect("a port");

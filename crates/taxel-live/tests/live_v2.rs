@@ -142,16 +142,16 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
     let array = Array::thesis();
     let registers = Registers { wire_version: 2, ..Registers::default() };
     let neuron = Neuron { tau: 20.0, refractory: 15.0, theta_0: 0.4, ..Neuron::default() };
-    let one = TrainedNeuron { delay_ms: 0.0, inputs: vec![], weights: vec![0.03; 2 * 4096], neuron };
+    let cell = TrainedNeuron { delay_ms: 0.0, inputs: vec![], weights: vec![0.03; 2 * 4096], neuron };
     let readout = Readout {
         encoder: Encoder::from_json(r#"{"name": "change_events"}"#).expect("an encoder"),
         array: None,
         unit: None,
         time: Time::Continuous,
-        after_spike: one.neuron.after_spike,
+        after_spike: cell.neuron.after_spike,
         run_threshold: 1.0,
         delays_ms: vec![0.0],
-        neurons: [("touch".to_owned(), one)].into(),
+        neurons: [("touch".to_owned(), cell)].into(),
         seen: BTreeMap::new(),
     };
     let readout = ReadoutSetup::Reading(Box::new(readout.stream(&array, 192.0, None).expect("a sound readout")));

@@ -46,7 +46,7 @@ fn record(path: &Path, datagrams: u64, compression: Compression) {
     let detection = Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5, repaired: true };
     writer.detection(1_000_000_000_700, &detection).unwrap();
     writer.registers(1_000_000_000_800, &header().registers.unwrap()).unwrap();
-    writer.picture(1_000_000_000_900, 192, 64, &vec![75; 4096]).unwrap();
+    writer.preview(1_000_000_000_900, 192, 64, &vec![75; 4096]).unwrap();
     let counts = RecordingCounts { received: datagrams, ..RecordingCounts::default() };
     writer.finish(counts).unwrap();
 }
@@ -282,7 +282,7 @@ fn all_that_a_decoder_of_version_2_could_not_use_is_damage() {
         unknown_value: 11,
         ..v2::Counts::default()
     };
-    let (decoder, missing) = damage(&wire::Counts::default(), 0, 0, &found);
+    let (decoder, missing) = damage(&wire::Counts::default(), &found, &wire::SenderTotals::default());
     let verdict =
         RecordingCounts { received: 9, recorded: 9, missing, decoder, ..RecordingCounts::default() }.verdict();
     let expected = [

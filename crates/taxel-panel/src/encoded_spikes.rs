@@ -110,7 +110,7 @@ impl EncodedSpikes {
     ) -> Result<Self> {
         if frames.numbered() {
             let text = "spikes have times, and these frames are numbered, so their rate is not known";
-            return Err(problem!("{text}").helped_by("rate_hz", Hint::Give).into());
+            return Err(problem!("{text}").with_hint("rate_hz", Hint::Give).into());
         }
         let sensors = frames.sensors();
         let mut spikes = Self::begin(encoder, &sensors, frames.array(), column_us)?;

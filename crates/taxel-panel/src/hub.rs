@@ -114,7 +114,7 @@ impl Hub {
             let mut board = self.board();
             if board.known {
                 // It is the board whose registers were read: the other source begins with them.
-                handle.wrote(board.registers);
+                handle.announce_registers(board.registers);
             } else {
                 board.registers = handle.registers();
             }
@@ -253,7 +253,7 @@ impl Hub {
 
     /// The taxels of the live source that were zeroed.
     pub(super) fn zeroed_message(&self) -> Message {
-        let zeroed = self.live().map(|live| live.handle.zeroed().0).unwrap_or_default();
+        let zeroed = self.live().map(|live| live.handle.latest_zeroings().0).unwrap_or_default();
         Message::zeroed(&zeroed)
     }
 

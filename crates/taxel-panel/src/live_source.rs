@@ -234,7 +234,7 @@ impl LiveSource {
         }
         let columns = usize::from(self.array().columns);
         let mut state = lock(&self.state);
-        for zeroing in self.handle.zeroed().0 {
+        for zeroing in self.handle.latest_zeroings().0 {
             // The rest is a held value, which has 16 bits.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             state.zero(usize::from(zeroing.y) * columns + usize::from(zeroing.x), zeroing.rest as u16);

@@ -56,7 +56,7 @@ fn hold(hub: &Hub, registers: Registers) {
         (board.registers, board.known) = (registers, true);
     }
     if let Some(live) = hub.live() {
-        live.handle.wrote(registers);
+        live.handle.announce_registers(registers);
         lock(&live.state).set_noise_floor(registers.noise_floor.into());
     }
     hub.clients.send_message(&hub.registers_message());

@@ -12,7 +12,7 @@ use taxel_border::errors::core;
 use taxel_border::parameters::Plain;
 
 fn law(json: &str) -> Result<Sensor> {
-    let sensor: Sensor = reading::from_text(json).map_err(|unfit| Error::scene(unfit.of("law")))?;
+    let sensor: Sensor = reading::from_text(json).map_err(|unfit| Error::scene(unfit.text("law")))?;
     sensor.check()?;
     Ok(sensor)
 }

@@ -120,7 +120,7 @@ pub fn score(
 /// Mean, standard deviation, median, 2.5th and 97.5th percentile.
 #[pyfunction]
 pub fn spread(values: PyReadonlyArray1<'_, f64>) -> PyResult<Plain<Spread>> {
-    Ok(Plain(Spread::of(slice("values", &values)?)))
+    Ok(Plain(Spread::new(slice("values", &values)?)))
 }
 
 /// Checks a readout's parts; gives the text of its file.
@@ -314,7 +314,7 @@ impl LoadCurve {
         frames: u32,
     ) -> PyResult<(DecisionsOut<'py>, DecisionsOut<'py>)> {
         let found = enter(py, |_| Ok::<_, taxel_core::Error>(self.0.edges(threshold, release, frames)))?;
-        let (begins, ends): (Vec<_>, Vec<_>) = found.into_iter().partition(|decision| decision.which == 0);
+        let (begins, ends): (Vec<_>, Vec<_>) = found.into_iter().partition(|decision| decision.label == 0);
         Ok((from_decisions(py, &begins), from_decisions(py, &ends)))
     }
 

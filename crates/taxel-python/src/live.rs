@@ -128,7 +128,7 @@ impl Live {
                 .map_err(std::io::Error::other)
             }));
         }
-        let readout = ReadoutSetup::of(&options).map_err(core)?;
+        let readout = ReadoutSetup::from_options(&options).map_err(core)?;
         let fed = feed.map(|feed| feed.receiver()).transpose().map_err(live)?;
         let pipeline = enter(py, |_| match fed {
             Some(receiver) => Pipeline::start_fed(receiver, options, readout, sinks),
@@ -222,7 +222,7 @@ impl Live {
 
     /// The latest zeroing of each taxel that was zeroed.
     fn zeroed(&self, py: Python<'_>) -> PyResult<Plain<Vec<Zeroing>>> {
-        self.with(py, |pipeline| Ok(Plain(pipeline.handle().zeroed().0)))
+        self.with(py, |pipeline| Ok(Plain(pipeline.handle().latest_zeroings().0)))
     }
 
     /// Writes a note into the recording.

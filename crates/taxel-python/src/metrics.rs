@@ -4,8 +4,7 @@ use std::num::NonZero;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::metrics::matching::matched;
-use taxel_core::metrics::{Metric, NAMES, Patterns, Work};
+use taxel_core::metrics::{Metric, NAMES, Patterns, Work, matching};
 use taxel_core::problem;
 use taxel_core::vectors::Instructions;
 
@@ -61,7 +60,7 @@ pub fn match_spikes(
         let each = spikes.iter().zip(&targets).enumerate();
         each.map(|(p, (spikes, targets))| {
             let (what, wanted) = (format!("spikes[{p}]"), format!("targets[{p}]"));
-            matched((&what, spikes), (&wanted, targets), window_ms, stop)
+            matching::match_spikes((&what, spikes), (&wanted, targets), window_ms, stop)
         })
         .collect()
     })

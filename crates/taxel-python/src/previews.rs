@@ -30,7 +30,7 @@ impl RecordingPreviews {
     }
 
     fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<PreviewOut<'py>>> {
-        let next = |previews: &mut EventPreviews| previews.next_picture().map(|(t, held)| (t, held.to_vec()));
+        let next = |previews: &mut EventPreviews| previews.next_preview().map(|(t, held)| (t, held.to_vec()));
         let found = self.0.enter(py, |previews, _| Ok::<_, Error>(next(previews)))?;
         Ok(found.map(|(t, held)| (t, array(py, held))))
     }

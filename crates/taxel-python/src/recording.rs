@@ -330,7 +330,7 @@ impl RecordingWriter {
         ticks: PyReadonlyArray1<'_, u16>,
     ) -> PyResult<()> {
         let ticks = slice("ticks", &ticks)?;
-        self.with(py, |writer| writer.picture(at_ns, t_us, columns, ticks))
+        self.with(py, |writer| writer.preview(at_ns, t_us, columns, ticks))
     }
 
     /// Writes a preview of values above rest, row by row; white is at least `least`.
@@ -345,7 +345,7 @@ impl RecordingWriter {
         unit: &str,
     ) -> PyResult<()> {
         let above = slice("above", &above)?;
-        self.with(py, |writer| writer.picture_above((at_ns, t_us), above, least, rest, unit))
+        self.with(py, |writer| writer.preview_above((at_ns, t_us), above, least, rest, unit))
     }
 
     /// Writes the values that the taxels held when it began, ticks by index, 65 535 of a taxel without any event so far.
@@ -385,7 +385,7 @@ impl RecordingWriter {
 /// The verdict on what is known of a recording, which is JSON.
 #[pyfunction]
 pub fn recording_verdict(basis: &str) -> PyResult<Plain<Value>> {
-    Ok(Plain(json!(Verdict::of(parsed::<Basis>("verdict", basis)?))))
+    Ok(Plain(json!(Verdict::new(parsed::<Basis>("verdict", basis)?))))
 }
 
 /// The damage among a decoder's counts, which are JSON.
@@ -473,5 +473,5 @@ pub fn numbered_path(path: PathBuf, index: u32) -> PathBuf {
 #[pyfunction]
 pub fn whole_frames(py: Python<'_>, values: PyReadonlyArray1<'_, f32>) -> PyResult<bool> {
     let values = slice("values", &values)?;
-    enter(py, |_| Ok::<_, taxel_core::Error>(FrameEncoding::of(values) == FrameEncoding::Whole))
+    enter(py, |_| Ok::<_, taxel_core::Error>(FrameEncoding::choose(values) == FrameEncoding::Whole))
 }

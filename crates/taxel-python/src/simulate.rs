@@ -33,7 +33,7 @@ pub(crate) enum ActIn<'py> {
 }
 
 fn scene(json: &str) -> Result<Scene> {
-    reading::from_text(json).map_err(|unfit| Error::scene(unfit.of("scene")))
+    reading::from_text(json).map_err(|unfit| Error::scene(unfit.text("scene")))
 }
 
 fn to_act(act: ActIn<'_>) -> PyResult<Act> {
@@ -51,7 +51,7 @@ fn to_acts(acts: Vec<ActIn<'_>>) -> PyResult<Vec<Act>> {
 }
 
 fn to_sensor(json: &str) -> PyResult<Sensor> {
-    reading::from_text(json).map_err(|unfit| core(Error::scene(unfit.of("sensor"))))
+    reading::from_text(json).map_err(|unfit| core(Error::scene(unfit.text("sensor"))))
 }
 
 /// What one body does at even steps, by name.
@@ -91,7 +91,7 @@ pub fn check_scene(parts: ArrayParts, json: &str, sensor: &str) -> PyResult<()> 
 #[pyfunction]
 pub fn motion<'py>(py: Python<'py>, parts: ArrayParts, json: &str, step_us: f64) -> PyResult<MotionOut<'py>> {
     let felt = to_array(parts)?;
-    let motion = enter(py, |stop| Motion::of(&scene(json)?, &felt, step_us, stop))?;
+    let motion = enter(py, |stop| Motion::compute(&scene(json)?, &felt, step_us, stop))?;
     let (contacts, narrow) = (Plain(motion.contacts), motion.narrow.map(|narrow| narrow.to_string()));
     let out = |Track { x_mm, y_mm, depth_mm, force_n }: Track| TrackOut {
         x_mm: array(py, x_mm),
@@ -238,11 +238,11 @@ impl Touch for Felt {
         }
     }
 
-    fn is_there(&mut self) -> taxel_live::Result<bool> {
+    fn has_frame(&mut self) -> taxel_live::Result<bool> {
         match self {
             // They are made ready while those before them are played.
             Self::Scenes(_) => Ok(true),
-            Self::Other(touch) => touch.is_there(),
+            Self::Other(touch) => touch.has_frame(),
         }
     }
 
@@ -350,7 +350,7 @@ impl Layer {
     /// `foam` is JSON.
     #[new]
     fn new(py: Python<'_>, parts: ArrayParts, foam: &str, cells_per_pitch: u16, tolerance: f64) -> PyResult<Self> {
-        let foam: Foam = reading::from_text(foam).map_err(|unfit| core(Error::scene(unfit.of("foam"))))?;
+        let foam: Foam = reading::from_text(foam).map_err(|unfit| core(Error::scene(unfit.text("foam"))))?;
         let array = to_array(parts)?;
         let layer =
             enter(py, |stop| Ok::<_, Error>(Bonded::new(&foam, &array, cells_per_pitch, stop)?.to_within(tolerance)))?;
@@ -376,11 +376,11 @@ impl Layer {
     fn press<'py>(&self, py: Python<'py>, sunk: PyReadonlyArray1<'py, f64>) -> PyResult<TwoOut<'py, f64, f32>> {
         let sunk = slice("sunk", &sunk)?;
         let (pressure, base) = self.0.enter(py, |layer, stop| {
-            let cells = layer.under(sunk);
+            let cells = layer.cells_under(sunk);
             let pressure = layer.press(&cells, stop)?.to_vec();
             let mut base = vec![];
             layer.arrive(&cells, &pressure, &mut base, stop)?;
-            Ok::<_, Error>((layer.on_array(&cells, &pressure), base))
+            Ok::<_, Error>((layer.taxel_pressures(&cells, &pressure), base))
         })?;
         Ok((array(py, pressure), array(py, base)))
     }

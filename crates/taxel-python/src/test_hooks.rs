@@ -13,7 +13,7 @@ use taxel_border::errors::ProblemError;
 #[pyfunction]
 pub fn test_hook(py: Python<'_>, what: &str) -> PyResult<()> {
     let error = match what {
-        "format" => Error::format("file, byte 0: raised by a test hook").helped_by("limit", Hint::Larger),
+        "format" => Error::format("file, byte 0: raised by a test hook").with_hint("limit", Hint::Larger),
         "problem" => Error::argument("tau", ": raised by a test hook"),
         "device" => Error::device("register: raised by a test hook"),
         "scene" => Error::scene("ball: raised by a test hook"),

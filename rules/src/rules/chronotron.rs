@@ -33,27 +33,27 @@ pub(super) const SOURCE: Source = Source {
     of_rule: &["rule", "tau_q", "gamma_r"],
     ranges: &[ELearning::RANGES],
     defaults: || json!({ "tau": 15.0, "tau_s": null, "after_spike": null, "tau_q": null, "gamma_r": null }),
-    arrange: |given| {
-        let i_learning = match given["rule"].as_str() {
+    arrange: |parameters| {
+        let i_learning = match parameters["rule"].as_str() {
             Some("E") => false,
             Some("I") => true,
-            _ => return Err(problem!("rule"; " is {}: must be \"E\" or \"I\"", given["rule"])),
+            _ => return Err(problem!("rule"; " is {}: must be \"E\" or \"I\"", parameters["rule"])),
         };
-        let Some(tau) = given["tau"].as_f64() else {
-            return Err(problem!("tau"; " is {}: must be a number", given["tau"]));
+        let Some(tau) = parameters["tau"].as_f64() else {
+            return Err(problem!("tau"; " is {}: must be a number", parameters["tau"]));
         };
         let mut fill = |name: &str, value: Value| {
-            if given[name].is_null() {
-                given.insert(name.to_owned(), value);
+            if parameters[name].is_null() {
+                parameters.insert(name.to_owned(), value);
             }
         };
         fill("tau_s", json!(tau / 4.0));
         fill("after_spike", json!(if i_learning { "membrane" } else { "subtract" }));
         fill("tau_q", json!(tau));
-        let (tau_q, gamma_r) = (given["tau_q"].clone(), given["gamma_r"].clone());
+        let (tau_q, gamma_r) = (parameters["tau_q"].clone(), parameters["gamma_r"].clone());
         let gamma_r = if gamma_r.is_null() { tau_q.clone() } else { gamma_r };
         let e_learning = json!({ "e_learning": { "tau_q": tau_q, "gamma_r": gamma_r } });
-        given.insert("constants".into(), if i_learning { json!({ "i_learning": {} }) } else { e_learning });
+        parameters.insert("constants".into(), if i_learning { json!({ "i_learning": {} }) } else { e_learning });
         Ok(())
     },
 };
@@ -89,13 +89,13 @@ impl Rule for ERule {
         self.kernels.value(since)
     }
 
-    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
-        for edit in edits(fired, of.targets, self.tau_q) {
+    fn correct(&self, presented: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
+        for edit in edits(fired, presented.targets, self.tau_q) {
             out.push(match edit {
                 Edit::Remove(k) => Correction::new(fired[k], -1.0),
-                Edit::Add(k) => Correction::at_target(k, of.targets[k], 1.0),
+                Edit::Add(k) => Correction::at_target(k, presented.targets[k], 1.0),
                 Edit::Move(from, to) => {
-                    let late = fired[from] - of.targets[to];
+                    let late = fired[from] - presented.targets[to];
                     Correction::new(fired[from], self.gamma_r / (self.tau_q * self.tau_q) * late)
                 }
             });

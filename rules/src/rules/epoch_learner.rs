@@ -41,15 +41,15 @@ impl Source {
 
     /// Names with what the source gives, and names that the caller must give.
     fn split(&self) -> (Map<String, Value>, Vec<&'static str>) {
-        let mut given = Map::new();
+        let mut parameters = Map::new();
         for defaults in [shared(), (self.defaults)()] {
             if let Value::Object(defaults) = defaults {
-                given.extend(defaults);
+                parameters.extend(defaults);
             }
         }
         let names = NEURON.iter().chain(&TRAINING).chain(self.of_rule);
-        let required = names.copied().filter(|name| !given.contains_key(*name)).collect();
-        (given, required)
+        let required = names.copied().filter(|name| !parameters.contains_key(*name)).collect();
+        (parameters, required)
     }
 }
 
@@ -76,18 +76,18 @@ impl EpochLearner {
     /// # Errors
     ///
     /// `Problem` for a name that is not known, or a parameter that is not known or missing.
-    pub fn parts(name: &str, given: Map<String, Value>) -> Result<Value> {
+    pub fn parts(name: &str, parameters: Map<String, Value>) -> Result<Value> {
         let Some(source) = Source::named(name) else {
             let known: Vec<&str> = Self::names().collect();
             return Err(problem!("rule {name}: must be one of {}", known.join(", ")));
         };
         let (mut all, required) = source.split();
-        for key in given.keys() {
+        for key in parameters.keys() {
             if !all.contains_key(key) && !required.contains(&key.as_str()) {
                 return Err(problem!(key.as_str(); " is not known: {name} has no such parameter"));
             }
         }
-        all.extend(given);
+        all.extend(parameters);
         if let Some(missing) = required.iter().find(|name| !all.contains_key(**name)) {
             return Err(problem!(*missing; ": its source does not give it, so it must be given"));
         }

@@ -95,9 +95,9 @@ pub(super) trait Rule {
 
     /// How weights shall change after a presentation in which these spikes were fired (ms, ascending); most rules, in the
     /// form of Widrow and Hoff, add 1 at every target and take 1 off at every output spike.
-    fn correct(&self, of: &Presented<'_>, weights: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
+    fn correct(&self, presented: &Presented<'_>, weights: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
         let _ = weights;
-        out.extend(of.targets.iter().enumerate().map(|(k, &t)| Correction::at_target(k, t, 1.0)));
+        out.extend(presented.targets.iter().enumerate().map(|(k, &t)| Correction::at_target(k, t, 1.0)));
         out.extend(fired.iter().map(|&t| Correction::new(t, -1.0)));
     }
 
@@ -155,25 +155,25 @@ pub(super) fn change_of(
     targets: &[f64],
 ) -> Result<(Vec<f64>, Vec<f64>)> {
     let laid = neuron.lay_out(pattern, Stop::never())?;
-    let of = Presented { neuron, laid: &laid, trains: pattern, targets };
+    let presented = Presented { neuron, laid: &laid, trains: pattern, targets };
     let (mut fired, mut corrections, mut change) = (Vec::new(), Vec::new(), vec![0.0; weights.len()]);
     neuron.fire(weights, &laid, &mut fired);
-    rule.correct(&of, weights, &fired, &mut corrections);
-    add_up(rule, &of, weights, &corrections, &mut vec![None; targets.len()], &mut change);
+    rule.correct(&presented, weights, &fired, &mut corrections);
+    add_up(rule, &presented, weights, &corrections, &mut vec![None; targets.len()], &mut change);
     Ok((change, fired))
 }
 
 /// Sums corrections, synapse by synapse. Factors at targets are computed once.
 fn add_up(
     rule: &impl Rule,
-    of: &Presented<'_>,
+    presented: &Presented<'_>,
     weights: &[f64],
     corrections: &[Correction],
     at_targets: &mut [Option<Vec<f64>>],
     change: &mut [f64],
 ) {
     let factor = |n: usize, t: f64, after: f64| {
-        let inputs = of.trains.train(n).iter().filter(|&&input| input > after);
+        let inputs = presented.trains.train(n).iter().filter(|&&input| input > after);
         rule.constant() + inputs.map(|input| rule.factor(t - input)).sum::<f64>()
     };
     let signed = |n: usize, value: f64| if rule.by_sign() && weights[n] < 0.0 { -value } else { value };

@@ -56,8 +56,8 @@ impl Rule for FpRule {
         self.kernels.value(since)
     }
 
-    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
-        let Some((t, amount)) = first_error(of.targets, fired, self.window) else { return };
+    fn correct(&self, presented: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
+        let Some((t, amount)) = first_error(presented.targets, fired, self.window) else { return };
         let before = fired.iter().copied().take_while(|&f| f < t).last();
         let after = before.filter(|_| self.forgets).unwrap_or(f64::NEG_INFINITY);
         out.push(Correction { after, ..Correction::new(t, amount) });

@@ -59,14 +59,14 @@ impl Htp {
 
 impl HtpRule {
     /// The potential at `t`, given output spikes at the targets before it.
-    fn potential(&self, of: &Presented<'_>, weights: &[f64], t: f64) -> f64 {
-        let earlier = || of.targets.iter().copied().take_while(|&e| e < t);
-        let after = self.after(of, t);
+    fn potential(&self, presented: &Presented<'_>, weights: &[f64], t: f64) -> f64 {
+        let earlier = || presented.targets.iter().copied().take_while(|&e| e < t);
+        let after = self.after(presented, t);
         let drive: f64 = weights
             .iter()
             .enumerate()
             .map(|(n, w)| {
-                let inputs = of.trains.train(n).iter().filter(|&&s| s > after && s < t);
+                let inputs = presented.trains.train(n).iter().filter(|&&s| s > after && s < t);
                 w * inputs.map(|s| self.kernels.value(t - s)).sum::<f64>()
             })
             .sum();
@@ -77,8 +77,8 @@ impl HtpRule {
     }
 
     /// The time up to which inputs have no effect at `t`.
-    fn after(&self, of: &Presented<'_>, t: f64) -> f64 {
-        let last = of.targets.iter().copied().take_while(|&e| e < t).last();
+    fn after(&self, presented: &Presented<'_>, t: f64) -> f64 {
+        let last = presented.targets.iter().copied().take_while(|&e| e < t).last();
         last.filter(|_| self.forgets).unwrap_or(f64::NEG_INFINITY)
     }
 }
@@ -88,26 +88,26 @@ impl Rule for HtpRule {
         self.kernels.value(since)
     }
 
-    fn correct(&self, of: &Presented<'_>, weights: &[f64], _: &[f64], out: &mut Vec<Correction>) {
+    fn correct(&self, presented: &Presented<'_>, weights: &[f64], _: &[f64], out: &mut Vec<Correction>) {
         const ROUNDING: f64 = 1e-12;
-        for (k, &t) in of.targets.iter().enumerate() {
-            if self.potential(of, weights, t) < self.theta_0 * (1.0 - ROUNDING) {
-                out.push(Correction { after: self.after(of, t), ..Correction::at_target(k, t, 1.0) });
+        for (k, &t) in presented.targets.iter().enumerate() {
+            if self.potential(presented, weights, t) < self.theta_0 * (1.0 - ROUNDING) {
+                out.push(Correction { after: self.after(presented, t), ..Correction::at_target(k, t, 1.0) });
             }
         }
         let mut next = 0;
         let mut peak: Option<(f64, f64)> = None;
         let lower = |peak: &mut Option<(f64, f64)>, out: &mut Vec<Correction>| {
             if let Some((t, _)) = peak.take() {
-                out.push(Correction { after: self.after(of, t), ..Correction::new(t, -1.0) });
+                out.push(Correction { after: self.after(presented, t), ..Correction::new(t, -1.0) });
             }
         };
-        of.neuron.forced(weights, of.laid, of.targets, |t, v| {
-            while next < of.targets.len() && of.targets[next] < t {
+        presented.neuron.run_forced(weights, presented.laid, presented.targets, |t, v| {
+            while next < presented.targets.len() && presented.targets[next] < t {
                 next += 1;
                 lower(&mut peak, out);
             }
-            let free = of.targets.get(next).is_some_and(|&target| t >= target - self.window);
+            let free = presented.targets.get(next).is_some_and(|&target| t >= target - self.window);
             if v < self.theta_0 || free {
                 lower(&mut peak, out);
             } else if peak.is_none_or(|(_, highest)| v > highest) {

@@ -31,10 +31,10 @@ pub(super) const SOURCE: Source = Source {
         })
     },
     // Without a synapse of its own the neuron is driven by the rule's current.
-    arrange: |given| {
-        if given["tau_s"].is_null() {
-            let current = json!({ "tau_1": given["tau_1"], "tau_2": given["tau_2"] });
-            given.insert("current".into(), json!({ "double_exponential": current }));
+    arrange: |parameters| {
+        if parameters["tau_s"].is_null() {
+            let current = json!({ "tau_1": parameters["tau_1"], "tau_2": parameters["tau_2"] });
+            parameters.insert("current".into(), json!({ "double_exponential": current }));
         }
         Ok(())
     },

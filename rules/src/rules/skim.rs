@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::batch::{BatchRule, Learnt};
 use crate::checks::{check_ungraded, check_untargeted};
 use taxel_core::allowed::{Range, one_weight_a_train};
-use taxel_core::metrics::matching::matched;
+use taxel_core::metrics::matching::match_spikes;
 use taxel_core::neuron::{Grid, Kernel, KernelSum, MOST_LAID_OUT, Shape, check_points};
 use taxel_core::parameters::parameters;
 use taxel_core::vectors::dot;
@@ -147,11 +147,11 @@ impl Normal {
             let first = top - reflected;
             let scale = 2.0 / (first * first + below);
             self.entries[j * width + j] = reflected;
-            for (k, other) in rest.iter_mut().enumerate() {
+            for (k, later) in rest.iter_mut().enumerate() {
                 let above = &mut self.entries[j * width + j + 1 + k];
-                let share = scale * (first * *above + dot(column, other));
+                let share = scale * (first * *above + dot(column, later));
                 *above -= share * first;
-                for (o, c) in other.iter_mut().zip(column) {
+                for (o, c) in later.iter_mut().zip(column) {
                     *o -= share * c;
                 }
             }
@@ -259,8 +259,8 @@ impl Skim {
                 wanted.extend((first..first + block[0].len()).map(|row| {
                     let point = row as f64;
                     let come = targets.partition_point(|&at| grid.has_come(at, point));
-                    let on = come > 0 && !grid.has_come(targets[come - 1] + self.pulse_ms, point);
-                    if on { 1.0 } else { 0.0 }
+                    let pulses = come > 0 && !grid.has_come(targets[come - 1] + self.pulse_ms, point);
+                    if pulses { 1.0 } else { 0.0 }
                 }));
                 block.push(std::mem::take(&mut wanted));
                 normal.add_rows(block);
@@ -351,7 +351,7 @@ impl BatchRule for Skim {
             let (what, wanted) = (format!("output of pattern {p}"), format!("targets[{p}]"));
             for (&threshold, (found, missed, too_many)) in self.thresholds.iter().zip(&mut counts) {
                 let fired = crossings(&output, threshold, Grid::new(pattern.start, self.step_ms));
-                let pairs = matched((&what, &fired), (&wanted, targets), self.within_ms, stop)?.len();
+                let pairs = match_spikes((&what, &fired), (&wanted, targets), self.within_ms, stop)?.len();
                 *found += pairs;
                 *missed += targets.len() - pairs;
                 *too_many += fired.len() - pairs;

@@ -259,7 +259,7 @@ impl SteppedNeuron {
 
     /// Calls `each` with time and potential of every grid point, the neuron firing at `forced` (ms, ascending) and nowhere
     /// else; for resets that leave the potential linear in the weights, [`AfterSpike::Subtract`] and [`AfterSpike::Reset`].
-    pub(super) fn forced(&self, weights: &[f64], laid: &Laid, forced: &[f64], mut each: impl FnMut(f64, f64)) {
+    pub(super) fn run_forced(&self, weights: &[f64], laid: &Laid, forced: &[f64], mut each: impl FnMut(f64, f64)) {
         let mut walk = Walk::new(self, weights, laid);
         let mut forced = forced.iter().copied().peekable();
         for step in 0..=laid.steps {

@@ -214,15 +214,15 @@ mod tests {
         let zeros = ticks.iter().filter(|&&t| t == 0).count();
         assert!((50..120).contains(&zeros) && ticks.iter().all(|&t| t == 0 || t == 100), "{zeros}");
         let mut slow = flawed(Flaws { hysteresis: flaw(10.0), ..Flaws::default() });
-        let mut seen = vec![];
+        let mut values = vec![];
         for value in [50, 100, 95, 50] {
             ticks.fill(value);
             slow.read(0.0, &mut ticks);
-            seen.push(ticks[0]);
+            values.push(ticks[0]);
         }
-        let behind = 100 - seen[1];
-        assert!((2..=8).contains(&behind), "{seen:?}");
-        assert_eq!(seen, [50, 100 - behind, 100 - behind, 50 + behind]);
+        let behind = 100 - values[1];
+        assert!((2..=8).contains(&behind), "{values:?}");
+        assert_eq!(values, [50, 100 - behind, 100 - behind, 50 + behind]);
         let mut wandering = flawed(Flaws { drift: flaw(6.0), ..Flaws::default() });
         ticks.fill(100);
         wandering.read(600e6, &mut ticks);

@@ -113,8 +113,8 @@ impl Network {
             "lost" => self.counts.lost += 1,
             "repeated" => {
                 self.counts.repeated += 1;
-                self.out(datagram, sink);
-                self.out(datagram, sink);
+                self.deliver(datagram, sink);
+                self.deliver(datagram, sink);
             }
             "reordered" => {
                 self.counts.reordered += 1;
@@ -125,7 +125,7 @@ impl Network {
             "cut" => {
                 self.counts.cut += 1;
                 let end = self.draw.random_range(0..datagram.len().max(1));
-                self.out(&datagram[..end.min(datagram.len())], sink);
+                self.deliver(&datagram[..end.min(datagram.len())], sink);
             }
             "corrupted" if !datagram.is_empty() => {
                 self.counts.corrupted += 1;
@@ -137,16 +137,16 @@ impl Network {
                         break;
                     }
                 }
-                self.out(&hurt, sink);
+                self.deliver(&hurt, sink);
             }
-            _ => self.out(datagram, sink),
+            _ => self.deliver(datagram, sink),
         }
         for (others, _) in &mut self.behind {
             *others = others.saturating_sub(1);
         }
         while let Some(place) = self.behind.iter().position(|(others, _)| *others == 0) {
             if let Some((_, late)) = self.behind.remove(place) {
-                self.out(&late, sink);
+                self.deliver(&late, sink);
             }
         }
     }
@@ -154,11 +154,11 @@ impl Network {
     /// Delivers the datagrams that still wait.
     pub fn flush(&mut self, sink: &mut impl FnMut(&[u8])) {
         while let Some((_, late)) = self.behind.pop_front() {
-            self.out(&late, sink);
+            self.deliver(&late, sink);
         }
     }
 
-    fn out(&mut self, datagram: &[u8], sink: &mut impl FnMut(&[u8])) {
+    fn deliver(&mut self, datagram: &[u8], sink: &mut impl FnMut(&[u8])) {
         self.counts.delivered += 1;
         sink(datagram);
     }

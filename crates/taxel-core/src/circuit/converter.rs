@@ -79,7 +79,7 @@ impl Converter {
     }
 
     /// The voltage of the ramp that ended `after_us` ago, V.
-    fn fallen(&self, after_us: f64) -> f64 {
+    fn end_voltage(&self, after_us: f64) -> f64 {
         RAMP_END_V * decay(after_us, self.discharge_us)
     }
 
@@ -160,7 +160,7 @@ impl Converter {
         let mut input_v = line_v[self.steps - 1];
         let (mut step, mut begun_us) = (0, 0.0);
         let mut high = false;
-        let mut seen = vec![];
+        let mut moments = vec![];
         for k in 0..=(stop_us / every_us) as usize {
             let t_us = k as f64 * every_us;
             loop {
@@ -176,14 +176,14 @@ impl Converter {
             let input = self.input(line_v[step % self.steps], 0.0, input_v).at(since);
             let ramp_v = match since - self.wait_us {
                 up if (0.0..=ramp_us).contains(&up) => self.ramp().volts(up * TICKS_A_US),
-                down if down > 0.0 => self.fallen(down - ramp_us),
+                down if down > 0.0 => self.end_voltage(down - ramp_us),
                 _ if step == 0 => 0.0,
-                before => self.fallen(before + self.step_us - ramp_us),
+                before => self.end_voltage(before + self.step_us - ramp_us),
             };
             high = if high { ramp_v >= input - half } else { ramp_v >= input + half };
-            seen.push(Moment { t_us, line_v: line_v[step % self.steps], input_v: input, ramp_v, high });
+            moments.push(Moment { t_us, line_v: line_v[step % self.steps], input_v: input, ramp_v, high });
         }
-        Ok(seen)
+        Ok(moments)
     }
 }
 
@@ -217,8 +217,8 @@ impl Input {
 
     /// The largest slope that it can have from then on, V/us.
     fn steepest(&self, since_us: f64) -> f64 {
-        let of = |size: f64, tau: f64| if size == 0.0 { 0.0 } else { size.abs() * decay(since_us, tau) / tau };
-        of(self.carried, self.slow) + of(self.settling, self.fast)
+        let output = |size: f64, tau: f64| if size == 0.0 { 0.0 } else { size.abs() * decay(since_us, tau) / tau };
+        output(self.carried, self.slow) + output(self.settling, self.fast)
     }
 }
 
@@ -282,8 +282,9 @@ impl ConverterScan {
         let Converter { steps, step_us, line_us, wait_us, amplifier_us, hysteresis_v, ramp, .. } = self.converter;
         let (columns, half) = (self.columns, 0.5 * hysteresis_v);
         let idle_us = step_us - f64::from(ramp) / TICKS_A_US;
-        let (left, left_by_column) =
-            (self.converter.fallen(idle_us), { self.converter.fallen(idle_us + line_us - steps as f64 * step_us) });
+        let (left, left_by_column) = (self.converter.end_voltage(idle_us), {
+            self.converter.end_voltage(idle_us + line_us - steps as f64 * step_us)
+        });
         for x in 0..columns {
             for step in 0..steps {
                 let (begins_us, last) = (step as f64 * step_us, step + 1 == steps);
@@ -409,8 +410,8 @@ mod tests {
     fn a_trace_shows_one_rise_of_the_comparator_a_step_where_it_reads() {
         let lines = [1.4, 2.2, 1.9, 2.7];
         let converter = Converter::default();
-        let seen = converter.trace(&lines, 0.001, 12.0).unwrap();
-        let rises: Vec<&Moment> = seen.windows(2).filter(|w| !w[0].high && w[1].high).map(|w| &w[1]).collect();
+        let moments = converter.trace(&lines, 0.001, 12.0).unwrap();
+        let rises: Vec<&Moment> = moments.windows(2).filter(|w| !w[0].high && w[1].high).map(|w| &w[1]).collect();
         assert_eq!(rises.len(), 16);
         let read = frames(converter, &[&lines, &lines], 1)[1].clone();
         for (k, rise) in rises[4..8].iter().enumerate() {

@@ -62,7 +62,7 @@ impl Matrix {
 
 /// `row - sum of factor times other row`, a block wide.
 #[inline(always)]
-fn less(mut row: Lanes, factors: &[f64], others: &[Lanes]) -> Lanes {
+fn subtract_rows(mut row: Lanes, factors: &[f64], others: &[Lanes]) -> Lanes {
     for (factor, other) in factors.iter().zip(others) {
         for lane in 0..LANES {
             row[lane] -= factor * other[lane];
@@ -77,7 +77,7 @@ wide! {
         let (rows, inner) = (out.rows.max(1), right.rows.max(1));
         for (out, right) in out.lanes.chunks_exact_mut(rows).zip(right.lanes.chunks_exact(inner)) {
             for (row, factors) in out.iter_mut().zip(left.chunks_exact(inner)) {
-                *row = less(*row, factors, right);
+                *row = subtract_rows(*row, factors, right);
             }
         }
     }
@@ -97,7 +97,7 @@ wide! {
             // The first block that is processed holds the pivot.
             for block in pivot_block..matrix.lanes.len() / n {
                 let (above, rest) = matrix.lanes[block * n..].split_at_mut(j);
-                rest[0] = less(rest[0], &factors[..j], above);
+                rest[0] = subtract_rows(rest[0], &factors[..j], above);
                 if block == pivot_block {
                     let pivot = rest[0][j % LANES];
                     if !(pivot > 0.0 && pivot.is_finite()) {
@@ -122,7 +122,7 @@ wide! {
         for right in right.lanes.chunks_exact_mut(n) {
             for i in 0..n {
                 let (above, rest) = right.split_at_mut(i);
-                rest[0] = less(rest[0], &lower[i * n..i * n + i], above);
+                rest[0] = subtract_rows(rest[0], &lower[i * n..i * n + i], above);
                 for value in &mut rest[0] {
                     *value *= inverse[i];
                 }
@@ -132,7 +132,7 @@ wide! {
             upper.copy_row(i, &mut factors);
             for right in right.lanes.chunks_exact_mut(n) {
                 let (rest, below) = right.split_at_mut(i + 1);
-                rest[i] = less(rest[i], &factors[i + 1..], below);
+                rest[i] = subtract_rows(rest[i], &factors[i + 1..], below);
                 for value in &mut rest[i] {
                     *value *= inverse[i];
                 }
@@ -158,13 +158,13 @@ impl Matrix {
         if eliminate(&mut self, &mut lower, &mut inverse) {
             Ok(FactoredMatrix { upper: self, lower, inverse })
         } else {
-            Err(beyond())
+            Err(too_far_apart())
         }
     }
 }
 
 /// Why a network was not solved.
-pub(super) fn beyond() -> crate::Error {
+pub(super) fn too_far_apart() -> crate::Error {
     problem!("the network's conductances lie too far apart to be solved in float64")
 }
 

@@ -37,12 +37,12 @@ impl Fabric {
     /// Conductance under a force, uS; a force below 0 is none.
     #[must_use]
     pub fn conductance_us(&self, force_n: f64) -> f64 {
-        self.rest_us + self.gained_us(force_n)
+        self.rest_us + self.conductance_gain_us(force_n)
     }
 
     /// What a force adds to the conductance at rest, uS.
     #[must_use]
-    pub fn gained_us(&self, force_n: f64) -> f64 {
+    pub fn conductance_gain_us(&self, force_n: f64) -> f64 {
         self.touch_us * (force_n.max(0.0) / TOUCH_N).powf(self.exponent)
     }
 

@@ -19,7 +19,7 @@ use faer::sparse::{SparseColMat, Triplet};
 use faer::{Conj, Mat, MatMut, Par, Side};
 use serde::{Deserialize, Serialize};
 
-use super::dense::{Matrix, beyond};
+use super::dense::{Matrix, too_far_apart};
 use super::limit::Limit;
 use crate::{Result, Stop, problem};
 
@@ -85,13 +85,13 @@ impl Crossbar {
         let mut currents = if self.wire_ohm > 0.0 {
             self.with_wires(&siemens, drive_v, sense_v, stop)?
         } else {
-            self.without_wires(siemens, drive_v, sense_v)?
+            self.currents_of_ideal_lines(siemens, drive_v, sense_v)?
         };
         currents.iter_mut().for_each(|current| *current *= 1e6);
         Ok(currents)
     }
 
-    fn without_wires(&self, mut g: Vec<f64>, drive_v: f64, sense_v: &[f64]) -> Result<Vec<f64>> {
+    fn currents_of_ideal_lines(&self, mut g: Vec<f64>, drive_v: f64, sense_v: &[f64]) -> Result<Vec<f64>> {
         let (n, m, r) = (self.rows, self.columns, self.drive_ohm);
         let (mut by_row, mut by_column, mut of_sources) = (vec![0.0; n], vec![0.0; m], vec![0.0; m]);
         let mut turned = Matrix::zeros(m, n);
@@ -256,13 +256,13 @@ struct Sparse {
 impl Sparse {
     /// Factors a symmetric matrix of which the lower triangle is given; entries of one place are summed.
     fn factor(n: usize, entries: &[Triplet<usize, usize, f64>], stop: Stop<'_>) -> Result<Self> {
-        let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, entries).map_err(|_| beyond())?;
+        let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, entries).map_err(|_| too_far_apart())?;
         let symbolic =
             factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, Default::default(), Default::default())
-                .map_err(|_| beyond())?;
+                .map_err(|_| too_far_apart())?;
         stop.check()?;
         let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-        let mut memory = MemBuffer::try_new(scratch).map_err(|_| beyond())?;
+        let mut memory = MemBuffer::try_new(scratch).map_err(|_| too_far_apart())?;
         let mut values = vec![0.0; symbolic.len_val()];
         symbolic
             .factorize_numeric_llt(
@@ -274,7 +274,7 @@ impl Sparse {
                 MemStack::new(&mut memory),
                 Default::default(),
             )
-            .map_err(|_| beyond())?;
+            .map_err(|_| too_far_apart())?;
         stop.check()?;
         Ok(Self { symbolic, values })
     }
@@ -282,7 +282,7 @@ impl Sparse {
     /// Solves for all columns, in place.
     fn solve(&self, right: MatMut<'_, f64>) -> Result<()> {
         let scratch = self.symbolic.solve_in_place_scratch::<f64>(right.ncols(), Par::Seq);
-        let mut memory = MemBuffer::try_new(scratch).map_err(|_| beyond())?;
+        let mut memory = MemBuffer::try_new(scratch).map_err(|_| too_far_apart())?;
         LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
             Conj::No,
             right,

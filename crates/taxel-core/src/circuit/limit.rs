@@ -1,6 +1,6 @@
 //! Sense lines whose source is at its limit: an amplifier that saturates no longer holds its line's voltage.
 
-use super::dense::{Matrix, beyond};
+use super::dense::{Matrix, too_far_apart};
 use crate::Result;
 
 /// The voltages between which a source works; beyond, `ohm` connects its line to the nearer one.
@@ -59,9 +59,9 @@ impl Limit {
         }
         let response = response()?;
         for column in 0..columns {
-            let given: Vec<f64> = (0..rows).map(|row| currents[row * columns + column]).collect();
+            let unlimited: Vec<f64> = (0..rows).map(|row| currents[row * columns + column]).collect();
             let mut ends = vec![RangeEnd::Within; rows];
-            let mut now = given.clone();
+            let mut now = unlimited.clone();
             let mut moved = vec![0.0; rows];
             for round in 0.. {
                 let wanted = |row: usize| match (ends[row], moved[row]) {
@@ -77,7 +77,7 @@ impl Limit {
                     break;
                 }
                 if round > 50 * rows {
-                    return Err(beyond());
+                    return Err(too_far_apart());
                 }
                 // All at once is quick; one at a time, the first, is sure to end (Murty 1974).
                 let at_once = if round < rows { changes.len() } else { 1 };
@@ -90,13 +90,13 @@ impl Limit {
                         *matrix.at_mut(i, j) = response[row * rows + limited];
                     }
                     *matrix.at_mut(i, i) += between.recip();
-                    *right.at_mut(i, 0) = limits[row][usize::from(ends[row] == RangeEnd::Most)] - given[row];
+                    *right.at_mut(i, 0) = limits[row][usize::from(ends[row] == RangeEnd::Most)] - unlimited[row];
                 }
                 matrix.factor()?.solve(&mut right);
                 moved.fill(0.0);
                 at.iter().enumerate().for_each(|(i, &row)| moved[row] = right.at(i, 0));
                 for (row, now) in now.iter_mut().enumerate() {
-                    *now = given[row]
+                    *now = unlimited[row]
                         + at.iter().map(|&limited| response[row * rows + limited] * moved[limited]).sum::<f64>();
                 }
             }

@@ -14,7 +14,7 @@ use crate::{Result, Stop, problem};
 /// Resistances of switches and wires, ohm.
 const LINE: Range = Range::FROM_0.at_most(1e9);
 
-fn wire_is_sound(wire_ohm: f64) -> Result<()> {
+fn check_wire(wire_ohm: f64) -> Result<()> {
     if wire_ohm > 0.0 && wire_ohm < LEAST_WIRE_OHM {
         return Err(problem!("wire_ohm"; " is {wire_ohm} ohm: must be 0, or from {LEAST_WIRE_OHM} to 1e9"));
     }
@@ -54,7 +54,7 @@ impl VirtualGround {
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
-        wire_is_sound(self.wire_ohm)
+        check_wire(self.wire_ohm)
     }
 
     /// The amplifier's voltage for one taxel by itself, V, without its rails.
@@ -130,7 +130,7 @@ impl Divider {
     /// As [`VirtualGround::check`].
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
-        wire_is_sound(self.wire_ohm)
+        check_wire(self.wire_ohm)
     }
 
     /// The divider's voltage for one taxel by itself, V.

@@ -53,7 +53,7 @@ impl FrameSequence {
     }
 
     /// The touch of the frames: from the last empty one before to the first empty one after all that are not.
-    pub(super) fn touched(&self, count: usize, size: usize) -> Vec<Contact> {
+    pub(super) fn contacts(&self, count: usize, size: usize) -> Vec<Contact> {
         let loaded = |k: usize| self.values[k * size..(k + 1) * size].iter().any(|v| *v > 0.0);
         let Some(first) = (0..count).find(|k| loaded(*k)) else { return vec![] };
         let last = (0..count).rev().find(|k| loaded(*k)).unwrap_or(first);

@@ -78,29 +78,29 @@ impl Bonded {
         check_cells(foam, array, cells_per_pitch)?;
         let pitch_mm = pitch_of(array)?;
         let CellPlane { per_pitch, reach, margin, tall, wide } =
-            CellPlane::of(foam, array, pitch_mm, usize::from(cells_per_pitch));
+            CellPlane::new(foam, array, pitch_mm, usize::from(cells_per_pitch));
         let (pitch, thick) = (pitch_mm / f64::from(cells_per_pitch), foam.thickness_mm);
-        let of = |taxels: u16| (usize::from(taxels) + 2 * margin) * per_pitch;
-        let (rows, columns) = (of(array.rows), of(array.columns));
+        let cells = |taxels: u16| (usize::from(taxels) + 2 * margin) * per_pitch;
+        let (rows, columns) = (cells(array.rows), cells(array.columns));
         let mut waves = Waves::new(tall, wide, pitch);
         let per_mpa = thick / (foam.modulus_kpa * 1e-3);
         let surface = waves.kernel(|q| per_mpa * surface_compliance(q * thick, foam.poisson), stop)?;
         let base = waves.kernel(|q| base_stress(q * thick, foam.poisson), stop)?;
-        let mut of_one = |kernel: &[f64]| -> Result<Vec<f64>> {
+        let mut kernel_plane = |kernel: &[f64]| -> Result<Vec<f64>> {
             waves.plane.fill(0.0);
             waves.plane[0] = 1.0;
             waves.convolve(kernel, stop)?;
             Ok(waves.plane.clone())
         };
-        let (near, through) = (of_one(&surface)?, of_one(&base)?);
-        let on = |plane: &[f64], y: isize, x: isize| {
+        let (near, through) = (kernel_plane(&surface)?, kernel_plane(&base)?);
+        let at = |plane: &[f64], y: isize, x: isize| {
             plane[y.rem_euclid(tall as isize) as usize * wide + x.rem_euclid(wide as isize) as usize]
         };
         let (down, across) = (rows as isize - 1, columns as isize - 1);
         let mut influence = Vec::with_capacity((2 * rows - 1) * (2 * columns - 1));
         for y in -down..=down {
             stop.check()?;
-            influence.extend((-across..=across).map(|x| on(&near, y, x)));
+            influence.extend((-across..=across).map(|x| at(&near, y, x)));
         }
         let (n, far) = (per_pitch as isize, reach as isize);
         let mut spread = Vec::with_capacity((per_pitch * (2 * reach + 1)).pow(2));
@@ -108,7 +108,7 @@ impl Bonded {
             stop.check()?;
             for (y, x) in (-far..=far).flat_map(|y| (-far..=far).map(move |x| (y * n - row, x * n - column))) {
                 let cells = (y..y + n).flat_map(|y| (x..x + n).map(move |x| (y, x)));
-                spread.push((cells.map(|(y, x)| on(&through, y, x)).sum::<f64>() / (n * n) as f64) as f32);
+                spread.push((cells.map(|(y, x)| at(&through, y, x)).sum::<f64>() / (n * n) as f64) as f32);
             }
         }
         Ok(Self {
@@ -202,7 +202,7 @@ impl Bonded {
 
     /// Cells that may be touched by a body that has sunk by `sunk_mm` at each cell over the array, row by row.
     #[must_use]
-    pub fn under(&self, sunk_mm: &[f64]) -> Vec<Cell> {
+    pub fn cells_under(&self, sunk_mm: &[f64]) -> Vec<Cell> {
         let above = -self.bulge() * sunk_mm.iter().fold(0.0_f64, |a, b| a.max(*b));
         let (_, columns) = self.over_array();
         let at = |n: usize| (n + self.margin) as u32;
@@ -212,16 +212,16 @@ impl Bonded {
 
     /// The mean pressure on each taxel of the array, row by row, MPa, of pressures on cells.
     #[must_use]
-    pub fn on_array(&self, cells: &[Cell], pressure: &[f64]) -> Vec<f64> {
+    pub fn taxel_pressures(&self, cells: &[Cell], pressure: &[f64]) -> Vec<f64> {
         let ((rows, columns), n) = (self.array, self.per_pitch);
-        let mut on = vec![0.0; rows * columns];
+        let mut pressures = vec![0.0; rows * columns];
         for (cell, pressure) in cells.iter().zip(pressure) {
             let (x, y) = ((cell.x as usize).wrapping_sub(self.margin), (cell.y as usize).wrapping_sub(self.margin));
             if x < columns * n && y < rows * n {
-                on[y / n * columns + x / n] += *pressure / (n * n) as f64;
+                pressures[y / n * columns + x / n] += *pressure / (n * n) as f64;
             }
         }
-        on
+        pressures
     }
 
     /// More cells than these are solved by waves.

@@ -25,10 +25,10 @@ impl Motion {
     ///
     /// `Scene` where its parameters make no sense, a body bottoms out, rolls or slides off the array, is lifted before
     /// it lands, or comes to rest before it can be caught; where the scene has more than 2e7 steps. `Interrupted`.
-    pub fn of(scene: &Scene, array: &Array, step_us: f64, stop: Stop<'_>) -> Result<Self> {
+    pub fn compute(scene: &Scene, array: &Array, step_us: f64, stop: Stop<'_>) -> Result<Self> {
         scene.check(array)?;
         check_step(scene, step_us)?;
-        Self::on(scene, array, Self::layer(scene, array, stop)?.as_mut(), step_us, stop)
+        Self::compute_on(scene, array, Self::layer(scene, array, stop)?.as_mut(), step_us, stop)
     }
 
     /// The bonded layer that the scene's foam is, or nothing for columns.
@@ -43,12 +43,12 @@ impl Motion {
         }
     }
 
-    /// As [`Motion::of`], of a scene that was checked, on its foam.
+    /// As [`Motion::compute`], of a scene that was checked, on its foam.
     ///
     /// # Errors
     ///
-    /// As [`Motion::of`].
-    pub fn on(
+    /// As [`Motion::compute`].
+    pub fn compute_on(
         scene: &Scene,
         array: &Array,
         mut layer: Option<&mut Bonded>,
@@ -58,12 +58,12 @@ impl Motion {
         check_step(scene, step_us)?;
         let mut trajectories = vec![];
         for (n, body) in scene.bodies.iter().enumerate() {
-            let push = Push::of(&scene.foam, body, layer.as_deref_mut(), stop)?;
+            let push = Push::new(&scene.foam, body, layer.as_deref_mut(), stop)?;
             let mut trajectory = Trajectory::new(scene, body, push, step_us * 1e-3, stop);
             trajectory
                 .run()
                 .and_then(|()| trajectory.stays_on(array, step_us))
-                .map_err(|error| if scene.bodies.len() > 1 { error.of(&format!("bodies[{n}]")) } else { error })?;
+                .map_err(|error| if scene.bodies.len() > 1 { error.in_part(&format!("bodies[{n}]")) } else { error })?;
             trajectories.push(trajectory);
         }
         let over = trajectories.iter().map(Trajectory::steps).max().unwrap_or(0);
@@ -77,7 +77,7 @@ impl Motion {
         }
         motion.contacts.sort_by(|a, b| a.start_us.total_cmp(&b.start_us));
         if scene.surface == Surface::Layer {
-            motion.narrow = Narrow::of(scene, array, &motion.tracks)?;
+            motion.narrow = Narrow::find(scene, array, &motion.tracks)?;
         }
         Ok(motion)
     }

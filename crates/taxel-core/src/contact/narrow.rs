@@ -31,7 +31,7 @@ impl Narrow {
     /// # Errors
     ///
     /// `Scene` if the pitch of the array is not known.
-    pub(super) fn of(scene: &Scene, array: &Array, tracks: &[Track]) -> Result<Option<Self>> {
+    pub(super) fn find(scene: &Scene, array: &Array, tracks: &[Track]) -> Result<Option<Self>> {
         let (most, pitch_mm) = (most_cells(&scene.foam, array)?, pitch_of(array)?);
         let of_body = |(n, track): (usize, &Track)| {
             // By depth and not by force: between two cells the narrowest touch makes no force at all.

@@ -47,7 +47,7 @@ impl Push {
     /// # Errors
     ///
     /// `Scene` where foam and ball do not fit columns; `Interrupted`.
-    pub fn of(foam: &Foam, body: &Body, layer: Option<&mut Bonded>, stop: Stop<'_>) -> Result<Self> {
+    pub fn new(foam: &Foam, body: &Body, layer: Option<&mut Bonded>, stop: Stop<'_>) -> Result<Self> {
         let give = body.stiffness_n_mm.map_or(0.0, f64::recip);
         let mut forces: Box<dyn FnMut(f64) -> Result<f64>> = match (layer, &body.shape) {
             (None, BodyShape::Sphere { radius_mm }) => {

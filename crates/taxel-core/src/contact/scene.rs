@@ -35,7 +35,7 @@ pub struct Scene {
     pub surface: Surface,
     /// How many cells of the layer lie along the pitch of taxels: more than one where a touch is narrower than some two
     /// taxels.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
+    #[serde(default = "one_cell", skip_serializing_if = "is_one")]
     pub cells_per_pitch: u16,
     /// The foam on the array.
     #[serde(default)]
@@ -56,7 +56,7 @@ pub struct Scene {
     pub tail_ms: f64,
 }
 
-fn one() -> u16 {
+fn one_cell() -> u16 {
     1
 }
 
@@ -210,7 +210,7 @@ mod tests {
             for dashpot_ms in [0.0, 0.3, 1.0] {
                 let mut scene = Scene::draw(&array, 11, index, index % 4 == 0).unwrap();
                 scene.foam.dashpot_ms = dashpot_ms;
-                let motion = super::super::Motion::of(&scene, &array, 48.0, crate::Stop::never()).unwrap();
+                let motion = super::super::Motion::compute(&scene, &array, 48.0, crate::Stop::never()).unwrap();
                 assert!(motion.contacts.iter().all(|c| c.stop_us.is_finite()));
             }
         }
@@ -224,7 +224,7 @@ mod tests {
             *height_mm = 200.0;
         }
         scene.foam = Foam { modulus_kpa: 50.0, damping_s_m: 0.1, dashpot_ms: 0.0, ..Foam::default() };
-        super::super::Motion::of(&scene, &Array::thesis(), 48.0, crate::Stop::never()).unwrap();
+        super::super::Motion::compute(&scene, &Array::thesis(), 48.0, crate::Stop::never()).unwrap();
     }
 
     fn dropped(scene: &mut Scene) -> (&mut f64, &mut u32, &mut Press) {

@@ -78,7 +78,7 @@ impl Sensor {
     #[must_use]
     pub fn reading(&self, force_n: f64, rest: f64, ramp: f64) -> f64 {
         let ramp = Ramp::rc(ramp);
-        ramp.ticks(ramp.volts(rest) + self.gain_v() * self.fabric().gained_us(force_n))
+        ramp.ticks(ramp.volts(rest) + self.gain_v() * self.fabric().conductance_gain_us(force_n))
     }
 
     /// Force on a taxel that reads `ticks`, N, where it reads `rest` without one: the inverse of [`Sensor::reading`].

@@ -92,11 +92,11 @@ impl BodyShape {
         match self {
             Self::Sphere { radius_mm } => arc(*radius_mm, x.hypot(y)),
             Self::Cylinder { radius_mm, length_mm, axis_deg } => {
-                let (along, across) = turned(x, y, *axis_deg);
+                let (along, across) = rotate(x, y, *axis_deg);
                 if along.abs() <= length_mm / 2.0 { arc(*radius_mm, across.abs()) } else { f64::INFINITY }
             }
             Self::Edge { slope_deg, length_mm, axis_deg } => {
-                let (along, across) = turned(x, y, *axis_deg);
+                let (along, across) = rotate(x, y, *axis_deg);
                 let slope = slope_deg.to_radians().tan();
                 if along.abs() <= length_mm / 2.0 { across.abs() * slope } else { f64::INFINITY }
             }
@@ -212,7 +212,7 @@ fn arc(radius: f64, off: f64) -> f64 {
 }
 
 /// A place by an axis: along it and across it.
-pub(super) fn turned(x: f64, y: f64, axis_deg: f64) -> (f64, f64) {
+pub(super) fn rotate(x: f64, y: f64, axis_deg: f64) -> (f64, f64) {
     let (sin, cos) = axis_deg.to_radians().sin_cos();
     (x * cos + y * sin, y * cos - x * sin)
 }
@@ -247,17 +247,19 @@ mod tests {
 
     #[test]
     fn a_height_map_is_as_wide_as_the_body_that_it_shows() {
-        let map = |of: &BodyShape| BodyShape::HeightMap {
+        let map = |shape: &BodyShape| BodyShape::HeightMap {
             heights_mm: (0..121)
                 .map(|y| {
-                    (0..161).map(|x| of.height_mm(0.1 * f64::from(x - 80), 0.1 * f64::from(y - 60)).min(9.0)).collect()
+                    (0..161)
+                        .map(|x| shape.height_mm(0.1 * f64::from(x - 80), 0.1 * f64::from(y - 60)).min(9.0))
+                        .collect()
                 })
                 .collect(),
             pitch_mm: 0.1,
         };
         // Of two chords across each other through a point of a disc the shorter one has, in the mean, this many diameters.
         let disc = 4.359 * 8.0 / std::f64::consts::PI * (1.0 - 0.5_f64.sqrt());
-        for (shape, height, width, seen) in [
+        for (shape, height, width, map_width) in [
             (BodyShape::Sphere { radius_mm: 5.0 }, 0.5, 4.359, disc),
             (BodyShape::Cylinder { radius_mm: 4.0, length_mm: 12.0, axis_deg: 0.0 }, 0.2, 2.498, 2.498),
             (BodyShape::Cylinder { radius_mm: 9.0, length_mm: 1.5, axis_deg: 90.0 }, 0.9, 1.5, 1.5),
@@ -265,12 +267,12 @@ mod tests {
         ] {
             assert!((shape.width_mm(height) / width - 1.0).abs() < 0.01, "{shape:?}: {}", shape.width_mm(height));
             let map = map(&shape).width_mm(height);
-            assert!((map / seen - 1.0).abs() < 0.1, "{shape:?}: {map} of {seen}");
+            assert!((map / map_width - 1.0).abs() < 0.1, "{shape:?}: {map} of {map_width}");
         }
         // Two ridges are no wider than one.
         let ridges = vec![(0..81).map(|x: i32| f64::from((x - 20).abs().min((x - 60).abs()))).collect(); 9];
-        let seen = BodyShape::HeightMap { heights_mm: ridges, pitch_mm: 0.5 }.width_mm(2.0);
-        assert!((seen / 2.0 - 1.0).abs() < 0.1, "{seen}");
+        let width = BodyShape::HeightMap { heights_mm: ridges, pitch_mm: 0.5 }.width_mm(2.0);
+        assert!((width / 2.0 - 1.0).abs() < 0.1, "{width}");
     }
 
     #[test]

@@ -46,25 +46,25 @@ impl Prepared {
     /// # Errors
     ///
     /// `Scene` where the act cannot be played; `Interrupted`.
-    pub fn of(array: &Array, frame_us: f64, act: &Act, stop: Stop<'_>) -> Result<Self> {
+    pub fn new(array: &Array, frame_us: f64, act: &Act, stop: Stop<'_>) -> Result<Self> {
         match act {
             Act::Silence { ms } => {
                 if !(0.0..=86_400_000.0).contains(ms) {
                     return Err(Error::scene(format!("silence of {ms} ms: must be 0 to a day")));
                 }
-                let part = ScenePart { frames: (us(*ms) / frame_us).round() as usize, what: ScenePartKind::Silence };
+                let part = ScenePart { frames: (us(*ms) / frame_us).round() as usize, kind: ScenePartKind::Silence };
                 Ok(Self { part, contacts: vec![], narrow: None })
             }
             Act::Scene(scene) => {
                 scene.check(array)?;
                 let mut layer = Motion::layer(scene, array, stop)?;
-                let mut motion = Motion::on(scene, array, layer.as_mut(), frame_us / GROUPS as f64, stop)?;
+                let mut motion = Motion::compute_on(scene, array, layer.as_mut(), frame_us / GROUPS as f64, stop)?;
                 if motion.len() < 2 {
                     return Err(Error::scene(format!("scene: shorter than a quarter of a frame, {frame_us} us")));
                 }
                 let (contacts, narrow) = (std::mem::take(&mut motion.contacts), motion.narrow.take());
                 let frames = motion.len().div_ceil(GROUPS);
-                let what = match layer {
+                let kind = match layer {
                     Some(layer) => ScenePartKind::Layer(Box::new(LayerScene::new(scene, layer, motion, array))),
                     None => ScenePartKind::Columns(Box::new(BallOnColumns::new(
                         scene,
@@ -72,14 +72,14 @@ impl Prepared {
                         array,
                     )?)),
                 };
-                Ok(Self { part: ScenePart { frames, what }, contacts, narrow })
+                Ok(Self { part: ScenePart { frames, kind }, contacts, narrow })
             }
             Act::Frames(sequence) => {
                 let size = array.len();
                 let count = sequence.count(size, frame_us)?;
                 let frames = (count as f64 * sequence.period_us / frame_us).ceil() as usize;
-                let contacts = sequence.touched(count, size);
-                let part = ScenePart { frames, what: ScenePartKind::Frames { sequence: sequence.clone(), count } };
+                let contacts = sequence.contacts(count, size);
+                let part = ScenePart { frames, kind: ScenePartKind::Frames { sequence: sequence.clone(), count } };
                 Ok(Self { part, contacts, narrow: None })
             }
         }
@@ -89,7 +89,7 @@ impl Prepared {
 #[derive(Debug)]
 struct ScenePart {
     frames: usize,
-    what: ScenePartKind,
+    kind: ScenePartKind,
 }
 
 #[derive(Debug)]
@@ -117,7 +117,7 @@ impl Stage {
         let (parts, contacts, narrow) = (vec![], vec![], vec![]);
         let mut stage = Self { taxels, frame_us, parts, contacts, narrow, part: 0, frame: 0, clean };
         for (n, act) in acts.iter().enumerate() {
-            stage.push(Prepared::of(array, frame_us, act, stop).map_err(|error| error.of(&format!("act {n}")))?);
+            stage.push(Prepared::new(array, frame_us, act, stop).map_err(|error| error.in_part(&format!("act {n}")))?);
         }
         Ok(stage)
     }
@@ -170,7 +170,7 @@ impl Stage {
         }
         let mut force = Vec::with_capacity(self.frames());
         for part in &self.parts {
-            match &part.what {
+            match &part.kind {
                 ScenePartKind::Columns(ball) => force.extend((0..part.frames).map(|k| ball.track.force_n[GROUPS * k])),
                 ScenePartKind::Layer(layer) => force.extend((0..part.frames).map(|k| layer.motion.force_n(GROUPS * k))),
                 ScenePartKind::Silence | ScenePartKind::Frames { .. } => force.resize(force.len() + part.frames, 0.0),
@@ -190,12 +190,12 @@ impl Stage {
         }
         while self.parts.get(self.part).is_some_and(|p| self.frame == p.frames) {
             // The tables of a part that is over are freed; its number of frames is still needed.
-            self.parts[self.part].what = ScenePartKind::Silence;
+            self.parts[self.part].kind = ScenePartKind::Silence;
             self.part += 1;
             self.frame = 0;
         }
         let Some(part) = self.parts.get_mut(self.part) else { return Ok(false) };
-        match &mut part.what {
+        match &mut part.kind {
             ScenePartKind::Silence => {}
             ScenePartKind::Columns(ball) => ball.show(self.frame, self.frame_us, &self.taxels, &mut self.clean),
             ScenePartKind::Layer(layer) => {
@@ -295,15 +295,15 @@ mod tests {
         values[4096 + 70] = 1.0;
         let act = Act::Frames(FrameSequence { values, period_us: 1920.0 });
         let mut stage = stage(&quiet(), &[act]);
-        let mut seen = vec![];
+        let mut values = vec![];
         let mut ticks = vec![0; 4096];
         while stage.frame(&mut ticks, Stop::never()).unwrap() {
-            seen.push(ticks[70]);
+            values.push(ticks[70]);
         }
-        assert_eq!(seen.len(), 30);
-        assert_eq!(seen[10], 150);
-        let halfway = f64::midpoint(f64::from(seen[0]), 150.0);
-        assert!((f64::from(seen[5]) - halfway).abs() <= 1.0 && (f64::from(seen[15]) - halfway).abs() <= 1.0);
+        assert_eq!(values.len(), 30);
+        assert_eq!(values[10], 150);
+        let halfway = f64::midpoint(f64::from(values[0]), 150.0);
+        assert!((f64::from(values[5]) - halfway).abs() <= 1.0 && (f64::from(values[15]) - halfway).abs() <= 1.0);
         assert_eq!(stage.contacts()[0].start_us, 0.0);
         assert_eq!(stage.contacts()[0].stop_us, 3840.0);
     }

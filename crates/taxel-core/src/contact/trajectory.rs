@@ -101,7 +101,7 @@ impl<'a> Trajectory<'a> {
         let body = self.body;
         match &body.motion {
             Move::Dropped { height_mm, ending } => {
-                self.let_go(*height_mm);
+                self.release_body(*height_mm);
                 match ending {
                     Ending::Caught { after, press } => {
                         self.fall_until_caught(*after)?;
@@ -121,7 +121,7 @@ impl<'a> Trajectory<'a> {
                         {
                             last.kind = TouchKind::Rest;
                         }
-                        self.hand(self.depth, -CLEAR_MM, lift_mm_s * 1e-3, TouchKind::Rest)?;
+                        self.move_by_hand(self.depth, -CLEAR_MM, lift_mm_s * 1e-3, TouchKind::Rest)?;
                     }
                 }
                 Ok(())
@@ -141,9 +141,9 @@ impl<'a> Trajectory<'a> {
             (None, depth) => self.push.down_of_depth_mm(depth.unwrap_or(0.0)),
         };
         self.reachable(deep)?;
-        self.hand(-CLEAR_MM, deep, speed, TouchKind::Hand)?;
-        self.hand(deep, deep, press.hold_ms, TouchKind::Hand)?;
-        self.hand(deep, -CLEAR_MM, speed, TouchKind::Hand)
+        self.move_by_hand(-CLEAR_MM, deep, speed, TouchKind::Hand)?;
+        self.move_by_hand(deep, deep, press.hold_ms, TouchKind::Hand)?;
+        self.move_by_hand(deep, -CLEAR_MM, speed, TouchKind::Hand)
     }
 
     /// Sets the body down, lets it go or pushes it along, and lifts it.
@@ -151,12 +151,12 @@ impl<'a> Trajectory<'a> {
         let weight = self.mass() * GRAVITY * self.scene.slant_deg.to_radians().cos();
         let deep = self.push.down_mm(along.press_n.unwrap_or(weight));
         self.reachable(deep)?;
-        self.hand(-CLEAR_MM, deep, SET_DOWN, kind)?;
+        self.move_by_hand(-CLEAR_MM, deep, SET_DOWN, kind)?;
         self.speed = 0.0;
         let (sin, cos) = along.toward_deg.to_radians().sin_cos();
         self.along = [cos, sin].map(|part| part * along.speed_mm_s * 1e-3);
         if along.press_n.is_some() {
-            self.hand(deep, deep, along.for_ms, kind)?;
+            self.move_by_hand(deep, deep, along.for_ms, kind)?;
         } else {
             if kind == TouchKind::Roll {
                 // What rolls does not slip where it can turn: a ball each way, a cylinder across its axis.
@@ -167,7 +167,7 @@ impl<'a> Trajectory<'a> {
             self.fall_for(along.for_ms)?;
         }
         self.along = [0.0; 2];
-        self.hand(self.depth, -CLEAR_MM, SET_DOWN, kind)
+        self.move_by_hand(self.depth, -CLEAR_MM, SET_DOWN, kind)
     }
 
     /// Refuses a course that leads off the array; a body that falls may glance off a tilted one.
@@ -178,12 +178,12 @@ impl<'a> Trajectory<'a> {
             _ => return Ok(()),
         };
         let pitch_mm = pitch_of(array)?;
-        let on = |at: f32, count: u16| (-0.01..=f64::from(count - 1) * pitch_mm + 0.01).contains(&f64::from(at));
+        let is_inside = |at: f32, count: u16| (-0.01..=f64::from(count - 1) * pitch_mm + 0.01).contains(&f64::from(at));
         let track = &self.track;
         let touches = |k: &usize| track.force_n[*k] > 0.0;
         let off = (0..track.force_n.len())
             .filter(touches)
-            .find(|&k| !(on(track.x_mm[k], array.columns) && on(track.y_mm[k], array.rows)));
+            .find(|&k| !(is_inside(track.x_mm[k], array.columns) && is_inside(track.y_mm[k], array.rows)));
         match (off, self.contacts.first()) {
             (Some(k), Some(first)) => Err(Error::scene(format!(
                 "the body {does} off the array {:.0} ms after it was set down, at x {:.0} mm, y {:.0} mm; begin further in, or stop earlier (for_ms)",
@@ -244,7 +244,7 @@ impl<'a> Trajectory<'a> {
     }
 
     /// Lets the body go so high above where it will touch.
-    fn let_go(&mut self, height_mm: f64) {
+    fn release_body(&mut self, height_mm: f64) {
         let (sin, cos) = self.scene.slant_deg.to_radians().sin_cos();
         let (down_y, down_x) = self.scene.downhill_deg.to_radians().sin_cos();
         self.depth = -height_mm * cos;
@@ -307,7 +307,7 @@ impl<'a> Trajectory<'a> {
     }
 
     /// Moves the body by hand from one depth to another at a speed in mm/ms; where both are one, holds it for `pace` ms.
-    fn hand(&mut self, from: f64, to: f64, pace: f64, kind: TouchKind) -> Result<()> {
+    fn move_by_hand(&mut self, from: f64, to: f64, pace: f64, kind: TouchKind) -> Result<()> {
         let ms = if from == to { pace } else { (to - from).abs() / pace };
         let steps = (ms / self.inner_ms).round().max(1.0) as u64;
         let speed = (to - from) / (steps as f64 * self.inner_ms);

@@ -67,7 +67,7 @@ impl Waves {
     /// # Errors
     ///
     /// `Interrupted`.
-    pub fn kernel(&self, of: impl Fn(f64) -> f64, stop: Stop<'_>) -> Result<Vec<f64>> {
+    pub fn kernel(&self, spectrum: impl Fn(f64) -> f64, stop: Stop<'_>) -> Result<Vec<f64>> {
         let step = |n: usize| 2.0 * PI / (n as f64 * self.pitch_mm);
         let (along, across) = (step(self.columns), step(self.rows));
         let mut kernel = Vec::with_capacity(self.spectrum.len());
@@ -75,7 +75,7 @@ impl Waves {
             stop.check()?;
             for y in 0..self.rows {
                 let y = y.min(self.rows - y);
-                kernel.push(of((x as f64 * along).hypot(y as f64 * across)));
+                kernel.push(spectrum((x as f64 * along).hypot(y as f64 * across)));
             }
         }
         Ok(kernel)

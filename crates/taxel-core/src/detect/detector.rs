@@ -138,7 +138,7 @@ impl Detector {
         stop: Stop<'_>,
     ) -> Result<(Vec<Detection>, Option<u64>)> {
         let frame_us = match frame_us {
-            Some(given) => given,
+            Some(frame_us) => frame_us,
             None => usual_distance(frames.t)?,
         };
         let last = frames.t.last().copied().unwrap_or(0);

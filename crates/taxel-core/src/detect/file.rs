@@ -16,7 +16,7 @@ const VERSION: u64 = 1;
 pub(super) fn parts(what: &str, text: &str, formats: &[&'static str]) -> Result<(&'static str, Value)> {
     let format = |message: String| Error::format(format!("{what}: {message}"));
     let names = formats.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(" or ");
-    let mut value: Value = reading::from_text(text).map_err(|unfit| Error::format(unfit.of(what)))?;
+    let mut value: Value = reading::from_text(text).map_err(|unfit| Error::format(unfit.text(what)))?;
     let Some(object) = value.as_object_mut() else {
         return Err(format("not a JSON object".to_owned()));
     };

@@ -94,9 +94,9 @@ impl LoadCurve {
         let (end, frames) = (release * threshold, i64::from(frames));
         let limits = Limits { begin: threshold, end, frames, touch_train: 0, threshold, age_us: None };
         // Begins and ends depend only on which limits the quantity has passed, and it changes far more often than that.
-        let mut last = limits.passed(0.0);
+        let mut last = limits.passed_limits(0.0);
         let passing = self.changes.iter().filter(|change| {
-            let before = std::mem::replace(&mut last, limits.passed(f64::from(change.value)));
+            let before = std::mem::replace(&mut last, limits.passed_limits(f64::from(change.value)));
             before != last
         });
         self.run(limits, passing)

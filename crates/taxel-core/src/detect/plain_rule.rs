@@ -153,7 +153,7 @@ impl PlainRule {
 
     /// As [`PlainRule::from_json`], from the contents of the file without format and version.
     pub(super) fn from_parts(parts: Value) -> Result<Self> {
-        let rule: Self = reading::from_value(parts).map_err(|unfit| Error::format(unfit.of("plain rule")))?;
+        let rule: Self = reading::from_value(parts).map_err(|unfit| Error::format(unfit.text("plain rule")))?;
         rule.check().map_err(|e| Error::format(format!("plain rule: {e}")))?;
         Ok(rule)
     }

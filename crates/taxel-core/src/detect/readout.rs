@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::{above_0, is_weight, no_weight};
+use crate::allowed::{above_0, is_weight, weight_error};
 use crate::detect::stream::{DelayedNeurons, NamedNeuron, Ranges, ReceivedTrains};
 use crate::detect::{self, FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeuron};
 use crate::encode::{Composite, Encoder, Tare};
@@ -42,7 +42,7 @@ pub struct Readout {
     pub run_threshold: f64,
     /// The delays at which every train of the encoder enters the neurons, ms, ascending: first all trains at the first
     /// delay, then all at the second (`SpikeTrains.delayed`). By default a single delay of 0.
-    #[serde(default = "at_once", skip_serializing_if = "is_at_once")]
+    #[serde(default = "no_delay", skip_serializing_if = "is_at_once")]
     pub delays_ms: Vec<f64>,
     /// The neurons by label.
     pub neurons: BTreeMap<String, TrainedNeuron>,
@@ -51,7 +51,7 @@ pub struct Readout {
     pub seen: BTreeMap<String, Seen>,
 }
 
-fn at_once() -> Vec<f64> {
+fn no_delay() -> Vec<f64> {
     vec![0.0]
 }
 
@@ -80,8 +80,8 @@ impl Readout {
             if label.trim().is_empty() {
                 return Err(problem!("a neuron without a name: must have a label"));
             }
-            cell.neuron.check().map_err(|error| error.of(label))?;
-            self.encoder_of(cell).map_err(|error| error.of(label))?;
+            cell.neuron.check().map_err(|error| error.in_part(label))?;
+            self.encoder_of(cell).map_err(|error| error.in_part(label))?;
             if cell.neuron.time != self.time {
                 let (its, mine) = (word(&cell.neuron.time), word(&self.time));
                 return Err(problem!("{label}: trained for time {its}, this readout is for time {mine}"));
@@ -94,13 +94,13 @@ impl Readout {
                 return Err(problem!("{label}: delay_ms is {}: must be from 0 to {LONGEST_DELAY_MS}", cell.delay_ms));
             }
             if let Some(n) = cell.weights.iter().position(|&w| !is_weight(w)) {
-                return Err(no_weight(&format!("{label}: weights[{n}]"), cell.weights[n]));
+                return Err(weight_error(&format!("{label}: weights[{n}]"), cell.weights[n]));
             }
             if let Some(array) = &self.array {
                 self.check_weights(label, cell, array)?;
             }
             match self.seen.get(label) {
-                Some(seen) => seen.check(cell.weights.len()).map_err(|error| error.of(label))?,
+                Some(seen) => seen.check(cell.weights.len()).map_err(|error| error.in_part(label))?,
                 None if self.seen.is_empty() => {}
                 None => return Err(problem!("{label}: seen has no ranges of its inputs, as other neurons have")),
             }
@@ -129,9 +129,9 @@ impl Readout {
     /// The encoder whose trains a neuron receives: the readout's own, or some of its parts.
     fn encoder_of(&self, cell: &TrainedNeuron) -> Result<Cow<'_, Encoder>> {
         match (&self.encoder, &*cell.inputs) {
-            (own, []) => Ok(Cow::Borrowed(own)),
-            (Encoder::Composite(own), names) => {
-                let parts = own.named(names)?.into_iter().map(|(name, part)| (name.to_owned(), part.clone()));
+            (encoder, []) => Ok(Cow::Borrowed(encoder)),
+            (Encoder::Composite(encoder), names) => {
+                let parts = encoder.parts_named(names)?.into_iter().map(|(name, part)| (name.to_owned(), part.clone()));
                 Ok(Cow::Owned(Encoder::Composite(Composite { parts: parts.collect() })))
             }
             (_, names) => {
@@ -178,8 +178,8 @@ impl Readout {
             );
             let row = array.rows == 1 && array.len() == mine.len();
             return Err(match row {
-                true if mine.rows == 1 => error.helped_by("array", Hint::Pitch),
-                true => error.helped_by("array", Hint::LayOut),
+                true if mine.rows == 1 => error.with_hint("array", Hint::Pitch),
+                true => error.with_hint("array", Hint::LayOut),
                 false => error,
             });
         }
@@ -189,7 +189,7 @@ impl Readout {
         let encoder = tare.map_or_else(|| self.encoder.clone(), |tare| self.encoder.with_tare(tare));
         let neurons = self.neurons.iter().map(|(label, cell)| {
             let received = match &self.encoder {
-                Encoder::Composite(own) if !cell.inputs.is_empty() => Some(own.of_parts(&cell.inputs, array)?),
+                Encoder::Composite(encoder) if !cell.inputs.is_empty() => Some(encoder.of_parts(&cell.inputs, array)?),
                 _ => None,
             };
             let (encoder, inputs) = (self.encoder_of(cell)?, ReceivedTrains::new(received, self.delays_ms.len()));

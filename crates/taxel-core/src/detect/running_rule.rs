@@ -35,7 +35,7 @@ impl Limits {
     }
 
     /// Which limits a quantity of this value has passed.
-    pub(super) fn passed(&self, load: f64) -> [bool; 2] {
+    pub(super) fn passed_limits(&self, load: f64) -> [bool; 2] {
         [load >= self.begin, load < self.end]
     }
 }
@@ -44,7 +44,7 @@ impl Limits {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decision {
     /// Which of the rule's two labels: 0 for the begin, or below the threshold; 1 for the end, or above.
-    pub which: usize,
+    pub label: usize,
     /// The begin or end of the load, us.
     pub t: i64,
     /// The end of the last frame on which the decision rests, us.
@@ -134,7 +134,7 @@ impl RunningRule {
         self.close_before(clock.open_at(t), clock, out);
         while let Some(due) = self.waiting.front().filter(|due| clock.is_over(due.at, t)) {
             out.push(Decision {
-                which: usize::from(self.quantity >= self.limits.threshold),
+                label: usize::from(self.quantity >= self.limits.threshold),
                 t: due.t,
                 known: clock.end_of(ms(due.at)),
                 repaired: due.repaired,
@@ -165,7 +165,7 @@ impl RunningRule {
         self.loaded = !self.loaded;
         match self.limits.age_us {
             None => out.push(Decision {
-                which: usize::from(!self.loaded),
+                label: usize::from(!self.loaded),
                 t,
                 known: clock.end_of_number(first + self.limits.frames - 1),
                 repaired,
@@ -178,6 +178,6 @@ impl RunningRule {
 
     /// Whether the quantity has passed the limit at which the state changes.
     fn passes(&self) -> bool {
-        self.limits.passed(self.load)[usize::from(self.loaded)]
+        self.limits.passed_limits(self.load)[usize::from(self.loaded)]
     }
 }

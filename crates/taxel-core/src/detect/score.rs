@@ -51,7 +51,7 @@ pub struct Spread {
 impl Spread {
     /// The spread of `values`; all NaN if there are none.
     #[must_use]
-    pub fn of(values: &[f64]) -> Self {
+    pub fn new(values: &[f64]) -> Self {
         let n = values.len();
         if n == 0 {
             return Self { mean: f64::NAN, sd: f64::NAN, median: f64::NAN, low: f64::NAN, high: f64::NAN };
@@ -105,7 +105,7 @@ pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: St
         let detected_t: Vec<i64> = detected.iter().map(|&k| found[k].t).collect();
         let events_t: Vec<i64> = events.iter().map(|&k| truth[k].t).collect();
         let reach: Vec<i64> = events.iter().map(|&k| windows[k]).collect();
-        let pairs = in_order(&detected_t, &events_t, &reach, stop).map_err(|error| error.of(label))?;
+        let pairs = in_order(&detected_t, &events_t, &reach, stop).map_err(|error| error.in_part(label))?;
 
         let mut tally = Tally { label: label.to_owned(), ..Tally::default() };
         let (mut matched, mut met) = (vec![false; detected.len()], vec![false; events.len()]);
@@ -176,19 +176,19 @@ mod tests {
 
     #[test]
     fn the_spread_is_that_of_the_textbook() {
-        let spread = Spread::of(&[4.0, 1.0, 2.0, 3.0]);
+        let spread = Spread::new(&[4.0, 1.0, 2.0, 3.0]);
         assert_eq!((spread.mean, spread.median), (2.5, 2.5));
         assert!((spread.sd - (5.0_f64 / 3.0).sqrt()).abs() < 1e-15);
         assert!((spread.low - 1.075).abs() < 1e-12 && (spread.high - 3.925).abs() < 1e-12);
-        assert!(Spread::of(&[]).mean.is_nan() && Spread::of(&[1.0]).sd.is_nan());
+        assert!(Spread::new(&[]).mean.is_nan() && Spread::new(&[1.0]).sd.is_nan());
     }
 
     #[test]
     fn windows_that_make_no_sense_are_refused() {
         let never = Stop::never();
-        let one = [Reference { label: "a".into(), t: 0 }];
-        assert!(score(&[], &one, &[-1], never).unwrap_err().to_string().contains("window_us is -1 us"));
-        assert!(score(&[], &one, &[i64::MAX], never).is_err());
+        let references = [Reference { label: "a".into(), t: 0 }];
+        assert!(score(&[], &references, &[-1], never).unwrap_err().to_string().contains("window_us is -1 us"));
+        assert!(score(&[], &references, &[i64::MAX], never).is_err());
         assert!(score(&[], &[Reference { label: "a".into(), t: 0 }], &[], never).is_err());
     }
 }

@@ -60,7 +60,7 @@ enum Decides {
 
 impl ReadoutStream {
     pub(super) fn new(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, neurons: DelayedNeurons) -> Self {
-        Self::of(encoder, array, clock, Decides::Neurons(neurons))
+        Self::start(encoder, array, clock, Decides::Neurons(neurons))
     }
 
     /// A stream of a plain rule: `loads` emits the changes of its quantities.
@@ -71,11 +71,11 @@ impl ReadoutStream {
         rule: RunningRule,
         labels: [Option<String>; 2],
     ) -> Self {
-        Self::of(loads, array, clock, Decides::Rule(LabelledRule::new(rule, labels)))
+        Self::start(loads, array, clock, Decides::Rule(LabelledRule::new(rule, labels)))
     }
 
-    fn of(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, decides: Decides) -> Self {
-        let repairs = Repairs::within(encoder.repaired_span_ms());
+    fn start(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, decides: Decides) -> Self {
+        let repairs = Repairs::with_memory(encoder.repaired_span_ms());
         let (emitted, zeroings) = (vec![], VecDeque::new());
         Self { encoder, array, decides, clock, now: None, emitted, repairs, zeroings, late: 0, begin: i64::MIN }
     }
@@ -261,7 +261,7 @@ impl ReadoutStream {
     fn settle(&mut self, until: i64, out: &mut Vec<Detection>) -> Result<()> {
         self.now = Some(self.now.map_or(until, |now| now.max(until)));
         let emitted = std::mem::take(&mut self.emitted);
-        let spikes = emitted.into_iter().map(|spike| (spike, self.repairs.may_give(spike.t)));
+        let spikes = emitted.into_iter().map(|spike| (spike, self.repairs.may_repair(spike.t)));
         match &mut self.decides {
             Decides::Neurons(neurons) => {
                 neurons.receive(spikes, self.encoder.trains(), self.encoder.kind());

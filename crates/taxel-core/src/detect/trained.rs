@@ -56,7 +56,7 @@ impl Seen {
     }
 
     /// The range of an input.
-    pub(super) fn of(&self, input: usize) -> (f64, f64) {
+    pub(super) fn range(&self, input: usize) -> (f64, f64) {
         (self.least.as_ref().map_or(0.0, |least| least[input]), self.most[input])
     }
 }

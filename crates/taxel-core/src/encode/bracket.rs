@@ -23,7 +23,7 @@ impl Bracket {
 
     /// Whether the value of any channel in this block is outside its bracket.
     #[inline(always)]
-    pub(super) fn left(&self, block: usize, values: &Block) -> bool {
+    pub(super) fn has_left(&self, block: usize, values: &Block) -> bool {
         let (low, high) = (&self.low[block], &self.high[block]);
         let mut left = 0_u32;
         for lane in 0..BLOCK {

@@ -16,16 +16,16 @@ wide! {
         const NOT_FINITE: u32 = 0x7f80_0000;
         for ((new, held), changed) in new.iter().zip(held).zip(changed) {
             next.fetch();
-            let (mut other, mut bad) = (0, 0);
+            let (mut difference, mut bad) = (0, 0);
             for (new, held) in new.iter().zip(held.iter()) {
-                other |= new.to_bits() ^ held.to_bits();
+                difference |= new.to_bits() ^ held.to_bits();
                 bad |= u32::from(new.to_bits() & NOT_FINITE == NOT_FINITE);
             }
             if bad != 0 {
                 let bad = new.iter().find(|v| !v.is_finite()).unwrap_or(&f32::NAN);
                 return Err(not_finite(t, *bad));
             }
-            if other != 0 {
+            if difference != 0 {
                 *held = *new;
                 *changed = true;
             }
@@ -58,12 +58,12 @@ impl Channels {
     pub(super) fn new(array: &Array) -> Self {
         let (mut places, mut of_place) = (None, None);
         if let Some(exists) = &array.exists {
-            let there: Vec<u32> = (0..).zip(exists).filter(|&(_, &e)| e).map(|(place, _)| place).collect();
+            let existing: Vec<u32> = (0..).zip(exists).filter(|&(_, &e)| e).map(|(place, _)| place).collect();
             let mut channels = vec![NONE; exists.len()];
-            for (channel, &place) in (0..).zip(&there) {
+            for (channel, &place) in (0..).zip(&existing) {
                 channels[place as usize] = channel;
             }
-            (places, of_place) = (Some(there), Some(channels));
+            (places, of_place) = (Some(existing), Some(channels));
         }
         Self { rows: array.rows, columns: array.columns, name: array.name.clone(), places, of_place }
     }
@@ -86,7 +86,7 @@ impl Channels {
     pub(super) fn of_place(&self, place: usize) -> Option<usize> {
         match &self.of_place {
             None => Some(place),
-            Some(of) => (of[place] != NONE).then_some(of[place] as usize),
+            Some(channels) => (channels[place] != NONE).then_some(channels[place] as usize),
         }
     }
 

@@ -276,7 +276,7 @@ impl Fa1Block {
 
     /// Lowers the thresholds as 5.5 does for a sample without spikes.
     #[inline(always)]
-    fn quieten(&mut self, decay: f64, theta_0: f64) {
+    fn lower_thresholds(&mut self, decay: f64, theta_0: f64) {
         let mut moved = 0;
         for theta in &mut self.theta {
             let next = if *theta > theta_0 { *theta - decay } else { theta_0 };
@@ -331,7 +331,7 @@ impl Rule for Fa1Afferents {
                 n < end
             } {}
             n = end;
-            afferent.quieten(self.decay, self.theta_0);
+            afferent.lower_thresholds(self.decay, self.theta_0);
         }
         self.reckon(t, held, &near[..n], out);
         self.near = near;

@@ -99,7 +99,7 @@ pub(super) struct FastState {
 impl Filter for Fast {
     type State = FastState;
 
-    fn settled(&self, x: &Lanes) -> (FastState, Lanes) {
+    fn steady_state(&self, x: &Lanes) -> (FastState, Lanes) {
         let none = [0.0; BLOCK];
         (FastState { x: *x, first: *x, once: none, second: none, twice: none }, none)
     }

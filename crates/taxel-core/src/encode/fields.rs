@@ -52,15 +52,16 @@ impl Fields {
                 for (number, group) in cut.chunks(ROW).enumerate().filter(|(_, group)| row < group[0].1.len()) {
                     let (mut starts, mut weights) = ([0; ROW], [[0.0; ROW]; WIDE]);
                     for (lane, (_, windows)) in group.iter().enumerate() {
-                        if let Some((start, own)) = windows.get(row) {
+                        if let Some((start, window)) = windows.get(row) {
                             starts[lane] = *start;
-                            (0..WIDE).for_each(|k| weights[k][lane] = own[k]);
+                            (0..WIDE).for_each(|k| weights[k][lane] = window[k]);
                         }
                     }
                     new.groups.push(number);
                     new.windows.push(starts);
                     let wide = weights[NARROW..].as_flattened().iter().any(|&weight| weight != 0.0);
-                    new.weights.extend(weights[..if wide { WIDE } else { NARROW }].iter().map(|&own| OnLine(own)));
+                    new.weights
+                        .extend(weights[..if wide { WIDE } else { NARROW }].iter().map(|&weights| OnLine(weights)));
                     new.weighed.push(new.weights.len());
                 }
             }
@@ -84,7 +85,7 @@ impl Fields {
     }
 
     /// The inputs of a block of afferents for these pressures, by lane.
-    pub(super) fn feel(&self, block: usize, held: &[Block]) -> Block {
+    pub(super) fn inputs_of_block(&self, block: usize, held: &[Block]) -> Block {
         #[inline(always)]
         fn by(fields: &Fields, block: usize, read: impl Fn(usize) -> [[f32; ROW]; WIDE]) -> Block {
             let mut felt = OnLine([[0.0; ROW]; BLOCK / ROW]);
@@ -123,16 +124,16 @@ impl Fields {
     }
 
     /// The lanes of the afferents whose fields contain a channel, with the channel's weight in each.
-    pub(super) fn feeling(&self, channel: usize) -> impl Iterator<Item = (usize, f32)> {
+    pub(super) fn lanes_of_channel(&self, channel: usize) -> impl Iterator<Item = (usize, f32)> {
         let near = move |block: &usize| (self.feels[*block][0]..self.feels[*block][1]).contains(&(channel / BLOCK));
         (0..self.feels.len()).filter(near).flat_map(|block| block * BLOCK..(block + 1) * BLOCK).filter_map(
             move |lane| {
-                let of = |row: usize| {
+                let weight_in = |row: usize| {
                     let at = channel.wrapping_sub(self.windows.starts(row)[lane % ROW] as usize);
                     self.weights[self.weights_of(row)].get(at).map_or(0.0, |weights| weights.0[lane % ROW])
                 };
-                let own = |row: &usize| self.groups[*row] == lane % BLOCK / ROW;
-                let weight: f32 = self.rows_of(lane / BLOCK).filter(own).map(of).sum();
+                let is_in_group = |row: &usize| self.groups[*row] == lane % BLOCK / ROW;
+                let weight: f32 = self.rows_of(lane / BLOCK).filter(is_in_group).map(weight_in).sum();
                 (weight != 0.0).then_some((lane, weight))
             },
         )
@@ -206,29 +207,29 @@ mod tests {
                 *held = rng.random_range(-10.0..150.0) * 10_f32.powi(rng.random_range(-3..4));
             }
             let new = Fields::new(&fields, channels);
-            for (block, own) in fields.chunks(BLOCK).enumerate() {
-                let felt = new.feel(block, &held);
-                for (lane, felt) in felt[..own.len()].iter().enumerate() {
+            for (block, block_fields) in fields.chunks(BLOCK).enumerate() {
+                let felt = new.inputs_of_block(block, &held);
+                for (lane, felt) in felt[..block_fields.len()].iter().enumerate() {
                     let field = &fields[new.afferent(block * BLOCK + lane) as usize];
                     let weighed = |&(channel, weight): &(u32, f32)| held.as_flattened()[channel as usize] * weight;
                     let wanted = field.iter().map(weighed).fold(0.0, |sum, weighed| sum + weighed);
                     assert_eq!(felt.to_bits(), f32::to_bits(wanted), "{field:?}");
                 }
-                assert!(felt[own.len()..].iter().all(|&felt| felt == 0.0));
+                assert!(felt[block_fields.len()..].iter().all(|&felt| felt == 0.0));
                 for changed in 0..held.len() {
                     let felt =
                         new.any(block, &std::array::from_fn::<bool, 7, _>(|other| other == changed)[..held.len()]);
-                    let needed = own.iter().flatten().any(|&(channel, _)| channel as usize / BLOCK == changed);
+                    let needed = block_fields.iter().flatten().any(|&(channel, _)| channel as usize / BLOCK == changed);
                     assert!(felt || !needed);
                 }
             }
             for channel in 0..channels {
-                let of = |(afferent, field): (usize, &Vec<(u32, f32)>)| {
+                let weight_on = |(afferent, field): (usize, &Vec<(u32, f32)>)| {
                     field.iter().find(|felt| felt.0 as usize == channel).map(|felt| (afferent, felt.1))
                 };
-                let wanted: Vec<(usize, f32)> = fields.iter().enumerate().filter_map(of).collect();
+                let wanted: Vec<(usize, f32)> = fields.iter().enumerate().filter_map(weight_on).collect();
                 let mut feeling: Vec<(usize, f32)> =
-                    new.feeling(channel).map(|(lane, weight)| (new.afferent(lane) as usize, weight)).collect();
+                    new.lanes_of_channel(channel).map(|(lane, weight)| (new.afferent(lane) as usize, weight)).collect();
                 feeling.sort_by_key(|&(afferent, _)| afferent);
                 assert_eq!(feeling, wanted);
             }

@@ -188,9 +188,9 @@ impl LevelCrossings {
                 above_since: vec![None; channels],
             }),
         };
-        let blank = |(&on, &off): (&f64, &f64)| ChannelLevel {
-            on_at: on as f32,
-            off_at: off as f32,
+        let blank = |(&rise, &fall): (&f64, &f64)| ChannelLevel {
+            on_at: rise as f32,
+            off_at: fall as f32,
             above: false,
             reported: false,
             since: i64::MIN,
@@ -246,7 +246,7 @@ impl LevelCrossings {
                 state.above = value >= state.on_at;
                 state.reported = state.above;
                 if state.reported {
-                    self.speak_tonic(t, channel, level, true, out);
+                    self.switch_tonic(t, channel, level, true, out);
                 }
             }
             self.set_bracket(channel);
@@ -256,9 +256,9 @@ impl LevelCrossings {
     #[inline(always)]
     fn cross(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
         let from = out.len();
-        self.say_trials(t, true, out);
+        self.emit_trials(t, true, out);
         for (block, values) in held.iter().enumerate() {
-            if changed[block] && self.bracket.left(block, values) {
+            if changed[block] && self.bracket.has_left(block, values) {
                 for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
                     let value = values[channel % BLOCK];
                     if !self.bracket.holds(channel, value) {
@@ -267,7 +267,7 @@ impl LevelCrossings {
                 }
             }
         }
-        self.say_tonic(t, true, out);
+        self.emit_tonic(t, true, out);
         sort_from(out, from);
     }
 
@@ -280,7 +280,7 @@ impl LevelCrossings {
                 state.above = above;
                 state.since = t;
                 if self.hold == 0 {
-                    self.say(t, train, out);
+                    self.report_level(t, train, out);
                 } else if above != state.reported {
                     self.trials.push_back((t + self.hold, train));
                 }
@@ -289,20 +289,20 @@ impl LevelCrossings {
         self.set_bracket(channel);
     }
 
-    fn say(&mut self, t: i64, train: usize, out: &mut Vec<Spike>) {
+    fn report_level(&mut self, t: i64, train: usize, out: &mut Vec<Spike>) {
         let state = &mut self.states[train];
         state.reported = state.above;
-        let on = state.reported;
-        out.push(Spike { t: ms(t), train: train as u32, value: if on { 1.0 } else { -1.0 } });
-        self.speak_tonic(t, train / self.levels.len(), train % self.levels.len(), on, out);
+        let above = state.reported;
+        out.push(Spike { t: ms(t), train: train as u32, value: if above { 1.0 } else { -1.0 } });
+        self.switch_tonic(t, train / self.levels.len(), train % self.levels.len(), above, out);
     }
 
     /// Starts or stops a channel's tonic spikes, if `level` is the tonic level.
-    fn speak_tonic(&mut self, t: i64, channel: usize, level: usize, on: bool, out: &mut Vec<Spike>) {
+    fn switch_tonic(&mut self, t: i64, channel: usize, level: usize, above: bool, out: &mut Vec<Spike>) {
         let first = self.states.len();
         let Some(tonic) = self.tonic.as_mut().filter(|tonic| tonic.level == level) else { return };
-        tonic.above_since[channel] = on.then_some(t);
-        if on {
+        tonic.above_since[channel] = above.then_some(t);
+        if above {
             out.push(Spike { t: ms(t), train: (first + channel) as u32, value: 1.0 });
             tonic.next.push_back((t + tonic.every, channel, t));
         }
@@ -310,21 +310,21 @@ impl LevelCrossings {
 
     /// Emits the crossings whose minimum duration ends before `t` (with `at_too` also at `t`), and the tonic spikes
     /// before each.
-    fn say_trials(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
+    fn emit_trials(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
         while let Some(&(due, train)) = self.trials.front()
             && (due < t || (at_too && due == t))
         {
             self.trials.pop_front();
-            self.say_tonic(due, false, out);
+            self.emit_tonic(due, false, out);
             let state = self.states[train];
             if state.above != state.reported && state.since == due - self.hold {
-                self.say(due, train, out);
+                self.report_level(due, train, out);
             }
         }
     }
 
     /// Emits the tonic spikes before `t` (with `at_too` also at `t`).
-    fn say_tonic(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
+    fn emit_tonic(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
         let first = self.states.len();
         let Some(tonic) = &mut self.tonic else { return };
         while let Some(&(due, channel, since)) = tonic.next.front()
@@ -364,7 +364,7 @@ impl Rule for LevelCrossings {
             }
             self.pass(t, out);
         }
-        let ranges = window.renewed(t);
+        let ranges = window.renew(t);
         if let Some(ranges) = &ranges {
             self.scale(ranges);
         }
@@ -380,8 +380,8 @@ impl Rule for LevelCrossings {
 
     fn pass(&mut self, t: i64, out: &mut Vec<Spike>) {
         let from = out.len();
-        self.say_trials(t, false, out);
-        self.say_tonic(t, false, out);
+        self.emit_trials(t, false, out);
+        self.emit_tonic(t, false, out);
         sort_from(out, from);
     }
 

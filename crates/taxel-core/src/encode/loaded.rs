@@ -15,11 +15,11 @@ fn round_up(x: f64) -> f32 {
 wide! {
     /// Whether the same places are loaded as before.
     fn as_loaded(held: &Block, from: &Block, loaded: &[u32; BLOCK]) -> bool {
-        let mut other = 0;
+        let mut changes = 0;
         for lane in 0..BLOCK {
-            other |= u32::from(held[lane] >= from[lane]) ^ loaded[lane];
+            changes |= u32::from(held[lane] >= from[lane]) ^ loaded[lane];
         }
-        other == 0
+        changes == 0
     }
 }
 
@@ -105,17 +105,17 @@ impl Paired {
         let (row, column) = (place / self.columns, place % self.columns);
         for y in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
             for x in column.saturating_sub(1)..=(column + 1).min(self.columns - 1) {
-                let other = y * self.columns + x;
-                if other == place {
+                let neighbour = y * self.columns + x;
+                if neighbour == place {
                     continue;
                 }
-                let counted = self.neighbours[other] > 0;
+                let counted = self.neighbours[neighbour] > 0;
                 if loaded {
-                    self.neighbours[other] += 1;
+                    self.neighbours[neighbour] += 1;
                 } else {
-                    self.neighbours[other] -= 1;
+                    self.neighbours[neighbour] -= 1;
                 }
-                if self.is_loaded(other) && counted != (self.neighbours[other] > 0) {
+                if self.is_loaded(neighbour) && counted != (self.neighbours[neighbour] > 0) {
                     self.area = if loaded { self.area + 1 } else { self.area - 1 };
                 }
             }
@@ -153,20 +153,20 @@ pub(super) struct LoadedSums {
 impl Loaded {
     /// Starts with no taxel loaded; `what` names the encoder in an error.
     pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
-        let rest = given(what, tare)?.rest_of(array)?;
+        let rest = require_tare(what, tare)?.rest_of(array)?;
         let places = Paired::new(usize::from(array.rows), usize::from(array.columns));
         let mut fresh = Self { places, noise_floor, rest };
-        (0..array.len()).for_each(|place| fresh.rest_changed(place));
+        (0..array.len()).for_each(|place| fresh.update_threshold(place));
         Ok(fresh)
     }
 
     /// Changes the rest of a place; the caller must pass its value again.
     pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
         self.rest.set(place, rest);
-        self.rest_changed(place);
+        self.update_threshold(place);
     }
 
-    fn rest_changed(&mut self, place: usize) {
+    fn update_threshold(&mut self, place: usize) {
         self.places.set_from(place, touched_from(self.rest.values()[place], self.noise_floor));
     }
 
@@ -228,6 +228,6 @@ impl std::ops::Deref for Loaded {
 }
 
 /// The tare of an encoder that needs one; `what` names the encoder in an error.
-pub(super) fn given<'a>(what: &str, tare: Option<&'a Tare>) -> Result<&'a Tare> {
-    tare.ok_or_else(|| problem!("{what} without a tare").helped_by("tare", Hint::Give))
+pub(super) fn require_tare<'a>(what: &str, tare: Option<&'a Tare>) -> Result<&'a Tare> {
+    tare.ok_or_else(|| problem!("{what} without a tare").with_hint("tare", Hint::Give))
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::blocks::{Block, NextFrame};
 use super::by_stamp::{ByStamp, Measure};
 use super::encoding::Encoding;
-use super::loaded::{Loaded, given};
+use super::loaded::{Loaded, require_tare};
 use super::local_sums::{LocalSums, SumPair, Values};
 use super::recent::{PastWindow, RecentSamples};
 use super::sampled::{Rule, Sampled};
@@ -96,8 +96,8 @@ impl LocalLoad {
             names.extend(OF_MEAN.iter().map(|name| format!("{name}, {tau} ms")));
         }
         let present = names.clone();
-        for ([from, to], of) in self.windows() {
-            names.extend(present[..of].iter().map(|name| format!("{name}, mean of {from} to {to} ms ago")));
+        for ([from, to], count) in self.windows() {
+            names.extend(present[..count].iter().map(|name| format!("{name}, mean of {from} to {to} ms ago")));
         }
         names.push("clock".to_owned());
         names
@@ -151,16 +151,18 @@ impl LocalLoad {
     }
 
     fn sums(&self, array: &Array, running_us: &[f64]) -> Result<LocalSums> {
-        let tare = given("local load", self.tare.as_ref())?;
+        let tare = require_tare("local load", self.tare.as_ref())?;
         let least = (self.least_noise, self.noise_floor);
         LocalSums::new(array, tare, least, self.rest == LocalRest::Tracked, running_us)
     }
 
     fn sampled(&self, array: &Array, emit: Emit) -> Result<Sampled<LocalLoadRule>> {
         let whole = |ms: f64| us(ms).round() as i64;
-        let windows: Vec<PastWindow> =
-            self.windows().map(|([from, to], of)| PastWindow { from: whole(from), to: whole(to), of }).collect();
-        let recent = RecentSamples::new(windows[0].of, &windows);
+        let windows: Vec<PastWindow> = self
+            .windows()
+            .map(|([from, to], quantities)| PastWindow { from: whole(from), to: whole(to), quantities })
+            .collect();
+        let recent = RecentSamples::new(windows[0].quantities, &windows);
         let rule = LocalLoadRule { sums: self.sums(array, &self.running_us())?, recent, quantities: vec![], emit };
         Sampled::new(self, rule, array, self.period_ms)
     }

@@ -122,7 +122,7 @@ impl CellNoise {
         for cell in 0..n {
             new.changed(cell);
         }
-        new.per_noise = new.of_sums(grid.stride);
+        new.per_noise = new.noise_reciprocals(grid.stride);
         new
     }
 
@@ -137,11 +137,11 @@ impl CellNoise {
     }
 
     /// 1 over the noise of the sum around each cell.
-    fn of_sums(&self, stride: usize) -> Vec<f32> {
+    fn noise_reciprocals(&self, stride: usize) -> Vec<f32> {
         let around = |cell: usize| {
             let row = |cell: usize| {
-                let [left, here, right] = [cell - 1, cell, cell + 1].map(|cell| self.unit(cell).powi(2));
-                (left + right) + here
+                let [left, middle, right] = [cell - 1, cell, cell + 1].map(|cell| self.unit(cell).powi(2));
+                (left + right) + middle
             };
             (row(cell - stride) + row(cell + stride)) + row(cell)
         };
@@ -155,11 +155,11 @@ impl CellNoise {
     }
 
     /// Counts a cell from now on whose rest was not known.
-    fn know(&mut self, cell: usize, stride: usize) {
+    fn start_counting(&mut self, cell: usize, stride: usize) {
         if self.sd[cell].is_none() {
             self.sd[cell] = Some(self.least);
             self.changed(cell);
-            self.per_noise = self.of_sums(stride);
+            self.per_noise = self.noise_reciprocals(stride);
         }
     }
 }
@@ -208,9 +208,9 @@ wide! {
 wide! {
     /// The sum of each cell, the one above it and the one below it; the outer ones first, so that a turned array has the
     /// same sums.
-    fn vertically(up: &[f32], here: &[f32], down: &[f32], sums: &mut [f32]) {
-        for (((sum, up), here), down) in sums.iter_mut().zip(up).zip(here).zip(down) {
-            *sum = (up + down) + here;
+    fn vertically(up: &[f32], middle: &[f32], down: &[f32], sums: &mut [f32]) {
+        for (((sum, up), middle), down) in sums.iter_mut().zip(up).zip(middle).zip(down) {
+            *sum = (up + down) + middle;
         }
     }
 }
@@ -220,13 +220,13 @@ type Extremes = (f32, f32, u32);
 
 wide! {
     /// Extremes of the sums of three neighbours, in units of their noise, and 0.
-    fn horizontally(left: &[f32], here: &[f32], right: &[f32], per_noise: &[f32]) -> Extremes {
+    fn horizontally(left: &[f32], middle: &[f32], right: &[f32], per_noise: &[f32]) -> Extremes {
         let (mut largest, mut smallest, mut outstanding) = ([0.0_f32; LANES], [0.0_f32; LANES], [0_u32; LANES]);
-        let groups = left.as_chunks::<LANES>().0.iter().zip(here.as_chunks::<LANES>().0);
+        let groups = left.as_chunks::<LANES>().0.iter().zip(middle.as_chunks::<LANES>().0);
         let groups = groups.zip(right.as_chunks::<LANES>().0).zip(per_noise.as_chunks::<LANES>().0);
-        for (((left, here), right), per_noise) in groups {
+        for (((left, middle), right), per_noise) in groups {
             for lane in 0..LANES {
-                let sum = ((left[lane] + right[lane]) + here[lane]) * per_noise[lane];
+                let sum = ((left[lane] + right[lane]) + middle[lane]) * per_noise[lane];
                 largest[lane] = if sum > largest[lane] { sum } else { largest[lane] };
                 smallest[lane] = if sum < smallest[lane] { sum } else { smallest[lane] };
                 outstanding[lane] += u32::from(sum > OUTSTANDING);
@@ -321,7 +321,7 @@ impl LocalSums {
         tracked: bool,
         running_us: &[f64],
     ) -> Result<Self> {
-        let (rest, measured, grid) = (tare.rest_of(array)?, tare.noise_of_places(), CellGrid::new(array));
+        let (rest, measured, grid) = (tare.rest_of(array)?, tare.place_noise(), CellGrid::new(array));
         let (mut begins, mut sd) = (vec![f64::NO_REST; grid.cells], vec![None; grid.cells]);
         for (cell, place) in grid.taxels() {
             begins[cell] = rest.values()[place];
@@ -368,7 +368,7 @@ impl LocalSums {
     /// Sets the rest of the existing taxel with this number.
     pub(super) fn set_rest(&mut self, channel: usize, rest: f64) {
         let cell = self.grid.cell(channel);
-        self.noise.know(cell, self.grid.stride);
+        self.noise.start_counting(cell, self.grid.stride);
         for side in &mut self.sides {
             side.changed(&self.noise, cell);
         }

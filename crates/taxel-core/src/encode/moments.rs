@@ -90,7 +90,7 @@ impl Moments {
         let [area, total, peak, way] = self.ranges().map(|(_, range)| range);
         for (moment, range) in [area, total, peak, way, way].into_iter().enumerate() {
             let Some([least, most]) = range else { continue };
-            let levels = in_equal_ratios(least, most, self.levels);
+            let levels = geometric_levels(least, most, self.levels);
             all.extend(levels.iter().map(|&at| MomentLevel { moment, at }));
             if moment >= 3 {
                 all.extend(levels.iter().map(|&at| MomentLevel { moment, at: -at }));
@@ -194,7 +194,7 @@ impl Encoding for Moments {
 
 /// `n` levels in a geometric series, rounded to 12 digits, so that differences between machines' `powf` do not move a
 /// level off a whole number.
-fn in_equal_ratios(least: f64, most: f64, n: usize) -> Vec<f64> {
+fn geometric_levels(least: f64, most: f64, n: usize) -> Vec<f64> {
     let level = |k: usize| {
         let exact = least * (most / least).powf(k as f64 / (n.max(2) - 1) as f64);
         format!("{exact:.11e}").parse().unwrap_or(exact)
@@ -328,7 +328,7 @@ impl LevelPass {
     }
 
     /// Emits the tonic spikes before `t` (with `at_too` also at `t`).
-    fn speak(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
+    fn emit_tonic(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
         let Some(every) = self.every else { return };
         while let Some(&(due, level, since)) = self.due.front()
             && (due < t || (at_too && due == t))
@@ -380,13 +380,13 @@ impl Rule for LevelPass {
             }
         }
         self.emit_sample(t, out);
-        self.speak(t, true, out);
+        self.emit_tonic(t, true, out);
         sort_from(out, from);
     }
 
     fn pass(&mut self, t: i64, out: &mut Vec<Spike>) {
         let from = out.len();
-        self.speak(t, false, out);
+        self.emit_tonic(t, false, out);
         sort_from(out, from);
     }
 

@@ -40,14 +40,14 @@ impl Pieces {
     ///
     /// As [`FramesView::check`] and [`Stream::push_frame`]; `Problem` if they are another array's.
     pub fn push_frames(&mut self, frames: FramesView<'_>) -> Result<SpikeTrains> {
-        let (own, given) = ((self.array.rows, self.array.columns), (frames.array.rows, frames.array.columns));
-        if given != own {
+        let (expected, received) = ((self.array.rows, self.array.columns), (frames.array.rows, frames.array.columns));
+        if received != expected {
             return Err(problem!(
                 "frames of {} x {} taxels: the encoder was begun for {} x {}",
-                given.0,
-                given.1,
-                own.0,
-                own.1
+                received.0,
+                received.1,
+                expected.0,
+                expected.1
             ));
         }
         frames.check()?;

@@ -24,11 +24,11 @@ pub(super) fn power(values: &Block, alpha: f64, out: &mut [f64; BLOCK]) {
 
 #[inline(always)]
 fn power_of(x: f64, alpha: f64) -> f64 {
-    let one = 1.0_f64.to_bits();
+    let one_bits = 1.0_f64.to_bits();
     // x = 2^(biased - 1023) * m with m between sqrt(1/2) and sqrt(2); f32 values are never subnormal in f64.
     let bits = x.to_bits();
-    let biased = bits.wrapping_add(one - (SQRT_2 / 2.0).to_bits()) >> 52;
-    let m = f64::from_bits(bits.wrapping_sub(biased << 52).wrapping_add(one));
+    let biased = bits.wrapping_add(one_bits - (SQRT_2 / 2.0).to_bits()) >> 52;
+    let m = f64::from_bits(bits.wrapping_sub(biased << 52).wrapping_add(one_bits));
     // ln m = 2 (s + s^3/3 + s^5/5 + ...) with s = (m - 1) / (m + 1), |s| < 0.172.
     let s = (m - 1.0) / (m + 1.0);
     let q = s * s;
@@ -48,7 +48,7 @@ fn power_of(x: f64, alpha: f64) -> f64 {
     for k in [12.0, 11.0, 10.0, 9.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0] {
         exponential = exponential * (f * (1.0 / k)) + 1.0;
     }
-    let scale = f64::from_bits((shifted.to_bits() << 52).wrapping_add(one));
+    let scale = f64::from_bits((shifted.to_bits() << 52).wrapping_add(one_bits));
     if x > 0.0 { exponential * scale } else { 0.0 }
 }
 

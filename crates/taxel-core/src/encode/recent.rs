@@ -12,7 +12,7 @@ const LANES: usize = 4;
 pub(super) struct PastWindow {
     pub(super) from: i64,
     pub(super) to: i64,
-    pub(super) of: usize,
+    pub(super) quantities: usize,
 }
 
 /// The samples that windows of the past need.
@@ -40,18 +40,18 @@ impl RecentSamples {
             self.samples.push(std::array::from_fn(|lane| group.get(lane).copied().unwrap_or(0.0)));
         }
         for k in 0..self.windows.len() {
-            let PastWindow { from, to, of } = self.windows[k];
+            let PastWindow { from, to, quantities: count } = self.windows[k];
             let (begin, end) = self.within(t, from, to);
             let rows = &self.samples[begin * self.groups..end * self.groups];
             let per = ((end - begin) as f64).recip();
-            for group in 0..of.div_ceil(LANES) {
+            for group in 0..count.div_ceil(LANES) {
                 let mut sums = [0.0; LANES];
                 for row in rows.iter().skip(group).step_by(self.groups) {
                     for (sum, value) in sums.iter_mut().zip(row) {
                         *sum += value;
                     }
                 }
-                quantities.extend(sums.iter().take(of - group * LANES).map(|sum| sum * per));
+                quantities.extend(sums.iter().take(count - group * LANES).map(|sum| sum * per));
             }
         }
         self.forget(t);

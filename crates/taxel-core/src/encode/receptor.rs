@@ -44,7 +44,7 @@ pub(super) trait Filter: Send + Clone + 'static {
     type State: Send + Clone + 'static;
 
     /// The state after a constant input `x`, and the potential in it.
-    fn settled(&self, x: &Lanes) -> (Self::State, Lanes);
+    fn steady_state(&self, x: &Lanes) -> (Self::State, Lanes);
 
     /// Processes the next sample of a channel whose potential was `u`; returns the potential. With `SEE`, sets the bits
     /// of `moved` for the lanes whose state changed.
@@ -105,7 +105,7 @@ impl<F: Filter> FilterAfferents<F> {
         let threshold = self.firing.threshold;
         self.blocks = x
             .map(|x| {
-                let (state, u) = self.filter.settled(x);
+                let (state, u) = self.filter.steady_state(x);
                 let raised = std::array::from_fn(|lane| (u[lane] - threshold).max(0.0));
                 FilterBlock { state, u, raised, wait: [0.0; BLOCK], still: false }
             })
@@ -249,7 +249,7 @@ mod tests {
         let Firing { threshold, jump, recovery_ms, refractory_ms, period_ms } = firing;
         let mut out = vec![];
         for channel in 0..frames[0].len() {
-            let (mut state, u) = filter.settled(&[frames[0][channel]; BLOCK]);
+            let (mut state, u) = filter.steady_state(&[frames[0][channel]; BLOCK]);
             let (mut u, mut wait) = (u[0], 0.0);
             let mut raised = f64::max(u - threshold, 0.0);
             for (t, frame) in (1..).zip(&frames[1..]) {
@@ -314,7 +314,7 @@ mod tests {
     #[test]
     fn blocks_fire_as_each_channel_would_by_itself() {
         let mut rng = StdRng::seed_from_u64(7);
-        let mut seen = [[0; 2]; 2];
+        let mut counts = [[0; 2]; 2];
         for round in 0..120 {
             let mut exponent = |least: f64, most: f64| 10_f64.powf(rng.random_range(least..most));
             let period_ms = exponent(-1.3, 0.0);
@@ -325,17 +325,17 @@ mod tests {
                 refractory_ms: if round % 3 == 0 { 0.0 } else { exponent(-1.5, 1.5) },
                 period_ms,
             };
-            let (one, other, membrane_ms) = (exponent(-1.5, 2.0), exponent(-1.5, 2.0), exponent(-1.5, 1.5));
+            let (onset_ms, loss_ms, membrane_ms) = (exponent(-1.5, 2.0), exponent(-1.5, 2.0), exponent(-1.5, 1.5));
             let [spikes, left_out] = if round % 2 == 0 {
                 let [onset, loss] = [rng.random_range(0.0..3.0), rng.random_range(0.0..1.0)];
-                holds(&Slow::new([onset, one], [loss, other], membrane_ms, period_ms), firing, &mut rng)
+                holds(&Slow::new([onset, onset_ms], [loss, loss_ms], membrane_ms, period_ms), firing, &mut rng)
             } else {
-                let fa2 = Fa2 { corner_ms: one, membrane_ms, period_ms, ..Fa2::default() };
+                let fa2 = Fa2 { corner_ms: onset_ms, membrane_ms, period_ms, ..Fa2::default() };
                 holds(&fa2.filter(), firing, &mut rng)
             };
-            seen[round % 2][0] += spikes;
-            seen[round % 2][1] += left_out;
+            counts[round % 2][0] += spikes;
+            counts[round % 2][1] += left_out;
         }
-        assert!(seen.as_flattened().iter().all(|&n| n > 1000), "{seen:?}");
+        assert!(counts.as_flattened().iter().all(|&n| n > 1000), "{counts:?}");
     }
 }

@@ -119,7 +119,7 @@ impl SampleWindow {
     }
 
     /// The new low and high of each channel, if an update was due by `t` and its window is not empty.
-    pub(super) fn renewed(&mut self, t: i64) -> Option<Vec<(f64, f64)>> {
+    pub(super) fn renew(&mut self, t: i64) -> Option<Vec<(f64, f64)>> {
         let due = self.next.filter(|&due| self.full && t >= due)?;
         let latest = due + (t - due) / self.renew * self.renew;
         self.next = Some(latest + self.renew);

@@ -168,7 +168,7 @@ struct Above {
 }
 
 impl Above {
-    fn of(&self, place: usize) -> f32 {
+    fn value(&self, place: usize) -> f32 {
         self.rest.above(place, f64::from(self.held.values()[place])) as f32
     }
 }
@@ -284,7 +284,7 @@ impl<R: Rule> Stream for Sampled<R> {
                 let read = f32::from(intensity.ticks[k]);
                 let value = self.above.as_mut().map_or(read, |above| {
                     above.held.set(place, read);
-                    above.of(place)
+                    above.value(place)
                 });
                 let before = self.held.set(channel, value);
                 if self.begun && events.is_repaired(k) {
@@ -316,7 +316,7 @@ impl<R: Rule> Stream for Sampled<R> {
         self.rule.set_rest(channel, rest);
         if let Some(above) = &mut self.above {
             above.rest.set(place, rest);
-            self.held.set(channel, above.of(place));
+            self.held.set(channel, above.value(place));
         }
         self.changed[channel / BLOCK] = true;
         self.quiet = false;
@@ -333,7 +333,7 @@ impl<R: Rule> Stream for Sampled<R> {
         if self.steady && self.begun && 2 * (t - self.last - self.period).abs() > self.period {
             let (since, period) = (ms(t - self.last), ms(self.period));
             return Err(problem!("frame at {t} us, {since} ms after the last: must come every {period} ms")
-                .helped_by("period_ms", Hint::Give));
+                .with_hint("period_ms", Hint::Give));
         }
         let (now, later) = (NextFrame::after(values), NextFrame::unknown());
         let (mut now, later) = if R::ASKS { (later, now) } else { (now, later) };
@@ -342,7 +342,7 @@ impl<R: Rule> Stream for Sampled<R> {
                 above.held.values_mut().copy_from_slice(values);
                 for (place, &read) in values.iter().enumerate() {
                     // Infinite values and NaN stay, so that they are refused below.
-                    above.frame[place] = if read.is_finite() { above.of(place) } else { read };
+                    above.frame[place] = if read.is_finite() { above.value(place) } else { read };
                 }
                 &above.frame
             }

@@ -203,7 +203,7 @@ impl Encoding for Skin {
 }
 
 /// The channels in each afferent's field, with their weights.
-fn felt(array: &Array, placed: &[&Placed], field_mm2: f64) -> Result<Vec<Vec<(u32, f32)>>> {
+fn fields_of(array: &Array, placed: &[&Placed], field_mm2: f64) -> Result<Vec<Vec<(u32, f32)>>> {
     let (taxels, pitch) = (places(array), array.pitch("skin")?);
     let edge = (field_mm2 / std::f64::consts::PI).sqrt();
     // Distances are computed in units of the columns' pitch.
@@ -211,7 +211,7 @@ fn felt(array: &Array, placed: &[&Placed], field_mm2: f64) -> Result<Vec<Vec<(u3
     // Channels are consecutive within a row of the array; only the rows that a field can reach are searched.
     let rows: Vec<usize> =
         (0..=usize::from(array.rows)).map(|row| taxels.partition_point(|at| at[1] < row as f64)).collect();
-    let of = |at: &&Placed| {
+    let field_of = |at: &&Placed| {
         let (x, y) = (at.x_mm / pitch.columns, at.y_mm / pitch.rows);
         let reach = edge / pitch.rows;
         let row = |y: f64| (y.max(0.0) as usize).min(rows.len() - 1);
@@ -228,15 +228,15 @@ fn felt(array: &Array, placed: &[&Placed], field_mm2: f64) -> Result<Vec<Vec<(u3
             }
         }
         if field.is_empty() {
-            let on = [x.round(), y.round()];
-            let channel = taxels.iter().position(|taxel| *taxel == on).unwrap_or(0);
+            let nearest = [x.round(), y.round()];
+            let channel = taxels.iter().position(|taxel| *taxel == nearest).unwrap_or(0);
             field.push((channel as u32, 1.0));
             sum = 1.0;
         }
         field.iter_mut().for_each(|(_, weight)| *weight /= sum as f32);
         field
     };
-    Ok(placed.iter().map(of).collect())
+    Ok(placed.iter().map(field_of).collect())
 }
 
 /// The afferents of one type, with their fields.
@@ -253,7 +253,7 @@ struct Type<R> {
 
 impl<R: Rule> Type<R> {
     fn new(rule: R, array: &Array, first: usize, placed: &[&Placed], field_mm2: f64) -> Result<Self> {
-        let fields = Fields::new(&felt(array, placed, field_mm2)?, Channels::new(array).len());
+        let fields = Fields::new(&fields_of(array, placed, field_mm2)?, Channels::new(array).len());
         let n = blocks(placed.len());
         Ok(Self { rule, first, fields, held: vec![[0.0; BLOCK]; n], changed: vec![true; n] })
     }
@@ -263,7 +263,7 @@ impl<R: Rule> Type<R> {
         for (block, felt) in self.held.iter_mut().enumerate() {
             self.changed[block] = self.fields.any(block, changed);
             if self.changed[block] {
-                *felt = self.fields.feel(block, held);
+                *felt = self.fields.inputs_of_block(block, held);
             }
         }
     }
@@ -290,7 +290,7 @@ impl<R: Rule> Type<R> {
         if R::SPIKES_OF_REPAIRED {
             return;
         }
-        for (lane, weight) in self.fields.feeling(channel) {
+        for (lane, weight) in self.fields.lanes_of_channel(channel) {
             let felt = &mut self.held[lane / BLOCK][lane % BLOCK];
             let before = *felt;
             *felt += weight * (to - from);
@@ -315,8 +315,8 @@ impl PlacedAfferents {
         let sa2 = Sa2 { range, period_ms, ..Sa2::default() };
         let fa2 = Fa2 { range, period_ms, ..Fa2::default() };
         let first = |kind| placed.iter().position(|p| p.kind == kind).unwrap_or(0);
-        let of = |kind| placed.iter().filter(|p| p.kind == kind).collect::<Vec<_>>();
-        let [a, b, c, d] = skin.types().map(|(kind, _, field)| (first(kind), of(kind), field));
+        let of_kind = |kind| placed.iter().filter(|p| p.kind == kind).collect::<Vec<_>>();
+        let [a, b, c, d] = skin.types().map(|(kind, _, field)| (first(kind), of_kind(kind), field));
         Ok(Self {
             sa1: Type::new(TaxelAfferents::new(sa1.filter(), sa1.firing(), range, a.1.len()), array, a.0, &a.1, a.2)?,
             fa1: Type::new(fa1::Fa1Afferents::new(&fa1), array, b.0, &b.1, b.2)?,

@@ -38,7 +38,7 @@ impl Filter for Slow {
 
     const SIGNALS_VALUES: bool = true;
 
-    fn settled(&self, x: &Lanes) -> (SlowState, Lanes) {
+    fn steady_state(&self, x: &Lanes) -> (SlowState, Lanes) {
         let drive = x.map(|x| (1.0 - self.loss) * x);
         (SlowState { x: *x, recent: *x, long: *x, drive }, drive)
     }

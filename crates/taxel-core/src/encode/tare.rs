@@ -67,13 +67,14 @@ impl Tare {
     ///
     /// `Problem` if the tare is of an array of another shape.
     pub(super) fn rest_of(&self, array: &Array) -> Result<Rest<f64>> {
-        let (of, to) = (&self.array, array);
-        if !of.fits(to) {
-            let others = if (of.rows, of.columns) == (to.rows, to.columns) { ", of which others exist" } else { "" };
+        let (from, to) = (&self.array, array);
+        if !from.fits(to) {
+            let others =
+                if (from.rows, from.columns) == (to.rows, to.columns) { ", of which others exist" } else { "" };
             return Err(problem!(
                 "tare of {} x {} taxels: the array has {} x {}{others}",
-                of.rows,
-                of.columns,
+                from.rows,
+                from.columns,
                 to.rows,
                 to.columns
             ));
@@ -83,7 +84,7 @@ impl Tare {
     }
 
     /// The noise of each place; 0 where it is not known.
-    pub(super) fn noise_of_places(&self) -> Vec<f64> {
+    pub(super) fn place_noise(&self) -> Vec<f64> {
         self.noise.iter().map(|noise| noise.unwrap_or(0.0)).collect()
     }
 
@@ -123,7 +124,7 @@ impl Tare {
     ///
     /// `Format` if the JSON is not a tare, `Problem` if its parts do not match.
     pub fn from_json(json: &str) -> Result<Self> {
-        let tare: Self = reading::from_text(json).map_err(|unfit| crate::Error::format(unfit.of("tare")))?;
+        let tare: Self = reading::from_text(json).map_err(|unfit| crate::Error::format(unfit.text("tare")))?;
         tare.check()?;
         Ok(tare)
     }

@@ -131,8 +131,8 @@ struct Model {
 }
 
 impl Model {
-    fn published(which: PublishedSet) -> Self {
-        let (a, gain) = match which {
+    fn published(set: PublishedSet) -> Self {
+        let (a, gain) = match set {
             PublishedSet::Curvature => (0.02, 0.5),
             PublishedSet::Gait => (0.005, 0.6),
         };
@@ -152,7 +152,7 @@ impl Model {
     }
 
     /// The fixed point for this input, or the state after 10^6 steps.
-    fn settled(self, input: f64) -> (f64, f64) {
+    fn steady_state(self, input: f64) -> (f64, f64) {
         let (mut v, mut u) = Self::rest();
         for _ in 0..1_000_000 {
             let (next_v, next_u) = self.step(v, u, input);
@@ -227,7 +227,7 @@ struct Pairs {
     levels: Vec<f32>,
     bracket: Bracket,
     /// Whether each train's taxel is at or above its level; padded to a multiple of eight.
-    on: Vec<[bool; LANES]>,
+    above: Vec<[bool; LANES]>,
     rises: Vec<IzhikevichNeurons>,
     falls: Vec<IzhikevichNeurons>,
     /// The start of the next step, us.
@@ -247,7 +247,7 @@ impl Pairs {
             channels,
             levels: parameters.levels.iter().map(|&l| l as f32).collect(),
             bracket: Bracket::new(blocks(channels)),
-            on: vec![[false; LANES]; groups],
+            above: vec![[false; LANES]; groups],
             rises: vec![neurons.clone(); groups],
             falls: vec![neurons; groups],
             next: 0,
@@ -261,16 +261,16 @@ impl Pairs {
         for (level, &at) in self.levels.iter().enumerate() {
             let train = channel * levels + level;
             let (group, lane) = (train / LANES, train % LANES);
-            let on = value >= at;
-            if on {
+            let above = value >= at;
+            if above {
                 low = at;
             } else {
                 high = high.min(at);
             }
-            if self.on[group][lane] != on {
-                self.on[group][lane] = on;
-                self.rises[group].set(lane, if on { gain } else { 0.0 });
-                self.falls[group].set(lane, if on { 0.0 } else { gain });
+            if self.above[group][lane] != above {
+                self.above[group][lane] = above;
+                self.rises[group].set(lane, if above { gain } else { 0.0 });
+                self.falls[group].set(lane, if above { 0.0 } else { gain });
             }
         }
         self.bracket.set(channel, low, high);
@@ -297,7 +297,7 @@ impl Pairs {
     }
 
     /// Emits the spikes that are due before `t` (with `at_too` also at `t`).
-    fn hand_on(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
+    fn flush(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
         let (from, end) = (out.len(), ms(t));
         self.ahead.retain(|&spike| {
             let due = spike.t < end || (at_too && spike.t == end);
@@ -327,10 +327,10 @@ impl Rule for Pairs {
             last.input[used..].fill(0.0);
         }
         if self.begin == Begin::Settled {
-            let (on, off) = (self.model.settled(self.model.gain), self.model.settled(0.0));
+            let (above, below) = (self.model.steady_state(self.model.gain), self.model.steady_state(0.0));
             for neurons in self.rises.iter_mut().chain(&mut self.falls) {
                 for lane in 0..LANES {
-                    (neurons.v[lane], neurons.u[lane]) = if neurons.input[lane] > 0.0 { on } else { off };
+                    (neurons.v[lane], neurons.u[lane]) = if neurons.input[lane] > 0.0 { above } else { below };
                 }
             }
         }
@@ -342,7 +342,7 @@ impl Rule for Pairs {
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {
             next.fetch();
-            if changed[block] && self.bracket.left(block, values) {
+            if changed[block] && self.bracket.has_left(block, values) {
                 for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
                     let value = values[channel % BLOCK];
                     if !self.bracket.holds(channel, value) {
@@ -351,13 +351,13 @@ impl Rule for Pairs {
                 }
             }
         }
-        self.hand_on(t, true, out);
+        self.flush(t, true, out);
     }
 
     #[inline(always)]
     fn pass(&mut self, t: i64, out: &mut Vec<Spike>) {
         self.step_until(t);
-        self.hand_on(t, false, out);
+        self.flush(t, false, out);
     }
 
     fn idle(&self) -> bool {
@@ -370,8 +370,8 @@ mod tests {
     use super::*;
 
     /// Time from the onset of an input to the resting neuron's first spike, ms.
-    fn latency(which: PublishedSet, gain: Option<f64>, dt: f64) -> Option<f64> {
-        let published = Model::published(which);
+    fn latency(set: PublishedSet, gain: Option<f64>, dt: f64) -> Option<f64> {
+        let published = Model::published(set);
         let model = Model { dt, gain: gain.unwrap_or(published.gain), ..published };
         let (v, u) = Model::rest();
         let mut neurons = IzhikevichNeurons { v: [v; LANES], u: [u; LANES], input: [model.gain; LANES], still: false };
@@ -383,16 +383,16 @@ mod tests {
 
     #[test]
     fn latencies_are_the_known_ones_at_every_step() {
-        for (which, known) in [
+        for (set, known) in [
             (PublishedSet::Curvature, [(1.0, 23.0), (0.2, 20.6), (0.1, 20.2), (0.05, 20.05), (0.01, 19.92)]),
             (PublishedSet::Gait, [(1.0, 18.0), (0.2, 16.2), (0.1, 15.8), (0.05, 15.7), (0.01, 15.53)]),
         ] {
             for (dt, wanted) in known {
-                let got = latency(which, None, dt).unwrap();
-                assert!((got - wanted).abs() < 1e-9, "{which:?} at {dt} ms: {got} against {wanted}");
+                let got = latency(set, None, dt).unwrap();
+                assert!((got - wanted).abs() < 1e-9, "{set:?} at {dt} ms: {got} against {wanted}");
             }
-            let stated = latency(which, None, 0.1).unwrap();
-            assert!((stated - which.latency_ms()).abs() < 1e-9);
+            let stated = latency(set, None, 0.1).unwrap();
+            assert!((stated - set.latency_ms()).abs() < 1e-9);
         }
     }
 
@@ -404,11 +404,11 @@ mod tests {
 
     #[test]
     fn settled_neurons_are_fixed_points_so_that_leaving_steps_out_is_exact() {
-        for which in [PublishedSet::Curvature, PublishedSet::Gait] {
-            let model = Model::published(which);
+        for set in [PublishedSet::Curvature, PublishedSet::Gait] {
+            let model = Model::published(set);
             for input in [0.0, model.gain] {
-                let (v, u) = model.settled(input);
-                assert_eq!(model.step(v, u, input), (v, u), "{which:?}, input {input}");
+                let (v, u) = model.steady_state(input);
+                assert_eq!(model.step(v, u, input), (v, u), "{set:?}, input {input}");
             }
         }
     }
@@ -416,7 +416,7 @@ mod tests {
     #[test]
     fn groups_that_are_left_out_while_still_spike_as_single_steps_do() {
         let model = Model::published(PublishedSet::Gait);
-        let (v, u) = model.settled(0.0);
+        let (v, u) = model.steady_state(0.0);
         let mut grouped = IzhikevichNeurons { v: [v; LANES], u: [u; LANES], input: [0.0; LANES], still: false };
         let mut plain: Vec<(f64, f64)> = vec![(v, u); LANES];
         let (mut got, mut wanted) = (vec![], vec![]);

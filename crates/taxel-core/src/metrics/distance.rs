@@ -36,7 +36,7 @@ pub(super) trait Ready: Sync {
 pub(super) type Pattern<'p> = (&'p Patterns<'p>, usize);
 
 /// The sum over trains of a distance between trains.
-pub(super) fn summed(
+pub(super) fn sum_over_trains(
     (a, p): Pattern<'_>,
     (b, q): Pattern<'_>,
     stop: Stop<'_>,

@@ -1,7 +1,7 @@
 //! What the ISI and SPIKE distances share: their window, the walk over the spikes of two trains, and the intervals before
 //! the first and after the last one.
 
-use super::distance::{Pattern, Ready, summed};
+use super::distance::{Pattern, Ready, sum_over_trains};
 use super::patterns::Patterns;
 use crate::{Result, Stop, problem};
 
@@ -20,7 +20,7 @@ pub(super) struct Within {
 
 impl Ready for Within {
     fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
-        summed(a, b, stop, |a, b| Ok((self.between)(a, b, self.window)))
+        sum_over_trains(a, b, stop, |a, b| Ok((self.between)(a, b, self.window)))
     }
 }
 
@@ -32,8 +32,8 @@ pub(super) fn window(
 ) -> Result<ObservationWindow> {
     let sides = || std::iter::once(a).chain(b);
     let widest = || {
-        sides().map(|p| p.window).try_fold((f64::INFINITY, f64::NEG_INFINITY), |wide, own| {
-            own.map(|own| (wide.0.min(own.0), wide.1.max(own.1)))
+        sides().map(|p| p.window).try_fold((f64::INFINITY, f64::NEG_INFINITY), |wide, window| {
+            window.map(|window| (wide.0.min(window.0), wide.1.max(window.1)))
         })
     };
     let Some((start, stop)) = asked.or_else(widest) else {
@@ -95,7 +95,7 @@ pub(super) struct IntervalWalk<'s> {
 
 impl<'s> IntervalWalk<'s> {
     fn new(spikes: &'s [f64], window: ObservationWindow) -> Self {
-        let k = begun(spikes, window);
+        let k = spikes_at_start(spikes, window);
         Self { spikes, window, k, interval: interval(spikes, k, window) }
     }
 
@@ -165,6 +165,6 @@ fn interval(spikes: &[f64], k: usize, window: ObservationWindow) -> f64 {
 }
 
 /// The number of spikes at the window's start: 0 or 1.
-pub(super) fn begun(spikes: &[f64], window: ObservationWindow) -> usize {
+pub(super) fn spikes_at_start(spikes: &[f64], window: ObservationWindow) -> usize {
     usize::from(spikes[0] <= window.start)
 }

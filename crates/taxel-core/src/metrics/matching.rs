@@ -22,7 +22,7 @@ pub fn described() -> Described {
 ///
 /// `Problem` for times that do not ascend or are not valid (names the list, `what`), or for a window that is not valid;
 /// those of [`in_order`].
-pub fn matched(
+pub fn match_spikes(
     (what, spikes): (&str, &[f64]),
     (wanted, targets): (&str, &[f64]),
     window_ms: f64,
@@ -214,11 +214,12 @@ mod tests {
 
     #[test]
     fn what_lies_at_the_edge_to_rounding_is_found() {
-        let pair =
-            |spike: f64, window| matched(("spikes", &[spike]), ("targets", &[0.1]), window, Stop::never()).unwrap();
+        let pair = |spike: f64, window| {
+            match_spikes(("spikes", &[spike]), ("targets", &[0.1]), window, Stop::never()).unwrap()
+        };
         assert_eq!((pair(50.1, 50.0).len(), pair(0.1 + 0.2, 0.2).len(), pair(50.100_001, 50.0).len()), (1, 1, 0));
         for (spikes, window) in [(&[1.0, 0.0][..], 1.0), (&[f64::NAN], 1.0), (&[1.0], -1.0), (&[1e13], 1.0)] {
-            assert!(matched(("spikes", spikes), ("targets", &[0.0]), window, Stop::never()).is_err());
+            assert!(match_spikes(("spikes", spikes), ("targets", &[0.0]), window, Stop::never()).is_err());
         }
     }
 }

@@ -3,7 +3,7 @@
 /// The times at which two ascending trains differ, each with the number of spikes of `a` minus that of `b`.
 ///
 /// Spikes of both at exactly the same time cancel before any summation, so equal trains yield no steps.
-pub(super) fn merged<'t>(a: &'t [f64], b: &'t [f64]) -> impl Iterator<Item = (f64, f64)> + 't {
+pub(super) fn merge_spikes<'t>(a: &'t [f64], b: &'t [f64]) -> impl Iterator<Item = (f64, f64)> + 't {
     let (mut i, mut j) = (0, 0);
     std::iter::from_fn(move || {
         loop {

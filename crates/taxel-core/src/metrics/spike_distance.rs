@@ -1,7 +1,7 @@
 //! SPIKE distance: the distance of spikes to the nearest spikes of the other train, averaged over time.
 
 use super::distance::{Distance, Ready};
-use super::edges::{IntervalWalk, ObservationWindow, Within, averaged, begun, distinct, mean};
+use super::edges::{IntervalWalk, ObservationWindow, Within, averaged, distinct, mean, spikes_at_start};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
 use crate::Result;
@@ -65,7 +65,7 @@ impl Far {
         let (from, past) = (self.nearest[k - 1], t - walk.spikes[k - 1]);
         if k < n {
             from + (self.nearest[k] - from) * past / walk.interval
-        } else if n == 1 && begun(walk.spikes, walk.window) == 1 {
+        } else if n == 1 && spikes_at_start(walk.spikes, walk.window) == 1 {
             // A lone spike at the window's start: like PySpike, continue linearly to the window's end.
             from + (self.end - from) * past / walk.interval
         } else {

@@ -5,7 +5,7 @@ mod matrix;
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, Ready};
-use super::merged::merged;
+use super::merged::merge_spikes;
 use super::patterns::Patterns;
 use crate::Result;
 use crate::allowed::{Range, ranges};
@@ -74,7 +74,7 @@ impl VanRossum {
     pub(super) fn between(&self, a: &[f64], b: &[f64]) -> f64 {
         // `height` is the difference of the smoothed trains just after `last`.
         let (mut square, mut height, mut last) = (0.0, 0.0, f64::NEG_INFINITY);
-        for (t, more) in merged(a, b) {
+        for (t, more) in merge_spikes(a, b) {
             let fallen = (t - last) / self.tau;
             square -= height * height * (-2.0 * fallen).exp_m1();
             height = height * (-fallen).exp() + more;

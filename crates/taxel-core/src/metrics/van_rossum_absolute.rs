@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::distance::{Distance, Pattern, Ready, summed};
-use super::merged::merged;
+use super::distance::{Distance, Pattern, Ready, sum_over_trains};
+use super::merged::merge_spikes;
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
@@ -46,7 +46,7 @@ impl Distance for VanRossumAbsolute {
 
 impl Ready for &VanRossumAbsolute {
     fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
-        summed(a, b, stop, |a, b| Ok(VanRossumAbsolute::between(self, a, b)))
+        sum_over_trains(a, b, stop, |a, b| Ok(VanRossumAbsolute::between(self, a, b)))
     }
 }
 
@@ -60,7 +60,7 @@ impl VanRossumAbsolute {
     pub(super) fn between(&self, a: &[f64], b: &[f64]) -> f64 {
         let exposure = Exposure::new(self.tau, self.window, self.step_ms);
         let (mut sum, mut height, mut last) = (0.0_f64, 0.0_f64, f64::NEG_INFINITY);
-        for (t, more) in merged(a, b) {
+        for (t, more) in merge_spikes(a, b) {
             if height != 0.0 {
                 sum += height.abs() * exposure.between(last, t);
             }

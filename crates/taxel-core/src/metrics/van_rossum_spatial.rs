@@ -177,9 +177,9 @@ impl SmoothingKernel {
         for row in 0..2 * rows - 1 {
             for column in 0..2 * columns - 1 {
                 let (dy, dx) = (row.abs_diff(rows - 1) as f64, column.abs_diff(columns - 1) as f64);
-                let own = row + 1 == rows && column + 1 == columns && smoothing.own_train == OwnTrain::Twice;
+                let is_own = row + 1 == rows && column + 1 == columns && smoothing.own_train == OwnTrain::Twice;
                 by_offset
-                    .push((-dx.hypot(dy * down) * pitch.columns / smoothing.sigma).exp() + f64::from(u8::from(own)));
+                    .push((-dx.hypot(dy * down) * pitch.columns / smoothing.sigma).exp() + f64::from(u8::from(is_own)));
             }
         }
         Ok(Self { rows, columns, exists: array.exists.clone(), by_offset })
@@ -209,7 +209,7 @@ impl SmoothingKernel {
     ) -> Result<()> {
         let mut steps: Vec<(f64, usize, f64)> = Vec::new();
         for n in 0..a.trains {
-            steps.extend(super::merged::merged(a.train(p, n), b.train(q, n)).map(|(t, more)| (t, n, more)));
+            steps.extend(super::merged::merge_spikes(a.train(p, n), b.train(q, n)).map(|(t, more)| (t, n, more)));
         }
         steps.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         let Some(&(first, ..)) = steps.first() else { return Ok(()) };
@@ -252,18 +252,23 @@ impl SmoothingKernel {
     }
 
     fn total(&self, heights: &[f64], gauge: SmoothingState) -> f64 {
-        let of = |h: f64| if gauge == SmoothingState::Squares { h * h } else { h.abs() };
+        let gauged = |h: f64| if gauge == SmoothingState::Squares { h * h } else { h.abs() };
         if let Some(exists) = &self.exists {
-            return heights.iter().zip(exists.iter().cycle()).filter(|(_, there)| **there).map(|(&h, _)| of(h)).sum();
+            return heights
+                .iter()
+                .zip(exists.iter().cycle())
+                .filter(|(_, exists)| **exists)
+                .map(|(&h, _)| gauged(h))
+                .sum();
         }
         // Eight independent sums, because a single sum would wait for each addition.
         let (eights, rest) = heights.as_chunks::<8>();
         let mut sums = [0.0; 8];
         for eight in eights {
             for (sum, &h) in sums.iter_mut().zip(eight) {
-                *sum += of(h);
+                *sum += gauged(h);
             }
         }
-        sums.iter().sum::<f64>() + rest.iter().map(|&h| of(h)).sum::<f64>()
+        sums.iter().sum::<f64>() + rest.iter().map(|&h| gauged(h)).sum::<f64>()
     }
 }

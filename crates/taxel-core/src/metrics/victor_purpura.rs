@@ -4,7 +4,7 @@ mod lanes;
 
 use serde::{Deserialize, Serialize};
 
-use super::distance::{Distance, Pattern, Ready, number_or_name, summed};
+use super::distance::{Distance, Pattern, Ready, number_or_name, sum_over_trains};
 use super::pairwise::{DistanceMatrix, Work};
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
@@ -42,7 +42,7 @@ impl Distance for VictorPurpura {
 
 impl Ready for &VictorPurpura {
     fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
-        summed(a, b, stop, |a, b| VictorPurpura::between(self, a, b, stop))
+        sum_over_trains(a, b, stop, |a, b| VictorPurpura::between(self, a, b, stop))
     }
 
     /// Fills a matrix with the sums of distances over trains, many pairs side by side.

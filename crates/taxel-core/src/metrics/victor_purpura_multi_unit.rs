@@ -71,7 +71,7 @@ impl VictorPurpuraMultiUnit {
             // Equal spikes of both patterns match at no cost, and some cheapest matching contains these pairs: the
             // costs satisfy the triangle inequality, so the partners of two equal spikes may be matched with each other
             // instead.
-            for (t, more) in super::merged::merged(a.train(p, unit), b.train(q, unit)) {
+            for (t, more) in super::merged::merge_spikes(a.train(p, unit), b.train(q, unit)) {
                 let side = if more > 0.0 { &mut rows } else { &mut columns };
                 side.extend(std::iter::repeat_n(Labelled { t, unit }, more.abs() as usize));
             }
@@ -119,7 +119,7 @@ impl<'m> Matching<'m> {
         let mut far = vec![f64::INFINITY; m];
         let mut from = vec![0; m];
         let mut done = vec![false; m];
-        let (mut seen, mut behind) = (Vec::new(), Vec::new());
+        let (mut touched, mut behind) = (Vec::new(), Vec::new());
         let mut next = BinaryHeap::new();
         for start in 0..self.rows.len() {
             stop.check()?;
@@ -129,9 +129,9 @@ impl<'m> Matching<'m> {
             // The best end found so far: a free column, or a row that becomes unmatched.
             let (mut least, mut end) = (f64::INFINITY, PathEnd::Row(start));
             loop {
-                while let Some(&(row, here)) = reached.get(at) {
+                while let Some(&(row, distance)) = reached.get(at) {
                     at += 1;
-                    let base = here - self.height[row];
+                    let base = distance - self.height[row];
                     if base + APART < least {
                         (least, end) = (base + APART, PathEnd::Row(row));
                     }
@@ -140,41 +140,41 @@ impl<'m> Matching<'m> {
                         if pair >= APART || done[column] {
                             continue;
                         }
-                        let there = base + pair - self.depth[column];
-                        if there < far[column] && there < least {
+                        let distance = base + pair - self.depth[column];
+                        if distance < far[column] && distance < least {
                             if far[column] == f64::INFINITY {
-                                seen.push(column);
+                                touched.push(column);
                             }
-                            (far[column], from[column]) = (there, row);
+                            (far[column], from[column]) = (distance, row);
                             if self.of_column[column].is_none() {
-                                (least, end) = (there, PathEnd::Column(column));
+                                (least, end) = (distance, PathEnd::Column(column));
                             } else {
-                                next.push(Reverse(Ordered(there, column)));
+                                next.push(Reverse(Ordered(distance, column)));
                             }
                         }
                     }
                 }
-                let Some(Reverse(Ordered(there, column))) = next.pop() else { break };
-                if there >= least {
+                let Some(Reverse(Ordered(distance, column))) = next.pop() else { break };
+                if distance >= least {
                     break;
                 }
-                if done[column] || there > far[column] {
+                if done[column] || distance > far[column] {
                     continue;
                 }
                 done[column] = true;
                 behind.push(column);
                 if let Some(row) = self.of_column[column] {
-                    reached.push((row, there));
+                    reached.push((row, distance));
                 }
             }
-            for &(row, here) in &reached {
-                self.height[row] += least - here;
+            for &(row, distance) in &reached {
+                self.height[row] += least - distance;
             }
             for &column in &behind {
                 self.depth[column] -= least - far[column];
             }
             self.turn(start, end, &from);
-            for column in seen.drain(..) {
+            for column in touched.drain(..) {
                 (far[column], done[column]) = (f64::INFINITY, false);
             }
             behind.clear();

@@ -161,7 +161,7 @@ impl Shape {
 
     /// The age of an input, ms, from which on its kernel is smaller than the rounding of its largest value.
     #[must_use]
-    pub fn forgotten(&self) -> f64 {
+    pub fn negligible_age(&self) -> f64 {
         45.0 * self.tau
     }
 }

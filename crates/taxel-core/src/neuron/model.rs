@@ -186,9 +186,9 @@ impl Neuron {
     /// numbers.
     pub(crate) fn ages(&self, start: f64, t: f64) -> impl Fn(f64) -> f64 + use<> {
         let grid = (self.time == Time::Grid).then(|| Grid::new(start, self.step_ms));
-        let here = grid.map(|grid| grid.place(t));
-        move |s| match (grid, here) {
-            (Some(grid), Some(here)) => grid.between(grid.place(s), here),
+        let place = grid.map(|grid| grid.place(t));
+        move |s| match (grid, place) {
+            (Some(grid), Some(place)) => grid.between(grid.place(s), place),
             _ => t - s,
         }
     }

@@ -13,7 +13,7 @@ pub use lanes::Weight;
 use lanes::LANES;
 
 use super::model::{Neuron, Time};
-use crate::allowed::{is_weight, no_weight};
+use crate::allowed::{is_weight, weight_error};
 use crate::{Result, SpikeKind, SpikeTrains, Stop, problem};
 
 /// The input sequence, computed once for all neurons.
@@ -43,8 +43,8 @@ impl Neuron {
         self.check_inputs(&vec![0.0; trains.len()], trains)?;
         self.stream(&[], threshold, trains.start)?;
         if neurons.checked_mul(trains.len()) != Some(weights.len()) {
-            let (given, inputs) = (weights.len(), trains.len());
-            return Err(problem!("weights"; ": {given} for {neurons} neurons of {inputs} trains, must be one each"));
+            let (count, inputs) = (weights.len(), trains.len());
+            return Err(problem!("weights"; ": {count} for {neurons} neurons of {inputs} trains, must be one each"));
         }
         if self.time == Time::Grid {
             self.check_rows(self.points(trains.start, trains.stop))?;
@@ -71,7 +71,7 @@ impl Neuron {
                 block.iter().enumerate().find(|(_, row)| !row.iter().all(|&w| is_weight(w.into())))
             {
                 let lane = row.iter().position(|&w| !is_weight(w.into())).unwrap_or(0);
-                return Err(no_weight(&format!("weights[{}, {train}]", first + lane), row[lane].into()));
+                return Err(weight_error(&format!("weights[{}, {train}]", first + lane), row[lane].into()));
             }
             match &script {
                 Script::Continuous(script) => continuous::run(self, script, &block, &mut fired, stop)?,

@@ -84,6 +84,6 @@ impl NeuronStream {
             TimeStream::Continuous(s) => (&s.threshold, s.potential(self.now)),
             TimeStream::Grid(s) => (&s.threshold, s.potential(self.now)),
         };
-        if refractory.silent_at(self.now) { 0.0 } else { value }
+        if refractory.is_refractory(self.now) { 0.0 } else { value }
     }
 }

@@ -67,7 +67,7 @@ impl Threshold {
     }
 
     /// Whether the neuron cannot fire at `t`: `0 < t - spike <= refractory` (6.6).
-    pub(super) fn silent_at(&self, t: f64) -> bool {
+    pub(super) fn is_refractory(&self, t: f64) -> bool {
         self.fired.is_some_and(|spike| spike < t && t <= spike + self.refractory + rounding_ms(t))
     }
 
@@ -87,7 +87,7 @@ impl Threshold {
         }
         let slope = slope.abs().min(STEEPEST * self.base) + self.plus / self.tau_rec;
         let potential = potential + self.touch + slope * rounding_ms;
-        potential >= self.base && !self.silent_at(t) && potential >= self.base + self.rise(t)
+        potential >= self.base && !self.is_refractory(t) && potential >= self.base + self.rise(t)
     }
 
     /// A potential further below the threshold than this, mV, has not reached it, whatever its slope.

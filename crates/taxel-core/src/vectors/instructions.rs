@@ -185,16 +185,16 @@ macro_rules! wide {
 macro_rules! kernel {
     (
         $(#[$about:meta])*
-        $seen:vis fn $name:ident<$vector:ident>($($argument:ident: $kind:ty),* $(,)?) $body:block
+        $visible:vis fn $name:ident<$vector:ident>($($argument:ident: $kind:ty),* $(,)?) $body:block
     ) => {
-        $crate::vectors::kernel! { $(#[$about])* $seen fn $name<$vector>($($argument: $kind),*) -> () $body }
+        $crate::vectors::kernel! { $(#[$about])* $visible fn $name<$vector>($($argument: $kind),*) -> () $body }
     };
     (
         $(#[$about:meta])*
-        $seen:vis fn $name:ident<$vector:ident>($($argument:ident: $kind:ty),* $(,)?) -> $out:ty $body:block
+        $visible:vis fn $name:ident<$vector:ident>($($argument:ident: $kind:ty),* $(,)?) -> $out:ty $body:block
     ) => {
         $(#[$about])*
-        $seen fn $name($($argument: $kind),*) -> $out {
+        $visible fn $name($($argument: $kind),*) -> $out {
             #[inline(always)]
             fn plain<$vector: $crate::vectors::Vector>($($argument: $kind),*) -> $out $body
             $crate::vectors::by_width!(
@@ -205,10 +205,10 @@ macro_rules! kernel {
     };
     (
         $(#[$about:meta])*
-        $seen:vis fn $name:ident<$vector:ident>(on $set:ident; $($argument:ident: $kind:ty),* $(,)?) -> $out:ty $body:block
+        $visible:vis fn $name:ident<$vector:ident>(on $set:ident; $($argument:ident: $kind:ty),* $(,)?) -> $out:ty $body:block
     ) => {
         $(#[$about])*
-        $seen fn $name($set: $crate::vectors::Instructions, $($argument: $kind),*) -> $out {
+        $visible fn $name($set: $crate::vectors::Instructions, $($argument: $kind),*) -> $out {
             #[inline(always)]
             fn plain<$vector: $crate::vectors::Vector>($($argument: $kind),*) -> $out $body
             assert!($set.present(), "the machine must have the instructions");

@@ -41,11 +41,11 @@ pub(crate) fn add_lines<V: Vector, const S: usize>(rows: [&[[f64; LANES]]; S], b
     let rows = rows.map(|row| &row[..sum.len()]);
     let by = by.map(V::splat);
     for (i, sum) in sum.iter_mut().enumerate() {
-        let mut here = V::load(sum);
+        let mut lanes = V::load(sum);
         for s in 0..S {
-            here = here.add_product(by[s], V::load(&rows[s][i]));
+            lanes = lanes.add_product(by[s], V::load(&rows[s][i]));
         }
-        here.store(sum);
+        lanes.store(sum);
     }
 }
 

@@ -136,7 +136,7 @@ pub(in crate::wire) trait Table {
     fn mark(&mut self, marker: Marker);
 
     /// Whether the intensity columns (ticks and present) are written for each row.
-    fn paired(&self) -> bool;
+    fn writes_intensity(&self) -> bool;
 
     /// Appends rows: `fill` gets the room, the index of the first free row (at least `most` rows follow) and whether it
     /// must write the intensity columns, which it must if the rows are `valued`; it returns the number of rows that it
@@ -160,7 +160,7 @@ impl Table for Events {
     }
 
     #[inline]
-    fn paired(&self) -> bool {
+    fn writes_intensity(&self) -> bool {
         self.intensity.is_some()
     }
 
@@ -172,7 +172,7 @@ impl Table for Events {
         repaired: bool,
         fill: impl FnOnce(&mut Room<'_>, usize, bool) -> usize,
     ) {
-        if valued || self.paired() {
+        if valued || self.writes_intensity() {
             self.complete_intensities();
         }
         let before = self.len();
@@ -255,7 +255,7 @@ impl Table for Laid<'_> {
     }
 
     #[inline]
-    fn paired(&self) -> bool {
+    fn writes_intensity(&self) -> bool {
         self.filled.paired
     }
 

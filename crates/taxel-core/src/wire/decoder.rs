@@ -89,8 +89,8 @@ impl Decoder {
     /// event whose difference applies to an unknown value gets no intensity and counts as unpaired. Has no effect if
     /// intensities are values.
     pub fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>>) {
-        if let Some(own) = &mut self.held {
-            own.iter_mut().zip(held).for_each(|(own, held)| *own = held);
+        if let Some(values) = &mut self.held {
+            values.iter_mut().zip(held).for_each(|(values, held)| *values = held);
         }
     }
 

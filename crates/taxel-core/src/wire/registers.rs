@@ -66,7 +66,7 @@ impl Registers {
     pub fn preset(name: &str) -> Result<Self> {
         match PRESETS.iter().find(|preset| preset.name == name) {
             Some(preset) => Ok(preset.registers),
-            None => Err(problem!("preset {name:?}: there are {}", named(&PRESETS))),
+            None => Err(problem!("preset {name:?}: there are {}", preset_names(&PRESETS))),
         }
     }
 
@@ -83,7 +83,7 @@ impl Registers {
             let Array { rows, columns, .. } = array;
             return Err(problem!(
                 "preset {name:?} is not made for a board of {rows} x {columns} taxels: there are {}",
-                named(fitting())
+                preset_names(fitting())
             ));
         }
         Ok(Self { lines: preset.lines.min(array.columns), ..preset })
@@ -210,7 +210,7 @@ impl Registers {
         let mut next = *self;
         next.store(register, value);
         next.rules(register, array).map_err(|mut refusal| {
-            refusal.text = format!("{}; the board keeps {}", refusal.text, self.shown(register));
+            refusal.text = format!("{}; the board keeps {}", refusal.text, self.register_text(register));
             refusal
         })?;
         *self = next;
@@ -247,7 +247,7 @@ impl Registers {
             }
         }
         let scanned = Scanned { steps: self.steps(array), driven_lines: array.columns, sense_lines: array.rows };
-        match rules::refused(self, &scanned) {
+        match rules::first_refusal(self, &scanned) {
             Some((rule, text)) => Err(WriteRefusal { register, rule, text }),
             None => Ok(()),
         }
@@ -256,7 +256,7 @@ impl Registers {
     /// Warnings about values that are allowed but probably a mistake, one line each.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
-        rules::warned(self).into_iter().map(|(_, text)| text).collect()
+        rules::warnings(self).into_iter().map(|(_, text)| text).collect()
     }
 
     /// The value of a field, in the register's own unit.
@@ -349,7 +349,7 @@ impl Registers {
         Ok(())
     }
 
-    fn shown(&self, register: u8) -> String {
+    fn register_text(&self, register: u8) -> String {
         match register {
             1 => format!("line_period {} us", us(self.line_period.into())),
             2 => format!("line_read {} us", us(self.line_read.into())),
@@ -370,7 +370,7 @@ impl Preset {
 }
 
 /// The presets' names, as an error message lists them.
-fn named<'a>(presets: impl IntoIterator<Item = &'a Preset>) -> String {
+fn preset_names<'a>(presets: impl IntoIterator<Item = &'a Preset>) -> String {
     let names: Vec<_> = presets.into_iter().map(|preset| format!("{:?}", preset.name)).collect();
     names.join(", ")
 }

@@ -1,17 +1,20 @@
 //! Decodes one sender's datagrams to events, whichever version of the wire it sends.
 
-mod ahead;
+mod clock_jumps;
 mod order;
 mod recent;
+mod totals;
 
 use crate::wire::decoder::{Counts, Decoder};
 use crate::wire::silence;
 use crate::wire::v1::{FIRST, WORD_BYTES};
 use crate::wire::v2::{self, DatagramHeader, DatagramOutcome};
 use crate::{Array, Events};
-pub use ahead::ClockJumps;
-pub use order::{Order, StepBack};
+use clock_jumps::ClockJumps;
+use order::Order;
+pub use order::StepBack;
 use recent::RecentDatagrams;
+pub use totals::SenderTotals;
 
 /// For how long only whole words of version 1 must arrive before a sender of version 2 counts as changed to version 1,
 /// us.
@@ -51,13 +54,10 @@ pub struct SenderDecoder {
     latest: Option<(i64, Option<i64>)>,
     /// Since when only whole words of version 1 have arrived.
     whole_since: Option<i64>,
-    refused: u64,
-    changes: u64,
-    ahead: ClockJumps,
+    jumps: ClockJumps,
     order: Order,
     recent: RecentDatagrams,
-    repeated: u64,
-    empty: u64,
+    totals: SenderTotals,
 }
 
 impl SenderDecoder {
@@ -74,13 +74,10 @@ impl SenderDecoder {
             offset: Some(0),
             latest: None,
             whole_since: None,
-            refused: 0,
-            changes: 0,
-            ahead: ClockJumps::default(),
+            jumps: ClockJumps::default(),
             order: Order::default(),
             recent: RecentDatagrams::default(),
-            repeated: 0,
-            empty: 0,
+            totals: SenderTotals::default(),
         }
     }
 
@@ -108,40 +105,16 @@ impl SenderDecoder {
         self.version_1.counts()
     }
 
-    /// Number of bytes of version 1 that were refused because the sender uses version 2.
+    /// The counts that do not belong to the decoder of either version.
     #[must_use]
-    pub fn refused(&self) -> u64 {
-        self.refused
+    pub fn totals(&self) -> &SenderTotals {
+        &self.totals
     }
 
-    /// Number of times that the sender changed its version.
+    /// The largest steps back of the times, in the order of arrival.
     #[must_use]
-    pub fn changes(&self) -> u64 {
-        self.changes
-    }
-
-    /// The jumps of time of version 1 ahead of the host's clock.
-    #[must_use]
-    pub fn ahead(&self) -> &ClockJumps {
-        &self.ahead
-    }
-
-    /// Where times step back, in the order of arrival.
-    #[must_use]
-    pub fn order(&self) -> &Order {
-        &self.order
-    }
-
-    /// Number of datagrams of version 1 that came again; their events are decoded again too.
-    #[must_use]
-    pub fn repeated(&self) -> u64 {
-        self.repeated
-    }
-
-    /// Number of datagrams without bytes, from a sender that uses version 1.
-    #[must_use]
-    pub fn empty(&self) -> u64 {
-        self.empty
+    pub fn steps_back(&self) -> &[StepBack] {
+        self.order.steps()
     }
 
     /// Notes that a recording begins, as [`v2::Decoder::begin_recording`] does.
@@ -173,15 +146,15 @@ impl SenderDecoder {
                 self.whole_since = None;
                 (info.until, info.missing, info.reset) = (until, missing, reset);
             }
-        } else if self.version == 2 && !self.changed_back(datagram, arrived) {
-            self.refused += datagram.len() as u64;
+        } else if self.version == 2 && !self.has_changed_back(datagram, arrived) {
+            self.totals.refused += datagram.len() as u64;
         } else {
             if self.version == 2 {
                 self.change(1, out);
             }
-            self.empty += u64::from(datagram.is_empty());
-            self.repeated +=
-                u64::from(self.recent.repeats(datagram, arrived, &self.array, self.version_1.has_values()));
+            self.totals.empty += u64::from(datagram.is_empty());
+            let repeated = self.recent.repeats(datagram, arrived, &self.array, self.version_1.has_values());
+            self.totals.repeated += u64::from(repeated);
             let rows = out.len();
             let markers = out.markers.len();
             let before = self.version_1.times();
@@ -191,10 +164,14 @@ impl SenderDecoder {
             if let (Some((_, last)), Some(arrived)) = (self.version_1.times(), arrived) {
                 let offset = self.offset.unwrap_or(0);
                 let (newest, first) = (before.map(|(newest, _)| newest + offset), out.t.get(rows).copied());
-                self.ahead.note(newest, first.unwrap_or(last + offset), last + offset, arrived);
+                let first = first.unwrap_or(last + offset);
+                if let Some(before) = self.jumps.note(newest, first, last + offset, arrived) {
+                    self.totals.jumps += 1;
+                    self.totals.doubtful_after.get_or_insert(before);
+                }
             }
         }
-        self.order.note(&out.t[rows..], second);
+        self.order.note(&out.t[rows..], second, &mut self.totals);
         if let Some(&t) = out.t[rows..].last() {
             let latest = self.latest.map_or(t, |(latest, _)| latest.max(t));
             self.latest = Some((latest, arrived));
@@ -210,11 +187,11 @@ impl SenderDecoder {
         let (rows, markers) = (out.len(), out.markers.len());
         self.version_1.finish_into(out);
         self.carry(rows, markers, None, out);
-        self.order.note(&out.t[rows..], false);
+        self.order.note(&out.t[rows..], false, &mut self.totals);
     }
 
     /// Whether only whole words of version 1 have arrived for long enough.
-    fn changed_back(&mut self, datagram: &[u8], arrived: Option<i64>) -> bool {
+    fn has_changed_back(&mut self, datagram: &[u8], arrived: Option<i64>) -> bool {
         let whole = !datagram.is_empty()
             && datagram.len().is_multiple_of(WORD_BYTES)
             && datagram.iter().enumerate().all(|(k, byte)| (byte & FIRST != 0) == k.is_multiple_of(WORD_BYTES));
@@ -229,7 +206,7 @@ impl SenderDecoder {
     fn change(&mut self, version: u8, out: &mut Events) {
         self.version_1.end_of_datagram_into(out);
         (self.version, self.whole_since) = (version, None);
-        self.changes += 1;
+        self.totals.changes += 1;
         if version == 1 {
             self.offset = None;
         } else if let Some((latest, then)) = self.latest {
@@ -279,7 +256,7 @@ mod tests {
         }
     }
 
-    fn speak(board: &mut Board, version: u8) {
+    fn set_version(board: &mut Board, version: u8) {
         let registers = Registers { wire_version: version, ..*board.registers() };
         board.command(&Command { register: 0, value: registers.word(0) }.to_bytes());
     }
@@ -318,7 +295,7 @@ mod tests {
         let mut events = Events::empty(array);
         let (mut now, mut changes) = (5_000_000, vec![]);
         for version in [1, 2, 1] {
-            speak(&mut board, version);
+            set_version(&mut board, version);
             for _ in 0..6000 {
                 play(&mut board, 1, |datagram| {
                     let info = decoder.push(datagram, Some(now), &mut events);
@@ -343,7 +320,7 @@ mod tests {
         assert_eq!(changes.iter().map(|c| c.0).collect::<Vec<_>>(), [2, 1]);
         let begun = 5_000_000 + 12_000 * 192;
         assert!((1_000_000..1_001_000).contains(&(changes[1].1 - begun)), "a second later: {}", changes[1].1 - begun);
-        assert!(decoder.refused() > 0);
+        assert!(decoder.totals().refused > 0);
         let (t, expected) = (*events.t.last().unwrap(), 18_000 * 192);
         assert!((t - expected).abs() < 2000, "{t} for {expected}");
     }
@@ -357,14 +334,14 @@ mod tests {
         play(&mut board, 3, |datagram| {
             decoder.push(datagram, Some(0), &mut events);
         });
-        assert_eq!((decoder.version(), decoder.changes()), (2, 1));
-        speak(&mut board, 1);
+        assert_eq!((decoder.version(), decoder.totals().changes), (2, 1));
+        set_version(&mut board, 1);
         decoder.expect(1, &mut events);
         let before = events.len();
         play(&mut board, 2, |datagram| {
             decoder.push(datagram, Some(400), &mut events);
         });
-        assert_eq!((decoder.version(), decoder.refused()), (1, 0));
+        assert_eq!((decoder.version(), decoder.totals().refused), (1, 0));
         assert_eq!(events.len(), before + 2 * 4096);
     }
 

@@ -92,7 +92,7 @@ pub enum BodyKind {
 impl BodyKind {
     /// The kind with this number; none if the number is unknown (yet).
     #[must_use]
-    pub fn of(number: u8) -> Option<Self> {
+    pub fn from_number(number: u8) -> Option<Self> {
         Some(match number {
             0 => Self::Changes,
             1 => Self::Small,
@@ -262,13 +262,13 @@ impl DatagramHeader {
             word.copy_from_slice(&header[at..at + 8]);
             u64::from_le_bytes(word)
         };
-        let (which, when, stride, flags) = (eight(0), eight(8), header[16], header[17]);
+        let (sender, time, stride, flags) = (eight(0), eight(8), header[16], header[17]);
         let header = Self {
             kind: header[1] & 0xf,
-            board: (which >> 16) as u16,
-            sequence: (which >> 32) as u32,
-            base: when & ((1 << BASE_BITS) - 1),
-            session: (when >> BASE_BITS) as u16,
+            board: (sender >> 16) as u16,
+            sequence: (sender >> 32) as u32,
+            base: time & ((1 << BASE_BITS) - 1),
+            session: (time >> BASE_BITS) as u16,
             stride: stride & ((1 << STRIDE_BITS) - 1),
             line: stride >> STRIDE_BITS | flags >> FLAG_BITS << LOW_LINE_BITS,
             flags: flags & ((1 << FLAG_BITS) - 1),

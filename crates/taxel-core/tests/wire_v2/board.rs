@@ -100,18 +100,18 @@ fn both_versions_carry_the_same_events_of_one_scene() {
         }
         bytes
     };
-    let mut one = Decoder1::new(array.clone()).push(&play(1).concat(), None);
+    let mut of_1 = Decoder1::new(array.clone()).push(&play(1).concat(), None);
     let (mut two, mut decoder) = (Events::empty(array.clone()), Decoder::new(array.clone()));
     for datagram in play(2) {
         decoder.push(&datagram, None, &mut two);
     }
     // Version 1 rounds times down to 100 us.
     two.t.iter_mut().for_each(|t| *t = *t / 100 * 100);
-    let (mut a, mut b) = (rows(&one), rows(&two));
+    let (mut a, mut b) = (rows(&of_1), rows(&two));
     a.sort_unstable();
     b.sort_unstable();
     assert_eq!(a, b);
-    one.clear();
+    of_1.clear();
 }
 
 #[test]

@@ -12,14 +12,14 @@ fn every_set_of_instructions_decodes_the_same() {
     for seed in 0..300 {
         let mut random = StdRng::seed_from_u64(seed);
         let array = arrays(&mut random);
-        let own = (u16::BITS - (array.rows - 1).leading_zeros()) as u8;
+        let right = (u16::BITS - (array.rows - 1).leading_zeros()) as u8;
         let mut time = 1 << 20;
         let kind = [0, 1, 1, 2, 2][random.random_range(0..5)];
         let datagrams: Vec<Vec<u8>> = (0..60)
             .map(|sequence| {
                 let kind = if random.random_bool(0.8) { kind } else { [0, 1, 2, 6, 7][random.random_range(0..5)] };
                 time = if random.random_bool(0.8) { time + 192 } else { random.random_range(0..1 << 21) };
-                let stride = if random.random_bool(0.9) { own } else { random.random() };
+                let stride = if random.random_bool(0.9) { right } else { random.random() };
                 let flags = if random.random_bool(0.9) { 1 } else { random.random() };
                 let line = if random.random_bool(0.5) { 0 } else { random.random() };
                 let header =

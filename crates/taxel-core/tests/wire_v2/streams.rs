@@ -137,7 +137,7 @@ fn a_stream_in_one_call_gives_what_its_datagrams_give_one_by_one() {
         let mut random = StdRng::seed_from_u64(seed);
         let tall = Array::new(1024, 16, 1.0, "tall").unwrap();
         let array = if random.random_bool(0.1) { tall } else { arrays(&mut random) };
-        let own = v2::stride(array.rows);
+        let right = v2::stride(array.rows);
         let (kind, rare) = (random.random_range(0..3), [0.0, 0.05, 0.3][random.random_range(0..3)]);
         let (mut time, mut session, mut sequence) = (1_u64 << 20, 1, random.random());
         let datagrams: Vec<Vec<u8>> = (0..120)
@@ -148,7 +148,7 @@ fn a_stream_in_one_call_gives_what_its_datagrams_give_one_by_one() {
                 let kind = if other { [0, 1, 2, 3, 4, 6, 7][random.random_range(0..7)] } else { kind };
                 let (line, body) = match kind {
                     3 | 4 => (0, (0..random.random_range(0..48)).map(|_| random.random_range(0..3)).collect()),
-                    0..3 if !long => few_words(&mut random, kind, &array, own),
+                    0..3 if !long => few_words(&mut random, kind, &array, right),
                     _ => (random.random_range(0..4), words(&mut random, kind)),
                 };
                 time = if late { random.random_range(0..1 << 21) } else { time + 192 };
@@ -161,7 +161,7 @@ fn a_stream_in_one_call_gives_what_its_datagrams_give_one_by_one() {
                     sequence,
                     base: time,
                     session,
-                    stride: if wide { random.random() } else { own },
+                    stride: if wide { random.random() } else { right },
                     line: if far { random.random() } else { line },
                     flags: if strange { random.random() } else { 1 },
                     span: [0, 192, u16::MAX][random.random_range(0..3)],

@@ -17,7 +17,7 @@ struct Vector {
 #[test]
 fn a_vector_decodes_to_what_its_json_lists() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/wire_v2");
-    let mut seen = 0;
+    let mut vectors = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_none_or(|e| e != "json") {
@@ -47,7 +47,7 @@ fn a_vector_decodes_to_what_its_json_lists() {
         for (name, count) in &vector.counts {
             assert_eq!(counts[name], *count, "{path:?}, {name}");
         }
-        seen += 1;
+        vectors += 1;
     }
-    assert!(seen >= 12, "{seen} vectors");
+    assert!(vectors >= 12, "{vectors} vectors");
 }

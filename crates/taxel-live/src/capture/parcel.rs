@@ -187,7 +187,7 @@ impl ParcelPacker {
     }
 
     /// Counts the datagrams of a closed parcel that did not fit in the queue as dropped.
-    pub fn lost(&mut self, parcel: &[u8]) {
+    pub fn count_dropped(&mut self, parcel: &[u8]) {
         self.dropped += Parcel::read(parcel).map_or(0, |parcel| u64::from(parcel.count));
     }
 }
@@ -230,7 +230,7 @@ mod tests {
         let parcel = packer.close(1, 0, false);
         let read = Parcel::read(&parcel).expect("whole");
         assert_eq!((read.before, read.dropped, read.count), (15, 4, 1));
-        packer.lost(&parcel);
+        packer.count_dropped(&parcel);
         let read = packer.close(2, 0, false);
         let read = Parcel::read(&read).expect("whole");
         assert_eq!((read.number, read.before, read.dropped, read.count), (2, 16, 5, 0));

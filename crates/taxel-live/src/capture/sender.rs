@@ -162,7 +162,7 @@ impl Sender {
         if self.datagrams == 0 {
             return Ok(());
         }
-        self.send().map_err(|error| Error::socket(format!("UDP to {}", self.to))(self.explained(error)))?;
+        self.send().map_err(|error| Error::socket(format!("UDP to {}", self.to))(self.explain(error)))?;
         self.counts.messages += 1;
         self.counts.datagrams += self.datagrams as u64;
         self.counts.bytes += self.train.len() as u64;
@@ -173,7 +173,7 @@ impl Sender {
 
     /// Adds to an error that the datagram is too long, if that is its cause: "message too long", or "invalid argument"
     /// for a train on older kernels.
-    fn explained(&self, error: io::Error) -> io::Error {
+    fn explain(&self, error: io::Error) -> io::Error {
         let too_long = match error.raw_os_error() {
             Some(libc::EMSGSIZE) => true,
             Some(libc::EINVAL) => self.datagrams > 1,

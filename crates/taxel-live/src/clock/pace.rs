@@ -81,7 +81,7 @@ impl ArrivalDelays {
     }
 
     #[cfg(test)]
-    pub(super) fn remembered(&self) -> usize {
+    pub(super) fn fastest_count(&self) -> usize {
         self.fastest.len()
     }
 

@@ -15,7 +15,7 @@ impl Points {
     /// The line with a given slope and the allowed number of points below it: its height at the mean time, and the sum
     /// of the times of the points below, whose sign shows on which side of the mean they are.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub(super) fn under(&self, slope: f64) -> (f64, f64) {
+    pub(super) fn line_below(&self, slope: f64) -> (f64, f64) {
         let mut above: Vec<(f64, f64)> = self.all.iter().map(|&(t, late)| (late - slope * t, t)).collect();
         let whole = (self.early.floor() as usize).min(above.len() - 1);
         let (below, &mut (height, at), _) = above.select_nth_unstable_by(whole, |a, b| a.0.total_cmp(&b.0));
@@ -29,7 +29,7 @@ impl Points {
         let (mut low, mut high) = (-most, most);
         let mut narrow = |slope: f64| {
             if slope <= low || slope >= high {
-            } else if self.under(slope).1 > 0.0 {
+            } else if self.line_below(slope).1 > 0.0 {
                 high = slope;
             } else {
                 low = slope;

@@ -72,7 +72,7 @@ impl ArrivalStretch {
 
     /// Number of points that may lie below the line: the share `EARLY` of all, at most half of the points that are stored.
     #[allow(clippy::cast_precision_loss)]
-    pub(super) fn early(&self) -> f64 {
+    pub(super) fn early_points(&self) -> f64 {
         (EARLY * self.points as f64).min(self.quick.len() as f64 / 2.0)
     }
 
@@ -80,6 +80,6 @@ impl ArrivalStretch {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub(super) fn thin(&mut self, line: Offset) {
         self.quick.sort_unstable_by_key(|&(t, late)| late + t * 1000 - line.host_ns(t));
-        self.quick.truncate((2.0 * self.early()).ceil() as usize);
+        self.quick.truncate((2.0 * self.early_points()).ceil() as usize);
     }
 }

@@ -27,7 +27,7 @@ impl CommandPort {
             let found = listener.local_addr().map_err(place)?;
             control.listener = Some((listener, found));
         }
-        control.greet(board);
+        control.send_greeting(board);
         Ok(control)
     }
 
@@ -36,7 +36,7 @@ impl CommandPort {
     }
 
     /// Sends the line that a board sends at reset.
-    pub(super) fn greet(&mut self, board: &Board) {
+    pub(super) fn send_greeting(&mut self, board: &Board) {
         self.send(&board.greeting());
     }
 
@@ -80,8 +80,8 @@ impl CommandPort {
 
 /// Sends status lines. They are lost if nothing reads them, as on a UART; a closed connection is dropped.
 fn send(cable: &mut Option<TcpStream>, lines: &str) {
-    if let Some(there) = cable
-        && let Err(error) = there.write_all(lines.as_bytes())
+    if let Some(stream) = cable
+        && let Err(error) = stream.write_all(lines.as_bytes())
         && error.kind() != ErrorKind::WouldBlock
     {
         *cable = None;

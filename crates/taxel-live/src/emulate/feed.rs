@@ -38,7 +38,7 @@ impl PipedFrames {
 }
 
 impl Touch for PipedFrames {
-    fn is_there(&mut self) -> Result<bool> {
+    fn has_frame(&mut self) -> Result<bool> {
         let mut piece = [0; 1 << 16];
         while !self.ended && self.bytes.len() < self.wanted {
             let mut poll = libc::pollfd { fd: self.from.as_raw_fd(), events: libc::POLLIN, revents: 0 };
@@ -60,7 +60,7 @@ impl Touch for PipedFrames {
     }
 
     fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool> {
-        while !self.is_there()? {
+        while !self.has_frame()? {
             if stop.asked() {
                 return Ok(false);
             }

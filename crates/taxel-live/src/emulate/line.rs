@@ -69,13 +69,13 @@ impl PseudoTerminal {
         if !ready {
             return Err(Error::file(link)(std::io::Error::last_os_error()));
         }
-        if std::fs::symlink_metadata(link).is_ok_and(|there| !there.file_type().is_symlink()) {
+        if std::fs::symlink_metadata(link).is_ok_and(|metadata| !metadata.file_type().is_symlink()) {
             return Err(Error::file(link)(std::io::Error::from_raw_os_error(libc::EEXIST)));
         }
         // The link is created under another name and renamed, so that a valid link exists at all times.
-        let mut other = link.as_os_str().to_owned();
-        other.push(format!(".{}", std::process::id()));
-        let made = std::os::unix::fs::symlink(&name, &other).and_then(|()| std::fs::rename(&other, link));
+        let mut temporary = link.as_os_str().to_owned();
+        temporary.push(format!(".{}", std::process::id()));
+        let made = std::os::unix::fs::symlink(&name, &temporary).and_then(|()| std::fs::rename(&temporary, link));
         made.map_err(Error::file(link))?;
         let (link, bytes_per_s) = (link.to_owned(), f64::from(baud) / BITS_A_BYTE);
         let (looked, waiting) = (Instant::now(), VecDeque::new());

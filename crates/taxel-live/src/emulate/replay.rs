@@ -20,7 +20,7 @@ enum ReplayedContent {
 pub struct Replay {
     /// Times, us from the first, ascending.
     times: Vec<i64>,
-    what: ReplayedContent,
+    content: ReplayedContent,
     held: Vec<u16>,
     next: usize,
     frame: u64,
@@ -70,7 +70,7 @@ impl Replay {
         Self::new(times, ReplayedContent::Frames(values), held, frame_us, speed)
     }
 
-    fn new(mut times: Vec<i64>, what: ReplayedContent, held: Vec<u16>, frame_us: f64, speed: f64) -> Result<Self> {
+    fn new(mut times: Vec<i64>, content: ReplayedContent, held: Vec<u16>, frame_us: f64, speed: f64) -> Result<Self> {
         if !(speed > 0.0 && speed.is_finite()) {
             return Err(problem!("speed"; " is {speed}: must be above 0").into());
         }
@@ -78,7 +78,7 @@ impl Replay {
             times.iter_mut().for_each(|t| *t -= first);
         }
         // The first frame arms the board; the recording begins with the second.
-        Ok(Self { times, what, held, next: 0, frame: 0, frame_us, speed })
+        Ok(Self { times, content, held, next: 0, frame: 0, frame_us, speed })
     }
 }
 
@@ -90,7 +90,7 @@ impl Touch for Replay {
             }
             let now = (self.frame - 1) as f64 * self.frame_us * self.speed;
             while let Some(_due) = self.times.get(self.next).filter(|&&t| t as f64 <= now) {
-                match &self.what {
+                match &self.content {
                     ReplayedContent::Events(events) => {
                         let (taxel, value) = events[self.next];
                         self.held[taxel as usize] = value;

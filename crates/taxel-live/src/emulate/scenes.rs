@@ -43,8 +43,8 @@ impl Scenes {
         let work = move || {
             for (n, act) in acts.enumerate() {
                 let prepared = act.and_then(|act| {
-                    Prepared::of(&array, frame_us, &act, Stop::never())
-                        .map_err(|error| error.of(&format!("act {n}")).into())
+                    Prepared::new(&array, frame_us, &act, Stop::never())
+                        .map_err(|error| error.in_part(&format!("act {n}")).into())
                 });
                 let last = prepared.is_err();
                 if ready.send(prepared).is_err() || last {

@@ -22,8 +22,8 @@ impl Sync {
     ///
     /// `File` if the file cannot be opened, or if it exists and may not be replaced.
     pub(super) fn open(path: &Path, overwrite: bool) -> Result<Self> {
-        let there = std::fs::metadata(path).ok();
-        let pipe = there.is_some_and(|m| m.file_type().is_fifo() || m.file_type().is_char_device());
+        let metadata = std::fs::metadata(path).ok();
+        let pipe = metadata.is_some_and(|m| m.file_type().is_fifo() || m.file_type().is_char_device());
         let mut options = File::options();
         options.write(true);
         if pipe {

@@ -150,7 +150,7 @@ impl Copier {
         match self.parcels.try_send(parcel) {
             Ok(()) => true,
             Err(channel::TrySendError::Full(parcel)) => {
-                self.packer.lost(&parcel);
+                self.packer.count_dropped(&parcel);
                 true
             }
             Err(channel::TrySendError::Disconnected(_)) => false,

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Serialize;
+use taxel_core::counts_since;
 use taxel_core::encode::Tare;
-use taxel_core::wire::{self, StepBack};
+use taxel_core::wire::{self, SenderTotals, StepBack};
 
 use super::sending::Sent;
 use crate::bridged::Bridged;
@@ -57,31 +58,15 @@ pub struct DecodingCounts {
     pub wire_version: u8,
     /// Counts of the decoder of version 2.
     pub wire_v2: wire::v2::Counts,
-    /// Bytes of version 1 that were refused because the board sends version 2.
-    pub wire_refused: u64,
-    /// Number of times that the board changed its version.
-    pub wire_changes: u64,
     /// Events of version 2 that arrived after time had advanced without them: their datagram was delayed longer than
     /// the pipeline waits at a gap.
     pub wire_late: u64,
-    /// Number of times that the times of version 1 jumped ahead of this computer's clock.
-    pub wire_jumps: u64,
-    /// The time after which times are doubtful since, us.
-    #[serde(skip)]
-    pub wire_doubtful_after: Option<i64>,
-    /// Events of version 2 before the latest time, by 0.1 s or less: the network reorders datagrams.
-    pub wire_overtaken: u64,
-    /// Events of version 2 before the latest time, by more than that.
-    pub wire_far_behind: u64,
-    /// Number of times that times stepped back, in either version.
-    pub wire_steps_back: u64,
-    /// The largest of these steps; of a recording that began later none, as its own clock may have others.
+    /// The counts that do not belong to the decoder of either version.
+    #[serde(flatten)]
+    pub totals: SenderTotals,
+    /// The largest steps back of times; of a recording that began later none, as its own clock may have others.
     #[serde(skip)]
     pub wire_steps: Vec<StepBack>,
-    /// Number of datagrams of version 1 that came again.
-    pub wire_repeated: u64,
-    /// Number of datagrams of version 1 without bytes.
-    pub wire_empty: u64,
     /// Number of decoded events.
     pub events: u64,
 }
@@ -221,37 +206,24 @@ impl Counters {
 
 impl DecodingCounts {
     fn since(&self, earlier: &Self) -> Self {
-        Self {
-            decoded: self.decoded - earlier.decoded,
+        counts_since! {
+            self, earlier;
+            decoded, wire_late, events;
             wire: self.wire.since(&earlier.wire),
             wire_version: self.wire_version,
             wire_v2: self.wire_v2.since(&earlier.wire_v2),
-            wire_refused: self.wire_refused - earlier.wire_refused,
-            wire_changes: self.wire_changes - earlier.wire_changes,
-            wire_late: self.wire_late - earlier.wire_late,
-            wire_jumps: self.wire_jumps - earlier.wire_jumps,
-            wire_doubtful_after: self.wire_doubtful_after,
-            wire_overtaken: self.wire_overtaken - earlier.wire_overtaken,
-            wire_far_behind: self.wire_far_behind - earlier.wire_far_behind,
-            wire_steps_back: self.wire_steps_back - earlier.wire_steps_back,
+            totals: self.totals.since(&earlier.totals),
             wire_steps: vec![],
-            wire_repeated: self.wire_repeated - earlier.wire_repeated,
-            wire_empty: self.wire_empty - earlier.wire_empty,
-            events: self.events - earlier.events,
         }
     }
 }
 
 impl ReadoutCounts {
     fn since(&self, earlier: &Self) -> Self {
-        Self {
-            read_out: self.read_out - earlier.read_out,
-            events_dropped: self.events_dropped - earlier.events_dropped,
-            late: self.late - earlier.late,
-            detections: self.detections - earlier.detections,
-            wrong: self.wrong - earlier.wrong,
+        counts_since! {
+            self, earlier;
+            read_out, events_dropped, late, detections, wrong, detections_dropped;
             outside: self.outside.map(|now| now - earlier.outside.unwrap_or(0)),
-            detections_dropped: self.detections_dropped - earlier.detections_dropped,
             taring: self.taring,
         }
     }

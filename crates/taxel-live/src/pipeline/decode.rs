@@ -179,7 +179,7 @@ impl DecodeStage {
     }
 
     /// Holds the values of the events that are about to be handed on.
-    pub(super) fn hold(&mut self) {
+    pub(super) fn update_held(&mut self) {
         self.has_intensities |= self.events.intensity.is_some();
         self.held.push(self.events.view());
     }
@@ -216,19 +216,9 @@ impl DecodeStage {
         counters.decoding.wire = *self.decoder.counts();
         counters.decoding.wire_v2 = self.decoder.version_2().counts();
         counters.decoding.wire_version = self.decoder.version();
-        counters.decoding.wire_refused = self.decoder.refused();
-        counters.decoding.wire_changes = self.decoder.changes();
         counters.decoding.wire_late = self.late;
-        counters.decoding.wire_jumps = self.decoder.ahead().jumps;
-        counters.decoding.wire_doubtful_after = self.decoder.ahead().after;
-        let order = self.decoder.order();
-        counters.decoding.wire_overtaken = order.overtaken();
-        counters.decoding.wire_far_behind = order.far();
-        counters.decoding.wire_steps_back = order.count();
-        counters.decoding.wire_steps.clear();
-        counters.decoding.wire_steps.extend_from_slice(order.steps());
-        counters.decoding.wire_repeated = self.decoder.repeated();
-        counters.decoding.wire_empty = self.decoder.empty();
+        counters.decoding.totals = *self.decoder.totals();
+        self.decoder.steps_back().clone_into(&mut counters.decoding.wire_steps);
         counters.decoding.events += self.events.len() as u64;
         counters.board.arrived_ns = self.arrivals.latest_ns;
         counters.board.heartbeat_us = self.arrivals.heartbeat_us;
@@ -246,11 +236,11 @@ impl DecodeStage {
 
     /// Sets the version of the wire to which the board was set; returns whether it is a different one.
     pub(super) fn expect(&mut self, version: u8) -> bool {
-        let other = version != self.decoder.version();
-        if other {
+        let changed = version != self.decoder.version();
+        if changed {
             self.decoder.expect(version, &mut self.events);
         }
-        other
+        changed
     }
 
     /// Number of decoded datagrams.
@@ -285,7 +275,7 @@ impl DecodeStage {
     /// The board's time before which everything has arrived, if nothing arrived until `until_ns`: the latest datagram's, and as
     /// much as has passed since on the host's clock. A sender that lags its own clock is not assumed to have caught up.
     #[allow(clippy::cast_possible_truncation)]
-    pub(super) fn quiet(&self, until_ns: Option<i64>) -> Option<QuietUntil> {
+    pub(super) fn quiet_until(&self, until_ns: Option<i64>) -> Option<QuietUntil> {
         if self.decoder.version() != 1 {
             return None;
         }

@@ -67,7 +67,7 @@ impl Handle {
     }
 
     /// Announces a write of the board's registers: it is recorded, and its version of the wire is expected.
-    pub fn wrote(&self, registers: Registers) {
+    pub fn announce_registers(&self, registers: Registers) {
         *lock(&self.shared.registers) = registers;
         self.shared.request(PipelineRequest::Registers(registers));
     }
@@ -155,7 +155,7 @@ impl Handle {
     }
 
     /// Makes the values that these taxels (column, row) hold their rest from now on, in the readout and in the recording's
-    /// pictures; the recording states when that was, and the rests before and after. Only done on request.
+    /// previews; the recording states when that was, and the rests before and after. Only done on request.
     ///
     /// # Errors
     ///
@@ -169,7 +169,7 @@ impl Handle {
 
     /// The latest zeroing of each zeroed taxel, by taxel index; and the number of zeroings.
     #[must_use]
-    pub fn zeroed(&self) -> (Vec<Zeroing>, u64) {
+    pub fn latest_zeroings(&self) -> (Vec<Zeroing>, u64) {
         let published = self.shared.published();
         (published.zeroed.values().copied().collect(), published.zeroings)
     }

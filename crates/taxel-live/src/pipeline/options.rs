@@ -18,11 +18,11 @@ use crate::recording::Compression;
 /// Declares the options with their defaults; `KEY = VALUE` after one is what its schema says beside.
 macro_rules! options {
     ($(#[$about:meta])* pub struct $name:ident {
-        $($(#[$of:meta])* $field:ident: $kind:ty = $default:expr $(, $key:literal = $value:literal)*;)*
+        $($(#[$attribute:meta])* $field:ident: $kind:ty = $default:expr $(, $key:literal = $value:literal)*;)*
     }) => {
         $(#[$about])*
         pub struct $name {
-            $($(#[$of])* $(#[cfg_attr(feature = "schema", schemars(extend($key = $value)))])* pub $field: $kind,)*
+            $($(#[$attribute])* $(#[cfg_attr(feature = "schema", schemars(extend($key = $value)))])* pub $field: $kind,)*
         }
 
         impl Default for $name {

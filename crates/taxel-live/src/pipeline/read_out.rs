@@ -54,7 +54,7 @@ impl ReadOutStage {
         self.readout.as_mut().map_or(&mut self.nothing, |readout| &mut readout.found)
     }
 
-    pub(super) fn announced(&self) -> Option<i64> {
+    pub(super) fn announced_until(&self) -> Option<i64> {
         self.announced
     }
 
@@ -81,10 +81,10 @@ impl ReadOutStage {
     }
 
     /// Processes a silence: no events before a time.
-    pub(super) fn quiet(&mut self, shared: &PipelineShared, quiet: QuietUntil) {
+    pub(super) fn process_silence(&mut self, shared: &PipelineShared, quiet: QuietUntil) {
         match &mut self.readout {
             Some(readout) => readout.advance(shared, BatchEnd { quiet: Some(quiet), last: false }),
-            None => shared.readout_queue.quiet(quiet),
+            None => shared.readout_queue.set_quiet(quiet),
         }
     }
 

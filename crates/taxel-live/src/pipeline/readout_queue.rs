@@ -82,7 +82,7 @@ impl ReadoutQueue {
     }
 
     /// Sets the time before which no data follow the queued events.
-    pub(super) fn quiet(&self, quiet: QuietUntil) {
+    pub(super) fn set_quiet(&self, quiet: QuietUntil) {
         self.state().quiet = Some(quiet);
         self.came.notify_one();
     }
@@ -166,9 +166,9 @@ mod tests {
     fn silence_is_popped_once_and_only_where_nothing_came_after_it() {
         let readout_queue = ReadoutQueue::new(&Array::thesis(), 10);
         let mut popped = Events::empty(Array::thesis());
-        readout_queue.quiet(QuietUntil::ByHostClock(100));
+        readout_queue.set_quiet(QuietUntil::ByHostClock(100));
         assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, Some(QuietUntil::ByHostClock(100)));
-        readout_queue.quiet(QuietUntil::ByHostClock(200));
+        readout_queue.set_quiet(QuietUntil::ByHostClock(200));
         readout_queue.push(&mut events(&[150], None), None);
         assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, None);
         readout_queue.push(&mut events(&[], None), Some(300));

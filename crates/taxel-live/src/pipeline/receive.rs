@@ -23,7 +23,7 @@ impl ReceiveStage {
 
     /// Moves receiving to a separate thread; without a readout it may gather datagrams.
     pub(super) fn move_to_thread(&self, reads_out: bool) -> Result<()> {
-        self.shared.receiver.apart(if reads_out { Duration::ZERO } else { TOGETHER })
+        self.shared.receiver.receive_in_thread(if reads_out { Duration::ZERO } else { TOGETHER })
     }
 
     /// Waits for datagrams at most `wait`; returns false and an empty batch if none arrived.

@@ -1,4 +1,4 @@
-//! The third stage: writes datagrams as they arrived, changes of the board, markers, pictures and counts to the running
+//! The third stage: writes datagrams as they arrived, changes of the board, markers, previews and counts to the running
 //! recording, if there is one.
 
 use std::sync::Arc;
@@ -29,7 +29,7 @@ pub(super) struct RecordStage {
     /// recording's clock and the pipeline's is known.
     origin: Option<Box<SenderDecoder>>,
     preview_buffer: PreviewBuffer,
-    /// Number of decoded datagrams when the last picture was considered.
+    /// Number of decoded datagrams when the last preview was considered.
     considered: u64,
     /// Whether the recording has the fresh tare.
     tared: bool,
@@ -103,7 +103,7 @@ impl RecordStage {
             return Ok(());
         }
         self.with(|recorder| markers.iter().try_for_each(|marker| recorder.marker(*marker)))?;
-        self.shared.picture_around(markers.iter().map(|marker| marker.t));
+        self.shared.preview_around(markers.iter().map(|marker| marker.t));
         Ok(())
     }
 
@@ -163,13 +163,13 @@ impl RecordStage {
         }
     }
 
-    /// Buffers a picture if one is due, and records the selected ones; with `last` also the final one.
-    pub(super) fn pictures(&mut self, decoded: u64, held: &Held, last: bool) -> Result<()> {
+    /// Buffers a preview if one is due, and records the selected ones; with `last` also the final one.
+    pub(super) fn previews(&mut self, decoded: u64, held: &Held, last: bool) -> Result<()> {
         let now = Instant::now();
         if !(last || self.preview_buffer.is_due(now)) {
             return Ok(());
         }
-        let times = std::mem::take(&mut *lock(&self.shared.recording.picture_times));
+        let times = std::mem::take(&mut *lock(&self.shared.recording.preview_times));
         if !self.runs() {
             self.preview_buffer.clear();
             return Ok(());
@@ -185,7 +185,7 @@ impl RecordStage {
         let outcome = self.with(|recorder| {
             preview_buffer
                 .take_wanted()
-                .try_for_each(|preview| recorder.picture(preview.at_ns, preview.t_us, columns, &preview.held))
+                .try_for_each(|preview| recorder.preview(preview.at_ns, preview.t_us, columns, &preview.held))
         });
         self.preview_buffer = preview_buffer;
         outcome

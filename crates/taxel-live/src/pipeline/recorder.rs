@@ -96,7 +96,7 @@ impl RecordingPart {
 }
 
 impl Recorder {
-    fn of(record: &Record, header: Header) -> Self {
+    fn new(record: &Record, header: Header) -> Self {
         Self {
             record: record.clone(),
             header,
@@ -115,7 +115,7 @@ impl Recorder {
     pub(super) fn join(host: RecordingPart, record: &Record, options: &LiveOptions, place: &Origin) -> Self {
         let name = host.name.clone();
         let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(place), now_ns());
-        Self { host: Some(host), ..Self::of(record, Header { name, ..board }) }
+        Self { host: Some(host), ..Self::new(record, Header { name, ..board }) }
     }
 
     /// A part of another pipeline's recording that begins while this pipeline's board is being received.
@@ -196,7 +196,7 @@ impl Recorder {
             "mcap" => OutputFile::open(path, record.overwrite)?,
             _ => LsaWriter::reserve(path, record.overwrite)?,
         };
-        Ok((Self::of(record, header), file))
+        Ok((Self::new(record, header), file))
     }
 
     /// Begins with the registers and the values that the taxels hold, at these counters.
@@ -211,7 +211,7 @@ impl Recorder {
 
     /// Restarts the recording if it is still empty; returns whether it does.
     pub(super) fn restart_if_empty(&mut self, now: &Counters) -> bool {
-        if self.holds_anything() {
+        if self.has_content() {
             return false;
         }
         self.since = Some(Box::new(now.clone()));
@@ -222,8 +222,8 @@ impl Recorder {
     }
 
     /// Whether any source passed data, or bytes that are in no line, or a note was written.
-    pub(super) fn holds_anything(&self) -> bool {
-        let others = matches!(self.file.get(), Some(RecordingFile::Mcap(writer)) if writer.holds_anything());
+    pub(super) fn has_content(&self) -> bool {
+        let others = matches!(self.file.get(), Some(RecordingFile::Mcap(writer)) if writer.has_content());
         others || self.has_data.load(Ordering::Relaxed) || self.has_notes.load(Ordering::Relaxed)
     }
 
@@ -337,7 +337,7 @@ impl Recorder {
         self.with_track(|track| track.detection(output.reported_ns, &Detection { t, known, ..found.clone() }))
     }
 
-    /// Sets the rest that is subtracted from the pictures from now on.
+    /// Sets the rest that is subtracted from the previews from now on.
     pub(super) fn tare(&self, tare: &Tare) -> Result<()> {
         self.with_track(|track| {
             track.tare(tare);
@@ -345,11 +345,11 @@ impl Recorder {
         })
     }
 
-    pub(super) fn picture(&self, at_ns: i64, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
-        // A file that is not begun has no pictures.
-        let there = !matches!(self.create_once()?, RecordingFile::Mcap(writer) if !writer.has_begun());
-        let Some(t_us) = self.timed(board_us).filter(|_| there) else { return Ok(()) };
-        self.with_track(|track| track.picture(at_ns, t_us, columns, held))
+    pub(super) fn preview(&self, at_ns: i64, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
+        // A file that is not begun has no previews.
+        let has_begun = !matches!(self.create_once()?, RecordingFile::Mcap(writer) if !writer.has_begun());
+        let Some(t_us) = self.timed(board_us).filter(|_| has_begun) else { return Ok(()) };
+        self.with_track(|track| track.preview(at_ns, t_us, columns, held))
     }
 
     /// Writes the losses so far, which an unfinished recording then states; a raw file cannot store them.
@@ -397,7 +397,7 @@ impl Recorder {
             }
             return Ok(None);
         }
-        let nothing = !self.holds_anything() && (self.since.is_some() || counters.nothing_came());
+        let nothing = !self.has_content() && (self.since.is_some() || counters.nothing_came());
         let refused = self.refused.into_inner();
         if nothing || (refused && !self.has_data.into_inner()) {
             match self.file.into_inner() {
@@ -446,14 +446,11 @@ fn kind_of_name(path: &Path) -> Result<&str> {
 pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::RecordingCounts {
     // Datagrams that wait at the end belong to a later recording.
     let now = since.map_or_else(|| counters.clone(), |begun| counters.since(begun));
-    let DecodingCounts { wire, wire_jumps, wire_repeated, wire_v2, .. } = &now.decoding;
-    let (mut decoder, missing) = recording::damage(wire, *wire_jumps, *wire_repeated, wire_v2);
-    recording::add_order(&mut decoder, now.decoding.wire_far_behind, now.decoding.wire_overtaken);
-    decoder.insert(recording::REFUSED.to_owned(), now.decoding.wire_refused);
+    let DecodingCounts { wire, wire_v2, totals, .. } = &now.decoding;
+    let (mut decoder, missing) = recording::damage(wire, wire_v2, totals);
     decoder.insert("changes_between_senders".to_owned(), now.capture.changes_between_senders);
-    decoder.insert(recording::EMPTY.to_owned(), now.decoding.wire_empty);
     decoder.insert(recording::ADDRESS.to_owned(), now.capture.changes_of_address);
-    let jumped = since.map_or(0, |begun| begun.decoding.wire_jumps);
+    let jumped = since.map_or(0, |begun| begun.decoding.totals.jumps);
     decoder.insert(recording::JUMPED_BEFORE.to_owned(), jumped);
     // Version 1 does not number datagrams: a recording with any of it cannot state that none is missing.
     let knows = now.decoding.wire_v2.intact > 0 && now.decoding.wire.bytes == 0;
@@ -488,7 +485,7 @@ mod tests {
         (now.decoding.wire_v2.datagrams, now.decoding.wire_v2.intact) = (110, 110);
         assert_eq!(losses(&now, Some(&begun)).missing, None, "some of it");
         now.decoding.wire_v2.missing += 3;
-        now.decoding.wire_refused += 25;
+        now.decoding.totals.refused += 25;
         let lost = losses(&now, Some(&begun));
         assert_eq!(lost.missing, Some(3));
         let verdict = lost.verdict();

@@ -127,7 +127,7 @@ pub(super) fn verdict(
     lost: &RecordingCounts,
 ) -> Verdict {
     let of_board =
-        |counters: &Counters, lost: &RecordingCounts| lost.verdict().doubtful(counters.decoding.wire_doubtful_after);
+        |counters: &Counters, lost: &RecordingCounts| lost.verdict().doubtful(counters.decoding.totals.doubtful_after);
     let verdict = if nothing {
         Verdict::nothing_arrived(nothing_arrived(place, counters.seconds))
     } else {

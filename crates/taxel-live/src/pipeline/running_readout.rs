@@ -5,12 +5,12 @@ use taxel_core::detect::{Detection, Detector, FrameTime, ReadoutStream};
 use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::problem;
 
-use super::ahead::SpeculativeReadout;
 use super::options::{LiveOptions, StatedTare};
 use super::output::DetectionOutput;
 use super::readout_queue::{BatchEnd, QuietUntil};
-use super::rest::TareMeasurement;
 use super::shared::PipelineShared;
+use super::speculative_readout::SpeculativeReadout;
+use super::tare_measurement::TareMeasurement;
 
 /// What is to read the events out.
 pub enum ReadoutSetup {
@@ -30,7 +30,7 @@ impl ReadoutSetup {
     /// # Errors
     ///
     /// `Format` for a text that is no readout or no tare, `Problem` for a time that no tare takes; as [`Detector::stream`].
-    pub fn of(options: &LiveOptions) -> taxel_core::Result<Self> {
+    pub fn from_options(options: &LiveOptions) -> taxel_core::Result<Self> {
         let Some(readout) = &options.readout else { return Ok(Self::None) };
         let readout = Detector::from_json(readout)?;
         let tare = match &options.tare {
@@ -136,7 +136,7 @@ impl RunningReadout {
                 match end.quiet {
                     Some(QuietUntil::ByBoard(t)) => readout.advance(t, &mut self.found)?,
                     Some(QuietUntil::ByHostClock(t)) if end.last => readout.advance(t, &mut self.found)?,
-                    Some(QuietUntil::ByHostClock(t)) => readout.quiet(t, &mut self.found)?,
+                    Some(QuietUntil::ByHostClock(t)) => readout.advance_silence(t, &mut self.found)?,
                     None => {}
                 }
             }

@@ -148,7 +148,7 @@ impl Sink for Sending {
         let mut state = lock(&self.line.state);
         if state.device.is_none() && matches!(self.line.to, Destination::Pipe(_)) {
             // A pipe may have a reader by now; a serial line takes longer to open, which is left to the other thread.
-            state.opened(Device::open(&self.line.to));
+            state.set_device(Device::open(&self.line.to));
         }
         if state.device.is_none() || state.waiting.len() >= WAITING {
             state.counts.lost += 1;
@@ -208,7 +208,7 @@ impl SendingLine {
                         drop(state);
                         let opened = Device::open(&self.to);
                         state = lock(&self.state);
-                        state.opened(opened);
+                        state.set_device(opened);
                     }
                 }
             }
@@ -218,7 +218,7 @@ impl SendingLine {
 
 impl SendingState {
     /// Handles the result of another attempt to open the destination.
-    fn opened(&mut self, tried: Result<Option<Device>>) {
+    fn set_device(&mut self, tried: Result<Option<Device>>) {
         match tried {
             Ok(Some(device)) => self.device = Some(device),
             Ok(None) => self.counts.trouble = Some("no reader".to_owned()),

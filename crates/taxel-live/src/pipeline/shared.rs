@@ -53,8 +53,8 @@ pub(super) struct RecordingSlot {
     pub(super) runs: AtomicBool,
     /// The error that ended one early which was begun while the pipeline ran.
     pub(super) broken: Mutex<Option<Error>>,
-    /// Times of detections, markers and notes, us, around which it gets pictures, since it last did.
-    pub(super) picture_times: Mutex<Vec<i64>>,
+    /// Times of detections, markers and notes, us, around which it gets previews, since it last did.
+    pub(super) preview_times: Mutex<Vec<i64>>,
 }
 
 /// State shared by all threads.
@@ -109,9 +109,9 @@ impl PipelineShared {
         self.requested.store(true, Ordering::Release);
     }
 
-    /// Selects the pictures around these times, us, for the recording.
-    pub(super) fn picture_around(&self, times: impl IntoIterator<Item = i64>) {
-        lock(&self.recording.picture_times).extend(times);
+    /// Selects the previews around these times, us, for the recording.
+    pub(super) fn preview_around(&self, times: impl IntoIterator<Item = i64>) {
+        lock(&self.recording.preview_times).extend(times);
     }
 
     /// Notes that everything that arrived was processed.
@@ -156,7 +156,7 @@ impl PipelineShared {
         let board_us = self.published().counters.board.board_us.filter(|_| timed);
         match &*lock(&self.recording.recorder) {
             Some(recorder) => {
-                self.picture_around(board_us);
+                self.preview_around(board_us);
                 recorder.note(board_us, text)
             }
             None => Err(taxel_core::problem!("a note is kept in a recording: record to a .mcap file").into()),

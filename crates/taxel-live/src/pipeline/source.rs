@@ -117,7 +117,7 @@ impl FromStr for SourceKind {
 
     fn from_str(text: &str) -> Result<Self> {
         let mut parts = text.split(',');
-        let what = parts.next().unwrap_or_default();
+        let input = parts.next().unwrap_or_default();
         let mut options = BTreeMap::new();
         for part in parts {
             let Some((key, value)) = part.split_once('=') else {
@@ -125,7 +125,7 @@ impl FromStr for SourceKind {
             };
             options.insert(key.trim(), value.trim());
         }
-        let kind = match what.split_once(':') {
+        let kind = match input.split_once(':') {
             Some(("udp", place)) => {
                 let array = options.remove("array").map_or(Ok(Array::thesis()), |size| array_of(text, size))?;
                 let registers = Registers::preset_on(options.remove("preset").unwrap_or("5.2 kHz"), &array)?;
@@ -140,15 +140,15 @@ impl FromStr for SourceKind {
                     },
                 };
                 let place = LineInput::Serial(path.into(), baud);
-                let (stream, opened) = named_or_read(stream_of(text, &mut options)?, &place)?;
+                let (stream, opened) = columns_or_first_line(stream_of(text, &mut options)?, &place)?;
                 Self::Lines(place, stream, opened)
             }
             Some(("pipe", place)) if !place.is_empty() => {
                 let place = LineInput::Pipe(place.into());
-                let (stream, opened) = named_or_read(stream_of(text, &mut options)?, &place)?;
+                let (stream, opened) = columns_or_first_line(stream_of(text, &mut options)?, &place)?;
                 Self::Lines(place, stream, opened)
             }
-            None if what == "given" => match stream_of(text, &mut options)? {
+            None if input == "given" => match stream_of(text, &mut options)? {
                 Some(stream) => Self::Given(stream),
                 None => return Err(problem!("source {text:?}: needs columns=A:B:C").into()),
             },
@@ -206,7 +206,7 @@ fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<St
 }
 
 /// The given columns, or those of the first line.
-fn named_or_read(named: Option<StreamColumns>, place: &LineInput) -> Result<(StreamColumns, Opened)> {
+fn columns_or_first_line(named: Option<StreamColumns>, place: &LineInput) -> Result<(StreamColumns, Opened)> {
     named.map_or_else(|| first_line(place), |stream| Ok((stream, Opened::default())))
 }
 
@@ -308,7 +308,7 @@ impl LineReader {
             std::thread::sleep(LOOK_EVERY);
             return Ok(false);
         };
-        if !comes(file.as_raw_fd(), LOOK_EVERY) {
+        if !is_readable(file.as_raw_fd(), LOOK_EVERY) {
             return Ok(false);
         }
         let mut piece = [0; 4096];
@@ -384,7 +384,7 @@ impl LineReader {
     }
 
     /// Opens the line again, and leaves out an incomplete line.
-    pub(super) fn again(&mut self) {
+    pub(super) fn reopen(&mut self) {
         self.discard();
         self.file = open(&self.place).ok();
         if self.file.is_none() {
@@ -410,7 +410,7 @@ fn open(place: &LineInput) -> Result<Box<dyn ReadsAsItComes>> {
 }
 
 /// Waits until data can be read, or the end was reached.
-fn comes(descriptor: RawFd, most: Duration) -> bool {
+fn is_readable(descriptor: RawFd, most: Duration) -> bool {
     let mut asked = libc::pollfd { fd: descriptor, events: libc::POLLIN, revents: 0 };
     let most = i32::try_from(most.as_millis()).unwrap_or(i32::MAX);
     // SAFETY: one entry, on our stack, of a descriptor that the caller holds open.

@@ -97,7 +97,7 @@ impl NumberStream {
     }
 
     /// Counts bytes that arrived and are in no line; an unfinished recording states them too.
-    fn left_out(&self, bytes: LeftOut) -> Result<()> {
+    fn count_left_out(&self, bytes: LeftOut) -> Result<()> {
         if bytes == LeftOut::default() {
             return Ok(());
         }
@@ -105,10 +105,10 @@ impl NumberStream {
         if self.always && current.track.is_none() {
             current.track = Some(self.part.open()?);
         }
-        current.faults.left_out(bytes);
-        current.all.left_out(bytes);
+        current.faults.count_left_out(bytes);
+        current.all.count_left_out(bytes);
         if let Some(track) = &current.track {
-            track.left_out();
+            track.note_left_out();
         }
         if current.counted.is_some_and(|counted| counted.elapsed() < COUNTS_EVERY) {
             return Ok(());
@@ -183,7 +183,7 @@ impl NumberStream {
                 Ok(ended) => ended,
                 Err(error) => {
                     *lock(&self.trouble) = Some(reader.broken(error).to_string());
-                    reader.again();
+                    reader.reopen();
                     first = true;
                     continue;
                 }
@@ -192,17 +192,17 @@ impl NumberStream {
             while let Some(line) = reader.line(ended) {
                 let has_no_beginning = std::mem::take(&mut first) && self.stream.parse(&line.text).is_none();
                 if has_no_beginning && reader.is_serial() {
-                    self.left_out(LeftOut { unfinished: line.bytes, ..LeftOut::default() })?;
+                    self.count_left_out(LeftOut { unfinished: line.bytes, ..LeftOut::default() })?;
                 } else {
                     self.line(at_ns, &line)?;
                 }
             }
-            self.left_out(reader.take_left_out(ended))?;
+            self.count_left_out(reader.take_left_out(ended))?;
             if ended {
                 return Ok(());
             }
         }
-        self.left_out(reader.take_left_out(true))
+        self.count_left_out(reader.take_left_out(true))
     }
 }
 

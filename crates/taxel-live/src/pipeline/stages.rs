@@ -118,15 +118,15 @@ impl Stages {
             None
         } else {
             let until = self.receive.silent_until();
-            if let (true, Some(quiet)) = (self.read_out.is_on(), self.decode.quiet(until)) {
-                self.read_out.quiet(&self.shared, quiet);
+            if let (true, Some(quiet)) = (self.read_out.is_on(), self.decode.quiet_until(until)) {
+                self.read_out.process_silence(&self.shared, quiet);
             }
             until
         };
         self.observers.datagrams(&batch, silent_until);
         self.receive.reuse(batch);
         self.observers.tick(self.decode.held());
-        self.record.pictures(self.decode.decoded(), self.decode.held(), false)?;
+        self.record.previews(self.decode.decoded(), self.decode.held(), false)?;
         if self.observers.frame(self.decode.held()) {
             self.record.progress()?;
         }
@@ -149,7 +149,7 @@ impl Stages {
                 }
             }
             let now = now_ns();
-            self.decode.note(&decoded, self.read_out.announced());
+            self.decode.note(&decoded, self.read_out.announced_until());
             self.record.record_board_change(&decoded.info, decoded.arrived_ns)?;
             self.record.find_origin(bytes, decoded.arrived_ns, self.decode.first_stamps(&decoded))?;
             self.shared.published().decode_latency.note(now - decoded.arrived_ns);
@@ -164,7 +164,7 @@ impl Stages {
 
     /// Passes the decoded events to the other stages.
     fn flush_events(&mut self) -> Result<()> {
-        self.decode.hold();
+        self.decode.update_held();
         self.observers.events(self.decode.events(), self.decode.held());
         self.record.markers(&self.decode.events().markers)?;
         {
@@ -182,8 +182,8 @@ impl Stages {
     fn finish(&mut self) -> Result<()> {
         self.decode.finish();
         self.flush_events()?;
-        self.record.pictures(self.decode.decoded(), self.decode.held(), true)?;
-        let quiet = self.decode.quiet(self.receive.silent_until()).filter(|_| self.read_out.is_on());
+        self.record.previews(self.decode.decoded(), self.decode.held(), true)?;
+        let quiet = self.decode.quiet_until(self.receive.silent_until()).filter(|_| self.read_out.is_on());
         self.observers.finish(self.decode.held());
         self.read_out.close(&self.shared, quiet);
         self.answer()
@@ -209,7 +209,7 @@ impl Stages {
     }
 
     fn switch_recording(&mut self, next: Option<Box<Recorder>>) -> Result<EndedRecording> {
-        self.record.pictures(self.decode.decoded(), self.decode.held(), true)?;
+        self.record.previews(self.decode.decoded(), self.decode.held(), true)?;
         if next.is_some() {
             self.move_to_threads()?;
         }
@@ -237,7 +237,7 @@ impl Stages {
             return Err(problem!("a tare is being taken: zero taxels when that is done").into());
         }
         let now = published.counters.board.offset.map(|offset| offset.board_us(now_ns()));
-        let Some(t) = published.counters.board.board_us.max(self.read_out.announced()).max(now) else {
+        let Some(t) = published.counters.board.board_us.max(self.read_out.announced_until()).max(now) else {
             return Err(problem!("nothing came yet: no taxel can be zeroed").into());
         };
         let mut zeroings = vec![];
@@ -261,7 +261,7 @@ impl Stages {
         published.zeroed.extend(zeroings.iter().map(|zeroing| (array.index(zeroing.x, zeroing.y), *zeroing)));
         published.zeroings += 1;
         drop(published);
-        self.shared.picture_around([t]);
+        self.shared.preview_around([t]);
         self.read_out.zero(&self.shared, &zeroings);
         Ok(zeroings)
     }

@@ -59,12 +59,12 @@ impl Threads {
             }
             let Some(stages) = turn.stages.take() else { return };
             drop(turn);
-            self.lead(stages, shared);
+            self.run_stages(stages, shared);
         }
     }
 
     /// Runs the stages until there are detections to output, or the pipeline has ended.
-    fn lead(&self, mut stages: Box<Stages>, shared: &PipelineShared) {
+    fn run_stages(&self, mut stages: Box<Stages>, shared: &PipelineShared) {
         loop {
             let next = stages.run();
             let alone = self.output.add(shared, stages.pending_detections());

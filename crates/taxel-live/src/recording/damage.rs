@@ -24,13 +24,10 @@ pub struct DamageCounts {
 impl DamageCounts {
     /// What a decoder found; `origin_us` is added to its times.
     #[must_use]
-    pub fn of(sender: &SenderDecoder, origin_us: i64) -> Self {
-        let (mut causes, missing) =
-            damage(sender.counts(), sender.ahead().jumps, sender.repeated(), &sender.version_2().counts());
-        causes.extend([(REFUSED.to_owned(), sender.refused()), (EMPTY.to_owned(), sender.empty())]);
-        add_order(&mut causes, sender.order().far(), sender.order().overtaken());
-        let doubtful_after_us = sender.ahead().after.map(|t| t + origin_us);
-        let steps = sender.order().steps().iter();
+    pub fn from_sender(sender: &SenderDecoder, origin_us: i64) -> Self {
+        let (causes, missing) = damage(sender.counts(), &sender.version_2().counts(), sender.totals());
+        let doubtful_after_us = sender.totals().doubtful_after.map(|t| t + origin_us);
+        let steps = sender.steps_back().iter();
         let steps_back = steps.map(|step| StepBack { after_us: step.after_us + origin_us, ..*step }).collect();
         Self { damage: causes, missing, unnumbered: sender.counts().bytes > 0, doubtful_after_us, steps_back }
     }
@@ -44,8 +41,8 @@ impl DamageCounts {
     /// Number of bytes that are in no line.
     #[must_use]
     pub fn left_out(&self) -> LeftOut {
-        let of = |cause: &str| self.damage.get(cause).copied().unwrap_or(0);
-        LeftOut { in_no_line: of(IN_NO_LINE), unfinished: of(UNFINISHED_LINES) }
+        let count = |cause: &str| self.damage.get(cause).copied().unwrap_or(0);
+        LeftOut { in_no_line: count(IN_NO_LINE), unfinished: count(UNFINISHED_LINES) }
     }
 }
 
@@ -73,23 +70,25 @@ pub fn damage_of_version_1(counts: &wire::Counts) -> BTreeMap<String, u64> {
     .into()
 }
 
-/// Adds the numbers of events of version 2 that are far before the latest time, and of those that were overtaken.
-pub(crate) fn add_order(causes: &mut BTreeMap<String, u64>, far: u64, overtaken: u64) {
-    *causes.entry(OUT_OF_ORDER.to_owned()).or_default() += far;
-    causes.insert(OVERTAKEN.to_owned(), overtaken);
-}
-
-/// The same of both versions, with the jumps of [`wire::ClockJumps`] and the datagrams of version 1 that came `again`; and the
-/// number of missing datagrams of version 2, if the board sends it.
+/// What the decoders of both versions could not use, by cause, with the sender's totals; and the number of missing datagrams of
+/// version 2, if the board sends it.
 #[must_use]
 pub fn damage(
     counts: &wire::Counts,
-    jumps: u64,
-    again: u64,
     two: &wire::v2::Counts,
+    totals: &wire::SenderTotals,
 ) -> (BTreeMap<String, u64>, Option<u64>) {
     let mut causes = damage_of_version_1(counts);
-    causes.extend([(JUMPS.to_owned(), jumps), (AGAIN.to_owned(), again), (REPEATED.to_owned(), two.repeated)]);
+    *causes.entry(OUT_OF_ORDER.to_owned()).or_default() += totals.far_behind;
+    let of_sender = [
+        (JUMPS, totals.jumps),
+        (AGAIN, totals.repeated),
+        (OVERTAKEN, totals.overtaken),
+        (REFUSED, totals.refused),
+        (EMPTY, totals.empty),
+        (REPEATED, two.repeated),
+    ];
+    causes.extend(of_sender.map(|(cause, n)| (cause.to_owned(), n)));
     if two.datagrams == 0 {
         return (causes, None);
     }
@@ -141,8 +140,8 @@ pub(super) const MISSING: &str = "missing_values";
 pub(super) const BACK: &str = "stamps_out_of_order";
 pub(super) const DRIFTS: &str = "drifts_from_arrival";
 /// Datagrams of version 1 without bytes.
-pub(crate) const EMPTY: &str = "empty_datagrams";
+const EMPTY: &str = "empty_datagrams";
 /// How often the sender had another address than before, as a board that got another one has, or another board.
 pub(crate) const ADDRESS: &str = "changes_of_address";
 /// Bytes of version 1 from a board that sends version 2.
-pub(crate) const REFUSED: &str = "bytes_of_version_1_refused";
+const REFUSED: &str = "bytes_of_version_1_refused";

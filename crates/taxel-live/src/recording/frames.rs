@@ -12,7 +12,7 @@ pub struct FrameProperties {
     /// Unit of the values.
     pub unit: String,
     /// Whether the frames have times; else they are numbered, one a us.
-    #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
+    #[serde(default = "true_by_default", skip_serializing_if = "Clone::clone")]
     pub clock: bool,
     /// The names of the columns, if each is a quantity of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -22,7 +22,7 @@ pub struct FrameProperties {
     pub turned: Option<f64>,
 }
 
-fn yes() -> bool {
+fn true_by_default() -> bool {
     true
 }
 
@@ -62,7 +62,7 @@ pub enum FrameEncoding {
 impl FrameEncoding {
     /// The encoding that holds these values to the last bit.
     #[must_use]
-    pub fn of(values: &[f32]) -> Self {
+    pub fn choose(values: &[f32]) -> Self {
         // -0.0 is no whole number of this encoding, which has no sign.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let whole = values.iter().all(|&value| f32::from(value as u16).to_bits() == value.to_bits());
@@ -184,7 +184,7 @@ fn next<'a>(message: &mut &'a [u8]) -> Option<(u64, FieldValue<'a>)> {
         }
         None
     }
-    fn taken<'a>(message: &mut &'a [u8], count: u64) -> Option<&'a [u8]> {
+    fn take_bytes<'a>(message: &mut &'a [u8], count: u64) -> Option<&'a [u8]> {
         let (taken, rest) = message.split_at_checked(usize::try_from(count).ok()?)?;
         *message = rest;
         Some(taken)
@@ -192,12 +192,12 @@ fn next<'a>(message: &mut &'a [u8]) -> Option<(u64, FieldValue<'a>)> {
     let key = number(message)?;
     let value = match key & 7 {
         VARINT => FieldValue::Number(number(message)?),
-        BITS_64 => FieldValue::Bytes(taken(message, 8)?),
+        BITS_64 => FieldValue::Bytes(take_bytes(message, 8)?),
         BYTES => {
             let count = number(message)?;
-            FieldValue::Bytes(taken(message, count)?)
+            FieldValue::Bytes(take_bytes(message, count)?)
         }
-        BITS_32 => FieldValue::Number(u32::from_le_bytes(taken(message, 4)?.try_into().ok()?).into()),
+        BITS_32 => FieldValue::Number(u32::from_le_bytes(take_bytes(message, 4)?.try_into().ok()?).into()),
         _ => return None,
     };
     Some((key >> 3, value))
@@ -282,7 +282,7 @@ mod tests {
             (&[nan, 1.0, 2.0, 3.0], FrameEncoding::Float),
         ];
         for (values, encoding) in cases {
-            assert_eq!(FrameEncoding::of(values), encoding, "{values:?}");
+            assert_eq!(FrameEncoding::choose(values), encoding, "{values:?}");
             for t in [0, 1, -1, 1_234_567, -4_503_599_627_370_496, 4_503_599_627_370_496] {
                 let (mut message, mut back) = (vec![], Frames::default());
                 write_message(&mut message, "left", t, 2, values, encoding);

@@ -38,7 +38,7 @@ pub(super) const TIME_US: i64 = 1 << 52;
 ///
 /// Frames of a board at rest compress by a factor of a few hundred; a factor of a thousand indicates a decompression
 /// bomb, unless all of it fits into the memory: large frames without a touch compress by a factor of ten thousand.
-pub(super) fn unpacked(length: u64, memory: u64) -> u64 {
+pub(super) fn most_unpacked(length: u64, memory: u64) -> u64 {
     length.saturating_mul(1000).saturating_add(1 << 28).max(memory)
 }
 
@@ -52,7 +52,7 @@ pub(super) fn datagrams(length: u64) -> u64 {
 
 /// The error of more bytes than are read unless the caller allows them.
 pub(super) fn too_large(path: &Path, text: &str) -> Error {
-    taxel_core::Error::format(format!("{}: {text}", path.display())).helped_by("limit", Hint::Larger).into()
+    taxel_core::Error::format(format!("{}: {text}", path.display())).with_hint("limit", Hint::Larger).into()
 }
 
 /// Refuses more bytes in memory than a caller allows.

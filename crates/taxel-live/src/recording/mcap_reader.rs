@@ -59,7 +59,7 @@ pub struct ReadPosition {
 impl ReadPosition {
     /// The same state without the reusable buffer.
     #[must_use]
-    pub fn without_memory(&self) -> Self {
+    pub fn clone_counts(&self) -> Self {
         Self { bytes: vec![], topics: self.topics.clone(), ..*self }
     }
 }
@@ -163,7 +163,7 @@ impl Reader {
     pub fn open_within(path: &Path, memory: u64, allowed: bool) -> Result<Self> {
         let file = open_regular(path)?;
         let length = file.metadata().map_err(Error::file(path))?.len();
-        let mut walk = FileWalk::of(path, &file, length, memory);
+        let mut walk = FileWalk::new(path, &file, length, memory);
         walk.magic()?;
         walk.records()?;
         let FileWalk { begin, end, ending, ends, blocks, skipped, summary, rebuilt, .. } = walk;
@@ -401,7 +401,7 @@ impl Reader {
         let mut unread = match (skipped, sound) {
             (Ok(k), _) => self.unread_chunks(place, self.blocks.skipped[k].1.as_ref(), &read),
             (Err(_), true) => Unread::default(),
-            (Err(_), false) => match self.blocks.indexed(block)? {
+            (Err(_), false) => match self.blocks.message_indexes(block)? {
                 Some(indexed) => Unread { unknown: false, ..self.unread_chunks(place, Some(&indexed), &read) },
                 None => Unread { unknown: true, ..Unread::default() },
             },
@@ -533,7 +533,7 @@ impl Reader {
         decoded.events.markers.iter_mut().for_each(|m| m.t += header.decoding.origin_us);
         decoded.counts = *sender.counts();
         decoded.version_2 = sender.version_2().counts();
-        decoded.found = DamageCounts::of(&sender, header.decoding.origin_us);
+        decoded.found = DamageCounts::from_sender(&sender, header.decoding.origin_us);
         Ok(decoded)
     }
 }
@@ -543,7 +543,7 @@ fn before_first(remarks: &Remarks) -> u64 {
     let Some(counts) = &remarks.counts else { return 0 };
     #[allow(clippy::cast_possible_truncation)]
     match (counts.first, remarks.numbers.first()) {
-        (Some(first), Some(there)) => there.saturating_sub(unwrap(there, first as u32)),
+        (Some(first), Some(recorded)) => recorded.saturating_sub(unwrap(recorded, first as u32)),
         (Some(_), None) => counts.recorded,
         _ => 0,
     }

@@ -21,7 +21,7 @@ use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
 use super::frames::{FrameEncoding, write_message};
-use super::grey_picture::GreyScale;
+use super::grey_preview::GreyScale;
 use super::{BoardChange, Compression, Header, OutputFile, RecordingCounts, StreamColumns, Topic, WriterOptions};
 use crate::Result;
 use crate::locked::lock;
@@ -128,7 +128,7 @@ impl Writer {
 
     /// Whether any source has passed data, or bytes that are in no line.
     #[must_use]
-    pub fn holds_anything(&self) -> bool {
+    pub fn has_content(&self) -> bool {
         self.track.queue.lock().written.iter().any(|written| written.data > 0 || written.left_out)
     }
 
@@ -222,7 +222,7 @@ impl SourceWriter {
     }
 
     /// States that bytes arrived that are in no line; a recording with nothing else is kept, for their count.
-    pub fn left_out(&self) {
+    pub fn note_left_out(&self) {
         self.queue.lock().written[self.source].left_out = true;
     }
 
@@ -339,11 +339,11 @@ impl SourceWriter {
     ///
     /// As [`SourceWriter::datagram`].
     pub fn counts(&self, at_ns: i64, counts: &RecordingCounts) -> Result<()> {
-        let counts = self.queue.lock().written[self.source].so_far(counts.clone());
+        let counts = self.queue.lock().written[self.source].counts_so_far(counts.clone());
         self.push_json(Topic::Counts, at_ns, &json!(counts))
     }
 
-    /// Subtracts a tare's rest from the pictures from now on; without a tare it is the
+    /// Subtracts a tare's rest from the previews from now on; without a tare it is the
     /// rest that [`TrackedRest`](taxel_core::tracked_rest::TrackedRest) finds.
     pub fn tare(&self, tare: &Tare) {
         self.grey_scale().tare(tare);
@@ -353,49 +353,49 @@ impl SourceWriter {
         lock(&self.grey_scale)
     }
 
-    /// Writes a picture of the taxels' values for viewers: 8 bits above rest, scaled so that the largest value of the
+    /// Writes a preview of the taxels' values for viewers: 8 bits above rest, scaled so that the largest value of the
     /// last 10 s is white. The message states the rest that was subtracted and the value of white in ticks.
     ///
     /// # Errors
     ///
     /// As [`SourceWriter::datagram`]; `Core` if the number of `ticks` is not a multiple of `columns`.
-    pub fn picture(&self, at_ns: i64, t_us: i64, columns: u16, ticks: &[u16]) -> Result<()> {
+    pub fn preview(&self, at_ns: i64, t_us: i64, columns: u16, ticks: &[u16]) -> Result<()> {
         let columns = usize::from(columns);
         if columns == 0 || ticks.is_empty() || !ticks.len().is_multiple_of(columns) {
             let n = ticks.len();
-            return Err(problem!("picture of {n} taxels, {columns} a row: must be whole rows").into());
+            return Err(problem!("preview of {n} taxels, {columns} a row: must be whole rows").into());
         }
         let grey = self.grey_scale().draw(t_us, columns, ticks);
         let about = json!({ "rest": grey.rest, "full_ticks": grey.full });
         self.push_grey((at_ns, t_us), columns, &grey.bytes, about)
     }
 
-    /// Writes a picture for viewers of values that are above rest already, in a unit: as [`SourceWriter::picture`]; white is at
+    /// Writes a preview for viewers of values that are above rest already, in a unit: as [`SourceWriter::preview`]; white is at
     /// least `least`, and the message states it in the unit (`full`, `unit`). Values that are not finite
     /// or below 0 are black.
     ///
     /// # Errors
     ///
     /// As [`SourceWriter::datagram`]; `Core(Problem)` if there is no value for each taxel.
-    pub fn picture_above(&self, at: (i64, i64), above: &[f32], least: f64, rest: &str, unit: &str) -> Result<()> {
+    pub fn preview_above(&self, at: (i64, i64), above: &[f32], least: f64, rest: &str, unit: &str) -> Result<()> {
         if above.len() != self.taxels {
-            return Err(problem!("picture of {} values: the array has {} taxels", above.len(), self.taxels).into());
+            return Err(problem!("preview of {} values: the array has {} taxels", above.len(), self.taxels).into());
         }
         let above: Vec<f64> = above.iter().map(|&v| if v.is_finite() { f64::from(v).max(0.0) } else { 0.0 }).collect();
         let (bytes, full) = self.grey_scale().white().grey(at.1, &above, least);
         self.push_grey(at, self.columns, &bytes, json!({ "rest": rest, "full": full, "unit": unit }))
     }
 
-    /// Adds a picture to the channel; `at` is its time in the file, ns, and the board's, us.
+    /// Adds a preview to the channel; `at` is its time in the file, ns, and the board's, us.
     fn push_grey(&self, at: (i64, i64), columns: usize, bytes: &[u8], about: serde_json::Value) -> Result<()> {
-        let mut picture = json!({
+        let mut preview = json!({
             "timestamp": time(at.0), "frame_id": "taxel", "width": columns, "height": bytes.len() / columns,
             "encoding": "mono8", "step": columns, "data": STANDARD.encode(bytes), "t_us": at.1,
         });
-        if let (Some(picture), serde_json::Value::Object(about)) = (picture.as_object_mut(), about) {
-            picture.extend(about);
+        if let (Some(preview), serde_json::Value::Object(about)) = (preview.as_object_mut(), about) {
+            preview.extend(about);
         }
-        self.push_json(Topic::Pressure, at.0, &picture)
+        self.push_json(Topic::Pressure, at.0, &preview)
     }
 
     /// Writes the taxels' values before the recording's first datagram, ticks by taxel index; 65 535 for a taxel

@@ -19,11 +19,11 @@ pub struct StreamColumns {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
     /// Unit of that clock, us.
-    #[serde(default = "one")]
+    #[serde(default = "default_unit")]
     pub unit_us: f64,
 }
 
-fn one() -> f64 {
+fn default_unit() -> f64 {
     1.0
 }
 
@@ -33,9 +33,9 @@ impl StreamColumns {
     #[must_use]
     pub fn of_columns(columns: Vec<String>) -> Self {
         let unit = |name: &str| {
-            let (what, unit) = name.rsplit_once('_')?;
+            let (stem, unit) = name.rsplit_once('_')?;
             let unit_us = [("ns", 1e-3), ("us", 1.0), ("ms", 1e3), ("s", 1e6)].into_iter().find(|(u, _)| *u == unit)?.1;
-            ["t", "time", "stamp", "timestamp"].contains(&what).then_some(unit_us)
+            ["t", "time", "stamp", "timestamp"].contains(&stem).then_some(unit_us)
         };
         let time = columns.iter().find_map(|name| Some((name.clone(), unit(name)?)));
         let (time, unit_us) = time.map_or((None, 1.0), |(name, unit_us)| (Some(name), unit_us));
@@ -49,7 +49,7 @@ impl StreamColumns {
 
     /// Checks names and units.
     pub(super) fn check(&self, name: &str) -> taxel_core::Result<()> {
-        let refused = |what: String| Err(problem!("source {name}: {what}"));
+        let refused = |message: String| Err(problem!("source {name}: {message}"));
         if self.columns.len() > limits::COLUMNS {
             return refused(format!("{} columns; at most {}", self.columns.len(), limits::COLUMNS));
         }
@@ -200,7 +200,7 @@ impl StreamFaults {
     }
 
     /// Counts bytes that are in no line.
-    pub fn left_out(&mut self, bytes: LeftOut) {
+    pub fn count_left_out(&mut self, bytes: LeftOut) {
         self.left_out.in_no_line += bytes.in_no_line;
         self.left_out.unfinished += bytes.unfinished;
     }

@@ -22,7 +22,7 @@ pub enum Topic {
     Detections = 5,
     /// Counts of what was received and lost so far.
     Counts = 6,
-    /// The low-rate picture.
+    /// The low-rate preview.
     Pressure = 7,
     /// The taxels' values at the beginning of the recording.
     Held = 8,
@@ -121,7 +121,7 @@ impl Topic {
             Self::Detections => ("detections_lost_in_file", "detection"),
             Self::Held => ("held_values_lost_in_file", "initial state"),
             Self::Board => ("changes_lost_in_file", "board change"),
-            // Later counts include them, and datagrams the values of low-rate pictures.
+            // Later counts include them, and datagrams the values of low-rate previews.
             Self::Counts | Self::Pressure => return None,
         })
     }

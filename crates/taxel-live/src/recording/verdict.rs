@@ -217,7 +217,7 @@ impl RecordingCounts {
 impl Verdict {
     /// The verdict on what there is to know.
     #[must_use]
-    pub fn of(basis: Basis) -> Self {
+    pub fn new(basis: Basis) -> Self {
         match basis {
             Basis::Counts(counts) => Self::of_counts(&counts, NOTHING_LOST),
             Basis::File(condition) => Self::of_file(*condition),
@@ -229,7 +229,7 @@ impl Verdict {
             Basis::Together(parts) => Self::combine(parts),
             Basis::Sources(parts) => Self::of_sources(parts),
             Basis::Stretches(parts) => Self::of_stretches(parts),
-            Basis::Later(us, verdict) => verdict.later(us),
+            Basis::Later(us, verdict) => verdict.shift_by(us),
         }
     }
 
@@ -280,9 +280,9 @@ impl Verdict {
         };
         let mut verdict = Self::default();
         let mut words = vec![];
-        for (n, cause, what) in board.into_iter().chain(dropped).chain([way]).filter(|(n, ..)| *n > 0) {
+        for (n, cause, text) in board.into_iter().chain(dropped).chain([way]).filter(|(n, ..)| *n > 0) {
             verdict.lost.insert(cause.to_owned(), n);
-            words.push(numbered(n, what));
+            words.push(numbered(n, text));
         }
         if words.is_empty() && counts.missing.is_none() && counts.received + counts.recorded == 0 {
             let unfinished = of_board(UNFINISHED_LINES);
@@ -314,7 +314,7 @@ impl Verdict {
             nothing_lost.to_owned()
         }];
         pieces.extend(verdict.damage_of(&counts.decoder));
-        for (n, cause, what) in [
+        for (n, cause, text) in [
             (of_board(REPAIRED), REPAIRED, "values repaired from the board's refresh"),
             (of_board(BOARD_RESET), BOARD_RESET, "resets of the board"),
             (of_board(ANEW), ANEW, "restarts of its clock"),
@@ -325,7 +325,7 @@ impl Verdict {
         ] {
             if n > 0 {
                 verdict.noted.insert(cause.to_owned(), n);
-                pieces.push(numbered(n, what));
+                pieces.push(numbered(n, text));
             }
         }
         if bridged.silences > 0 || bridged.restarts > 0 {
@@ -338,11 +338,11 @@ impl Verdict {
             ));
         }
         verdict.text = pieces.join("; ");
-        verdict.stepped(counts.steps_back.clone())
+        verdict.with_steps(counts.steps_back.clone())
     }
 
     /// The verdict where times also step back there.
-    pub(crate) fn stepped(mut self, steps: Vec<StepBack>) -> Self {
+    pub(crate) fn with_steps(mut self, steps: Vec<StepBack>) -> Self {
         if !steps.is_empty() {
             self.change(|verdict| verdict.steps_back.extend(steps));
         }
@@ -430,9 +430,9 @@ impl Verdict {
     }
 
     fn combine_with(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
-        let numbers = |one: &Self| !(one.lost.is_empty() && one.damaged.is_empty() && one.noted.is_empty());
+        let numbers = |part: &Self| !(part.lost.is_empty() && part.damaged.is_empty() && part.noted.is_empty());
         if let [(_, first), others @ ..] = &parts[..]
-            && (others.is_empty() || (others.iter().all(|(_, one)| one == first) && !numbers(first)))
+            && (others.is_empty() || (others.iter().all(|(_, part)| part == first) && !numbers(first)))
         {
             return first.clone();
         }
@@ -449,7 +449,7 @@ impl Verdict {
                 }
             }
             let taken = |name: &str| named.iter().any(|(known, _)| known == name);
-            let unique = (2..).map(|k| format!("{name} ({k})")).find(|other| !taken(other));
+            let unique = (2..).map(|k| format!("{name} ({k})")).find(|name| !taken(name));
             let name = if taken(&name) { unique.unwrap_or_default() } else { name };
             named.push((name, part));
         }
@@ -463,11 +463,11 @@ impl Verdict {
     }
 
     /// The verdict on the recording whose times are later by so many us.
-    fn later(mut self, us: i64) -> Self {
+    fn shift_by(mut self, us: i64) -> Self {
         if us != 0 && (self.doubtful_after_us.is_some() || !self.steps_back.is_empty()) {
             self.change(|verdict| {
                 verdict.steps_back.iter_mut().for_each(|step| step.after_us = step.after_us.saturating_add(us));
-                verdict.parts.iter_mut().for_each(|(_, part)| *part = std::mem::take(part).later(us));
+                verdict.parts.iter_mut().for_each(|(_, part)| *part = std::mem::take(part).shift_by(us));
                 verdict.doubtful_after_us = verdict.doubtful_after_us.map(|after| after.saturating_add(us));
             });
         }

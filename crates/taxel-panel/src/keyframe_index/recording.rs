@@ -317,7 +317,7 @@ impl RecordingIndex {
             let mut piece = DecodedBlock { key: None, thin: false, held: None, changes: vec![] };
             if since >= spacing {
                 (since, keys) = (0, keys + 1);
-                piece.key = Some((k, place.without_memory(), decoding.clone()));
+                piece.key = Some((k, place.clone_counts(), decoding.clone()));
                 if keys * each > KEYFRAME_BYTES {
                     (piece.thin, keys, spacing) = (true, keys.div_ceil(2), 2 * spacing);
                 }
@@ -354,7 +354,7 @@ impl RecordingIndex {
             (OpenedFile::Mcap(reader), _) => reader,
             (OpenedFile::Lsa(..), RecordingDecoder::Bytes(decoder)) => {
                 let name = self.path.with_extension("lss").file_name().map(|name| name.to_string_lossy().into_owned());
-                return Verdict::of(Basis::Raw(
+                return Verdict::new(Basis::Raw(
                     name.filter(|_| self.unfinished),
                     damage_of_version_1(decoder.counts()),
                 ));
@@ -362,11 +362,13 @@ impl RecordingIndex {
             (OpenedFile::Lsa(..), RecordingDecoder::Datagrams(_)) => return Verdict::default(),
         };
         let decoded = match decoding {
-            RecordingDecoder::Datagrams(sender) => Some(DamageCounts::of(sender, self.header.decoding.origin_us)),
+            RecordingDecoder::Datagrams(sender) => {
+                Some(DamageCounts::from_sender(sender, self.header.decoding.origin_us))
+            }
             RecordingDecoder::Bytes(_) => None,
         };
         let condition = reader.condition(&contents.remarks, &contents.unread);
-        Verdict::of(Basis::File(Box::new(Condition { decoded, ..condition })))
+        Verdict::new(Basis::File(Box::new(Condition { decoded, ..condition })))
     }
 }
 

@@ -27,7 +27,7 @@ pub(super) struct CellPlane {
 }
 
 impl CellPlane {
-    pub fn of(foam: &Foam, array: &Array, pitch_mm: f64, per_pitch: usize) -> Self {
+    pub fn new(foam: &Foam, array: &Array, pitch_mm: f64, per_pitch: usize) -> Self {
         let reach = (REACH * foam.thickness_mm / pitch_mm).ceil().max(1.0) as usize;
         let margin = reach.min(usize::from(array.rows.max(array.columns)));
         // The plane repeats: so far apart that no cell is moved by another's repetition, for a layer thinner than the plane.
@@ -69,5 +69,5 @@ pub fn check_cells(foam: &Foam, array: &Array, cells_per_pitch: u16) -> Result<(
 /// `Scene` if the pitch of the array is not known.
 pub fn most_cells(foam: &Foam, array: &Array) -> Result<u16> {
     let pitch_mm = pitch_of(array)?;
-    Ok((2..=MOST_PER_PITCH).rev().find(|n| CellPlane::of(foam, array, pitch_mm, usize::from(*n)).fits()).unwrap_or(1))
+    Ok((2..=MOST_PER_PITCH).rev().find(|n| CellPlane::new(foam, array, pitch_mm, usize::from(*n)).fits()).unwrap_or(1))
 }

@@ -26,8 +26,8 @@ wide! {
         // The cell's taxel, and which of its cells it is. Taxel (x, y) of the array is (x + margin, y + margin); a table's
         // first entry is `reach` before the cell's own.
         let (own_x, own_y) = (cell.x as usize / n, cell.y as usize / n);
-        let which = cell.y as usize % n * n + cell.x as usize % n;
-        let table = &spread.table[which * side * side..(which + 1) * side * side];
+        let cell_number = cell.y as usize % n * n + cell.x as usize % n;
+        let table = &spread.table[cell_number * side * side..(cell_number + 1) * side * side];
         let span = |at: usize, count: usize| {
             let first = at.saturating_sub(spread.margin + spread.reach);
             let last = (at + spread.reach + 1).saturating_sub(spread.margin).min(count);

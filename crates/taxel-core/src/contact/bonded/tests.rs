@@ -164,8 +164,9 @@ fn all_of_the_force_arrives_at_the_base() {
         let up = pressure.iter().sum::<f64>() * layer.area_mm2();
         let down = near.iter().map(|s| f64::from(*s)).sum::<f64>() * array.square_pitch("foam").unwrap().powi(2);
         assert!((down / up - 1.0).abs() < 1e-2, "nu {nu}, {per_pitch}: {down} of {up} N");
-        let on = layer.on_array(&found, &pressure).iter().sum::<f64>() * array.square_pitch("foam").unwrap().powi(2);
-        assert!((on / up - 1.0).abs() < 1e-9, "nu {nu}, {per_pitch}: {on} of {up} N");
+        let total =
+            layer.taxel_pressures(&found, &pressure).iter().sum::<f64>() * array.square_pitch("foam").unwrap().powi(2);
+        assert!((total / up - 1.0).abs() < 1e-9, "nu {nu}, {per_pitch}: {total} of {up} N");
     }
 }
 
@@ -202,7 +203,7 @@ fn cells_along_a_pitch_are_the_grid_of_as_many_taxels_and_a_taxel_feels_their_me
         }
         // By waves, as of many cells, and cell by cell.
         let (mut whole, many) = (vec![], vec![1e-3; cut.over_array().0 * cut.over_array().1]);
-        let all = cut.under(&many);
+        let all = cut.cells_under(&many);
         assert!(all.len() > cut.most_swept());
         cut.arrive(&all, &many, &mut whole, Stop::never()).unwrap();
         let (mut sum, mut part) = (vec![0.0_f32; felt.len()], vec![]);

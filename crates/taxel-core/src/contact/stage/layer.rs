@@ -130,8 +130,8 @@ impl LayerScene {
         let share = (place / self.every as f64 - number as f64) as f32;
         self.solve(number, stop)?;
         self.solve(number + 1, stop)?;
-        let of = |number: usize| self.solved.iter().find(|solved| solved.number == number).expect("solved above");
-        let (now, next) = (of(number), of(number + 1));
+        let frame = |number: usize| self.solved.iter().find(|solved| solved.number == number).expect("solved above");
+        let (now, next) = (frame(number), frame(number + 1));
         if !now.touches && !next.touches && !self.pressed[group] {
             return Ok(());
         }

@@ -1,7 +1,7 @@
 //! Friction between a body and the foam (Coulomb), and of rolling.
 
 use super::super::Body;
-use super::super::shape::turned;
+use super::super::shape::rotate;
 
 /// Changes a body's speed along the foam, and that of its lowest point by its turning, by friction of sliding and of rolling.
 ///
@@ -13,7 +13,7 @@ pub fn act(body: &Body, push: f64, along: &mut [f64; 2], turning: &mut [f64; 2])
     }
     let (first, second, axis_deg) = body.shape.turns();
     let turns = [first, second];
-    let by_axis = |v: [f64; 2]| <[f64; 2]>::from(turned(v[0], v[1], axis_deg));
+    let by_axis = |v: [f64; 2]| <[f64; 2]>::from(rotate(v[0], v[1], axis_deg));
     let (before, turned_before) = (by_axis(*along), by_axis(*turning));
     let slip: [f64; 2] = std::array::from_fn(|k| before[k] + turned_before[k]);
     let stop: [f64; 2] = std::array::from_fn(|k| -slip[k] / (1.0 + turns[k]));
@@ -34,12 +34,12 @@ pub fn act(body: &Body, push: f64, along: &mut [f64; 2], turning: &mut [f64; 2])
         after = after.map(|v| v * left);
         turned_after = turned_after.map(|v| v * left);
     }
-    let back = |v: [f64; 2]| <[f64; 2]>::from(turned(v[0], v[1], -axis_deg));
+    let back = |v: [f64; 2]| <[f64; 2]>::from(rotate(v[0], v[1], -axis_deg));
     (*along, *turning) = (back(after), back(turned_after));
 }
 
 /// The part of a velocity across an axis.
 pub fn across_axis(velocity: [f64; 2], axis_deg: f64) -> [f64; 2] {
-    let (_, across) = turned(velocity[0], velocity[1], axis_deg);
-    turned(0.0, across, -axis_deg).into()
+    let (_, across) = rotate(velocity[0], velocity[1], axis_deg);
+    rotate(0.0, across, -axis_deg).into()
 }

@@ -1,6 +1,6 @@
 //! Against energy, momentum, Coulomb's law and the ranges of the model.
 
-use super::super::shape::turned;
+use super::super::shape::rotate;
 use super::super::{BodyShape, Foam, Motion, Surface};
 use super::*;
 
@@ -33,7 +33,7 @@ fn dropped(foam: Foam, radius_mm: f64, height_mm: f64, after: u32) -> Scene {
 }
 
 fn play(scene: &Scene, step_us: f64) -> Result<Motion> {
-    Motion::of(scene, &Array::thesis(), step_us, Stop::never())
+    Motion::compute(scene, &Array::thesis(), step_us, Stop::never())
 }
 
 fn undamped() -> Foam {
@@ -156,7 +156,7 @@ fn a_step_that_would_not_end_is_refused_before_or_on_the_way_and_ctrl_c_is_answe
     let text = play(&long, 1.001 * least_us).unwrap_err().to_string();
     assert!(text.contains("must be longer"), "{text}");
     let asked = || true;
-    let stopped = Motion::of(&scene, &Array::thesis(), QUARTER_US, Stop::when(&asked));
+    let stopped = Motion::compute(&scene, &Array::thesis(), QUARTER_US, Stop::when(&asked));
     assert_eq!(stopped.unwrap_err(), Error::Interrupted);
 }
 
@@ -257,7 +257,7 @@ fn friction_acts_against_the_slip_of_a_cylinder_that_slides_aslant() {
     let motion = play(&scene, QUARTER_US).unwrap();
     let track = &motion.tracks[0];
     let began = (0..track.x_mm.len()).find(|k| track.x_mm[*k] > 60.0).unwrap() - 1;
-    let (mut speed, mut at): ([f64; 2], [f64; 2]) = (turned(0.5, 0.0, 45.0).into(), [0.0; 2]);
+    let (mut speed, mut at): ([f64; 2], [f64; 2]) = (rotate(0.5, 0.0, 45.0).into(), [0.0; 2]);
     let mut slip = speed;
     for _ in 0..steps {
         let loss = slip.map(|part| friction * GRAVITY * dt * part / slip[0].hypot(slip[1]));
@@ -266,7 +266,7 @@ fn friction_acts_against_the_slip_of_a_cylinder_that_slides_aslant() {
         slip = [slip[0] - loss[0], slip[1] - 3.0 * loss[1]];
     }
     assert!(slip[0].hypot(slip[1]) > 0.05, "it slips until then");
-    let (x, y) = turned(at[0], at[1], -45.0);
+    let (x, y) = rotate(at[0], at[1], -45.0);
     let (right, down) = (track.x_mm[began + steps] - 60.0, track.y_mm[began + steps] - 80.0);
     assert!((f64::from(right) - x).abs() < 0.1 && (f64::from(down) - y).abs() < 0.1, "{right} {down}, {x} {y}");
 }

@@ -28,7 +28,7 @@ impl Readout {
         if let Some(encoder) = parts.get("encoder") {
             Encoder::from_json(&encoder.to_string()).map_err(|e| format(format!("readout: {e}")))?;
         }
-        let readout: Self = reading::from_value(parts).map_err(|unfit| format(unfit.of("readout")))?;
+        let readout: Self = reading::from_value(parts).map_err(|unfit| format(unfit.text("readout")))?;
         readout.check().map_err(|e| format(format!("readout: {e}")))?;
         Ok(readout)
     }

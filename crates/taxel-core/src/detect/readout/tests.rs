@@ -12,7 +12,7 @@ use crate::{Error, Events, Intensities, Stop};
 
 fn readout() -> Readout {
     let neuron = Neuron { tau: 0.5, time: Time::Grid, step_ms: 0.192, ..Neuron::default() };
-    let one = |delay_ms, first: f64| TrainedNeuron {
+    let cell = |delay_ms, first: f64| TrainedNeuron {
         neuron: neuron.clone(),
         delay_ms,
         inputs: vec![],
@@ -26,7 +26,7 @@ fn readout() -> Readout {
         after_spike: AfterSpike::Keep,
         run_threshold: 0.9,
         delays_ms: vec![0.0],
-        neurons: [("contact".to_owned(), one(0.2, 3.0)), ("lift".to_owned(), one(0.5, -0.1))].into(),
+        neurons: [("contact".to_owned(), cell(0.2, 3.0)), ("lift".to_owned(), cell(0.5, -0.1))].into(),
         seen: BTreeMap::new(),
     }
 }
@@ -161,8 +161,8 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
         let encoder = Encoder::from_json(&format!(r#"{{"name": "{name}"}}"#)).unwrap();
         let weights = (0..encoder.trains(&array)).map(|_| random.random_range(-0.2..1.0)).collect();
         let neuron = Neuron { tau: 0.5, refractory: 0.5, theta_0: 0.3, ..Neuron::default() };
-        let one = TrainedNeuron { neuron: neuron.clone(), delay_ms: 0.0, inputs: vec![], weights };
-        let neurons = [("touch".to_owned(), one)].into();
+        let cell = TrainedNeuron { neuron: neuron.clone(), delay_ms: 0.0, inputs: vec![], weights };
+        let neurons = [("touch".to_owned(), cell)].into();
         let readout =
             Readout { encoder, array: None, time: neuron.time, after_spike: neuron.after_spike, neurons, ..readout() };
         let events = presses(&mut random, &array);

@@ -37,8 +37,8 @@ impl LabelledRule {
             self.rule.change(change, repaired, clock, &mut self.decisions);
         }
         self.rule.advance(until, clock, &mut self.decisions);
-        out.extend(self.decisions.drain(..).filter_map(|Decision { which, t, known, repaired, .. }| {
-            let label = self.labels[which].clone().filter(|_| t >= begin)?;
+        out.extend(self.decisions.drain(..).filter_map(|Decision { label, t, known, repaired, .. }| {
+            let label = self.labels[label].clone().filter(|_| t >= begin)?;
             // A rule has no potential, hence no slope.
             Some(Detection { label, t, known, slope: f64::NAN, repaired })
         }));

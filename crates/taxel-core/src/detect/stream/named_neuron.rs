@@ -27,7 +27,7 @@ impl ReceivedTrains {
         Self { of_trains: received.map(number) }
     }
 
-    fn of(&self, train: u32) -> Option<u32> {
+    fn input(&self, train: u32) -> Option<u32> {
         match &self.of_trains {
             Some(inputs) => inputs[train as usize],
             None => Some(train),
@@ -96,7 +96,7 @@ impl NamedNeuron {
     ///
     /// Those of [`NeuronStream::push`].
     pub fn push(&mut self, spike: Spike, repaired: bool, k: usize, out: &mut Vec<NeuronCrossing>) -> Result<()> {
-        let Some(input) = self.inputs.of(spike.train) else { return Ok(()) };
+        let Some(input) = self.inputs.input(spike.train) else { return Ok(()) };
         let spike = Spike { train: input, ..spike };
         let stream = match &mut self.stream {
             Some(stream) => stream,
@@ -129,7 +129,7 @@ impl NamedNeuron {
 
     /// Moves the crossings so far to `out`.
     fn drain_crossings(&mut self, k: usize, out: &mut Vec<NeuronCrossing>) {
-        let rests = |on: Option<f64>, t: f64| on.is_some_and(|at| at <= t && t - at <= self.neuron.memory_ms());
+        let rests = |since: Option<f64>, t: f64| since.is_some_and(|at| at <= t && t - at <= self.neuron.memory_ms());
         out.extend(self.crossings.drain(..).map(|spike| NeuronCrossing {
             repaired: rests(self.repaired, spike.t),
             outside: rests(self.outside, spike.t),

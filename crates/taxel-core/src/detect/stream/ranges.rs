@@ -39,7 +39,7 @@ impl Ranges {
             }
             None => f64::from(spike.value),
         };
-        let (least, most) = seen.of(input);
+        let (least, most) = seen.range(input);
         !(least..=most).contains(&value)
     }
 }

@@ -16,7 +16,7 @@ pub(super) struct Repairs {
 
 impl Repairs {
     /// No repairs so far; `within_ms` is the encoder's memory.
-    pub fn within(within_ms: Option<f64>) -> Self {
+    pub fn with_memory(within_ms: Option<f64>) -> Self {
         Self { within_ms, at: VecDeque::new() }
     }
 
@@ -31,7 +31,7 @@ impl Repairs {
     }
 
     /// Whether a spike of the encoder may rest on a repaired taxel. Calls must be in order of time.
-    pub fn may_give(&mut self, t: f64) -> bool {
+    pub fn may_repair(&mut self, t: f64) -> bool {
         self.forget_before(t);
         self.at.front().is_some_and(|&at| ms(at) <= t)
     }

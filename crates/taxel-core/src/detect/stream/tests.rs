@@ -54,11 +54,11 @@ fn array() -> Array {
 }
 
 fn stream(neuron: &Neuron, latency_ms: f64, period_us: f64) -> ReadoutStream {
-    let on = vec![0.9, 0.5, 0.0, 0.2, -0.6, 0.0, 0.1, -0.3];
+    let toward_on = vec![0.9, 0.5, 0.0, 0.2, -0.6, 0.0, 0.1, -0.3];
     let off = vec![-0.4, 0.0, -0.2, 0.0, 0.8, 0.6, 0.4, 0.3];
-    let neurons = [("contact", on, 0.2), ("lift", off, 0.5)].into_iter().map(|(label, weights, delay_ms)| {
-        let one = TrainedNeuron { neuron: neuron.clone(), inputs: vec![], weights, delay_ms };
-        NamedNeuron::new(label, &one, 0.9, latency_ms, ReceivedTrains::new(None, 1))
+    let neurons = [("contact", toward_on, 0.2), ("lift", off, 0.5)].into_iter().map(|(label, weights, delay_ms)| {
+        let cell = TrainedNeuron { neuron: neuron.clone(), inputs: vec![], weights, delay_ms };
+        NamedNeuron::new(label, &cell, 0.9, latency_ms, ReceivedTrains::new(None, 1))
     });
     ReadoutStream::new(
         Box::new(Plain { latency_ms }),
@@ -165,12 +165,12 @@ fn time_and_latency_are_taken_off_the_crossing_but_not_off_known() {
 #[test]
 fn silence_is_told_by_moving_time_on() {
     let neuron = Neuron { tau: 2.0, ..Neuron::default() };
-    let mut one = events(0, 1);
-    (one.x[0], one.y[0], one.p[0]) = (0, 0, true);
+    let mut event = events(0, 1);
+    (event.x[0], event.y[0], event.p[0]) = (0, 0, true);
     let (mut live, mut out) = (stream(&neuron, 0.0, 192.0), Vec::new());
-    live.push_events(one.view(), &mut out).unwrap();
+    live.push_events(event.view(), &mut out).unwrap();
     assert_eq!(out, [], "the crossing lies ahead, and something could still come before it");
-    live.advance(one.t[0] + 10 * 192, &mut out).unwrap();
+    live.advance(event.t[0] + 10 * 192, &mut out).unwrap();
     assert_eq!((out.len(), out[0].label.as_str()), (1, "contact"));
     assert!(out[0].slope > 0.0);
 }
@@ -217,10 +217,10 @@ fn a_detection_in_a_frame_of_the_input_is_known_at_its_end() {
 #[test]
 fn what_does_not_fit_is_refused() {
     let neuron = Neuron::default();
-    let other = Events::empty(Array::new(3, 2, 1.0, "other").unwrap());
+    let narrow = Events::empty(Array::new(3, 2, 1.0, "other").unwrap());
     let mut live = stream(&neuron, 0.0, 192.0);
     let mut out = Vec::new();
-    let message = live.push_events(other.view(), &mut out).unwrap_err().to_string();
+    let message = live.push_events(narrow.view(), &mut out).unwrap_err().to_string();
     assert_eq!(message, "input from 3 x 2 taxels: this readout reads 2 x 2");
     assert!(live.advance(i64::MAX, &mut out).is_err());
     assert!(live.push_frame(i64::MIN, &[0.0; 4], &mut out).is_err());

@@ -178,8 +178,8 @@ impl ConeRProblem {
         let neuron = &parameters.neuron;
         check_examples(neuron, patterns, targets)?;
         if silence.len() != patterns.len() {
-            let (given, there) = (silence.len(), patterns.len());
-            return Err(problem!("silence"; ": {given} lists for {there} patterns, must be one a pattern"));
+            let (lists, count) = (silence.len(), patterns.len());
+            return Err(problem!("silence"; ": {lists} lists for {count} patterns, must be one a pattern"));
         }
         for (p, windows) in silence.iter().enumerate() {
             check_silence(p, windows.as_deref())?;
@@ -197,7 +197,7 @@ impl ConeRProblem {
     }
 
     /// Computes the rows of a first pattern, which the caller has checked; `push` adds the others.
-    pub(crate) fn of_one(
+    pub(crate) fn of_first_pattern(
         parameters: &ConeR,
         pattern: &SpikeTrains,
         asked: PatternDemand<'_>,
@@ -236,7 +236,7 @@ impl ConeRProblem {
 
     /// Removes the first pattern; returns the number of grid rows and the number of targets removed with it.
     pub(crate) fn drop_first(&mut self) -> (usize, usize) {
-        let gone = (self.rows.silent.of_first(), self.rows.targets.of_first());
+        let gone = (self.rows.silent.rows_of_first(), self.rows.targets.count_of_first());
         self.rows.drop_first();
         self.statement.drop_first();
         self.patterns.remove(0);
@@ -324,7 +324,7 @@ impl ConeRProblem {
         let start = self.start_from(&objective, start)?;
         let mut found =
             self.rows.minimise(&objective, parameters.tolerance, parameters.engine, start, progress, stop)?;
-        if self.rows.meet(&objective, parameters.tolerance, &mut found, stop)? {
+        if self.rows.move_to_limits(&objective, parameters.tolerance, &mut found, stop)? {
             found.rounds += 1;
             let (round, left) = (found.rounds, Left::Gap(found.gap));
             progress(Round { round, rows: found.rows, objective: found.objective, left });
@@ -336,7 +336,7 @@ impl ConeRProblem {
             multipliers: Shares { rows: kept().map(|s| s.0).collect(), values: kept().map(|s| *s.1).collect() },
             unreachable: self.unreachable(&objective),
             refires: self.refires(&weights, pattern)?,
-            proof: self.named(found.proof),
+            proof: self.name_rows(found.proof),
             fit: Fit {
                 status: if found.gap <= parameters.tolerance { Status::Solved } else { Status::Stopped },
                 weights,
@@ -350,7 +350,7 @@ impl ConeRProblem {
     }
 
     /// The nonzero multipliers of a proof, by the names of their rows.
-    fn named(&self, mut proof: RelaxedProof) -> GapMultipliers {
+    fn name_rows(&self, mut proof: RelaxedProof) -> GapMultipliers {
         proof.divide(1.0, self.statement.unit);
         let (silent, targets) = proof.multipliers.split_at(self.rows.silent.len());
         let names = || self.rows.targets.names.iter().copied();
@@ -413,7 +413,7 @@ impl ConeRProblem {
     fn refires(&self, weights: &[f64], only: Option<usize>) -> Result<usize> {
         let mut refires = 0;
         let neuron = self.base.neuron.in_units(1.0 / self.statement.unit);
-        for (p, pattern) in self.patterns.iter().enumerate().filter(|(p, _)| only.is_none_or(|one| one == *p)) {
+        for (p, pattern) in self.patterns.iter().enumerate().filter(|(p, _)| only.is_none_or(|pattern| pattern == *p)) {
             let spikes = neuron.run(weights, pattern, 1.0, Stop::never())?;
             let targets = &self.statement.examples[p].targets;
             let again = |a: f64, b: f64| b - a <= neuron.tau && !targets.iter().any(|&t| a < t && t <= b);

@@ -310,12 +310,12 @@ impl ConeXProblem {
             && let Some(proof) =
                 Certificate::of_same_inputs(&self.exact.statement, &self.exact.objective.bounds)?.filter(|p| p.at_all)
         {
-            found = self.exact.refuted(proof, rounds);
+            found = self.exact.infeasible_fit(proof, rounds);
         }
         while self.free_margin && not_at_all(&found) {
             let margin = found.asked.times(SMALLER);
             if margin.height < LEAST_SHARE * first.height {
-                found = self.undecided(&found);
+                found = self.undecided_fit(&found);
                 break;
             }
             let mut notify = |round: Round| progress(Round { round: rounds + round.round, ..round });
@@ -340,7 +340,7 @@ impl ConeXProblem {
 
     /// The result if infeasibility is proven for the smallest margin alone, which leaves still smaller margins
     /// undecided.
-    fn undecided(&self, found: &ConeXFit) -> ConeXFit {
+    fn undecided_fit(&self, found: &ConeXFit) -> ConeXFit {
         let Margin { height, slope } = found.asked.times(self.unit());
         let proof = found.certificate.as_ref().map_or("", |proof| proof.text.as_str());
         let reason = format!(
@@ -362,14 +362,14 @@ impl Exact {
     /// Finds the weights at this margin, or a proof that there are none.
     fn solve(&self, start: &[(Row, f64)], progress: &mut dyn FnMut(Round), stop: Stop<'_>) -> Result<ConeXFit> {
         if let Some(certificate) = Certificate::of_one_target(&self.statement, &self.objective.bounds)? {
-            return Ok(self.refuted(certificate, 0));
+            return Ok(self.infeasible_fit(certificate, 0));
         }
         let Shortest { weights, held, rounds, end } = self.shortest(start, progress, stop)?;
         // The other terms are at least 0, so a bound on the l2 term bounds the objective.
         let (least, proof) = self.bound_of_length(&held)?;
         let best = BestWeights { weights, least, proof, held, engine: Engine::Native, rounds };
         Ok(match end {
-            RowGenerationEnd::Infeasible(certificate) => self.refuted(certificate, rounds),
+            RowGenerationEnd::Infeasible(certificate) => self.infeasible_fit(certificate, rounds),
             RowGenerationEnd::Met if self.objective.l1 > 0.0 || self.objective.b > 0.0 => {
                 let best = self.mix(best, start, progress, stop)?;
                 self.report(best, stop.asked().then_some(ASKED), stop)?
@@ -380,7 +380,7 @@ impl Exact {
         })
     }
 
-    fn refuted(&self, certificate: Certificate, rounds: usize) -> ConeXFit {
+    fn infeasible_fit(&self, certificate: Certificate, rounds: usize) -> ConeXFit {
         let none = f64::INFINITY;
         ConeXFit {
             fit: Fit {
@@ -410,12 +410,12 @@ impl Exact {
         for ((w, &l), &u) in weights.iter_mut().zip(lower).zip(upper) {
             *w = w.clamp(l, u);
         }
-        let unmet = match self.raised(&weights, stop)? {
+        let unmet = match self.raise(&weights, stop)? {
             Some(raised) => {
                 weights = raised;
                 None
             }
-            None => self.unmet(&weights)?,
+            None => self.find_unmet(&weights)?,
         };
         let parts = self.parts(&weights);
         let objective = parts.sum();
@@ -430,10 +430,10 @@ impl Exact {
         };
         let open = || format!("the objective is only proven to lie within {gap:.1e} of its least value");
         let reason = match (cut_short, unmet.or_else(|| (!known).then(open))) {
-            (Some(why), Some(what)) => Some(format!("{why}; {what}")),
-            (_, what) => what,
+            (Some(why), Some(reason)) => Some(format!("{why}; {reason}")),
+            (_, reason) => reason,
         };
-        let violation = largest([self.missed(&weights), self.worst(&weights), 0.0]);
+        let violation = largest([self.worst_target(&weights), self.worst(&weights), 0.0]);
         Ok(ConeXFit {
             margin: self.kept_margin(&weights),
             fit: Fit { status, weights, objective, parts, gap, rounds, engine },

@@ -75,7 +75,7 @@ impl Exact {
     }
 
     /// The largest violation of a target row, mV.
-    pub(super) fn missed(&self, weights: &[f64]) -> f64 {
+    pub(super) fn worst_target(&self, weights: &[f64]) -> f64 {
         let missed = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
         largest(missed.chain([0.0]))
     }
@@ -102,7 +102,7 @@ impl Exact {
     ///
     /// On the grid the neuron is not run if the margin is 0, because it fires at a silent row that holds with equality,
     /// nor if a target is not a grid point.
-    pub(super) fn unmet(&self, weights: &[f64]) -> Result<Option<String>> {
+    pub(super) fn find_unmet(&self, weights: &[f64]) -> Result<Option<String>> {
         let unit = self.statement.unit;
         let worst = self.silence.broken(weights, KEPT_SHARE, self.rounding(weights)).into_iter();
         if let Some(SilencePeak { pattern, t, excess }) = worst.max_by(|a, b| a.excess.total_cmp(&b.excess)) {

@@ -55,13 +55,13 @@ impl Exact {
             let found =
                 mixed::minimise(&terms, &rows.hard(), &objective.bounds, size, going.as_ref(), tolerance, stop)?;
             if found.bound > best.least {
-                (best.least, best.proof) = (found.bound, rows.named(found.proof));
+                (best.least, best.proof) = (found.bound, rows.name_rows(found.proof));
             }
             if found.stopped || best.rounds >= MOST_ROUNDS {
                 return Ok(best);
             }
             let mut weights = found.weights;
-            let met = rows.missed(&weights) <= 0.5 * MET;
+            let met = rows.worst_row(&weights) <= 0.5 * MET;
             if !near
                 && !met
                 && let Some(meets) = nearest(&weights, &rows.hard(), lower, upper, stop)?
@@ -93,7 +93,7 @@ impl Exact {
                     best.held.push((name, 0.0));
                 }
             }
-            if self.missed(&weights) <= MET
+            if self.worst_target(&weights) <= MET
                 && self.worst(&weights) <= self.rounding(&weights)
                 && value < self.parts(&best.weights).sum()
             {
@@ -113,7 +113,7 @@ struct Dense {
     names: Vec<Row>,
     /// The target whose row was subtracted from a row of silence beside it, and the factor of the difference.
     beside: Vec<Option<(usize, f64)>>,
-    there: HashSet<(usize, u64)>,
+    silent: HashSet<(usize, u64)>,
     slopes: Slopes,
 }
 
@@ -128,7 +128,7 @@ impl Dense {
             limit: vec![],
             names: vec![],
             beside: vec![],
-            there: HashSet::new(),
+            silent: HashSet::new(),
             slopes,
         };
         for row in rows {
@@ -152,7 +152,7 @@ impl Dense {
     }
 
     fn add_silence(&mut self, problem: &Exact, pattern: usize, t: f64) -> Result<()> {
-        if self.there.insert((pattern, t.to_bits())) {
+        if self.silent.insert((pattern, t.to_bits())) {
             let row = Row::Silence { pattern, t };
             let StatedRow { mut coefficients, mut limit } = problem.statement.state(row)?;
             // Near a target the two rows are parallel to within rounding. Their difference divided by the time between
@@ -211,12 +211,12 @@ impl Dense {
         self.beside = (0..keep.len()).filter(kept).map(|k| self.beside[k]).collect();
         let silent =
             |row: &Row| if let Row::Silence { pattern, t } = row { Some((*pattern, t.to_bits())) } else { None };
-        self.there = self.names.iter().filter_map(silent).collect();
+        self.silent = self.names.iter().filter_map(silent).collect();
         keep
     }
 
     /// The nonzero multipliers of a proof, by the names of their rows; those of a difference go to both of its rows.
-    fn named(&self, proof: MixedProof) -> GapMultipliers {
+    fn name_rows(&self, proof: MixedProof) -> GapMultipliers {
         let MixedProof { mut equality, inequality, behind, pull } = proof;
         let mut rows = vec![];
         for ((&row, beside), z) in self.names.iter().zip(&self.beside).zip(inequality) {
@@ -236,7 +236,7 @@ impl Dense {
     }
 
     /// The largest violation of any row of the working set.
-    fn missed(&self, weights: &[f64]) -> f64 {
+    fn worst_row(&self, weights: &[f64]) -> f64 {
         let n = weights.len();
         let equal = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
         let below = self.below.chunks_exact(n).zip(&self.limit).map(|(row, limit)| dot(row, weights) - limit);

@@ -35,7 +35,7 @@ impl Exact {
     /// A row is left as it is if the neuron, with the row raised, might fire before the end of silence, 1e-6 ms before
     /// the target. Where all rows together give no solution, those of smaller and of larger rises are raised apart, and
     /// so on by halves, and those that give none are left out.
-    pub(super) fn raised(&self, weights: &[f64], stop: Stop<'_>) -> Result<Option<Vec<f64>>> {
+    pub(super) fn raise(&self, weights: &[f64], stop: Stop<'_>) -> Result<Option<Vec<f64>>> {
         let mut wanted = self.to_be_raised(weights)?;
         if wanted.is_empty() {
             return Ok(None);
@@ -44,7 +44,7 @@ impl Exact {
         let every: Vec<&RaisedRow> = wanted.iter().collect();
         let all = self.solution_with(weights, &every, &KeptRows::default())?;
         // Weights that are no solution themselves would need more than a rise by a rounding error.
-        if all.is_some() || self.unmet(weights)?.is_some() {
+        if all.is_some() || self.find_unmet(weights)?.is_some() {
             return Ok(all);
         }
         let kept = self.kept(weights)?;
@@ -130,7 +130,7 @@ impl Exact {
         let rows = HardRows { below: &below, limit: &limit, ..HardRows::default() };
         let found = nearest(weights, &rows, &lower, &upper, Stop::never())?;
         Ok(match found {
-            Some(found) if self.unmet(&found)?.is_none() => Some(found),
+            Some(found) if self.find_unmet(&found)?.is_none() => Some(found),
             _ => None,
         })
     }
@@ -173,7 +173,7 @@ mod tests {
         for lambdas in [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]] {
             let fits = solved(1.01e-8, lambdas);
             assert!(fits.len() > 5);
-            assert!(fits.iter().all(|(exact, weights)| exact.raised(weights, Stop::never()).unwrap().is_none()));
+            assert!(fits.iter().all(|(exact, weights)| exact.raise(weights, Stop::never()).unwrap().is_none()));
         }
     }
 
@@ -182,7 +182,7 @@ mod tests {
         let (mut raised, mut left) = (0, 0);
         for (exact, weights) in [0.0, 1e-12, 1e-8].into_iter().flat_map(|behind| solved(behind, [0.0, 1.0, 0.0])) {
             let low: Vec<f64> = weights.iter().map(|w| w * (1.0 - 1e-14)).collect();
-            let Some(high) = exact.raised(&low, Stop::never()).unwrap() else {
+            let Some(high) = exact.raise(&low, Stop::never()).unwrap() else {
                 assert!(!exact.statement.is_turned_down((0, 0), &low));
                 left += 1;
                 continue;

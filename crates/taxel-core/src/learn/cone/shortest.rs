@@ -51,7 +51,7 @@ impl Exact {
             let before = std::mem::replace(&mut weights, working.engine.weights().to_vec());
             let end = match verdict {
                 SolveOutcome::Infeasible(ray) => self
-                    .refutation(working.named(&ray.multipliers), stop)?
+                    .refutation(working.name_rows(&ray.multipliers), stop)?
                     .map_or(RowGenerationEnd::Stopped, RowGenerationEnd::Infeasible),
                 SolveOutcome::Stopped => RowGenerationEnd::Stopped,
                 SolveOutcome::Optimal => {
@@ -73,7 +73,7 @@ impl Exact {
                     }
                 }
             };
-            let held = working.named(&working.engine.multipliers());
+            let held = working.name_rows(&working.engine.multipliers());
             return Ok(Shortest { weights, held, rounds, end });
         }
     }
@@ -125,7 +125,7 @@ impl Exact {
             }
         }
         let SolveOutcome::Infeasible(ray) = engine.solve(stop)? else { return Ok(None) };
-        Certificate::check(&self.statement, &self.objective.bounds, named(&targets, &others, &ray.multipliers))
+        Certificate::check(&self.statement, &self.objective.bounds, name_rows(&targets, &others, &ray.multipliers))
     }
 
     /// A lower bound on the l2 term by any multipliers, from the minimum of the Lagrangian of `|w|^2 / 2` within the
@@ -141,7 +141,7 @@ impl Exact {
         let Bounds { lower, upper } = &self.objective.bounds;
         let least: Vec<f64> = sum.iter().zip(lower.iter().zip(upper)).map(|(g, (l, u))| (-g).clamp(*l, *u)).collect();
         let square = dot(&least, &least);
-        let bound = self.objective.of_square((2.0 * (0.5 * square + dot(&sum, &least) - allowed)).max(0.0));
+        let bound = self.objective.l2_term((2.0 * (0.5 * square + dot(&sum, &least) - allowed)).max(0.0));
         let factor = match self.objective.norm {
             Norm::Norm if square > 0.0 => self.objective.l2 / square.sqrt(),
             Norm::Norm => 0.0,
@@ -160,7 +160,7 @@ struct Working {
     /// The names of the inequalities, by their number.
     names: Vec<Row>,
     /// Silent rows in the working set, by pattern and time.
-    there: HashSet<(usize, u64)>,
+    silent: HashSet<(usize, u64)>,
     slopes: Slopes,
     /// The number of each slope row in the working set.
     ids: Vec<Option<RowId>>,
@@ -175,7 +175,7 @@ impl Working {
             engine: DualActiveSet::new(&bounds.lower, &bounds.upper)?,
             targets: statement.targets().map(|(pattern, target)| Row::Target { pattern, target }).collect(),
             names: vec![],
-            there: HashSet::new(),
+            silent: HashSet::new(),
             slopes: Slopes::new(statement)?,
             ids: vec![],
             row: vec![0.0; statement.trains],
@@ -212,7 +212,7 @@ impl Working {
                 }
                 // Rows that this problem does not have are skipped.
                 Row::Silence { pattern, t } => {
-                    if statement.is_asked(pattern, t) && !self.there.contains(&(pattern, t.to_bits())) {
+                    if statement.is_asked(pattern, t) && !self.silent.contains(&(pattern, t.to_bits())) {
                         let id = self.add(statement, row)?;
                         multipliers.inequalities.push((id, multiplier.max(0.0)));
                     }
@@ -228,7 +228,7 @@ impl Working {
         let id = self.engine.inequality(&self.row, limit)?;
         self.names.push(row);
         if let Row::Silence { pattern, t } = row {
-            self.there.insert((pattern, t.to_bits()));
+            self.silent.insert((pattern, t.to_bits()));
         }
         Ok(id)
     }
@@ -241,13 +241,13 @@ impl Working {
     }
 
     fn rows(&self) -> usize {
-        self.targets.len() + self.there.len()
+        self.targets.len() + self.silent.len()
     }
 
     /// Drops rows that are not binding and adds the worst of the violated ones; returns whether any row is new.
     fn cut(&mut self, statement: &Statement, broken: &[SilencePeak], flat: &[usize]) -> Result<bool> {
         let mut new: Vec<&SilencePeak> =
-            broken.iter().filter(|p| !self.there.contains(&(p.pattern, p.t.to_bits()))).collect();
+            broken.iter().filter(|p| !self.silent.contains(&(p.pattern, p.t.to_bits()))).collect();
         new.sort_by(|a, b| b.excess.total_cmp(&a.excess));
         new.truncate(((ENTER_SHARE * new.len() as f64) as usize).max(ENTER_LEAST));
         if new.is_empty() && flat.is_empty() {
@@ -255,7 +255,7 @@ impl Working {
         }
         for id in self.engine.drop_inactive() {
             match self.names[id.index()] {
-                Row::Silence { pattern, t } => drop(self.there.remove(&(pattern, t.to_bits()))),
+                Row::Silence { pattern, t } => drop(self.silent.remove(&(pattern, t.to_bits()))),
                 _ => self.ids.iter_mut().filter(|known| **known == Some(id)).for_each(|known| *known = None),
             }
         }
@@ -270,13 +270,13 @@ impl Working {
         Ok(true)
     }
 
-    fn named(&self, multipliers: &Multipliers) -> Vec<(Row, f64)> {
-        named(&self.targets, &self.names, multipliers)
+    fn name_rows(&self, multipliers: &Multipliers) -> Vec<(Row, f64)> {
+        name_rows(&self.targets, &self.names, multipliers)
     }
 }
 
 /// The multipliers with the names of their rows.
-fn named(targets: &[Row], others: &[Row], multipliers: &Multipliers) -> Vec<(Row, f64)> {
+fn name_rows(targets: &[Row], others: &[Row], multipliers: &Multipliers) -> Vec<(Row, f64)> {
     let targets = targets.iter().copied().zip(multipliers.equalities.iter().copied());
     let others = multipliers.inequalities.iter().map(|&(id, z)| (others[id.index()], z));
     targets.chain(others).filter(|(_, u)| *u != 0.0).collect()

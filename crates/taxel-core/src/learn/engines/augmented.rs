@@ -165,7 +165,8 @@ impl<'a> Lagrangian<'a> {
         shares.resize(total, 0.0);
         let widest =
             objective.bounds.upper.iter().zip(&objective.bounds.lower).fold(0.0_f64, |m, (u, l)| m.max(u.max(-l)));
-        let width = widest.min(FAR * problem.needed()).max(zero.weights.iter().fold(0.0, |m, w| w.abs().max(m)));
+        let width =
+            widest.min(FAR * problem.typical_weight()).max(zero.weights.iter().fold(0.0, |m, w| w.abs().max(m)));
         let scratch = cholesky_in_place_scratch::<f64>(n, Par::Seq, faer::Spec::default());
         let mut engine = Self {
             started,
@@ -209,13 +210,13 @@ impl<'a> Lagrangian<'a> {
     fn multipliers(&mut self) {
         let silent = self.problem.silent.len();
         let (d, (c, low)) = (self.objective.d, self.objective.kink_of_c());
-        let [one, other] = self.delta.map(|delta| 1.0 / delta);
+        let [per_silent, per_slope] = self.delta.map(|delta| 1.0 / delta);
         let rows = self.factors.iter_mut().zip(&self.excess).zip(&self.shares);
         for (k, ((factor, &x), &share)) in rows.enumerate() {
             *factor = if k < silent {
-                d * (share + x * one).clamp(0.0, 1.0)
+                d * (share + x * per_silent).clamp(0.0, 1.0)
             } else {
-                c * (share + x * other).clamp(low, low + 1.0)
+                c * (share + x * per_slope).clamp(low, low + 1.0)
             };
         }
     }
@@ -252,7 +253,7 @@ impl<'a> Lagrangian<'a> {
         let (mut near, mut anywhere) = (0.0, 0.0);
         for n in 0..self.weights.len() {
             let w = self.weights[n];
-            self.gradient[n] += self.rho * (w - self.centre[n]) + self.hold(n, w).0;
+            self.gradient[n] += self.rho * (w - self.centre[n]) + self.penalty(n, w).0;
             let apart = o.bounds.upper[n] - o.bounds.lower[n];
             near += self.gradient[n].abs() * apart.min(2.0 * self.width);
             anywhere += self.gradient[n].abs() * apart;
@@ -269,7 +270,7 @@ impl<'a> Lagrangian<'a> {
 
     /// The term that holds weight `n` at 0 and within its bounds: its slope, whether it is active, and the value it
     /// holds to.
-    fn hold(&self, n: usize, w: f64) -> (f64, bool, f64) {
+    fn penalty(&self, n: usize, w: f64) -> (f64, bool, f64) {
         let o = self.objective;
         let z = w + self.held[n] / self.sigma;
         let shift = o.l1 / self.sigma;
@@ -292,7 +293,7 @@ impl<'a> Lagrangian<'a> {
         self.slope();
         for n in 0..self.weights.len() {
             let (w, o) = (self.weights[n], self.objective);
-            let against = self.hold(n, w).0 - self.gradient[n];
+            let against = self.penalty(n, w).0 - self.gradient[n];
             self.held[n] = if w <= o.bounds.lower[n] || w >= o.bounds.upper[n] {
                 against
             } else if w == 0.0 {
@@ -305,7 +306,7 @@ impl<'a> Lagrangian<'a> {
 
     /// The weights projected by l1 and the bounds: some exactly 0, none outside the bounds.
     fn candidate(&self) -> Vec<f64> {
-        (0..self.weights.len()).map(|n| self.hold(n, self.weights[n]).2).collect()
+        (0..self.weights.len()).map(|n| self.penalty(n, self.weights[n]).2).collect()
     }
 
     /// Ends a round: sets the multipliers to the slopes found, reduces the smoothing, and weakens the proximal term.
@@ -318,7 +319,7 @@ impl<'a> Lagrangian<'a> {
             *share = if weight > 0.0 { factor / weight } else { 0.0 };
         }
         for n in 0..self.weights.len() {
-            self.held[n] = self.hold(n, self.weights[n]).0;
+            self.held[n] = self.penalty(n, self.weights[n]).0;
         }
         self.centre.copy_from_slice(&self.weights);
         let theta = self.problem.theta_0;

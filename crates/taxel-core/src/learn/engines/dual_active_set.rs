@@ -162,7 +162,7 @@ impl DualActiveSet {
     /// The multipliers: `w` minimises `|w|^2 / 2 + y.(A_eq w) + z.(A_in w)` within the bounds.
     #[must_use]
     pub fn multipliers(&self) -> Multipliers {
-        self.stated(&self.multipliers)
+        self.multipliers_by_row(&self.multipliers)
     }
 
     /// Removes the inactive inequalities from the working set; returns their ids.
@@ -269,13 +269,13 @@ impl DualActiveSet {
             if exchanges > 0 && candidates.len() > 1 {
                 exchanges -= 1;
                 let slots: Vec<usize> = candidates.iter().map(|c| c.0).collect();
-                let (held, here) = (self.active.len(), self.dual(&self.weights));
+                let (held, dual) = (self.active.len(), self.dual(&self.weights));
                 if slots.len() > CROWD * self.lower.len().saturating_sub(held) {
                     falls_left = 0;
                 }
                 if falls_left > 0 {
-                    if best.as_ref().is_none_or(|b| here < b.0) {
-                        best = Some((here, self.active.clone(), self.multipliers.clone()));
+                    if best.as_ref().is_none_or(|b| dual < b.0) {
+                        best = Some((dual, self.active.clone(), self.multipliers.clone()));
                         falls_left = MOST_FALLS;
                     } else {
                         falls_left -= 1;

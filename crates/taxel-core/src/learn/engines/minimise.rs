@@ -87,7 +87,7 @@ impl Relaxed {
     }
 
     /// The lower bound that these shares of the multipliers' ranges prove, together with the weights they belong to.
-    fn proven_by(&self, objective: &Objective, point: &RelaxedPoint, shares: &[f64]) -> RelaxedProof {
+    fn prove(&self, objective: &Objective, point: &RelaxedPoint, shares: &[f64]) -> RelaxedProof {
         let times = |(row, share): (usize, &f64)| share * self.hinge_weight(objective, row);
         let length = dot(&point.weights, &point.weights).sqrt();
         let pull = if length > 0.0 { objective.l2 / length } else { 0.0 };
@@ -122,7 +122,7 @@ impl Relaxed {
         let mut at = best.excess.clone();
         // The multipliers of a fit to the same rows may already prove it.
         let (mut proof, mut rounds) = (self.no_proof(), 0);
-        proof.improve(self.proven_by(objective, &best, &shares));
+        proof.improve(self.prove(objective, &best, &shares));
         if best.gap(proof.bound) <= tolerance {
             let rows = shares.iter().filter(|share| **share != 0.0).count();
             progress(1, rows, best.parts.sum(), best.gap(proof.bound));
@@ -133,7 +133,7 @@ impl Relaxed {
             if live.len() > MOST_ROWS {
                 break;
             }
-            let small = self.of_rows(&live);
+            let small = self.with_silent_rows(&live);
             let begin = live.iter().map(|&row| shares[row]).chain(shares[silent..].iter().copied());
             let from = WarmStart { weights: Some(best.weights.clone()), shares: Some(begin.collect()) };
             let mut report =

@@ -58,14 +58,14 @@ pub(crate) fn minimise(
         // After a few new rows, a few exchanges are often enough.
         best.exchange(point, guess, tolerance, stop);
         if best.gap() <= tolerance || stop.asked() {
-            return Ok(best.found(Engine::Native, stop.asked(), state.clone()));
+            return Ok(best.minimum(Engine::Native, stop.asked(), state.clone()));
         }
     }
     let mut state = start.map_or_else(|| interior.start(), |s| interior.resume(&s.state));
     if tolerance > LOOSE {
         let near = interior.solve(&mut state, tolerance, stop);
         best.offer(near.point, None);
-        return Ok(best.found(Engine::Native, stop.asked(), state));
+        return Ok(best.minimum(Engine::Native, stop.asked(), state));
     }
     for aim in TRIES {
         let near = interior.solve(&mut state, aim, stop);
@@ -74,7 +74,7 @@ pub(crate) fn minimise(
             best.proximal(&near.point.weights, tolerance, stop)?;
         }
         if best.gap() <= tolerance || stop.asked() {
-            return Ok(best.found(Engine::Native, stop.asked(), state));
+            return Ok(best.minimum(Engine::Native, stop.asked(), state));
         }
     }
     match program.clarabel(stop) {
@@ -85,5 +85,5 @@ pub(crate) fn minimise(
         Err(Error::Interrupted) => {}
         Err(error) => return Err(error),
     }
-    Ok(best.found(Engine::ConeSolver, stop.asked(), state))
+    Ok(best.minimum(Engine::ConeSolver, stop.asked(), state))
 }

@@ -81,7 +81,7 @@ impl Relaxed {
             answer => answer.map(Some),
         };
         if !near_best && let Some(answer) = solve(&self.start(objective), 1e-6)? {
-            best = self.better(objective, best, answer.weights);
+            best = self.best_between(objective, best, answer.weights);
         }
         loop {
             let states = self.states(&best, near);
@@ -113,7 +113,7 @@ impl Relaxed {
                 }
             }
             let before = best.parts.sum();
-            best = self.better(objective, best, answer.weights);
+            best = self.best_between(objective, best, answer.weights);
             let (least, gap) = (best.parts.sum(), best.gap(proof.bound));
             progress(rounds, rows, least, gap);
             let stalled = before - least <= STALLED * least;
@@ -127,7 +127,7 @@ impl Relaxed {
     }
 
     /// The best point on the line from `from` to `to`.
-    fn better(&self, objective: &Objective, from: RelaxedPoint, to: Vec<f64>) -> RelaxedPoint {
+    fn best_between(&self, objective: &Objective, from: RelaxedPoint, to: Vec<f64>) -> RelaxedPoint {
         let end = self.point(objective, to);
         let silent = self.silent.len();
         let above = objective.kink_of_c().0 - objective.c;
@@ -212,7 +212,7 @@ impl Relaxed {
     fn kept(&self, objective: &Objective, states: &[HingeState]) -> KeptHinges {
         let rows: Vec<usize> = (0..states.len()).filter(|&row| states[row] == HingeState::Kept).collect();
         let slopes = self.slopes(objective, states);
-        let mixed = objective.mixed_of_b();
+        let mixed = objective.mixed_factor();
         let mut linear = vec![0.0; self.trains];
         self.silent.add_sum(&slopes[..self.silent.len()], &mut linear);
         for (target, slope) in self.targets.iter().zip(&slopes[self.silent.len()..]) {
@@ -246,7 +246,7 @@ impl Relaxed {
         }
         rows.sort_unstable();
         rows.dedup();
-        let mixed = objective.mixed_of_b();
+        let mixed = objective.mixed_factor();
         let mut weight = vec![objective.d * (stride * every) as f64; rows.len()];
         let mut linear = vec![0.0; self.trains];
         for (k, target) in self.targets.iter().enumerate() {

@@ -25,7 +25,7 @@ impl Relaxed {
     /// At the optimum a target whose multiplier is inside its range is reached exactly, and a silent row likewise; here
     /// such a silent row is moved just below its limit. The step is undone if the objective would leave the tolerance;
     /// returns whether the weights moved.
-    pub(crate) fn meet(
+    pub(crate) fn move_to_limits(
         &self,
         objective: &Objective,
         tolerance: f64,

@@ -18,7 +18,7 @@ pub struct OnlineConeR {
     window: usize,
     problem: Option<ConeRProblem>,
     /// The number of patterns added so far.
-    seen: usize,
+    added: usize,
     last: Option<(Vec<f64>, Shares)>,
 }
 
@@ -40,13 +40,13 @@ impl OnlineConeR {
     pub fn new(parameters: &ConeR, window: usize) -> Result<Self> {
         parameters.check()?;
         Self::WINDOW.check(&window)?;
-        Ok(Self { parameters: parameters.clone(), window, problem: None, seen: 0, last: None })
+        Ok(Self { parameters: parameters.clone(), window, problem: None, added: 0, last: None })
     }
 
     /// The number of patterns in the window.
     #[must_use]
     pub fn patterns(&self) -> usize {
-        self.seen.min(self.window)
+        self.added.min(self.window)
     }
 
     /// The number of rows in the window that require silence.
@@ -70,30 +70,30 @@ impl OnlineConeR {
         stop: Stop<'_>,
     ) -> Result<()> {
         let parameters = &self.parameters;
-        check_example(&parameters.neuron, self.seen, pattern, targets)?;
-        check_silence(self.seen, silence)?;
-        let (end, points) = parameters.end_of(self.seen, pattern, targets)?;
+        check_example(&parameters.neuron, self.added, pattern, targets)?;
+        check_silence(self.added, silence)?;
+        let (end, points) = parameters.end_of(self.added, pattern, targets)?;
         let asked = PatternDemand { targets, silence, end };
         let rows = self.problem.as_ref().map_or(0, ConeRProblem::silent_and_free_rows);
         parameters.neuron.check_rows(rows as f64 + points)?;
         if let Some(problem) = &mut self.problem {
-            problem.check_trains(self.seen, pattern)?;
+            problem.check_trains(self.added, pattern)?;
             let silent = problem.silent_and_free_rows();
             problem.push(pattern, asked, stop)?;
             let rows = problem.silent_and_free_rows() - silent;
             if let Some((_, shares)) = &mut self.last {
                 shares.make_room(silent, rows);
             }
-            if self.seen >= self.window {
+            if self.added >= self.window {
                 let (rows, targets_gone) = problem.drop_first();
                 if let Some((_, shares)) = &mut self.last {
                     shares.drop_first(rows, problem.silent_and_free_rows(), targets_gone);
                 }
             }
         } else {
-            self.problem = Some(ConeRProblem::of_one(parameters, pattern, asked, stop)?);
+            self.problem = Some(ConeRProblem::of_first_pattern(parameters, pattern, asked, stop)?);
         }
-        self.seen += 1;
+        self.added += 1;
         Ok(())
     }
 

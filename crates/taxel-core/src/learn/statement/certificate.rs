@@ -37,7 +37,7 @@ impl Certificate {
     pub(crate) fn check(statement: &Statement, bounds: &Bounds, rows: Vec<(Row, f64)>) -> Result<Option<Self>> {
         let Some(proven) = gap(statement, bounds, &rows, false)? else { return Ok(None) };
         let at_all = gap(statement, bounds, &rows, true)?.is_some();
-        let text = explained(statement, bounds, &rows, at_all)?;
+        let text = explain(statement, bounds, &rows, at_all)?;
         Ok(Some(Self { rows, gap: proven, at_all, text }))
     }
 
@@ -103,7 +103,7 @@ fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) 
     Ok((gap > rounding || cancels && rows.iter().any(asks)).then_some(gap))
 }
 
-fn explained(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: bool) -> Result<String> {
+fn explain(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: bool) -> Result<String> {
     let mv = |potential: f64| short(potential * statement.unit);
     let mut text = match rows {
         [(row @ Row::Target { pattern, target }, _)] => {

@@ -6,7 +6,7 @@
 //! and starts of tapers. An upper bound that needs no exponential excludes nearly all of them.
 
 use super::peak::{SilencePeak, exceeds};
-use super::rows::{Example, Statement, lost, until};
+use super::rows::{Example, Statement, is_lost, until};
 use crate::Spike;
 use crate::neuron::{AfterSpike, FirstThreshold, KernelSum, Shape, Step, peak, rounding_ms};
 
@@ -83,7 +83,7 @@ impl SilentTimes {
                     found.extend(worst.take());
                     continue;
                 }
-                let (t, excess, last) = self.largest(asked, state, share);
+                let (t, excess, last) = self.largest_excess(asked, state, share);
                 if exceeds(excess, tolerance) && worst.is_none_or(|w| exceeds(excess, w.excess)) {
                     worst = Some(SilencePeak { pattern, t, excess });
                 }
@@ -97,7 +97,7 @@ impl SilentTimes {
     }
 
     /// The time and value of the largest excess between a node and the next, and the excess at the next node.
-    fn largest(&self, asked: &SilenceLimit, state: KernelSum, share: f64) -> (f64, f64, f64) {
+    fn largest_excess(&self, asked: &SilenceLimit, state: KernelSum, share: f64) -> (f64, f64, f64) {
         let KernelSum { a, b } = asked.taper;
         let state = KernelSum { a: state.a + share * a, b: state.b + share * b };
         let limit = asked.theta - share * asked.height;
@@ -126,7 +126,7 @@ fn positive(x: f64) -> f64 {
 fn strip(statement: &Statement, example: &Example) -> Strip {
     let Statement { neuron, shape, taper, .. } = statement;
     // An input that is lost just after its own time has no effect at all, because spikes occur only at targets.
-    let counts = |i: &Spike| i.t <= example.end && !lost(neuron, &example.targets, i.t, i.t.next_up());
+    let counts = |i: &Spike| i.t <= example.end && !is_lost(neuron, &example.targets, i.t, i.t.next_up());
     let counted: Vec<Spike> = example.inputs.iter().copied().filter(counts).collect();
 
     let mut times = vec![example.start, example.end];
@@ -153,22 +153,23 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
         }
         next += counted[next..].iter().take_while(|i| i.t <= t).count();
         let reset = neuron.after_spike == AfterSpike::Reset && example.next(t) == Some(t);
-        let mut here =
+        let mut silence =
             SilenceLimit { t, to: t, theta: neuron.theta_0, rise: 0.0, taper: KernelSum::default(), height: 0.0 };
         let (mut reach, mut least) = (0.0, f64::INFINITY);
         if let Some(to) = times.get(k + 1).copied().filter(|&to| asks(statement, example, t, to)) {
-            here.to = to;
+            silence.to = to;
             // The rise just after the node: a target at the node itself has fired.
-            here.rise = statement.rise(example, example.fired(to), t);
+            silence.rise = statement.rise(example, example.last_target_before(to), t);
             reach = shape.value((to - t).min(shape.peak()));
             match example.next(to).filter(|target| target - f64::midpoint(t, to) < taper.length) {
-                Some(target) => here.taper = taper.before(target - t),
-                None => here.height = statement.margin.height,
+                Some(target) => silence.taper = taper.before(target - t),
+                None => silence.height = statement.margin.height,
             }
-            least = here.theta + here.rise * (-(to - t) / neuron.tau_rec()).exp() - here.height - here.taper.b;
+            least =
+                silence.theta + silence.rise * (-(to - t) / neuron.tau_rec()).exp() - silence.height - silence.taper.b;
         }
         nodes.push(Node { step, reach, least, inputs: next as u32, reset });
-        asked.push(here);
+        asked.push(silence);
     }
     Strip { nodes, asked, inputs: counted }
 }
@@ -176,7 +177,7 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
 /// Whether silence is required between the neighbouring nodes `t` and `to`.
 fn asks(statement: &Statement, example: &Example, t: f64, to: f64) -> bool {
     let neuron = &statement.neuron;
-    let fired = example.fired(to);
+    let fired = example.last_target_before(to);
     let rises =
         neuron.first_threshold == FirstThreshold::Printed && fired.is_none() && to == example.start + neuron.refractory;
     !rises

@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 
 use super::peak::{SilencePeak, exceeds};
-use super::rows::{Example, Statement, lost};
+use super::rows::{Example, Statement, is_lost};
 use crate::neuron::{AfterSpike, Grid, GridTime, KernelSum, Shape, Step};
 use crate::vectors::{add, dot};
 use crate::{Result, Spike, Stop};
@@ -79,7 +79,7 @@ impl Steps {
         }
     }
 
-    fn of(&self, k: usize) -> Step {
+    fn step(&self, k: usize) -> Step {
         Step { aa: self.aa[k], ba: self.ba[k], bb: self.bb[k] }
     }
 }
@@ -134,7 +134,7 @@ impl SilentRows {
             let place = grid.place(t);
             // An input exactly at a point acts after it; with a kernel that jumps at 0, from the next point on.
             let acts_at = if self.shape.input().b == 0.0 { place.from() } else { place.behind() };
-            if acts_at < points as f64 && !lost(neuron, targets, t, grid.time(acts_at)) {
+            if acts_at < points as f64 && !is_lost(neuron, targets, t, grid.time(acts_at)) {
                 let age = grid.between(place, GridTime::at(acts_at)).max(0.0);
                 let mut unit = KernelSum::default();
                 self.shape.add(&mut unit, 1.0, f64::from(value), age);
@@ -170,7 +170,7 @@ impl SilentRows {
     }
 
     /// The number of rows of the first pattern, including points without a requirement.
-    pub(crate) fn of_first(&self) -> usize {
+    pub(crate) fn rows_of_first(&self) -> usize {
         self.lanes.first().map_or(0, |lane| lane.points)
     }
 
@@ -182,7 +182,7 @@ impl SilentRows {
     }
 
     /// A copy with the given rows only (ascending), as coefficients.
-    pub(crate) fn written_out(&self, rows: &[usize]) -> Self {
+    pub(crate) fn with_rows(&self, rows: &[usize]) -> Self {
         Self {
             lanes: vec![],
             steps: self.steps.clone(),
@@ -193,7 +193,7 @@ impl SilentRows {
     }
 
     /// These rows for inputs whose values have no sign.
-    pub(crate) fn without_signs(&self) -> Cow<'_, Self> {
+    pub(crate) fn unsigned_rows(&self) -> Cow<'_, Self> {
         let is_negative = |input: &GridInput| input.a < 0.0 || input.b < 0.0;
         if !self.lanes.iter().any(|lane| lane.inputs.iter().any(is_negative)) {
             return Cow::Borrowed(self);
@@ -213,7 +213,7 @@ impl SilentRows {
     /// The decay over `points` grid steps.
     fn step(&self, points: u32) -> Step {
         if points as usize <= RUN {
-            self.steps.of(points as usize)
+            self.steps.step(points as usize)
         } else {
             self.shape.step(f64::from(points) * self.step_ms)
         }
@@ -283,7 +283,7 @@ impl SilentRows {
         for rows in rows.chunks_mut(RUN) {
             let steps = self.steps.ba.iter().zip(&self.steps.bb);
             rows.iter_mut().zip(steps).for_each(|(row, (ba, bb))| *row = state.a * ba + state.b * bb);
-            state = self.steps.of(rows.len()).apply(state);
+            state = self.steps.step(rows.len()).apply(state);
         }
     }
 
@@ -316,7 +316,7 @@ impl SilentRows {
     /// That derivative at the first of consecutive rows without inputs, given the derivative after the last of them.
     fn run_back(&self, mut derivative: KernelSum, factors: &[f64]) -> KernelSum {
         for factors in factors.rchunks(RUN) {
-            let step = self.steps.of(factors.len());
+            let step = self.steps.step(factors.len());
             let KernelSum { a, b } = derivative;
             derivative = KernelSum { a: a * step.aa + b * step.ba, b: b * step.bb };
             if factors.iter().any(|&f| f != 0.0) {
@@ -379,14 +379,14 @@ fn jumps(inputs: &[GridInput], resets: &[u32]) -> Vec<Jump> {
     while input < inputs.len() || reset < resets.len() {
         let point = inputs.get(input).map(|i| i.point).into_iter().chain(resets.get(reset).copied()).min();
         let Some(point) = point else { break };
-        let here = reset < resets.len() && resets[reset] == point;
+        let resets_here = reset < resets.len() && resets[reset] == point;
         while reset < resets.len() && resets[reset] == point {
             reset += 1;
         }
         while input < inputs.len() && inputs[input].point == point {
             input += 1;
         }
-        found.push(Jump { point, reset: here, inputs: input as u32 });
+        found.push(Jump { point, reset: resets_here, inputs: input as u32 });
     }
     found
 }

@@ -171,16 +171,16 @@ impl Objective {
 
     /// The terms l1 and l2 at these weights.
     pub(crate) fn norms(&self, weights: &[f64]) -> (f64, f64) {
-        (self.l1 * weights.iter().map(|w| w.abs()).sum::<f64>(), self.of_square(dot(weights, weights)))
+        (self.l1 * weights.iter().map(|w| w.abs()).sum::<f64>(), self.l2_term(dot(weights, weights)))
     }
 
     /// The l2 term, given the sum of squared weights.
-    pub(crate) fn of_square(&self, square: f64) -> f64 {
+    pub(crate) fn l2_term(&self, square: f64) -> f64 {
         self.l2 * if self.norm == Norm::Norm { square.sqrt() } else { square }
     }
 
     /// The distance of the potential after each target to `kappa` thresholds, mV.
-    pub(crate) fn unlifted(&self, targets: &Targets, weights: &[f64]) -> Vec<f64> {
+    pub(crate) fn missing_lift(&self, targets: &Targets, weights: &[f64]) -> Vec<f64> {
         targets.iter().map(|row| dot(row.behind, weights) - self.kappa * row.threshold).collect()
     }
 
@@ -190,7 +190,7 @@ impl Objective {
     }
 
     /// C at one target without its factor, given the distance of the potential to the threshold, mV.
-    pub(crate) fn missed(&self, distance: f64) -> f64 {
+    pub(crate) fn c_at_distance(&self, distance: f64) -> f64 {
         if self.sides_c == Sides::Both { distance.abs() } else { (-distance).max(0.0) }
     }
 
@@ -201,19 +201,19 @@ impl Objective {
 
     /// The potentials that B requires, mV; none if it counts both sides and so needs no kink.
     pub(crate) fn kinks_of_b(&self, targets: &Targets) -> Vec<f64> {
-        let of = |threshold| self.kappa * threshold;
-        if self.sides_b == Sides::Both { vec![] } else { targets.thresholds.iter().map(of).collect() }
+        let kink = |threshold| self.kappa * threshold;
+        if self.sides_b == Sides::Both { vec![] } else { targets.thresholds.iter().map(kink).collect() }
     }
 
     /// The factor of the thresholds in B's mixed term; 0 if B has kinks.
-    pub(crate) fn mixed_of_b(&self) -> f64 {
+    pub(crate) fn mixed_factor(&self) -> f64 {
         if self.sides_b == Sides::Both { -2.0 * self.b * self.kappa } else { 0.0 }
     }
 
     /// The terms of 6.11 at these weights.
     pub(crate) fn exact_parts(&self, targets: &Targets, weights: &[f64]) -> Parts {
         let (l1, l2) = self.norms(weights);
-        let missed = if self.b > 0.0 { self.unlifted(targets, weights) } else { vec![] };
+        let missed = if self.b > 0.0 { self.missing_lift(targets, weights) } else { vec![] };
         Parts { l1, l2, B: self.b * dot(&missed, &missed), ..Parts::default() }
     }
 

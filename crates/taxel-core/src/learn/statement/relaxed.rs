@@ -67,7 +67,7 @@ impl Relaxed {
 
     /// Removes the rows of the first pattern.
     pub(crate) fn drop_first(&mut self) {
-        for k in 0..self.targets.of_first() {
+        for k in 0..self.targets.count_of_first() {
             self.lift(k, -1.0);
         }
         Arc::make_mut(&mut self.targets).drop_first();
@@ -75,17 +75,17 @@ impl Relaxed {
     }
 
     /// A copy with the given silent rows only, as coefficients; for solving, since its value leaves out the other rows.
-    pub(crate) fn of_rows(&self, rows: &[usize]) -> Self {
+    pub(crate) fn with_silent_rows(&self, rows: &[usize]) -> Self {
         Self {
             targets: Arc::clone(&self.targets),
-            silent: self.silent.written_out(rows),
+            silent: self.silent.with_rows(rows),
             gram: Arc::clone(&self.gram),
             ..*self
         }
     }
 
     /// The typical size of weights that reach the threshold at the targets, mV.
-    pub(crate) fn needed(&self) -> f64 {
+    pub(crate) fn typical_weight(&self) -> f64 {
         let (thresholds, lengths) = self
             .targets
             .iter()
@@ -97,7 +97,7 @@ impl Relaxed {
     /// inputs of both signs are present; then D cannot exceed it.
     pub(crate) fn most_broken_silence(&self, weights: &[f64]) -> f64 {
         let mut potential = Vec::new();
-        self.silent.without_signs().potential(weights, &mut potential);
+        self.silent.unsigned_rows().potential(weights, &mut potential);
         potential.iter().zip(&self.silent.limit).map(|(u, limit)| (u - limit).max(0.0)).sum()
     }
 }
@@ -120,7 +120,7 @@ impl Relaxed {
         self.silent.potential(&weights, &mut excess);
         excess.iter_mut().zip(&self.silent.limit).for_each(|(u, limit)| *u -= limit);
         excess.extend(self.targets.iter().map(|row| dot(row.at, &weights) - row.threshold));
-        let behind = objective.unlifted(&self.targets, &weights);
+        let behind = objective.missing_lift(&self.targets, &weights);
         let (silent, targets) = excess.split_at(self.silent.len());
         let (l1, l2) = objective.norms(&weights);
         let counted: Vec<f64> = behind.iter().map(|&x| objective.counts_in_b(x)).collect();
@@ -128,7 +128,7 @@ impl Relaxed {
             l1,
             l2,
             B: objective.b * dot(&counted, &counted),
-            C: objective.c * targets.iter().map(|&x| objective.missed(x)).sum::<f64>(),
+            C: objective.c * targets.iter().map(|&x| objective.c_at_distance(x)).sum::<f64>(),
             D: objective.d * silent.iter().map(|x| x.max(0.0)).sum::<f64>(),
         };
         RelaxedPoint { weights, excess, behind, parts }

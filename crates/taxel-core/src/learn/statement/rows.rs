@@ -167,7 +167,7 @@ impl Example {
     }
 
     /// The last target before `t`.
-    pub(crate) fn fired(&self, t: f64) -> Option<f64> {
+    pub(crate) fn last_target_before(&self, t: f64) -> Option<f64> {
         last_before(&self.targets, t)
     }
 
@@ -183,7 +183,7 @@ fn last_before(targets: &[f64], t: f64) -> Option<f64> {
 }
 
 /// Whether an input at `s` has no effect at `t`, given that the neuron fired at these targets.
-pub(crate) fn lost(neuron: &Neuron, targets: &[f64], s: f64, t: f64) -> bool {
+pub(crate) fn is_lost(neuron: &Neuron, targets: &[f64], s: f64, t: f64) -> bool {
     match neuron.after_spike {
         AfterSpike::Keep => false,
         AfterSpike::Ignore => neuron.loses(s, last_before(targets, s)),
@@ -228,7 +228,7 @@ impl Statement {
             end,
             targets: targets.to_vec(),
             silence: silence.map(<[_]>::to_vec),
-            forgotten: self.shape.forgotten() + self.shape.tau * spread(&inputs).ln(),
+            forgotten: self.shape.negligible_age() + self.shape.tau * spread(&inputs).ln(),
             inputs,
         });
         Ok(())
@@ -365,16 +365,16 @@ impl Statement {
     }
 
     fn example(&self, pattern: usize) -> Result<&Example> {
-        let there = self.examples.len();
-        self.examples.get(pattern).ok_or_else(|| problem!("pattern {pattern}: there are {there}"))
+        let count = self.examples.len();
+        self.examples.get(pattern).ok_or_else(|| problem!("pattern {pattern}: there are {count}"))
     }
 
     fn target(&self, pattern: usize, target: usize) -> Result<(&Example, f64)> {
         let example = self.example(pattern)?;
-        let there = example.targets.len();
+        let count = example.targets.len();
         match example.targets.get(target) {
             Some(&t) => Ok((example, t)),
-            None => Err(problem!("pattern {pattern}, target {target}: the pattern has {there} targets")),
+            None => Err(problem!("pattern {pattern}, target {target}: the pattern has {count} targets")),
         }
     }
 
@@ -421,7 +421,7 @@ impl Statement {
 
     /// Whether `t` is in a window of silence, and neither a target nor in the refractory time after one.
     pub(crate) fn is_silent(&self, example: &Example, t: f64) -> bool {
-        example.in_window(t) && self.is_silent_between(example.fired(t), t, example.next(t))
+        example.in_window(t) && self.is_silent_between(example.last_target_before(t), t, example.next(t))
     }
 
     /// Like `is_silent` whatever the windows, given the last target before `t` and the first one at or after `t`.
@@ -435,7 +435,7 @@ impl Statement {
 
     /// The threshold at `t`, given that the neuron fired at the targets before, mV.
     pub(crate) fn threshold(&self, example: &Example, t: f64) -> f64 {
-        self.neuron.theta_0 + self.rise(example, example.fired(t), t)
+        self.neuron.theta_0 + self.rise(example, example.last_target_before(t), t)
     }
 
     /// The remaining threshold rise at `t`, given that the neuron last fired at `fired`, mV.
@@ -456,8 +456,8 @@ impl Statement {
     /// targets only.
     fn sum(&self, example: &Example, t: f64, earlier: &[f64], part: impl Fn(KernelSum) -> f64, out: &mut [f64]) {
         out.fill(0.0);
-        self.for_inputs(example, t, earlier, part, |input, one| {
-            out[input.train as usize] += f64::from(input.value) * one;
+        self.for_inputs(example, t, earlier, part, |input, state| {
+            out[input.train as usize] += f64::from(input.value) * state;
         });
     }
 
@@ -474,18 +474,18 @@ impl Statement {
         let inputs = example.before(t);
         let age = self.neuron.ages(example.start, t);
         let from = inputs.partition_point(|i| i.t < t - example.forgotten);
-        let (mut at, mut one) = (f64::NAN, 0.0);
+        let (mut at, mut state) = (f64::NAN, 0.0);
         for input in &inputs[from..] {
             // With times in whole ms, many inputs share a time: the exponential is computed once per time.
             if input.t != at {
                 at = input.t;
-                one = if lost(&self.neuron, earlier, at, t) {
+                state = if is_lost(&self.neuron, earlier, at, t) {
                     0.0
                 } else {
                     part(self.shape.after(self.shape.input(), age(at)))
                 };
             }
-            each(input, one);
+            each(input, state);
         }
     }
 }

@@ -67,7 +67,7 @@ impl Targets {
 
     /// Removes the rows of the first pattern; the others are renumbered from 0.
     pub(crate) fn drop_first(&mut self) {
-        let gone = self.of_first();
+        let gone = self.count_of_first();
         self.names.drain(..gone);
         self.names.iter_mut().for_each(|(pattern, _)| *pattern -= 1);
         self.times.drain(..gone);
@@ -77,7 +77,7 @@ impl Targets {
     }
 
     /// The number of targets in the first pattern.
-    pub(crate) fn of_first(&self) -> usize {
+    pub(crate) fn count_of_first(&self) -> usize {
         self.names.partition_point(|name| name.0 == 0)
     }
 

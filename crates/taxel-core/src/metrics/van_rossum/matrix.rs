@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use super::{NEAR, VanRossum};
-use crate::metrics::distance::{Pattern, Ready, summed};
+use crate::metrics::distance::{Pattern, Ready, sum_over_trains};
 use crate::metrics::pairwise::DistanceMatrix;
 use crate::metrics::stored::{Entries, Frame, Query};
 use crate::metrics::{Patterns, Work};
@@ -14,7 +14,7 @@ const ROWS: usize = 4;
 
 impl Ready for &VanRossum {
     fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
-        summed(a, b, stop, |a, b| Ok(VanRossum::between(self, a, b)))
+        sum_over_trains(a, b, stop, |a, b| Ok(VanRossum::between(self, a, b)))
     }
 
     /// Fills a matrix with the sums of distances over trains.

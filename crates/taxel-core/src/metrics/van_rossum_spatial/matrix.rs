@@ -131,9 +131,9 @@ impl MatrixState<'_> {
                     }
                 })?;
                 for (j, product) in (begin..).zip(products) {
-                    let own = rows[i] + columns[j];
-                    let square = own - 2.0 * product;
-                    let distance = if square > NEAR * own {
+                    let squares = rows[i] + columns[j];
+                    let square = squares - 2.0 * product;
+                    let distance = if square > NEAR * squares {
                         self.metric.normalisation.root(square, self.metric.smoothing.tau)
                     } else {
                         self.metric.between(self.kernel, (self.rows, i), (self.columns, j), stop)?
@@ -147,7 +147,7 @@ impl MatrixState<'_> {
     }
 
     /// The sums of row `i` with the weights of each train that has spikes.
-    fn products(&self, i: usize, stop: Stop<'_>, mut seen: impl FnMut(usize, &Entries, &[[f64; 2]])) -> Result<()> {
+    fn products(&self, i: usize, stop: Stop<'_>, mut receive: impl FnMut(usize, &Entries, &[[f64; 2]])) -> Result<()> {
         let (taxels, count) = (self.kernel.taxels(), self.active.len());
         let (mut sums, mut weights) = (Vec::new(), Vec::new());
         for layer in (0..self.rows.trains).step_by(taxels) {
@@ -169,7 +169,7 @@ impl MatrixState<'_> {
                     weights[e] += common[k];
                 }
                 entries.sums(|e| weights[e], &mut sums);
-                seen(layer + n, &entries, &sums);
+                receive(layer + n, &entries, &sums);
             }
         }
         Ok(())

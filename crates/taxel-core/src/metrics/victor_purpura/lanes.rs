@@ -37,8 +37,8 @@ impl TrainBlock {
                 times[j * lanes + l] = t;
             }
         }
-        let extreme = |of: fn(f64, f64) -> f64, begin: f64| {
-            times.chunks_exact(lanes).map(|row| row.iter().copied().fold(begin, of)).collect()
+        let extreme = |pick: fn(f64, f64) -> f64, begin: f64| {
+            times.chunks_exact(lanes).map(|row| row.iter().copied().fold(begin, pick)).collect()
         };
         Self {
             lanes,
@@ -62,11 +62,11 @@ impl TrainBlock {
         cost.resize((self.first.len() + 1) * self.lanes, 0.0);
         let against = if self.lanes == 2 * LANES { against_16 } else { against_32 };
         let hi = against(set, self, a, q, reach, cost, stop)?;
-        let of = |(lane, &length): (usize, &usize)| {
+        let distance = |(lane, &length): (usize, &usize)| {
             let column = length.min(hi);
             cost[column * self.lanes + lane] + (length - column) as f64
         };
-        Ok(self.lengths.iter().enumerate().map(of).collect())
+        Ok(self.lengths.iter().enumerate().map(distance).collect())
     }
 }
 

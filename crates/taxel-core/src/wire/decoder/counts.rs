@@ -36,18 +36,9 @@ impl Counts {
     /// The difference from an earlier state of these counts.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
-        Self {
-            bytes: self.bytes - earlier.bytes,
-            words: self.words - earlier.words,
-            skipped: self.skipped - earlier.skipped,
-            short: self.short - earlier.short,
-            changes: self.changes - earlier.changes,
-            intensities: self.intensities - earlier.intensities,
-            unpaired: self.unpaired - earlier.unpaired,
-            markers: self.markers - earlier.markers,
-            contradictory: self.contradictory - earlier.contradictory,
-            outside: self.outside - earlier.outside,
-            back: self.back - earlier.back,
+        crate::counts_since! {
+            self, earlier;
+            bytes, words, skipped, short, changes, intensities, unpaired, markers, contradictory, outside, back;
         }
     }
 }

@@ -36,13 +36,13 @@ impl FilledColumns<'_> {
         self.rows = k + 1;
         self.open = true;
         if self.paired {
-            self.without_intensity();
+            self.clear_intensity();
         }
     }
 
     /// Marks the last row as without intensity; there must be a row.
     #[inline]
-    pub(super) fn without_intensity(&mut self) {
+    pub(super) fn clear_intensity(&mut self) {
         self.room.ticks[self.rows - 1].write(0);
         self.room.present[self.rows - 1].write(false);
     }

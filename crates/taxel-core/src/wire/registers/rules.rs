@@ -4,7 +4,7 @@ use super::field::{Scanned, us};
 use super::table::Registers;
 
 /// The first rule that refuses these registers, with its numbers.
-pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, String)> {
+pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<(u8, String)> {
     let wire_version = i64::from(registers.wire_version);
     let line_period = i64::from(registers.line_period);
     let line_read = i64::from(registers.line_read);
@@ -77,7 +77,7 @@ pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, S
 }
 
 /// Warnings about values that are allowed but probably a mistake.
-pub(super) fn warned(registers: &Registers) -> Vec<(u8, String)> {
+pub(super) fn warnings(registers: &Registers) -> Vec<(u8, String)> {
     let mut warnings = vec![];
     let random_lines = i64::from(registers.random_lines);
     let step_period = i64::from(registers.step_period);

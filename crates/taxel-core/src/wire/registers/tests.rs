@@ -36,13 +36,13 @@ fn a_preset_leaves_what_it_does_not_say() {
             assert_eq!(then, chosen, "{}", preset.name);
         }
     }
-    let of = |lines, channels| {
+    let names_for = |lines, channels| {
         let array = Array::new(lines, lines, 1.0, "any").unwrap();
         Registers::presets(&array, channels).map(|preset| preset.name).collect::<Vec<_>>()
     };
-    assert_eq!(of(8, 16), ["5.2 kHz", "2 kHz", "5.2 kHz, FA-1"]);
-    assert_eq!(of(64, 64), ["20.8 kHz", "5.2 kHz, 64 channels"]);
-    assert_eq!(of(128, 16), ["128 x 128, 1.3 kHz"]);
+    assert_eq!(names_for(8, 16), ["5.2 kHz", "2 kHz", "5.2 kHz, FA-1"]);
+    assert_eq!(names_for(64, 64), ["20.8 kHz", "5.2 kHz, 64 channels"]);
+    assert_eq!(names_for(128, 16), ["128 x 128, 1.3 kHz"]);
 }
 
 #[test]

@@ -32,7 +32,7 @@ impl RecentDatagrams {
             let events = |datagram| decode(datagram, array.clone(), Pairing::Direct).0;
             let again = events(datagram);
             let since = self.0.iter().take(before).map(|(known, _)| events(known));
-            if has_two_times(&again) || (values && has_values(&again) && touches_none(&again, since)) {
+            if has_two_times(&again) || (values && has_values(&again) && has_no_repeated_taxel(&again, since)) {
                 return true;
             }
         }
@@ -54,12 +54,12 @@ fn has_values(events: &Events) -> bool {
 }
 
 /// Whether no taxel has a second event, among these or those that came since.
-fn touches_none(events: &Events, since: impl Iterator<Item = Events>) -> bool {
+fn has_no_repeated_taxel(events: &Events, since: impl Iterator<Item = Events>) -> bool {
     let taxels = |events: &Events| events.x.iter().copied().zip(events.y.iter().copied()).collect::<Vec<_>>();
-    let mut own = taxels(events);
-    own.sort_unstable();
-    own.windows(2).all(|pair| pair[0] != pair[1])
-        && !since.flat_map(|events| taxels(&events)).any(|taxel| own.binary_search(&taxel).is_ok())
+    let mut touched = taxels(events);
+    touched.sort_unstable();
+    touched.windows(2).all(|pair| pair[0] != pair[1])
+        && !since.flat_map(|events| taxels(&events)).any(|taxel| touched.binary_search(&taxel).is_ok())
 }
 
 #[cfg(test)]
@@ -106,7 +106,7 @@ mod tests {
         for (datagram, arrived) in datagrams {
             sender.push(datagram, *arrived, &mut events);
         }
-        sender.repeated()
+        sender.totals().repeated
     }
 
     #[test]
@@ -114,8 +114,8 @@ mod tests {
         let all = sent(40, 100);
         for behind in 0..DATAGRAMS {
             let mut came: Vec<(&[u8], Option<i64>)> = vec![];
-            for (k, one) in all.iter().enumerate() {
-                came.push((one, Some(k as i64 * 1000)));
+            for (k, datagram) in all.iter().enumerate() {
+                came.push((datagram, Some(k as i64 * 1000)));
                 if k >= behind && k % 10 == 9 {
                     came.push((&all[k - behind], Some(k as i64 * 1000)));
                     came.push((&all[k - behind], None));
@@ -125,32 +125,32 @@ mod tests {
         }
         let mut in_turn = all.clone();
         in_turn.swap(3, 4);
-        assert_eq!(repeated(&in_turn.iter().map(|one| (&one[..], None)).collect::<Vec<_>>()), 0);
+        assert_eq!(repeated(&in_turn.iter().map(|datagram| (&datagram[..], None)).collect::<Vec<_>>()), 0);
     }
 
     #[test]
     fn a_frame_with_values_that_comes_again_is_counted_unless_its_taxels_moved_since() {
-        let (one, other, back) = (frame(&[(3, 90), (4, 80)]), frame(&[(9, 90)]), frame(&[(4, 60)]));
-        assert_eq!(repeated(&[(&one, Some(0)), (&other, Some(10)), (&one, Some(20))]), 1);
-        assert_eq!(repeated(&[(&other, None), (&other, None), (&other, None)]), 2);
+        let (first, second, back) = (frame(&[(3, 90), (4, 80)]), frame(&[(9, 90)]), frame(&[(4, 60)]));
+        assert_eq!(repeated(&[(&first, Some(0)), (&second, Some(10)), (&first, Some(20))]), 1);
+        assert_eq!(repeated(&[(&second, None), (&second, None), (&second, None)]), 2);
         // One of its taxels had another value between them.
-        assert_eq!(repeated(&[(&one, Some(0)), (&back, Some(48)), (&one, Some(96))]), 0);
-        assert_eq!(repeated(&[(&one, Some(0)), (&one, Some(6_553_600))]), 0);
+        assert_eq!(repeated(&[(&first, Some(0)), (&back, Some(48)), (&first, Some(96))]), 0);
+        assert_eq!(repeated(&[(&first, Some(0)), (&first, Some(6_553_600))]), 0);
         // Two equal differences in one stamp are two frames, and so are two of a taxel in one datagram.
-        assert_eq!(repeated_of(&[(&one, Some(0)), (&one, Some(48))], true), 0);
+        assert_eq!(repeated_of(&[(&first, Some(0)), (&first, Some(48))], true), 0);
         let twice = frame(&[(3, 90), (3, 80)]);
         assert_eq!(repeated(&[(&twice, Some(0)), (&twice, Some(48))]), 0);
         // Without values nothing tells them apart.
-        assert_eq!(repeated(&[(&one[..5], Some(0)), (&one[..5], Some(48))]), 0);
+        assert_eq!(repeated(&[(&first[..5], Some(0)), (&first[..5], Some(48))]), 0);
     }
 
     #[test]
     fn equal_frames_within_one_stamp_and_a_turn_later_are_no_repetition() {
         let at_once = &sent(1, 0)[0];
         assert_eq!(repeated(&[(at_once, Some(0)), (at_once, Some(48))]), 0);
-        let one = &sent(1, 100)[0];
-        assert_eq!(repeated(&[(one, Some(0)), (one, Some(6_553_600))]), 0);
-        assert_eq!(repeated(&[(one, Some(0)), (one, Some(10_000))]), 1);
-        assert_eq!(repeated(&[(&one[..5], None), (&one[..5], None), (&[], None), (&[], None)]), 0);
+        let datagram = &sent(1, 100)[0];
+        assert_eq!(repeated(&[(datagram, Some(0)), (datagram, Some(6_553_600))]), 0);
+        assert_eq!(repeated(&[(datagram, Some(0)), (datagram, Some(10_000))]), 1);
+        assert_eq!(repeated(&[(&datagram[..5], None), (&datagram[..5], None), (&[], None), (&[], None)]), 0);
     }
 }

@@ -82,32 +82,13 @@ impl Counts {
     /// The difference from an earlier state of these counts, that at the beginning of a recording.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
-        Self {
-            datagrams: self.datagrams - earlier.datagrams,
-            intact: self.intact - earlier.intact,
-            repeated: self.repeated - earlier.repeated,
-            old: self.old - earlier.old,
-            short: self.short - earlier.short,
-            long: self.long - earlier.long,
-            foreign: self.foreign - earlier.foreign,
-            other_board: self.other_board - earlier.other_board,
-            checksum: self.checksum - earlier.checksum,
-            missing: self.missing.saturating_add_signed(self.filled - earlier.filled).saturating_sub(earlier.missing),
-            filled: 0,
-            unknown_kind: self.unknown_kind - earlier.unknown_kind,
-            unknown_flags: self.unknown_flags - earlier.unknown_flags,
-            malformed: self.malformed - earlier.malformed,
-            events: self.events - earlier.events,
-            repaired: self.repaired - earlier.repaired,
-            states: self.states - earlier.states,
-            stale: self.stale - earlier.stale,
-            outside: self.outside - earlier.outside,
-            markers: self.markers - earlier.markers,
-            unknown_marker: self.unknown_marker - earlier.unknown_marker,
-            dropped: self.dropped - earlier.dropped,
-            events_dropped: self.events_dropped - earlier.events_dropped,
-            resets: self.resets - earlier.resets,
-            unknown_value: self.unknown_value - earlier.unknown_value,
+        let missing = self.missing.saturating_add_signed(self.filled - earlier.filled);
+        crate::counts_since! {
+            self, earlier;
+            datagrams, intact, repeated, old, short, long, foreign, other_board, checksum, unknown_kind, unknown_flags,
+            malformed, events, repaired, states, stale, outside, markers, unknown_marker, dropped, events_dropped, resets,
+            unknown_value;
+            missing: missing.saturating_sub(earlier.missing), filled: 0
         }
     }
 }

@@ -239,15 +239,15 @@ impl Decoder {
     ) -> DatagramOutcome {
         self.counts.datagrams += 1;
         if *self.board.get_or_insert(header.board) != header.board {
-            return self.other_board();
+            return self.refuse_other_board();
         }
         let sum = split(datagram).1;
-        let (which, reset) = match self.sessions.last() {
+        let (index, reset) = match self.sessions.last() {
             // The usual case.
             Some(last) if last.is_next(header) && last.unlike == 0 => (self.sessions.len() - 1, false),
             _ => self.session(header, sum, arrived),
         };
-        let session = &mut self.sessions[which];
+        let session = &mut self.sessions[index];
         let number = session.number_of(header.sequence);
         let ahead = number > session.highest;
         match session.note(number, sum) {
@@ -260,7 +260,7 @@ impl Decoder {
                 self.again = (number + 1, in_turn);
                 if noted == Noted::Unlike {
                     session.unlike += 1;
-                    return self.other_board();
+                    return self.refuse_other_board();
                 }
                 self.counts.repeated += 1;
                 return DatagramOutcome::Repeated;
@@ -276,7 +276,7 @@ impl Decoder {
         self.counts.dropped += u64::from(header.flags & DROPPED != 0);
         self.counts.unknown_flags += u64::from(header.flags & !(FRAME_SYNC | DIFFERENCES | DROPPED) != 0);
         self.latest = self.latest.max(base);
-        if which + 1 == self.sessions.len() {
+        if index + 1 == self.sessions.len() {
             self.body(header, body, base, Some(number), out);
         } else {
             // An event from before the latest reset must not change the taxels' current values.
@@ -294,7 +294,7 @@ impl Decoder {
     }
 
     /// Leaves out an intact datagram of another board.
-    fn other_board(&mut self) -> DatagramOutcome {
+    fn refuse_other_board(&mut self) -> DatagramOutcome {
         self.counts.foreign += 1;
         self.counts.other_board += 1;
         DatagramOutcome::Refused(Refused::Foreign)
@@ -317,7 +317,7 @@ impl Decoder {
             && session.unlike == 0
             && let Self { held, counts, latest, again, .. } = self
             && let Some((mut run, value)) = RunDecoder::new(first, board, session, held, latest, counts)
-            && (value == 0 || out.paired())
+            && (value == 0 || out.writes_intensity())
         {
             // SAFETY: `instructions` and `best` select a set only if the machine has it. A run writes each row that it
             // counts, and with `paired` its ticks and present.
@@ -339,13 +339,13 @@ impl Decoder {
     /// The session of a datagram with this sum, and whether the datagram begins it.
     fn session(&mut self, header: &DatagramHeader, sum: u32, arrived: Option<i64>) -> (usize, bool) {
         // The latest session with this number, in case two resets drew the same one.
-        if let Some(which) = self.sessions.iter().rposition(|session| session.number == header.session) {
-            if !self.begins_again(&self.sessions[which], header, sum, arrived) {
-                return (which, false);
+        if let Some(index) = self.sessions.iter().rposition(|session| session.number == header.session) {
+            if !self.begins_again(&self.sessions[index], header, sum, arrived) {
+                return (index, false);
             }
             // What was refused since the last new datagram is this board's: its numbers are missing in the session that
             // begins.
-            let unlike = u64::from(std::mem::take(&mut self.sessions[which].unlike));
+            let unlike = u64::from(std::mem::take(&mut self.sessions[index].unlike));
             self.counts.foreign -= unlike;
             self.counts.other_board -= unlike;
             self.counts.repeated += unlike;

@@ -266,11 +266,11 @@ mod tests {
                 events.x.push(draw(array.columns.into()) as u16);
                 events.y.push(draw(array.rows.into()) as u16);
                 events.p.push(draw(2) == 0);
-                let there = round % 3 != 0 && draw(5) > 0;
-                present.push(there);
-                ticks.push(if there { draw(if large { 65_536 } else { 256 }) as u16 } else { 0 });
+                let has_value = round % 3 != 0 && draw(5) > 0;
+                present.push(has_value);
+                ticks.push(if has_value { draw(if large { 65_536 } else { 256 }) as u16 } else { 0 });
             }
-            if present.iter().any(|&there| there) {
+            if present.iter().any(|&has_value| has_value) {
                 events.intensity = Some(Intensities { ticks, present });
             }
             for _ in 0..draw(4) {

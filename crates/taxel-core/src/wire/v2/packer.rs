@@ -235,7 +235,7 @@ impl Packer {
         sink: &mut impl FnMut(&[u8], usize),
     ) {
         let Settings { board, session, frame_sync, differences, .. } = self.settings;
-        let flag = |on: bool, bit: u8| if on { bit } else { 0 };
+        let flag = |set: bool, bit: u8| if set { bit } else { 0 };
         let after_loss = if events > 0 { self.after_loss } else { std::mem::take(&mut self.dropped) };
         let states = matches!(kind, BodyKind::SmallStates | BodyKind::LargeStates);
         let header = DatagramHeader {

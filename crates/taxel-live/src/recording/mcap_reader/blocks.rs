@@ -25,7 +25,7 @@ pub(super) struct FileBlock {
 pub(super) type IndexedChunks = BTreeMap<u16, u64>;
 
 /// The channel and the number of messages that a message index lists, from its first 15 bytes.
-pub(super) fn indexed(head: &[u8]) -> Option<(u16, u64)> {
+pub(super) fn index_entry(head: &[u8]) -> Option<(u16, u64)> {
     // Opcode 1, length 8, channel 2, size of the entries 4; an entry has 16 bytes.
     let (channel, size) = head.get(9..15)?.split_first_chunk::<2>()?;
     Some((u16::from_le_bytes(*channel), u64::from(u32::from_le_bytes(size.try_into().ok()?)) / 16))
@@ -62,11 +62,11 @@ impl Blocks {
     }
 
     /// What the message indexes behind a block list; none if there are none, though the block had messages.
-    pub(super) fn indexed(&self, block: FileBlock) -> Result<Option<IndexedChunks>> {
+    pub(super) fn message_indexes(&self, block: FileBlock) -> Result<Option<IndexedChunks>> {
         // Times of the first and the last message, both 0 in a chunk without messages.
         let mut times = [0; 16];
         self.file.read_exact_at(&mut times, block.offset + 9).map_err(Error::file(&self.path))?;
-        let all = indexed_from(&self.path, &self.file, self.length, block.offset + block.length)?;
+        let all = message_indexes_from(&self.path, &self.file, self.length, block.offset + block.length)?;
         Ok((times == [0; 16] || !all.is_empty()).then_some(all))
     }
 
@@ -98,16 +98,16 @@ pub(super) fn records(
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(length.max(limits::CHUNK as usize));
     let mut reader = LinearReader::new_with_options(options);
-    let mut given = 0;
+    let mut position = 0;
     while let Some(event) = reader.next_event() {
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
                 // At the end of the block no bytes are available: the reader then ends, or reports that data are
                 // missing.
-                let more = wanted.min(length - given);
-                reader.insert(more).copy_from_slice(&bytes[given..given + more]);
+                let more = wanted.min(length - position);
+                reader.insert(more).copy_from_slice(&bytes[position..position + more]);
                 reader.notify_read(more);
-                given += more;
+                position += more;
             }
             // The content of other records is not used, so an error in them is ignored.
             Ok(LinearReadEvent::Record { opcode, .. }) if !matches!(opcode, op::CHANNEL | op::MESSAGE) => {}
@@ -127,11 +127,11 @@ pub(super) fn records(
 }
 
 /// What the message indexes from `at` on list, up to the next other record.
-pub(super) fn indexed_from(path: &Path, file: &File, length: u64, mut at: u64) -> Result<IndexedChunks> {
+pub(super) fn message_indexes_from(path: &Path, file: &File, length: u64, mut at: u64) -> Result<IndexedChunks> {
     let (mut all, mut head) = (IndexedChunks::new(), [0; 15]);
     while at.checked_add(15).is_some_and(|end| end <= length) {
         file.read_exact_at(&mut head, at).map_err(Error::file(path))?;
-        let Some((channel, messages)) = indexed(&head).filter(|_| head[0] == op::MESSAGE_INDEX) else { break };
+        let Some((channel, messages)) = index_entry(&head).filter(|_| head[0] == op::MESSAGE_INDEX) else { break };
         *all.entry(channel).or_default() += messages;
         at += 15 + 16 * messages;
     }

@@ -40,7 +40,7 @@ impl FileSummary {
                     reader.notify_read(more);
                     at += more as u64;
                 }
-                LinearReadEvent::Record { opcode: op::STATISTICS, data } => counts = Some(counted(data)?),
+                LinearReadEvent::Record { opcode: op::STATISTICS, data } => counts = Some(message_counts(data)?),
                 LinearReadEvent::Record { opcode: op::CHANNEL, data } if limits::texts_fit(op::CHANNEL, data) => {
                     if let Ok(Record::Channel(channel)) = parse_record(op::CHANNEL, data) {
                         names.insert(channel.id, channel.topic);
@@ -65,7 +65,7 @@ impl FileSummary {
 }
 
 /// The number of messages of each channel in a record of statistics.
-fn counted(data: &[u8]) -> Option<BTreeMap<u16, u64>> {
+fn message_counts(data: &[u8]) -> Option<BTreeMap<u16, u64>> {
     // Number of messages 8, schemas 2, channels 4, attachments 4, metadata 4, chunks 4, first time 8, last 8, size of the table 4
     let table = data.get(46..)?;
     let pairs = table.chunks_exact(10).map(|pair| {

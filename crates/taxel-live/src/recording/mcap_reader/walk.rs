@@ -8,7 +8,7 @@ use std::path::Path;
 use mcap::records::{Record, op};
 use mcap::{MAGIC, parse_record};
 
-use super::blocks::{FileBlock, IndexedChunks, indexed, indexed_from, records};
+use super::blocks::{FileBlock, IndexedChunks, index_entry, message_indexes_from, records};
 use super::summary::FileSummary;
 use crate::recording::metadata::{BEGIN, CHECK, END, check};
 use crate::recording::{FileEnding, Header, Rebuilt, RecordingCounts, limits};
@@ -56,7 +56,7 @@ pub(super) struct FileWalk<'a> {
 }
 
 impl<'a> FileWalk<'a> {
-    pub(super) fn of(path: &'a Path, file: &'a File, length: u64, memory: u64) -> Self {
+    pub(super) fn new(path: &'a Path, file: &'a File, length: u64, memory: u64) -> Self {
         let rebuilt = Rebuilt { unfinished: true, ..Rebuilt::default() };
         Self {
             path,
@@ -128,7 +128,7 @@ impl<'a> FileWalk<'a> {
 
     /// Where what cannot be read begins: at `at`, or at the chunk that ends there, if that is damaged. In it bytes may be
     /// missing or too many, so that it ends elsewhere.
-    fn unless_damaged(&mut self, at: u64) -> Result<u64> {
+    fn damage_start(&mut self, at: u64) -> Result<u64> {
         let Some(&block) = self.blocks.last().filter(|block| !block.bare && block.offset + block.length == at) else {
             return Ok(at);
         };
@@ -144,7 +144,7 @@ impl<'a> FileWalk<'a> {
                 (indexed.unwrap_or_default(), skipped)
             }
             (None, Some(block)) => {
-                let indexed = indexed_from(self.path, self.file, self.length, block.offset + block.length)?;
+                let indexed = message_indexes_from(self.path, self.file, self.length, block.offset + block.length)?;
                 (indexed, Skipped::Nothing)
             }
             (None, None) => (IndexedChunks::new(), Skipped::Nothing),
@@ -155,9 +155,9 @@ impl<'a> FileWalk<'a> {
     fn data(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
         while at < self.length {
-            let Some((opcode, length, size)) = self.sound(at)? else {
-                let from = self.unless_damaged(at)?;
-                match self.next_sound(from + 1)? {
+            let Some((opcode, length, size)) = self.readable_record(at)? else {
+                let from = self.damage_start(at)?;
+                match self.next_readable(from + 1)? {
                     Some(next) => {
                         self.rebuilt.gaps += 1;
                         self.rebuilt.skipped_bytes += next - from;
@@ -186,14 +186,14 @@ impl<'a> FileWalk<'a> {
                     self.since.1 = self.since.1.max(Skipped::Records);
                 }
                 op::MESSAGE_INDEX => {
-                    if let Some((channel, messages)) = indexed(&self.bytes(at, 15)?) {
+                    if let Some((channel, messages)) = index_entry(&self.bytes(at, 15)?) {
                         *self.since.0.entry(channel).or_default() += messages;
                     }
                 }
                 op::CHUNK => {
                     self.next_block();
                     self.unpacked += size;
-                    let most = limits::unpacked(self.length, self.memory);
+                    let most = limits::most_unpacked(self.length, self.memory);
                     if self.unpacked > most {
                         let claim = format!("the chunks up to byte {at} say that they unpack to {}", self.unpacked);
                         let right = "(1000 times the file and 256 MiB)";
@@ -225,12 +225,12 @@ impl<'a> FileWalk<'a> {
     fn ends_at(&self, at: u64, end: u64) -> Result<bool> {
         let head = self.bytes(at, 80)?;
         let length = number(&head, 1).and_then(|length| length.checked_add(RECORD_HEAD));
-        let packed = packed(&head).and_then(|(before, packed)| packed.checked_add(before));
+        let packed = packed_range(&head).and_then(|(before, packed)| packed.checked_add(before));
         Ok([length, packed].into_iter().flatten().any(|length| at.checked_add(length) == Some(end)))
     }
 
     /// Opcode and length of the record at `at`, where they make sense, and the size that it states to unpack to.
-    fn sound(&self, at: u64) -> Result<Option<(u8, u64, u64)>> {
+    fn readable_record(&self, at: u64) -> Result<Option<(u8, u64, u64)>> {
         let head = self.bytes(at, 80)?;
         let (Some(&opcode), Some(length)) = (head.first(), number(&head, 1)) else { return Ok(None) };
         let fits = at.checked_add(RECORD_HEAD).and_then(|a| a.checked_add(length)).is_some_and(|e| e <= self.length);
@@ -269,7 +269,7 @@ impl<'a> FileWalk<'a> {
         let next = at + RECORD_HEAD + length;
         Ok(match opcode {
             op::CHUNK => true,
-            op::MESSAGE_INDEX => length > 6 && self.sound(next)?.is_some(),
+            op::MESSAGE_INDEX => length > 6 && self.readable_record(next)?.is_some(),
             op::METADATA => {
                 length < limits::METADATA && self.bytes(at + RECORD_HEAD + 4, BEGIN.len() as u64)? == BEGIN.as_bytes()
             }
@@ -283,7 +283,7 @@ impl<'a> FileWalk<'a> {
     }
 
     /// The next position from `at` on where the walk may continue.
-    fn next_sound(&self, mut at: u64) -> Result<Option<u64>> {
+    fn next_readable(&self, mut at: u64) -> Result<Option<u64>> {
         const WINDOW: u64 = 1 << 20;
         while at < self.length {
             let window = self.bytes(at, WINDOW)?;
@@ -292,7 +292,7 @@ impl<'a> FileWalk<'a> {
                     continue;
                 }
                 let place = at + k as u64;
-                if let Some((opcode, length, _)) = self.sound(place)?
+                if let Some((opcode, length, _)) = self.readable_record(place)?
                     && self.resumes(place, opcode, length)?
                 {
                     return Ok(Some(place));
@@ -338,12 +338,12 @@ impl<'a> FileWalk<'a> {
 
 /// The unpacked size that a chunk states, if the lengths inside its header agree with the record's length.
 fn chunk(head: &[u8], length: u64) -> Option<u64> {
-    let (before, packed) = packed(head)?;
+    let (before, packed) = packed_range(head)?;
     if packed.checked_add(before - RECORD_HEAD) == Some(length) { number(head, 25) } else { None }
 }
 
 /// Where the packed messages of a chunk begin, and their size, as its header states.
-fn packed(head: &[u8]) -> Option<(u64, u64)> {
+fn packed_range(head: &[u8]) -> Option<(u64, u64)> {
     // opcode 1, length 8, start 8, end 8, size 8, checksum 4, name of the compression, packed size 8
     const NAME: usize = 37;
     let name_bytes = head.get(NAME..NAME + 4).map(|b| word(b) as usize).filter(|&n| n <= 16)?;

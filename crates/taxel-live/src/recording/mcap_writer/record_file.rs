@@ -81,7 +81,7 @@ impl RecordFile {
             file.seek(SeekFrom::Start(self.whole))?;
             file.write_all(end)
         };
-        let with_reason = [stopped(why).as_slice(), CLOSING].concat();
+        let with_reason = [stop_record(why).as_slice(), CLOSING].concat();
         if close(&with_reason).is_err() && close(CLOSING).is_err() {
             // Even the short end could not be written: the file then ends with its last whole chunk, which is all that
             // our reader needs.
@@ -96,7 +96,7 @@ const CLOSING: &[u8] = b"\x0f\x04\0\0\0\0\0\0\0\0\0\0\0\
     \x89MCAP0\r\n";
 
 /// The metadata record of a recording that had to stop, with the reason.
-fn stopped(why: &str) -> Vec<u8> {
+fn stop_record(why: &str) -> Vec<u8> {
     let text = |s: &str| [&u32::try_from(s.len()).unwrap_or(0).to_le_bytes(), s.as_bytes()].concat();
     let pair = [text("stopped"), text(why)].concat();
     let body = [text(END), u32::try_from(pair.len()).unwrap_or(0).to_le_bytes().to_vec(), pair].concat();

@@ -96,13 +96,13 @@ impl Written {
     }
 
     /// Counts that state what a reader must find: all but the number of datagrams, which a caller counts while it records.
-    pub(super) fn so_far(&self, counts: RecordingCounts) -> RecordingCounts {
+    pub(super) fn counts_so_far(&self, counts: RecordingCounts) -> RecordingCounts {
         RecordingCounts { first: self.first, messages: self.others.clone(), ..counts }
     }
 
     /// The same at the end.
     pub(super) fn at_end(&self, counts: RecordingCounts) -> RecordingCounts {
-        RecordingCounts { recorded: self.data, sum: Some(self.sum), ..self.so_far(counts) }
+        RecordingCounts { recorded: self.data, sum: Some(self.sum), ..self.counts_so_far(counts) }
     }
 }
 
@@ -207,7 +207,7 @@ impl WriteQueue {
     pub(super) fn open(&self, ReservedFile { file, header, compression }: ReservedFile) -> Result<()> {
         file.begin()?;
         let writer = ChunkWriter::begin(file, &header, compression, &self.at_disk);
-        *lock(&self.writer) = Some(writer.map_err(|error| WriteFailure::of(error).of_file(&self.path))?);
+        *lock(&self.writer) = Some(writer.map_err(|error| WriteFailure::new(error).of_file(&self.path))?);
         let mut state = self.lock();
         state.begun = true;
         // The age of messages that waited for the file counts from now on.
@@ -298,7 +298,7 @@ impl WriteQueue {
 
     /// Stores an error for later callers, and leaves a readable file.
     fn fail(&self, error: McapError, file: Option<RecordFile>) -> Error {
-        let failure = WriteFailure::of(error);
+        let failure = WriteFailure::new(error);
         if let Some(file) = file {
             file.salvage(&failure.text);
         }
@@ -317,7 +317,7 @@ impl WriteFailure {
         }
     }
 
-    fn of(error: McapError) -> Self {
+    fn new(error: McapError) -> Self {
         match error {
             McapError::Io(error) => {
                 let whole = error.to_string();

@@ -57,7 +57,7 @@ impl Verdict {
                     counts.unwrap_or_else(|| RecordingCounts { recorded: messages, ..RecordingCounts::default() });
                 let found = if skipped { DamageCounts::default() } else { decoded.clone() };
                 let (inner, before) = if skipped { (0, 0) } else { (skipped_numbers, before_first) };
-                let counted = || Self::of_counts(&so_far_with(counts, found, inner, before), nothing_lost);
+                let counted = || Self::of_counts(&counts_with(counts, found, inner, before), nothing_lost);
                 (converted.unwrap_or_else(counted), Some(why))
             }
         };
@@ -157,7 +157,7 @@ impl Verdict {
             }
         }
         if verdict.steps_back.is_empty() && !is_converted {
-            verdict = verdict.stepped(decoded.steps_back);
+            verdict = verdict.with_steps(decoded.steps_back);
         }
         verdict.doubtful(decoded.doubtful_after_us)
     }
@@ -165,7 +165,7 @@ impl Verdict {
 
 /// The last counts of an unfinished recording, with what decoding found since. The arrival numbers that the file skips, and
 /// those before its first, were dropped by the queue, or another program left their datagrams out.
-fn so_far_with(
+fn counts_with(
     mut counts: RecordingCounts,
     found: DamageCounts,
     skipped_numbers: u64,

@@ -61,15 +61,15 @@ impl Lagrangian<'_> {
             // The Illinois method: a secant that halves the value of an end retained twice.
             for _ in 0..60 {
                 t = low + (high - low) * (at_low / (at_low - at_high)).clamp(1e-3, 0.999);
-                let here = slope(t);
-                if here.abs() <= EXACT * start.abs() || high - low <= 1e-12 * high {
+                let slope_at = slope(t);
+                if slope_at.abs() <= EXACT * start.abs() || high - low <= 1e-12 * high {
                     break;
                 }
-                if here > 0.0 {
-                    (high, at_high) = (t, here);
+                if slope_at > 0.0 {
+                    (high, at_high) = (t, slope_at);
                     at_low *= 0.5;
                 } else {
-                    (low, at_low) = (t, here);
+                    (low, at_low) = (t, slope_at);
                     at_high *= 0.5;
                 }
             }
@@ -89,12 +89,12 @@ impl Lagrangian<'_> {
     fn passing(&self, rise: &[f64], end: f64) -> (Vec<PassedKink>, f64) {
         let silent = self.problem.silent.len();
         let (d, (c, lower)) = (self.objective.d, self.objective.kink_of_c());
-        let [one, other] = self.delta.map(|delta| 1.0 / delta);
+        let [per_silent, per_slope] = self.delta.map(|delta| 1.0 / delta);
         let mut passing = Vec::new();
         let mut steady = 0.0;
         let rows = self.excess.iter().zip(rise).zip(&self.shares);
         for (k, ((&x, &r), &share)) in rows.enumerate() {
-            let (weight, steep, low) = if k < silent { (d, one, 0.0) } else { (c, other, lower) };
+            let (weight, steep, low) = if k < silent { (d, per_silent, 0.0) } else { (c, per_slope, lower) };
             let (from, change) = (share + x * steep, r * steep);
             let to = from + end * change;
             if from.max(to) <= low {
@@ -128,10 +128,10 @@ impl Lagrangian<'_> {
         }
         let (mut along, mut square) = (0.0, 0.0);
         for (n, (&w, &d)) in self.weights.iter().zip(direction).enumerate() {
-            let here = w + t * d;
-            sum += self.hold(n, here).0 * d;
-            along += here * d;
-            square += here * here;
+            let weight = w + t * d;
+            sum += self.penalty(n, weight).0 * d;
+            along += weight * d;
+            square += weight * weight;
         }
         if self.objective.norm == Norm::Norm && square > 0.0 {
             sum += self.objective.l2 * along / square.sqrt();

@@ -49,7 +49,7 @@ impl Lagrangian<'_> {
             };
             let mut steepest = 0.0_f64;
             for i in 0..n {
-                let holding = if self.hold(i, self.weights[i]).1 { self.sigma } else { 0.0 };
+                let holding = if self.penalty(i, self.weights[i]).1 { self.sigma } else { 0.0 };
                 self.hessian[i * n + i] += ridge + self.rho + holding;
                 steepest = steepest.max(self.hessian[i * n + i]);
             }

@@ -6,7 +6,7 @@ use super::rows::{ConstraintKind, Multipliers, Ray};
 
 impl DualActiveSet {
     /// Converts multipliers by slot to multipliers of the rows as stated.
-    pub(super) fn stated(&self, by_slot: &[f64]) -> Multipliers {
+    pub(super) fn multipliers_by_row(&self, by_slot: &[f64]) -> Multipliers {
         let mut out = Multipliers { equalities: vec![0.0; self.equalities.len()], inequalities: Vec::new() };
         for &slot in &self.live {
             let u = by_slot[slot] / self.rows[slot].length;
@@ -43,6 +43,6 @@ impl DualActiveSet {
             rounding += by.abs();
         }
         rounding *= f64::EPSILON * widest * (self.lower.len() as f64).sqrt();
-        (least > 1e-12 * size + rounding).then(|| Ray { multipliers: self.stated(&by_slot), gap: least })
+        (least > 1e-12 * size + rounding).then(|| Ray { multipliers: self.multipliers_by_row(&by_slot), gap: least })
     }
 }

@@ -19,9 +19,9 @@ impl DualActiveSet {
         let mut leaves = vec![false; self.active.len()];
         for &slot in fresh.iter().filter(|slot| !self.is_equality(**slot)) {
             let products = &self.gram[slot * self.gram_stride..][..self.rows.len()];
-            let others = self.active.iter().enumerate().filter(|(k, other)| !leaves[*k] && !self.is_equality(**other));
+            let others = self.active.iter().enumerate().filter(|(k, row)| !leaves[*k] && !self.is_equality(**row));
             let nearest = others.max_by(|a, b| products[*a.1].total_cmp(&products[*b.1]));
-            if let Some((k, _)) = nearest.filter(|(_, other)| products[**other] >= ALIKE) {
+            if let Some((k, _)) = nearest.filter(|(_, row)| products[**row] >= ALIKE) {
                 leaves[k] = true;
                 entering.push(slot);
             }
@@ -38,7 +38,7 @@ impl DualActiveSet {
     /// The products of a row with the active ones, in their order, padded to whole lines.
     pub(super) fn products(&self, slot: usize) -> Vec<f64> {
         let row = &self.gram[slot * self.gram_stride..][..self.gram_stride];
-        let mut out = vec![0.0; self.factor.padded()];
+        let mut out = vec![0.0; self.factor.padded_length()];
         for (value, &slot) in out.iter_mut().zip(&self.active) {
             *value = row[slot];
         }
@@ -49,7 +49,7 @@ impl DualActiveSet {
     pub(super) fn activate(&mut self, slots: &[usize]) {
         for block in slots.chunks(BLOCK) {
             let block: Vec<usize> = block.iter().copied().filter(|&slot| self.place[slot].is_none()).collect();
-            let stride = self.factor.padded();
+            let stride = self.factor.padded_length();
             let mut g = vec![0.0; stride * block.len()];
             let mut inner_products = vec![0.0; block.len() * block.len()];
             for (k, &slot) in block.iter().enumerate() {
@@ -107,7 +107,7 @@ impl DualActiveSet {
         };
         let mut z = rest(&r);
         for _ in 0..2 {
-            let mut change = vec![0.0; self.factor.padded()];
+            let mut change = vec![0.0; self.factor.padded_length()];
             rows_times(&self.coefficients, self.stride, &self.active, &z, &mut change[..self.active.len()]);
             self.factor.forward(&mut change);
             self.factor.backward(&mut change);

@@ -27,7 +27,7 @@ impl CholeskyFactor {
     }
 
     /// The length that vectors must have for `forward` and `backward`: the number of rows, padded to whole lines.
-    pub(super) fn padded(&self) -> usize {
+    pub(super) fn padded_length(&self) -> usize {
         self.len().next_multiple_of(LANES)
     }
 
@@ -44,7 +44,7 @@ impl CholeskyFactor {
     /// `-(L L')^-1` times the limits: the multipliers if all rows were equalities.
     pub(super) fn optimum(&self) -> Vec<f64> {
         let mut x: Vec<f64> = self.limits.iter().map(|y| -y).collect();
-        x.resize(self.padded(), 0.0);
+        x.resize(self.padded_length(), 0.0);
         self.backward(&mut x);
         x.truncate(self.len());
         x

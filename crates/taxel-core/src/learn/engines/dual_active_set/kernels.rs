@@ -4,14 +4,14 @@ use crate::vectors::{LANES, add_lines, kernel, lines, lines_mut, times};
 
 kernel! {
     /// `out[k] = rows[which[k]].x`; each row has `stride` numbers, a multiple of eight, padded with 0.
-    pub(super) fn rows_times<V>(rows: &[f64], stride: usize, which: &[usize], x: &[f64], out: &mut [f64]) {
+    pub(super) fn rows_times<V>(rows: &[f64], stride: usize, chosen: &[usize], x: &[f64], out: &mut [f64]) {
         let x = lines(&x[..stride]);
         let row = |k: usize| lines(&rows[k * stride..][..stride]);
-        for (which, out) in which.chunks(LANES).zip(out.chunks_mut(LANES)) {
-            if let Ok(which) = <[usize; LANES]>::try_from(which) {
-                out.copy_from_slice(&times::<V, LANES>(which.map(row), x));
+        for (chosen, out) in chosen.chunks(LANES).zip(out.chunks_mut(LANES)) {
+            if let Ok(chosen) = <[usize; LANES]>::try_from(chosen) {
+                out.copy_from_slice(&times::<V, LANES>(chosen.map(row), x));
             } else {
-                for (&k, out) in which.iter().zip(out) {
+                for (&k, out) in chosen.iter().zip(out) {
                     [*out] = times::<V, 1>([row(k)], x);
                 }
             }
@@ -21,14 +21,14 @@ kernel! {
 
 kernel! {
     /// `out += sum of by[k] rows[which[k]]`; rows as in `rows_times`.
-    pub(super) fn add_rows<V>(rows: &[f64], stride: usize, which: &[usize], by: &[f64], out: &mut [f64]) {
+    pub(super) fn add_rows<V>(rows: &[f64], stride: usize, chosen: &[usize], by: &[f64], out: &mut [f64]) {
         let out = lines_mut(&mut out[..stride]);
         let row = |k: usize| lines(&rows[k * stride..][..stride]);
-        for (which, by) in which.chunks(LANES).zip(by.chunks(LANES)) {
-            if let (Ok(which), Ok(by)) = (<[usize; LANES]>::try_from(which), by.try_into()) {
-                add_lines::<V, LANES>(which.map(row), by, out);
+        for (chosen, by) in chosen.chunks(LANES).zip(by.chunks(LANES)) {
+            if let (Ok(chosen), Ok(by)) = (<[usize; LANES]>::try_from(chosen), by.try_into()) {
+                add_lines::<V, LANES>(chosen.map(row), by, out);
             } else {
-                for (&k, &by) in which.iter().zip(by) {
+                for (&k, &by) in chosen.iter().zip(by) {
                     add_lines::<V, 1>([row(k)], [by], out);
                 }
             }
@@ -38,10 +38,10 @@ kernel! {
 
 /// Solves `L x = x` for the unknowns k to k + here, after the contributions of earlier unknowns have been subtracted.
 #[inline(always)]
-fn triangle(l: &[f64], stride: usize, inverse: &[f64], k: usize, here: usize, x: &mut [f64]) {
-    for j in k..k + here {
+fn triangle(l: &[f64], stride: usize, inverse: &[f64], k: usize, count: usize, x: &mut [f64]) {
+    for j in k..k + count {
         x[j] *= inverse[j];
-        for i in j + 1..k + here {
+        for i in j + 1..k + count {
             x[i] -= x[j] * l[j * stride + i];
         }
     }
@@ -79,9 +79,9 @@ kernel! {
                     x[k + j] -= sums[j];
                 }
             }
-            let here = (m - k).min(LANES);
-            for j in (k..k + here).rev() {
-                for i in j + 1..k + here {
+            let count = (m - k).min(LANES);
+            for j in (k..k + count).rev() {
+                for i in j + 1..k + count {
                     x[j] -= l[j * stride + i] * x[i];
                 }
                 x[j] *= inverse[j];
@@ -92,7 +92,7 @@ kernel! {
 
 /// The inverse of the eight by eight triangle at k, by columns.
 #[inline(always)]
-fn inverted(l: &[f64], stride: usize, inverse: &[f64], k: usize) -> [[f64; LANES]; LANES] {
+fn inverse_triangle(l: &[f64], stride: usize, inverse: &[f64], k: usize) -> [[f64; LANES]; LANES] {
     let mut columns = [[0.0; LANES]; LANES];
     for (j, column) in columns.iter_mut().enumerate() {
         column[j] = inverse[k + j];
@@ -120,15 +120,15 @@ kernel! {
                     }
                     continue;
                 }
-                let own = inverted(l, stride, inverse, k);
+                let inverse_block = inverse_triangle(l, stride, inverse, k);
                 for x in x.chunks_exact_mut(x_stride) {
-                    let here = &mut lines_mut(&mut x[k..k + LANES])[0];
+                    let unknowns = &mut lines_mut(&mut x[k..k + LANES])[0];
                     let (mut even, mut odd) = (V::splat(0.0), V::splat(0.0));
                     for j in (0..LANES).step_by(2) {
-                        even = even.add_product(V::splat(here[j]), V::load(&own[j]));
-                        odd = odd.add_product(V::splat(here[j + 1]), V::load(&own[j + 1]));
+                        even = even.add_product(V::splat(unknowns[j]), V::load(&inverse_block[j]));
+                        odd = odd.add_product(V::splat(unknowns[j + 1]), V::load(&inverse_block[j + 1]));
                     }
-                    even.add_product(V::splat(1.0), odd).store(here);
+                    even.add_product(V::splat(1.0), odd).store(unknowns);
                 }
                 for from in (k + LANES..padded).step_by(NEAR * LANES) {
                     let to = (from + NEAR * LANES).min(padded);

@@ -237,7 +237,7 @@ fn a_start_from_multipliers_ends_where_a_cold_one_does() {
         warm.inequality(a, *limit).unwrap();
     }
     warm.start(&cold.multipliers()).unwrap();
-    for (a, b) in cold.weights().iter().zip(warm.combined()) {
+    for (a, b) in cold.weights().iter().zip(warm.combine_rows()) {
         assert!((a - b).abs() < 1e-10, "the start alone is not there");
     }
     for (_, limit) in &mut stated.inequalities {

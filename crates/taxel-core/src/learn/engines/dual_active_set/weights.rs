@@ -21,7 +21,7 @@ impl DualActiveSet {
     }
 
     /// `-A'u` over the active rows A and their multipliers u.
-    pub(super) fn combined(&self) -> Vec<f64> {
+    pub(super) fn combine_rows(&self) -> Vec<f64> {
         let by: Vec<f64> = self.active.iter().map(|&slot| -self.multipliers[slot]).collect();
         let mut weights = vec![0.0; self.stride];
         add_rows(&self.coefficients, self.stride, &self.active, &by, &mut weights);
@@ -30,7 +30,7 @@ impl DualActiveSet {
 
     /// The excess of the active rows, in their order, padded to whole lines.
     pub(super) fn residuals(&self, weights: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; self.factor.padded()];
+        let mut out = vec![0.0; self.factor.padded_length()];
         rows_times(&self.coefficients, self.stride, &self.active, weights, &mut out[..self.active.len()]);
         for (value, &slot) in out.iter_mut().zip(&self.active) {
             *value -= self.rows[slot].limit;
@@ -43,7 +43,7 @@ impl DualActiveSet {
         let enough = if last { REFINED } else { 0.1 * TOLERANCE };
         let mut worst = f64::INFINITY;
         for round in 0..4 {
-            self.weights = self.combined();
+            self.weights = self.combine_rows();
             self.update_excess();
             let off = |&slot: &usize| self.excess[slot].abs() * self.rows[slot].length.max(1.0);
             let now = self.active.iter().map(off).fold(0.0, f64::max);

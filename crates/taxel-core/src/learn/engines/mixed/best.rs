@@ -71,7 +71,7 @@ impl<'a> BestPoint<'a> {
 
     pub(super) fn offer(&mut self, point: PrimalDualPoint, guess: Option<Guess>) {
         let objective = self.program.objective(&point.weights);
-        let met = self.program.met(&point.weights);
+        let met = self.program.meets_rows(&point.weights);
         let bound = self.program.bound(&point);
         if bound > self.bound {
             (self.bound, self.proof) = (bound, point.clone());
@@ -127,7 +127,7 @@ impl<'a> BestPoint<'a> {
         }
     }
 
-    pub(super) fn found(self, engine: Engine, stopped: bool, state: PrimalDual) -> MixedMinimum {
+    pub(super) fn minimum(self, engine: Engine, stopped: bool, state: PrimalDual) -> MixedMinimum {
         let program = self.program;
         let multipliers = self.point.inequality.iter().zip(&program.of_below);
         MixedMinimum {

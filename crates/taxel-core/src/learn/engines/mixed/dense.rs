@@ -70,7 +70,7 @@ impl Cholesky {
     }
 
     /// `L^-1` times each row; the rows are stored one after the other.
-    pub(super) fn halve(&self, rows: &[f64]) -> Vec<f64> {
+    pub(super) fn multiply_by_inverse(&self, rows: &[f64]) -> Vec<f64> {
         let n = self.0.nrows();
         let mut out = rows.to_vec();
         let count = rows.len() / n.max(1);

@@ -206,7 +206,7 @@ impl<'a> Interior<'a> {
         let program = self.program;
         let mut sum = -dot(&state.equality, &program.equal_to) - dot(&state.inequality, &program.limit);
         for (j, &g) in r.gradient.iter().enumerate() {
-            sum += program.least(j, g);
+            sum += program.least_cost(j, g);
         }
         sum - program.tangent(&r.w)
     }

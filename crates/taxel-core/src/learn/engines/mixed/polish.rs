@@ -42,7 +42,7 @@ pub(super) fn polish(
         }
         polish.solve()?;
         let point = polish.point();
-        if program.met(&point.weights) {
+        if program.meets_rows(&point.weights) {
             let gap = program.gap(&point);
             if best.as_ref().is_none_or(|b| gap < b.0) {
                 best = Some((gap, point, polish.guess.clone()));

@@ -151,7 +151,7 @@ impl Program {
         HardRows { equal: &self.equal, equal_to: &self.equal_to, below: &self.below, limit: &self.limit }
     }
 
-    pub(super) fn missed(&self, w: &[f64]) -> Vec<f64> {
+    pub(super) fn shortfalls(&self, w: &[f64]) -> Vec<f64> {
         if self.lift > 0.0 {
             times(&self.behind, w).iter().zip(&self.wanted).map(|(u, m)| u - m).collect()
         } else {
@@ -161,7 +161,7 @@ impl Program {
 
     pub(super) fn objective(&self, w: &[f64]) -> f64 {
         let square = dot(w, w);
-        let missed = self.missed(w);
+        let missed = self.shortfalls(w);
         self.l1 * w.iter().map(|w| w.abs()).sum::<f64>()
             + self.l2 * if self.norm == Norm::Square { square } else { square.sqrt() }
             + self.lift * dot(&missed, &missed)
@@ -171,7 +171,7 @@ impl Program {
     pub(super) fn slope(&self, w: &[f64]) -> Vec<f64> {
         let mut slope = vec![0.0; w.len()];
         if self.lift > 0.0 {
-            let mut missed = self.missed(w);
+            let mut missed = self.shortfalls(w);
             missed.iter_mut().for_each(|m| *m *= 2.0 * self.lift);
             add_sum(&self.behind, &missed, &mut slope);
         }
@@ -183,14 +183,14 @@ impl Program {
 
     /// The amount by which the tangent of the smooth terms at `w` is below 0 at weights of 0.
     pub(super) fn tangent(&self, w: &[f64]) -> f64 {
-        let missed = self.missed(w);
+        let missed = self.shortfalls(w);
         let lift: f64 = missed.iter().zip(&self.wanted).map(|(x, m)| x * (2.0 * m + x)).sum();
         let square = if self.norm == Norm::Square { self.l2 * dot(w, w) } else { 0.0 };
         self.lift * lift + square
     }
 
     /// The least value of `slope v + l1 |v|` between the bounds of weight `j`.
-    pub(super) fn least(&self, j: usize, slope: f64) -> f64 {
+    pub(super) fn least_cost(&self, j: usize, slope: f64) -> f64 {
         let cost = |v: f64| slope * v + self.l1 * v.abs();
         let (lower, upper) = (self.lower[j], self.upper[j]);
         let ends = cost(lower).min(cost(upper));
@@ -217,7 +217,7 @@ impl Program {
         equal.chain(below).chain(bounds).fold(0.0, f64::max)
     }
 
-    pub(super) fn met(&self, w: &[f64]) -> bool {
+    pub(super) fn meets_rows(&self, w: &[f64]) -> bool {
         w.iter().all(|w| w.is_finite()) && self.missing(w) <= MET * (self.width() as f64).sqrt().max(10.0)
     }
 
@@ -302,7 +302,7 @@ impl Program {
                 .zip(&self.of_below)
                 .map(|(z, scale)| z.max(0.0) * self.cost / scale)
                 .collect(),
-            behind: self.missed(weights).into_iter().map(lifted).collect(),
+            behind: self.shortfalls(weights).into_iter().map(lifted).collect(),
             pull: pull.iter().zip(weights).map(pulled).collect(),
         }
     }
@@ -338,7 +338,7 @@ impl Program {
         add(&self.below, &inequality, &self.limit);
         if self.lift > 0.0 {
             // x^2 >= 2 m x - m^2 for any m; here x = behind.w - wanted.
-            let missed = self.missed(w);
+            let missed = self.shortfalls(w);
             let factors: Vec<f64> = missed.iter().map(|m| 2.0 * self.lift * m).collect();
             let values: Vec<f64> = missed.iter().zip(&self.wanted).map(|(m, wanted)| wanted + 0.5 * m).collect();
             add(&self.behind, &factors, &values);
@@ -360,7 +360,7 @@ impl Program {
         }
         let mut rounding = 0.0;
         for k in 0..n {
-            let least = self.least(k, slope[k]);
+            let least = self.least_cost(k, slope[k]);
             let most = self.lower[k].abs().max(self.upper[k].abs());
             value += least;
             size += least.abs();

@@ -57,10 +57,10 @@ impl Program {
         };
         let mut engine = DualActiveSet::new(&room(&self.lower, f64::NEG_INFINITY), &room(&self.upper, f64::INFINITY))?;
         let mut row = vec![0.0; n + targets];
-        let mut state = |coefficients: &[f64], limit: f64, of: Option<usize>| {
+        let mut state = |coefficients: &[f64], limit: f64, behind: Option<usize>| {
             row[n..].fill(0.0);
             row[..n].copy_from_slice(coefficients);
-            if let Some(k) = of {
+            if let Some(k) = behind {
                 row[n + k] = -scale;
             }
             (row.clone(), limit - dot(coefficients, centre))

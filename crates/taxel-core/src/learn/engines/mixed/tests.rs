@@ -308,8 +308,8 @@ fn from_what_clarabel_finds_the_same_objective_is_reached() {
         assert!(best.met && best.gap() <= 1e-8);
         let native = problem.solve();
         assert_eq!(native.engine, Engine::Native);
-        let (one, other) = (best.objective * program.cost, problem.objective(&native.weights));
-        assert!((one - other).abs() <= 2e-8 * other, "{one} and {other}");
+        let (ours, native) = (best.objective * program.cost, problem.objective(&native.weights));
+        assert!((ours - native).abs() <= 2e-8 * native, "{ours} and {native}");
     }
 }
 

@@ -66,7 +66,7 @@ impl SelectedLanes {
     /// Moves the selected lanes of a vector to the front of each half.
     #[inline]
     #[target_feature(enable = "avx2")]
-    fn of(&self, lanes: __m256i) -> [__m128i; 2] {
+    fn look_up(&self, lanes: __m256i) -> [__m128i; 2] {
         let lanes = _mm256_shuffle_epi8(lanes, self.shuffle);
         [_mm256_castsi256_si128(lanes), _mm256_extracti128_si256::<1>(lanes)]
     }
@@ -75,7 +75,7 @@ impl SelectedLanes {
 /// Shifts the 16-bit lanes up by one; lane 0 becomes the last lane of `before`.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn one_up(before: __m256i, lanes: __m256i) -> __m256i {
+fn shift_lane_up(before: __m256i, lanes: __m256i) -> __m256i {
     _mm256_alignr_epi8::<14>(lanes, _mm256_permute2x128_si256::<0x21>(before, lanes))
 }
 
@@ -166,10 +166,10 @@ pub(super) unsafe fn blocks(
         let farthest;
         if intensities == 0 {
             // The stamps do not fall, so each is ahead of the latest time if it is ahead of the stamp before it.
-            let before = one_up(zero, ahead);
+            let before = shift_lane_up(zero, ahead);
             let rising = low_bits(_mm256_cmpeq_epi16(_mm256_max_epu16(ahead, before), ahead)) == u32::MAX;
             farthest = value(bytes, at + WORD_BYTES * (WORDS - 1)).wrapping_sub(base);
-            if !rising || farthest > state.farthest() {
+            if !rising || farthest > state.largest_lead() {
                 break;
             }
             let p = _mm_packus_epi16(_mm256_castsi256_si128(polarity), _mm256_extracti128_si256::<1>(polarity));
@@ -201,12 +201,12 @@ pub(super) unsafe fn blocks(
             let before = _mm_slli_si128::<2>(ahead);
             let rising = _mm_movemask_epi8(_mm_cmpeq_epi16(_mm_max_epu16(ahead, before), ahead)) == 0xffff;
             farthest = value(bytes, at + WORD_BYTES * (WORDS - 2)).wrapping_sub(base);
-            if !rising || farthest > state.farthest() {
+            if !rising || farthest > state.largest_lead() {
                 break;
             }
             filling.begin_pairs();
             if open == 1 {
-                filling.without_intensity();
+                filling.clear_intensity();
             }
             let p = changes(polarity);
             // SAFETY: at least 16 words are left, so 8 rows fit after `first`.
@@ -237,12 +237,12 @@ pub(super) unsafe fn blocks(
             greatest = _mm256_max_epu16(greatest, _mm256_shuffle_epi8(half, last_lane));
             let rising = _mm256_or_si256(_mm256_cmpeq_epi16(greatest, ahead), intensity);
             farthest = _mm256_extract_epi16::<15>(greatest) as u16;
-            if low_bits(rising) != u32::MAX || farthest > state.farthest() {
+            if low_bits(rising) != u32::MAX || farthest > state.largest_lead() {
                 break;
             }
             // An intensity is paired if the word before it is a change of the same taxel.
-            let same = _mm256_cmpeq_epi16(place, one_up(place_before, place));
-            let behind_change = one_up(_mm256_set1_epi16(-(open as i16)), change);
+            let same = _mm256_cmpeq_epi16(place, shift_lane_up(place_before, place));
+            let behind_change = shift_lane_up(_mm256_set1_epi16(-(open as i16)), change);
             let pair = _mm256_and_si256(_mm256_and_si256(intensity, behind_change), same);
             let pairs = mask(pair);
             if pairs == SPLIT_PAIRS {
@@ -255,8 +255,8 @@ pub(super) unsafe fn blocks(
                 filling.begin_pairs();
             }
             let rows = SelectedLanes::new(changes);
-            let ([t_early, t_late], [early, late]) = (rows.of(ahead), rows.of(place));
-            let [p_early, p_late] = rows.of(polarity);
+            let ([t_early, t_late], [early, late]) = (rows.look_up(ahead), rows.look_up(place));
+            let [p_early, p_late] = rows.look_up(polarity);
             let (columns, row_bits) = (_mm_set1_epi16(0x3f), |place| _mm_srli_epi16::<8>(place));
             // SAFETY: at least 16 words are left, so 16 rows fit after `first`: up to 8 for each half.
             unsafe {
@@ -278,8 +278,8 @@ pub(super) unsafe fn blocks(
             if filling.paired {
                 // For each change, from the open one before the block on, the lane after it: its intensity, or none.
                 let behind = SelectedLanes::new(changes << 1 | open);
-                let [ticks_early, ticks_late] = behind.of(_mm256_and_si256(values, pair));
-                let [there_early, there_late] = behind.of(_mm256_srli_epi16::<15>(pair));
+                let [ticks_early, ticks_late] = behind.look_up(_mm256_and_si256(values, pair));
+                let [there_early, there_late] = behind.look_up(_mm256_srli_epi16::<15>(pair));
                 // SAFETY: as above; if a change is open, a row precedes `first`.
                 unsafe {
                     let ticks = filling.room.ticks.as_mut_ptr().add(first - open as usize);
@@ -301,7 +301,7 @@ pub(super) unsafe fn blocks(
     }
     filling.open = open == 1;
     if filling.open && filling.paired {
-        filling.without_intensity();
+        filling.clear_intensity();
     }
     at
 }

@@ -44,10 +44,10 @@ static PLACE: Fetch = Fetch::new([Some(3), Some(4)]);
 static HEAD: Fetch = Fetch::new([Some(0), None]);
 
 /// For each 16-bit lane, the index of the lane below it, and of the lane above it.
-static ONE_UP: [u8; 64] = shifted(-1);
-static ONE_DOWN: [u8; 64] = shifted(1);
+static ONE_UP: [u8; 64] = shift_table(-1);
+static ONE_DOWN: [u8; 64] = shift_table(1);
 
-const fn shifted(by: i32) -> [u8; 64] {
+const fn shift_table(by: i32) -> [u8; 64] {
     let mut lanes = [0; 64];
     let mut k = 0;
     while k < WORDS {
@@ -140,7 +140,7 @@ pub(super) unsafe fn blocks(
             let last = 31 - changes.leading_zeros() as usize;
             value(bytes, at + WORD_BYTES * last).wrapping_sub(base)
         };
-        if rising != u32::MAX || farthest > state.farthest() {
+        if rising != u32::MAX || farthest > state.largest_lead() {
             break;
         }
 

@@ -21,7 +21,7 @@ pub(crate) struct Carried {
 impl Carried {
     /// Largest distance of a stamp ahead of the current time; 0 or more until `until` is passed.
     #[inline(always)]
-    pub(super) fn farthest(&self) -> u16 {
+    pub(super) fn largest_lead(&self) -> u16 {
         (self.until - self.latest).min(FARTHEST_AHEAD) as u16
     }
 }

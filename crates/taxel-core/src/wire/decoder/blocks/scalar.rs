@@ -33,7 +33,7 @@ pub(super) fn words(
             break;
         }
         if word[0] & 0x20 == 0 {
-            if ahead > state.farthest() {
+            if ahead > state.largest_lead() {
                 break;
             }
             state.latest += i64::from(ahead);

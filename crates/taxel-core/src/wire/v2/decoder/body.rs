@@ -19,7 +19,7 @@ impl Decoder {
         number: Option<i64>,
         out: &mut impl Table,
     ) {
-        let Some(kind) = BodyKind::of(header.kind) else {
+        let Some(kind) = BodyKind::from_number(header.kind) else {
             self.counts.unknown_kind += 1;
             return;
         };

@@ -48,7 +48,7 @@ impl<'a> RunDecoder<'a> {
         latest: &'a mut i64,
         counts: &'a mut Counts,
     ) -> Option<(Self, u32)> {
-        let kind = BodyKind::of(short(datagram).then(|| DatagramHeader::fields(datagram).0.kind)?)?;
+        let kind = BodyKind::from_number(short(datagram).then(|| DatagramHeader::fields(datagram).0.kind)?)?;
         if !matches!(kind, BodyKind::Changes | BodyKind::Small | BodyKind::Large) {
             return None;
         }
@@ -142,7 +142,7 @@ impl<'a> RunDecoder<'a> {
                 let eight = Eight::read::<VALUE>(datagram, at, count, passed, self.held)?;
                 eight.write::<VALUE>(t, room, row, paired);
                 if VALUE > 0 && eight.n > 0 {
-                    eight.hold(t, self.held);
+                    eight.store(t, self.held);
                 }
                 (row, passed) = (row + eight.n, eight.passed);
             }

@@ -32,7 +32,7 @@ pub(super) struct BoardSession {
     pub(super) from: i64,
     pub(super) filled: i64,
     /// A bit for each number modulo the window: whether its datagram has arrived.
-    seen: Vec<u64>,
+    received_bits: Vec<u64>,
     /// Half of the checksum of the datagram that came under each number, counted from the first one modulo the window; as
     /// many as were needed so far, as most streams are short.
     sums: Vec<u16>,
@@ -58,7 +58,7 @@ impl BoardSession {
             received: 0,
             from: i64::MIN,
             filled: 0,
-            seen: vec![0; WINDOW / 64],
+            received_bits: vec![0; WINDOW / 64],
             sums: vec![],
             first,
             offset,
@@ -80,7 +80,7 @@ impl BoardSession {
     /// Whether the datagram of a number was received: one within the window, and at most the highest.
     pub(super) fn has(&self, number: i64) -> bool {
         let (word, bit) = place(number);
-        self.seen[word] & bit != 0
+        self.received_bits[word] & bit != 0
     }
 
     /// Whether a number came before, with other contents.
@@ -116,12 +116,12 @@ impl BoardSession {
     fn note_ahead(&mut self, number: i64, sum: u32) {
         let (word, bit) = place(number);
         let between = (number - self.highest - 1) as u32;
-        let here = between.min(bit.trailing_zeros());
+        let in_word = between.min(bit.trailing_zeros());
         // Masks of the bits just below the number's bit, and at the top of the word before.
-        let below = bit - (bit >> here);
-        let before = (u64::MAX << 1) << (63 - (between - here));
-        self.seen[(word + WINDOW / 64 - 1) % (WINDOW / 64)] &= !before;
-        self.seen[word] = self.seen[word] & !below | bit;
+        let below = bit - (bit >> in_word);
+        let before = (u64::MAX << 1) << (63 - (between - in_word));
+        self.received_bits[(word + WINDOW / 64 - 1) % (WINDOW / 64)] &= !before;
+        self.received_bits[word] = self.received_bits[word] & !below | bit;
         self.store(number, sum);
         (self.highest, self.received) = (number, self.received + 1);
     }
@@ -142,7 +142,7 @@ impl BoardSession {
         }
         let (word, bit) = place(number);
         self.store(number, sum);
-        self.seen[word] |= bit;
+        self.received_bits[word] |= bit;
         self.received += 1;
         if number < self.from {
             self.filled += missing as i64 - self.missing() as i64;
@@ -175,7 +175,7 @@ impl BoardSession {
         while first <= last {
             let (word, bit) = place(first);
             let numbers = (64 - i64::from(bit.trailing_zeros())).min(last + 1 - first);
-            self.seen[word] &= !(bit.wrapping_mul(u64::MAX >> (64 - numbers)));
+            self.received_bits[word] &= !(bit.wrapping_mul(u64::MAX >> (64 - numbers)));
             first += numbers;
         }
     }
@@ -212,7 +212,7 @@ mod tests {
             };
             header.write(&[], &mut bytes);
             let mut session = BoardSession::new(&header, 0, false);
-            let (mut seen, mut highest) = (BTreeSet::from([i64::from(begin)]), i64::from(begin));
+            let (mut received_bits, mut highest) = (BTreeSet::from([i64::from(begin)]), i64::from(begin));
             let mut sums = BTreeMap::from([(highest, 7)]);
             assert_eq!(session.note(highest, 7), Noted::New);
             for _ in 0..20_000 {
@@ -221,7 +221,7 @@ mod tests {
                 let sum = random.random_range(0..3);
                 let expected = match number > highest - WINDOW as i64 {
                     false => Noted::Old,
-                    true if seen.insert(number) => Noted::New,
+                    true if received_bits.insert(number) => Noted::New,
                     true if sums[&number] == sum => Noted::Again,
                     true => Noted::Unlike,
                 };
@@ -231,7 +231,10 @@ mod tests {
                 }
                 highest = highest.max(number);
             }
-            assert_eq!(session.missing(), (highest + 1 - seen.first().unwrap()) as u64 - seen.len() as u64);
+            assert_eq!(
+                session.missing(),
+                (highest + 1 - received_bits.first().unwrap()) as u64 - received_bits.len() as u64
+            );
         }
     }
 }

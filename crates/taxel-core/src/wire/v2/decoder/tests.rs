@@ -60,8 +60,8 @@ fn a_recording_misses_what_is_lost_since_it_began_whatever_comes_late_from_befor
         let mut order: Vec<u32> = (7..200).filter(|_| draw.random_bool(0.9)).collect();
         for k in 0..order.len() {
             if draw.random_bool(0.1) {
-                let other = (k + draw.random_range(0..20)).min(order.len() - 1);
-                order[k..=other].rotate_left(1);
+                let last = (k + draw.random_range(0..20)).min(order.len() - 1);
+                order[k..=last].rotate_left(1);
             }
         }
         let (before, since) = order.split_at(begins as usize);

@@ -66,7 +66,7 @@ impl Interior<'_> {
         }
         (0..n).for_each(|j| matrix[(j, j)] += diagonal[j] + ridge);
         let factor = Cholesky::new(matrix)?;
-        let half = factor.halve(&self.program.equal);
+        let half = factor.multiply_by_inverse(&self.program.equal);
         let schur = if self.program.equal_to.is_empty() {
             None
         } else {
@@ -103,7 +103,7 @@ impl Newton<'_> {
         out
     }
 
-    fn once(&self, w: &[f64], equality: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    fn solve_once(&self, w: &[f64], equality: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut right = w.to_vec();
         let weighted: Vec<f64> = equality.iter().map(|e| self.weight * e).collect();
         add_sum(&self.inner.program.equal, &weighted, &mut right);
@@ -148,7 +148,7 @@ impl Newton<'_> {
             cone = Some((h, m00, m01));
         }
         let equality: Vec<f64> = r.equality.iter().map(|e| -e).collect();
-        let (mut w, mut du) = self.once(&right, &equality);
+        let (mut w, mut du) = self.solve_once(&right, &equality);
         let size = right.iter().chain(&equality).fold(0.0_f64, |m, x| m.max(x.abs()));
         for _ in 0..MOST_REFINEMENTS {
             let mut left = self.times(&w);
@@ -159,7 +159,7 @@ impl Newton<'_> {
             if off <= REFINED * size {
                 break;
             }
-            let (cw, cu) = self.once(&rw, &re);
+            let (cw, cu) = self.solve_once(&rw, &re);
             w.iter_mut().zip(&cw).for_each(|(a, b)| *a += b);
             du.iter_mut().zip(&cu).for_each(|(a, b)| *a += b);
         }

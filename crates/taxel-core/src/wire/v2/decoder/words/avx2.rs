@@ -32,7 +32,7 @@ pub(super) unsafe fn blocks<const VALUE: u32>(
         unsafe {
             eight.write::<VALUE>(body.t, room, body.rows, paired);
             if VALUE > 0 && eight.n > 0 {
-                eight.hold_neighbours(body.t, held);
+                eight.store_neighbours(body.t, held);
             }
         }
         if eight.n > 0 {

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::body::BodyReader;
-use super::eight::{EIGHT, FULL, hold_eight};
+use super::eight::{EIGHT, FULL, store_eight};
 use crate::wire::columns::Room;
 use crate::wire::v2::decoder::held::ValuesByLine;
 
@@ -73,7 +73,7 @@ struct Words {
 struct BlockEvents {
     n: usize,
     /// Mask of the first `n` lanes.
-    given: u32,
+    lanes: u32,
     position: __m512i,
     x: __m512i,
     y: __m512i,
@@ -164,25 +164,25 @@ impl Constants {
     /// The events among the words, whose positions count from 1; none if an event is outside the array.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    fn found(&self, words: &Words, events: u32, from_1: __m512i) -> Option<BlockEvents> {
+    fn compress_events(&self, words: &Words, events: u32, from_1: __m512i) -> Option<BlockEvents> {
         let n = events.count_ones() as usize;
         let position = _mm512_maskz_compress_epi16(events, _mm512_sub_epi16(from_1, _mm512_set1_epi16(1)));
         let ticks = _mm512_maskz_compress_epi16(events, words.value);
         let p = _pext_u32(words.polarity, events);
-        let given = _bzhi_u32(u32::MAX, n as u32);
+        let lanes = _bzhi_u32(u32::MAX, n as u32);
         let (x, y) = (_mm512_srl_epi16(position, self.stride), _mm512_and_si512(position, self.row_mask));
         let outside = _mm512_cmpge_epu16_mask(x, self.columns) | _mm512_cmpge_epu16_mask(y, self.rows);
-        (outside & given == 0).then_some(BlockEvents { n, given, position, x, y, ticks, p })
+        (outside & lanes == 0).then_some(BlockEvents { n, lanes, position, x, y, ticks, p })
     }
 
     /// Stores the taxels' new values, of one or more events at time `t`.
     ///
     /// # Safety
     ///
-    /// `found` must come from [`Self::found`], with positions in `held`.
+    /// `found` must come from [`Self::compress_events`], with positions in `held`.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    unsafe fn hold(&self, found: &BlockEvents, t: i64, held: &mut ValuesByLine) {
+    unsafe fn store(&self, found: &BlockEvents, t: i64, held: &mut ValuesByLine) {
         held.newest = t;
         // Lanes without an event repeat the last one, so that the loop has one of two lengths, which a processor can
         // predict.
@@ -195,12 +195,12 @@ impl Constants {
             unsafe {
                 _mm512_store_si512(at.0.as_mut_ptr().cast(), places);
                 _mm512_store_si512(ticks.0.as_mut_ptr().cast(), values);
-                hold_many(&at, &ticks, t, held);
+                store_many(&at, &ticks, t, held);
             }
             return;
         }
         // SAFETY: the positions are those of events.
-        unsafe { hold_eight(_mm512_castsi512_si128(places), _mm512_castsi512_si128(values), t, held) }
+        unsafe { store_eight(_mm512_castsi512_si128(places), _mm512_castsi512_si128(values), t, held) }
     }
 }
 
@@ -208,7 +208,7 @@ impl Constants {
 ///
 /// The positions must be in `held`.
 #[inline(never)]
-unsafe fn hold_many(places: &WordLanes, values: &WordLanes, t: i64, held: &mut ValuesByLine) {
+unsafe fn store_many(places: &WordLanes, values: &WordLanes, t: i64, held: &mut ValuesByLine) {
     for (&place, &value) in places.0.iter().zip(&values.0) {
         // SAFETY: the caller guarantees this.
         unsafe {
@@ -222,20 +222,20 @@ unsafe fn hold_many(places: &WordLanes, values: &WordLanes, t: i64, held: &mut V
 ///
 /// # Safety
 ///
-/// The positions from `begin` on, as many as `given` has lanes, must be in `held`.
+/// The positions from `begin` on, as many as `lanes` has lanes, must be in `held`.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-unsafe fn hold_neighbours(begin: usize, given: u32, ticks: __m512i, t: i64, held: &mut ValuesByLine) {
+unsafe fn store_neighbours(begin: usize, lanes: u32, ticks: __m512i, t: i64, held: &mut ValuesByLine) {
     held.newest = t;
     let times = _mm512_set1_epi64(t);
     // SAFETY: the caller guarantees this.
     unsafe {
-        _mm512_mask_storeu_epi16(held.values.as_mut_ptr().add(begin).cast(), given, ticks);
+        _mm512_mask_storeu_epi16(held.values.as_mut_ptr().add(begin).cast(), lanes, ticks);
         let since = held.since.as_mut_ptr().add(begin);
-        _mm512_mask_storeu_epi64(since, given as u8, times);
-        _mm512_mask_storeu_epi64(since.wrapping_add(8), (given >> 8) as u8, times);
-        _mm512_mask_storeu_epi64(since.wrapping_add(16), (given >> 16) as u8, times);
-        _mm512_mask_storeu_epi64(since.wrapping_add(24), (given >> 24) as u8, times);
+        _mm512_mask_storeu_epi64(since, lanes as u8, times);
+        _mm512_mask_storeu_epi64(since.wrapping_add(8), (lanes >> 8) as u8, times);
+        _mm512_mask_storeu_epi64(since.wrapping_add(16), (lanes >> 16) as u8, times);
+        _mm512_mask_storeu_epi64(since.wrapping_add(24), (lanes >> 24) as u8, times);
     }
 }
 
@@ -260,7 +260,7 @@ impl BlockEvents {
             }
             _mm512_storeu_si512(room.x.as_mut_ptr().add(first).cast(), self.x);
             _mm512_storeu_si512(room.y.as_mut_ptr().add(first).cast(), self.y);
-            _mm256_storeu_si256(room.p.as_mut_ptr().add(first).cast(), _mm256_maskz_set1_epi8(self.p & self.given, 1));
+            _mm256_storeu_si256(room.p.as_mut_ptr().add(first).cast(), _mm256_maskz_set1_epi8(self.p & self.lanes, 1));
             if paired {
                 let present = _mm256_set1_epi8(i8::from(VALUE > 0));
                 let ticks = if VALUE > 0 { self.ticks } else { _mm512_setzero_si512() };
@@ -315,7 +315,7 @@ pub(super) unsafe fn blocks<const VALUE: u32>(
         if last == FULL {
             return;
         }
-        let Some(found) = constants.found(&words, taken & !words.controls, from_1) else { return };
+        let Some(found) = constants.compress_events(&words, taken & !words.controls, from_1) else { return };
         // SAFETY: the caller guarantees that 32 rows fit after the rows so far.
         unsafe { found.write::<VALUE>(body.t, room, body.rows, paired) };
         if VALUE > 0 && found.n > 0 {
@@ -323,9 +323,9 @@ pub(super) unsafe fn blocks<const VALUE: u32>(
             // SAFETY: the events are on the array, and so in `held`.
             unsafe {
                 if found.n > EIGHT && advances == 0 && usize::from(last) == begin + found.n {
-                    hold_neighbours(begin, found.given, found.ticks, body.t, held);
+                    store_neighbours(begin, found.lanes, found.ticks, body.t, held);
                 } else {
-                    constants.hold(&found, body.t, held);
+                    constants.store(&found, body.t, held);
                 }
             }
         }

@@ -84,7 +84,7 @@ impl Eight {
             }
             let ending = _mm_loadu_si128(words.add(2 * count).sub(REGISTER).cast());
             let to_start = _mm_loadu_si128(TO_START.as_ptr().add(REGISTER - 2 * count).cast());
-            Self::of::<VALUE>(_mm_shuffle_epi8(ending, to_start), _mm_setzero_si128(), lanes, passed, held)
+            Self::from_halves::<VALUE>(_mm_shuffle_epi8(ending, to_start), _mm_setzero_si128(), lanes, passed, held)
         }
     }
 
@@ -102,7 +102,7 @@ impl Eight {
             if VALUE == 16 {
                 return Self::of_large(_mm256_loadu_si256(words.cast()), lanes, passed, held);
             }
-            Self::of::<VALUE>(_mm_loadu_si128(words.cast()), _mm_setzero_si128(), lanes, passed, held)
+            Self::from_halves::<VALUE>(_mm_loadu_si128(words.cast()), _mm_setzero_si128(), lanes, passed, held)
         }
     }
 
@@ -112,14 +112,14 @@ impl Eight {
     fn of_large(words: __m256i, lanes: __m128i, passed: u16, held: &ValuesByLine) -> Option<Self> {
         let halves = |lanes| _mm_packus_epi32(_mm256_castsi256_si128(lanes), _mm256_extracti128_si256::<1>(lanes));
         let value = _mm256_blend_epi16::<0xaa>(words, _mm256_setzero_si256());
-        Self::of::<16>(halves(_mm256_srli_epi32::<16>(words)), halves(value), lanes, passed, held)
+        Self::from_halves::<16>(halves(_mm256_srli_epi32::<16>(words)), halves(value), lanes, passed, held)
     }
 
     /// Decodes the words' halves with polarity and skip, and the values if the halves have none; lanes outside `lanes`
     /// are zero.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
-    fn of<const VALUE: u32>(
+    fn from_halves<const VALUE: u32>(
         head: __m128i,
         value: __m128i,
         lanes: __m128i,
@@ -202,26 +202,26 @@ impl Eight {
     /// The machine must have the features below; `held` must be the one passed to [`Self::read`].
     #[inline]
     #[target_feature(enable = "avx2")]
-    pub(crate) unsafe fn hold(&self, t: i64, held: &mut ValuesByLine) {
+    pub(crate) unsafe fn store(&self, t: i64, held: &mut ValuesByLine) {
         held.newest = t;
         // Lanes without an event repeat the last one, so that no branch depends on the number of events, which no
         // processor can predict.
         // SAFETY: the positions are those of events on the array.
-        unsafe { hold_eight(self.position, self.ticks, t, held) }
+        unsafe { store_eight(self.position, self.ticks, t, held) }
     }
 
-    /// As [`Self::hold`], with a faster path for eight events at consecutive positions.
+    /// As [`Self::store`], with a faster path for eight events at consecutive positions.
     ///
     /// # Safety
     ///
-    /// As for [`Self::hold`].
+    /// As for [`Self::store`].
     #[inline]
     #[target_feature(enable = "avx2")]
-    pub(crate) unsafe fn hold_neighbours(&self, t: i64, held: &mut ValuesByLine) {
+    pub(crate) unsafe fn store_neighbours(&self, t: i64, held: &mut ValuesByLine) {
         let begin = usize::from(_mm_cvtsi128_si32(self.position) as u16);
         if self.n < EIGHT || usize::from(_mm_extract_epi16::<7>(self.position) as u16) - begin >= EIGHT {
             // SAFETY: the caller guarantees this.
-            return unsafe { self.hold(t, held) };
+            return unsafe { self.store(t, held) };
         }
         held.newest = t;
         let times = _mm256_set1_epi64x(t);
@@ -242,7 +242,7 @@ impl Eight {
 /// The machine must have SSE 4.1; all eight places must be in `held`.
 #[inline]
 #[target_feature(enable = "sse4.1")]
-pub(super) unsafe fn hold_eight(places: __m128i, values: __m128i, t: i64, held: &mut ValuesByLine) {
+pub(super) unsafe fn store_eight(places: __m128i, values: __m128i, t: i64, held: &mut ValuesByLine) {
     // Extracts the lanes from registers: loads from memory would wait for the store.
     let halves = |lanes| [_mm_cvtsi128_si64(lanes) as u64, _mm_extract_epi64::<1>(lanes) as u64];
     for (places, values) in halves(places).into_iter().zip(halves(values)) {

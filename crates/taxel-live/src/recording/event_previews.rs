@@ -1,4 +1,4 @@
-//! The low-rate pictures of a recording that is converted from events: the taxels' values, for viewers.
+//! The low-rate previews of a recording that is converted from events: the taxels' values, for viewers.
 
 use std::collections::BTreeSet;
 
@@ -7,13 +7,13 @@ use taxel_core::{EventsView, Result};
 
 use super::LOW_RATE_EVERY;
 
-/// Interval between pictures while there are events, us.
+/// Interval between previews while there are events, us.
 const EVERY_US: i64 = LOW_RATE_EVERY.as_micros() as i64;
 
-/// Interval between pictures around a time of interest (a detection, a note, a marker), us.
+/// Interval between previews around a time of interest (a detection, a note, a marker), us.
 const NEAR_US: i64 = 10_000;
 
-/// The sequence of pictures, in order of time.
+/// The sequence of previews, in order of time.
 #[derive(Debug)]
 pub struct EventPreviews {
     times: std::vec::IntoIter<i64>,
@@ -21,7 +21,7 @@ pub struct EventPreviews {
 }
 
 impl EventPreviews {
-    /// The pictures of events: at each multiple of 100 ms if an event occurred in the 100 ms up to it, and at the
+    /// The previews of events: at each multiple of 100 ms if an event occurred in the 100 ms up to it, and at the
     /// multiples of 10 ms before and after each of the times `around`, within the range of events. None if no event has
     /// an intensity.
     ///
@@ -29,7 +29,7 @@ impl EventPreviews {
     ///
     /// `Problem` if columns are unequal or a taxel is outside the array.
     pub fn new(events: EventsView<'_>, around: &[i64]) -> Result<Self> {
-        // In a picture, the value of a taxel without any event so far is 0.
+        // In a preview, the value of a taxel without any event so far is 0.
         let held = HeldOverTime::new(events, None, vec![0; events.array.len()])?;
         let ends = |t: i64, every: i64| -(-t).div_euclid(every) * every;
         let mut times: BTreeSet<i64> = held.times().map(|t| ends(t, EVERY_US)).collect();
@@ -41,8 +41,8 @@ impl EventPreviews {
         Ok(Self { times: times.into_iter(), held })
     }
 
-    /// The next picture: its time, us, and each taxel's value, by index; 0 for a taxel without any event so far.
-    pub fn next_picture(&mut self) -> Option<(i64, &[u16])> {
+    /// The next preview: its time, us, and each taxel's value, by index; 0 for a taxel without any event so far.
+    pub fn next_preview(&mut self) -> Option<(i64, &[u16])> {
         let time = self.times.next()?;
         Some((time, self.held.at(time)))
     }

@@ -29,7 +29,7 @@ struct Advanced {
 }
 
 impl Advanced {
-    fn of(stream: &ReadoutStream) -> Self {
+    fn new(stream: &ReadoutStream) -> Self {
         Self { stream: Box::new(stream.clone()), found: vec![] }
     }
 
@@ -55,8 +55,8 @@ impl SpeculativeReadout {
     }
 
     /// Assumes that no data arrive before `t` us; adds to `out` the detections that follow.
-    pub(super) fn quiet(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
-        let ahead = self.ahead.get_or_insert_with(|| Advanced::of(&self.certain));
+    pub(super) fn advance_silence(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
+        let ahead = self.ahead.get_or_insert_with(|| Advanced::new(&self.certain));
         let before = ahead.found.len();
         ahead.stream.advance(t, &mut ahead.found)?;
         for detection in &ahead.found[before..] {
@@ -67,7 +67,7 @@ impl SpeculativeReadout {
         }
         let t = QuietUntil::ByHostClock(t).certain();
         if self.certain.now().is_none_or(|now| now < t) {
-            let behind = self.behind.get_or_insert_with(|| Advanced::of(&self.certain));
+            let behind = self.behind.get_or_insert_with(|| Advanced::new(&self.certain));
             behind.stream.advance(t, &mut behind.found)?;
         }
         Ok(())
@@ -151,16 +151,16 @@ mod tests {
     /// A readout that detects once, some 7 ms after a change at taxel 0.
     fn readout() -> SpeculativeReadout {
         let neuron = Neuron { tau: 20.0, refractory: 500.0, theta_0: 0.3, ..Neuron::default() };
-        let one = TrainedNeuron { delay_ms: 0.0, inputs: vec![], weights: vec![1.2; 8], neuron };
+        let cell = TrainedNeuron { delay_ms: 0.0, inputs: vec![], weights: vec![1.2; 8], neuron };
         let readout = Readout {
             encoder: Encoder::from_json(r#"{"name": "change_events"}"#).unwrap(),
             array: None,
             unit: None,
             time: Time::Continuous,
-            after_spike: one.neuron.after_spike,
+            after_spike: cell.neuron.after_spike,
             run_threshold: 1.0,
             delays_ms: vec![0.0],
-            neurons: [("touch".to_owned(), one)].into(),
+            neurons: [("touch".to_owned(), cell)].into(),
             seen: BTreeMap::new(),
         };
         SpeculativeReadout::new(Box::new(readout.stream(&array(), 192.0, None).unwrap()))
@@ -180,9 +180,9 @@ mod tests {
         let (mut ahead, mut out) = (readout(), vec![]);
         ahead.push(event(0, 10).view(), &mut out).unwrap();
         ahead.push(event(1000, 20).view(), &mut out).unwrap();
-        ahead.quiet(5000, &mut out).unwrap();
+        ahead.advance_silence(5000, &mut out).unwrap();
         assert_eq!(out, []);
-        ahead.quiet(20_000, &mut out).unwrap();
+        ahead.advance_silence(20_000, &mut out).unwrap();
         assert_eq!(out.len(), 1);
         ahead.push(event(60_000, 22).view(), &mut out).unwrap();
         ahead.advance(60_000, &mut out).unwrap();
@@ -194,10 +194,10 @@ mod tests {
         let (mut ahead, mut out) = (readout(), vec![]);
         ahead.push(event(0, 10).view(), &mut out).unwrap();
         ahead.push(event(1000, 20).view(), &mut out).unwrap();
-        ahead.quiet(5000, &mut out).unwrap();
+        ahead.advance_silence(5000, &mut out).unwrap();
         // 2 ms before the end of the silence that was assumed.
         ahead.push(event(3000, 30).view(), &mut out).unwrap();
-        ahead.quiet(150_000, &mut out).unwrap();
+        ahead.advance_silence(150_000, &mut out).unwrap();
         let mut straight = readout();
         let mut expected = vec![];
         for (t, ticks) in [(0, 10), (1000, 20), (3000, 30)] {
@@ -219,20 +219,20 @@ mod tests {
                 // From the same stamp up to a minute later; the silence assumed before may end after the event.
                 let pause = 10_f64.powf(random.random_range(0.0..7.8)) as i64 / 100 * 100;
                 for _ in 0..random.random_range(0..4) {
-                    ahead.quiet(t + (pause as f64 * random.random_range(0.0..1.6)) as i64, &mut out).unwrap();
+                    ahead.advance_silence(t + (pause as f64 * random.random_range(0.0..1.6)) as i64, &mut out).unwrap();
                 }
                 t += pause;
                 ticks += random.random_range(0..12);
-                for (one, found) in [(&mut ahead, &mut out), (&mut straight, &mut expected)] {
-                    one.push(event(t, ticks).view(), found).unwrap();
+                for (stream, found) in [(&mut ahead, &mut out), (&mut straight, &mut expected)] {
+                    stream.push(event(t, ticks).view(), found).unwrap();
                 }
             }
-            for (one, found) in [(&mut ahead, &mut out), (&mut straight, &mut expected)] {
-                one.advance(t + 1_000_000, found).unwrap();
+            for (stream, found) in [(&mut ahead, &mut out), (&mut straight, &mut expected)] {
+                stream.advance(t + 1_000_000, found).unwrap();
             }
             assert_eq!((ahead.late(), out.len() as u64), (0, expected.len() as u64 + ahead.wrong()), "{round}");
-            for one in &expected {
-                assert!(out.iter().any(|other| same(one, other)), "{round}: {one:?} is not among {out:?}");
+            for detection in &expected {
+                assert!(out.iter().any(|found| same(detection, found)), "{round}: {detection:?} is not among {out:?}");
             }
         }
     }
@@ -242,7 +242,7 @@ mod tests {
         let (mut ahead, mut out) = (readout(), vec![]);
         ahead.push(event(0, 10).view(), &mut out).unwrap();
         ahead.push(event(1000, 20).view(), &mut out).unwrap();
-        ahead.quiet(20_000, &mut out).unwrap();
+        ahead.advance_silence(20_000, &mut out).unwrap();
         let early = out.clone();
         // The event was before the crossing, which therefore was earlier: the detection is output again, as from the
         // recording.

@@ -1,4 +1,4 @@
-//! The low-rate picture: values above rest in grey, so that a viewer shows touches and not the sensor's rest.
+//! The low-rate preview: values above rest in grey, so that a viewer shows touches and not the sensor's rest.
 
 use std::collections::VecDeque;
 
@@ -9,14 +9,14 @@ use taxel_core::tracked_rest::TrackedRest;
 /// White is the largest value of this period, us.
 const SCALE_US: i64 = 10_000_000;
 
-/// Largest age of a picture relative to the latest one, us, at which it is drawn with that one's scale.
+/// Largest age of a preview relative to the latest one, us, at which it is drawn with that one's scale.
 const LATE_US: i64 = 1_000_000;
 
 /// From values to grey: what each taxel reads at rest, and how strongly it was pressed lately.
 #[derive(Debug)]
 pub(super) struct GreyScale {
     rest: Rest<f64>,
-    /// The rest as it is tracked, from the first picture on, unless a tare was given.
+    /// The rest as it is tracked, from the first preview on, unless a tare was given.
     tracked: Option<TrackedRest>,
     tared: bool,
     white: White,
@@ -29,7 +29,7 @@ pub(super) struct White {
     peaks: VecDeque<(i64, f64)>,
 }
 
-/// A picture, and the meaning of its grey values.
+/// A preview, and the meaning of its grey values.
 #[derive(Debug, PartialEq)]
 pub(super) struct GreyPreview {
     /// 0 at rest, 255 at `full`, row by row.
@@ -61,12 +61,12 @@ impl GreyScale {
         }
     }
 
-    /// What white is, for pictures that are above rest already.
+    /// What white is, for previews that are above rest already.
     pub(super) fn white(&mut self) -> &mut White {
         &mut self.white
     }
 
-    /// The grey picture of the values at `t_us`; a value of 0 is also that of a taxel without any event so far.
+    /// The grey preview of the values at `t_us`; a value of 0 is also that of a taxel without any event so far.
     pub(super) fn draw(&mut self, t_us: i64, columns: usize, held: &[u16]) -> GreyPreview {
         if self.rest.values().len() != held.len() {
             *self = Self::new(held.len());
@@ -93,7 +93,7 @@ impl GreyScale {
 }
 
 impl White {
-    /// The grey values of a picture above rest, and the value of white, which is at least `least`.
+    /// The grey values of a preview above rest, and the value of white, which is at least `least`.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub(super) fn grey(&mut self, t_us: i64, above: &[f64], least: f64) -> (Vec<u8>, f64) {
         let peak = above.iter().copied().fold(0.0, f64::max);
@@ -153,12 +153,12 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_that_comes_late_keeps_the_scale() {
+    fn a_preview_that_comes_late_keeps_the_scale() {
         let mut scale = tared(&[100.0]);
         scale.draw(0, 1, &[100]);
         assert_eq!(scale.draw(1_000_000, 1, &[140]).full, 40.0);
         assert_eq!(scale.draw(1_500_000, 1, &[120]).full, 40.0);
-        // Pictures from half a second ago, weaker and stronger than the latest values.
+        // Previews from half a second ago, weaker and stronger than the latest values.
         assert_eq!(scale.draw(1_400_000, 1, &[110]).bytes, [64]);
         assert_eq!(scale.draw(1_450_000, 1, &[180]).full, 80.0);
         assert_eq!(scale.draw(1_600_000, 1, &[140]).bytes, [128]);

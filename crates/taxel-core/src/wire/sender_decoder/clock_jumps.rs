@@ -11,15 +11,11 @@ const JUMP_US: i64 = 1_000_000;
 /// Reading: a board's clock drifts less than 1 in this against the host's.
 const DRIFT: i64 = 1000;
 
-/// The jumps of a sender's time ahead of the host's clock, and after which time they make times doubtful.
+/// Detects jumps of a sender's time ahead of the host's clock.
 ///
 /// Compared are datagrams: how far the last stamp of each is ahead of its arrival, against the most before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct ClockJumps {
-    /// Number of jumps.
-    pub jumps: u64,
-    /// The newest time before the first jump, us; times after it are doubtful.
-    pub after: Option<i64>,
+pub(super) struct ClockJumps {
     /// The most that a stamp was ahead of its arrival, us, and the last arrival.
     most: Option<(i64, i64)>,
     /// How much farther ahead the last datagram was, and the newest time before it, if that was more than
@@ -28,8 +24,9 @@ pub struct ClockJumps {
 }
 
 impl ClockJumps {
-    /// Notes a datagram: the newest time before it, the times of its first and its last stamp, and its arrival, us.
-    pub(super) fn note(&mut self, newest: Option<i64>, first: i64, last: i64, arrived: i64) {
+    /// Notes a datagram: the newest time before it, the times of its first and its last stamp, and its arrival, us. Returns the
+    /// newest time before the jump if this datagram shows one.
+    pub(super) fn note(&mut self, newest: Option<i64>, first: i64, last: i64, arrived: i64) -> Option<i64> {
         let ahead = |t: i64| t.saturating_sub(arrived);
         let allowed = match self.most {
             Some((most, then)) if then <= arrived => most.saturating_sub(arrived.saturating_sub(then) / DRIFT),
@@ -39,14 +36,12 @@ impl ClockJumps {
         let rise = ahead(last).saturating_sub(allowed);
         let before = newest.unwrap_or(first);
         let rose = self.rose.take();
-        if rise > JUMP_US && rose.is_none_or(|(rise, _)| rise <= JUMP_US) {
-            self.jumps += 1;
-            self.after = self.after.or(rose.map(|(_, before)| before)).or(Some(before));
-        }
+        let jumped = rise > JUMP_US && rose.is_none_or(|(rise, _)| rise <= JUMP_US);
         // One datagram alone may be ahead by its damaged last stamp.
         let stays = rise <= FARTHEST_BACK_US || rose.is_some();
         self.rose = (!stays).then_some((rise, before));
         self.most = Some((if stays { allowed.max(ahead(last)) } else { allowed }, arrived));
+        jumped.then(|| rose.map_or(before, |(_, before)| before))
     }
 }
 
@@ -58,7 +53,7 @@ mod tests {
     use crate::{Array, Events};
 
     /// The decoder after datagrams of stamps, each with its arrival, us.
-    fn of(datagrams: impl IntoIterator<Item = (Vec<u16>, i64)>) -> (SenderDecoder, Events) {
+    fn decode(datagrams: impl IntoIterator<Item = (Vec<u16>, i64)>) -> (SenderDecoder, Events) {
         let mut decoder = SenderDecoder::new(Decoder::new(Array::thesis()), 1);
         let mut events = Events::empty(Array::thesis());
         for (stamps, arrived) in datagrams {
@@ -79,9 +74,9 @@ mod tests {
             for place in 0..3 {
                 let mut datagrams: Vec<_> = regular(1, 100).collect();
                 datagrams[50].0[place] ^= flipped;
-                let (decoder, events) = of(datagrams);
-                assert_eq!(decoder.ahead().jumps, 1, "{flipped} at {place}");
-                let after = decoder.ahead().after.unwrap();
+                let (decoder, events) = decode(datagrams);
+                assert_eq!(decoder.totals().jumps, 1, "{flipped} at {place}");
+                let after = decoder.totals().doubtful_after.unwrap();
                 let (wrong, at) = (events.t[150 + place], events.t[149]);
                 assert!(wrong != 510_000 + 100 * place as i64);
                 assert_eq!(after, at, "{flipped} at {place}");
@@ -96,10 +91,10 @@ mod tests {
         for (came_to, jumps) in [(20, 1), (200, 1), (400, 1), (550, 1), (570, 0), (650, 0), (700, 1), (1200, 1)] {
             let before = regular(came_to - 15, 15);
             let after = regular(0, 50).map(|(stamps, at)| (stamps, at + 10_000 * came_to));
-            let (decoder, events) = of(before.chain(after));
+            let (decoder, events) = decode(before.chain(after));
             let last = events.t[44];
             assert_eq!(
-                (decoder.ahead().jumps, decoder.ahead().after),
+                (decoder.totals().jumps, decoder.totals().doubtful_after),
                 (jumps, (jumps > 0).then_some(last)),
                 "{came_to}"
             );
@@ -110,13 +105,13 @@ mod tests {
     #[test]
     fn silences_delays_drift_and_a_host_set_back_are_no_jumps() {
         let silent = regular(1, 50).chain(regular(900, 50)).chain(regular(9000, 50));
-        assert_eq!(of(silent).0.ahead().jumps, 0);
+        assert_eq!(decode(silent).0.totals().jumps, 0);
         let delayed =
             regular(1, 900).map(|(stamps, at)| (stamps, at + if at % 3_000_000 < 400_000 { 900_000 } else { 0 }));
-        assert_eq!(of(delayed).0.ahead().jumps, 0);
+        assert_eq!(decode(delayed).0.totals().jumps, 0);
         let drifting = (0..30_000).map(|k| (vec![(1000 * k) as u16], 100_000 * k - 9 * k));
-        assert_eq!(of(drifting).0.ahead().jumps, 0);
+        assert_eq!(decode(drifting).0.totals().jumps, 0);
         let set_back = regular(1, 100).map(|(stamps, at)| (stamps, if at < 7_500_000 { at } else { at - 60_000_000 }));
-        assert_eq!(of(set_back).0.ahead().jumps, 0);
+        assert_eq!(decode(set_back).0.totals().jumps, 0);
     }
 }
