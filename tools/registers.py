@@ -276,14 +276,14 @@ def rust_checks(source: Table) -> str:
 use super::table::Registers;
 
 /// The first rule that refuses these registers, with its numbers.
-pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, String)> {{
+pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<(u8, String)> {{
 {rust_values(source, warns=False)}
 {rust_rules(source, warns=False)}
     None
 }}
 
 /// Warnings about values that are allowed but probably a mistake.
-pub(super) fn warned(registers: &Registers) -> Vec<(u8, String)> {{
+pub(super) fn warnings(registers: &Registers) -> Vec<(u8, String)> {{
     let mut warnings = vec![];
 {rust_values(source, warns=True)}
 {rust_rules(source, warns=True)}

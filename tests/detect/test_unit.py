@@ -121,7 +121,7 @@ def test_the_commands_and_the_page_name_both_units(tmp_path: Path, capsys) -> No
     handler = TrainingRequests(Opening(), ShownFiles())
     with refused("values in counts, and the readout was trained on kPa"):
         handler.detect(tmp_path / "counts.npz", None, readout)
-    labels, found = handler.detect(tmp_path / "kPa.npz", None, readout)
+    labels, _, found = handler.detect(tmp_path / "kPa.npz", None, readout)
     assert (labels, len(found) > 0) == (["contact"], True)
     code, _, error = call(capsys, "live", "--readout", readout, "--tare", "0.05", "--seconds", "0.1")
     last = error.splitlines()[-1]

@@ -73,4 +73,5 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_a_process_an
         return
     [one] = found["recordings"]
     assert {key: shown[key] for key in one} == one
-    assert requests().detect(place, None, readout) == (["contact", "lift"], moments(one["detections"]))
+    labels, _, detections = requests().detect(place, None, readout)
+    assert (labels, detections) == (["contact", "lift"], moments(one["detections"]))

@@ -45,7 +45,18 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-panel",
         &[
-            &["assets", "centre", "connections", "limited", "limits", "options", "refusal", "time_columns", "weights"],
+            &[
+                "assets",
+                "centre",
+                "connections",
+                "limited",
+                "limits",
+                "options",
+                "readout_encoders",
+                "refusal",
+                "time_columns",
+                "weights",
+            ],
             &["load", "request"],
             &["array_state", "taxel_history"],
             &["keyframe_index"],
@@ -83,7 +94,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
                 "metrics",
                 "neuron",
                 "nouns",
-                "pictures",
+                "previews",
                 "recording",
                 "simulate",
                 "test_hooks",
