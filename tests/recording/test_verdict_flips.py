@@ -210,7 +210,7 @@ def test_of_a_chunk_without_its_index_and_without_the_end_of_the_file_not_all_is
     whole: Path, tmp_path: Path
 ) -> None:
     data, of = whole.read_bytes(), held_by(taxel.open(whole))
-    # The chunk of the first note, with what follows it: the zeroing too, unless the writer ended the chunk between them.
+    # The chunk of the first note; the zeroing stands in it too, unless the writer ended the chunk between them.
     begin, end = next((a, b) for a, b in chunks_of(data) if b"heel" in data[a:b])
     gone = 1 + (b'"rest":40' in data[begin:end])
     spoilt = without_end(data[:begin] + bytes(end - begin) + data[end:])
