@@ -1,5 +1,6 @@
 """What is computed together is what the plain way gives: every fold trained anew, every table counted alone."""
 
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 from scipy.stats import beta
 
 import taxel
@@ -125,6 +127,17 @@ def test_a_training_curve_is_of_discriminants_of_the_drawn_trials():
             drawn = np.concatenate([mixed[y[mixed] == k][:size] for k in range(3)])
             expected[test] = discriminant(x[drawn], y[drawn], x[test], level(x, ridge))
         assert np.array_equal(said, expected)
+
+
+def test_a_training_curve_takes_the_matrices_and_trials_of_its_predictions_alone():
+    tables, y = cloud(60, 3, 4)
+    grams, features = [x @ x.T for x in tables], [6, 6]
+    first = nested_predictions(grams, features, y)
+    one_too_far = replace(first, chosen={**first.chosen, 0: (len(grams), 0.1)})
+    fewer = replace(first, folds=first.folds[:-1])
+    for wrong in (one_too_far, fewer):
+        with refused("^nested is of other trials or matrices"):
+            training_curve(grams, features, y, wrong, [3])
 
 
 def table_of(row, column, classes):
