@@ -64,6 +64,9 @@ module taxel_top #(
   if (COLUMNS > 128 || ROWS > 128 || (1 << $clog2(STEPS)) != STEPS) begin : g_lines
     $error("COLUMNS, ROWS: at most 128, and steps that are a power of two");
   end
+  if (ANSWERS < 2 || (1 << $clog2(ANSWERS)) != ANSWERS) begin : g_answers
+    $error("ANSWERS: a power of two, at least 2");
+  end
   if (STATES_US == 1 || STATES_US > 20_000_000) begin : g_states
     $error("STATES_US: 0, or 2 to 20000000");
   end
