@@ -308,8 +308,9 @@ PROOFS = (
         ("formal/late_synchroniser.sv", UART),
         "smtbmc yices",
         (
-            (UART, "left <= BITS'(CLOCKS + CLOCKS / 2 - 1);", "left <= BITS'(CLOCKS - 1);"),
-            (UART, "bits <= 4'd9;", "bits <= 4'd8;"),
+            (UART, "left <= BITS'(CLOCKS / 2 - 1);", "left <= BITS'(CLOCKS - 1);"),
+            (UART, "bits <= 4'd10;", "bits <= 4'd9;"),
+            (UART, "busy <= !line;", "busy <= line;"),
             (UART, "busy <= !line && !low;", "busy <= line && !low;"),
             (UART, "broken <= !line;", "broken <= line;"),
             (UART, "left <= BITS'(CLOCKS);", "left <= BITS'(CLOCKS - 1);"),
