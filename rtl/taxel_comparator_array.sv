@@ -15,8 +15,8 @@ module taxel_comparator_array #(
     input  logic                     reset,
     input  logic                     read_start,
     input  logic                     step_end,
-    input  logic [15:0]              length,      // of the ramp, in ticks; from a read's start on
-    input  logic                     inverted,    // comparators fall when they trip
+    input  logic [15:0]              length,      // of the ramp, in ticks; at a read's start
+    input  logic                     inverted,    // comparators fall when they trip; at a read's start
     output logic                     read_done,   // the counts of the read that ended last stand from here to the next one
     output logic [CHANNELS-1:0]      tripped,
     output logic [CHANNELS-1:0]      first,       // at the first sample of the pair
@@ -28,11 +28,17 @@ module taxel_comparator_array #(
 
   localparam int BANK = 8;  // channels
 
-  // On the scan's clock: the number of the read that began last, and of the one that ended last, modulo 2.
-  logic began, ended, done, done_before;
+  // On the scan's clock: the number of the read that began last, and of the one that ended last, modulo 2. What a read asks
+  // for stands until the next one: the fast clock takes it when a short one has ended.
+  logic began, ended, done, done_before, inverted_held;
+  logic [15:0] length_held;
 
   always_ff @(posedge clk) begin
-    if (read_start) began <= !began;
+    if (read_start) begin
+      began         <= !began;
+      length_held   <= length;
+      inverted_held <= inverted;
+    end
     if (step_end) ended <= began;
     done_before <= done;
     read_done   <= done != done_before;
@@ -42,7 +48,7 @@ module taxel_comparator_array #(
 
   // On the fast clock.
   logic reset_fast, began_fast, ended_fast, began_before, number, copied, over, copy;
-  logic start, nears, begins, begun, open, closing, inverted_next, inverted_now, done_fast;
+  logic start, nears, begins, begun, open, closing, inverted_now, done_fast;
   logic [CHANNELS-1:0][1:0] sampled, brought;
   logic [CHANNELS-1:0] tripped_now, first_now;
   logic [CHANNELS-1:0][14:0] at_now;
@@ -59,9 +65,8 @@ module taxel_comparator_array #(
   always_ff @(posedge clk_fast) begin
     began_before <= began_fast;
     start        <= began_fast != began_before;
-    if (start) inverted_next <= inverted;
     // Pins lie all around a part: samples have a clock to come from there, and one more to spread.
-    if (nears) inverted_now <= inverted_next;
+    if (nears) inverted_now <= inverted_held;
     sampled <= comparators;
     brought <= sampled ^ {2 * CHANNELS{inverted_now}};
     copy    <= over;
@@ -81,7 +86,7 @@ module taxel_comparator_array #(
       .clk_fast,
       .reset(reset_fast),
       .start,
-      .length,
+      .length(length_held),
       .ramp,
       .nears,
       .begins,
