@@ -73,6 +73,7 @@ class Pair:
         named = {name.upper(): value for name, value in self.version_2.items()}
         options = PREVIOUS[previous] | INTENSITY[intensity] | {"FAULT_CLOCKS": 5000} | named | parameters
         self.logic = Logic(columns, rows, channels, **options)
+        self.csel_clocks = parameters.get("CSEL_CLOCKS", 8)
         self.options = {"previous": previous, "intensity": intensity, "queue": 1 << 30}
         self.registers = Registers(array=self.array, channels=channels)
         self.begin(np.zeros((rows, columns), np.uint16) if first is None else first)

@@ -41,7 +41,7 @@ def test_random_pressures_and_thresholds_give_the_emulated_boards_spikes(
 ):
     rng = np.random.default_rng([columns, rows, channels])
     options = OFTEN | {"hold_us": 0}  # as of a build of the tests of version 2
-    pair = Pair(columns, rows, channels, previous=previous, intensity=intensity, version_2=options)
+    pair = Pair(columns, rows, channels, previous=previous, intensity=intensity, version_2=options, CSEL_CLOCKS=1)
     spiking = 0
     ticks = np.zeros(pair.array.shape, np.uint16)
     for _ in range(250):

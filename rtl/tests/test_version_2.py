@@ -27,7 +27,7 @@ def built(columns: int, rows: int, channels: int, previous: str, intensity: str,
     first[-1, -1] = NOT_RETURNED
     options = OFTEN | {"hold_us": hold_us}
     values = {"previous": previous, "intensity": intensity}
-    return Pair(columns, rows, channels, first=first, version_2=options, LINK_BYTES=link_bytes, **values)
+    return Pair(columns, rows, channels, first=first, version_2=options, LINK_BYTES=link_bytes, CSEL_CLOCKS=1, **values)
 
 
 def in_version_2(pair: Pair) -> None:
