@@ -111,7 +111,7 @@ PROOFS = (
             ),
             (PACKER_V2, "bank            <= !bank;", ""),
             (PACKER_V2, "!fits[count_of]", "!fits[0]"),
-            (PACKER_V2, "units           <= '0;\n  endtask", "units           <= 10'(lost);\n  endtask"),
+            (PACKER_V2, "if (goes || reset) units <= '0;", "if (goes || reset) units <= 10'(lost && goes);"),
             (PACKER_V2, "words_over <= word == 5'd19;", "words_over <= word == 5'd24;"),
             (
                 PACKER_V2,
@@ -252,7 +252,7 @@ PROOFS = (
             (ARRAY, "(ended_fast == number && !open && !begun) || begins", "begins"),
             (ARRAY, "ended_fast == number && !open && !begun", "ended_fast == number && !begun"),
             (ARRAY, "ended_fast == number && !open && !begun", "!open && !begun"),
-            (ARRAY, "if (nears) inverted_now <= inverted_next;", "inverted_now <= 1'b0;"),
+            (ARRAY, "if (nears) inverted_now <= inverted_held;", "inverted_now <= 1'b0;"),
             (ARRAY, "if (step_end) ended <= began;", "if (step_end) ended <= !began;"),
             (ARRAY, "done_fast <= !done_fast;", "done_fast <= 1'b0;"),
             (ARRAY, "assign over = !copied &&", "assign over ="),
@@ -327,16 +327,16 @@ PROOFS = (
         "abc pdr",
         (
             (SELECT, "out > in ? out : in", "in"),
-            (SELECT, "lines + 8'd1 - 8'(at)", "lines - 8'(at)"),
-            (SELECT, "unknown || lines > known", "unknown"),
-            (SELECT, "8'(line - at)", "8'(line - at) + 8'd1"),
-            (SELECT, "!all && later ? 8'd0", "later ? 8'd0"),
-            (SELECT, "pulses == insert && !csel_din", "pulses == insert"),
-            (
-                SELECT,
-                "if (pulses == insert && !csel_din) csel_din <= 1'b1;\n        else csel_clk <= 1'b1;",
-                "csel_din <= pulses == insert;\n        csel_clk <= 1'b1;",
-            ),
+            (SELECT, "aim_lines + 8'd1 - place", "aim_lines - place"),
+            (SELECT, " && aim_lines <= known", ""),
+            (SELECT, "insert == 8'd0 && aim > at", "aim > at"),
+            (SELECT, "8'(aim) - place", "8'(aim) - 8'(at)"),
+            (SELECT, "(start || !waits)", "1'b1"),
+            (SELECT, " && csel_din == data;", ";"),
+            (SELECT, "falls || (!csel_clk && csel_din != data)", "falls || csel_din != data"),
+            (SELECT, "csel_din <= data;\n      left     <= HALF_BITS'(HALF - 1);", "csel_din <= data;"),
+            (SELECT, "if (csel_din) place <= '0;\n      else if", "if"),
+            (SELECT, "place    <= '0;", "place    <= 8'(COLUMNS);"),
         ),
     ),
     Proof(
@@ -359,25 +359,29 @@ PROOFS = (
 )
 
 
-def checked(proof: Proof, name: str, mode: str, edit: tuple[str, str, str] | None = None) -> str:
-    """Run one proof or its covers, on the sources or a copy with one edit; return sby's verdict."""
+def checked(
+    proof: Proof, name: str, mode: str, edit: tuple[str, str, str] | None = None, source: Path = RTL
+) -> str:
+    """Run one proof or its covers, on the sources, on a copy with one edit, or on others; return sby's verdict."""
+    planted = edit is not None or source != RTL
     folder = WORK / name
     folder.mkdir(parents=True, exist_ok=True)
     files = []
-    for source in (*(RTL / s for s in proof.sources), RTL / "formal" / f"{proof.name}.sv"):
-        text = source.read_text()
-        if edit and edit[0] == source.name:
+    for file in (*proof.sources, f"formal/{proof.name}.sv"):
+        path = (RTL if file.startswith("formal/") else source) / file
+        text = path.read_text()
+        if edit and edit[0] == path.name:
             if text.count(edit[1]) != 1:
-                raise ValueError(f"{source.name}: {edit[1]!r} stands there {text.count(edit[1])} times")
+                raise ValueError(f"{path.name}: {edit[1]!r} stands there {text.count(edit[1])} times")
             text = text.replace(edit[1], edit[2])
-        (folder / source.name).write_text(text)
-        files.append(folder / source.name)
-    engine = "smtbmc yices" if mode == "cover" else (edit and proof.search) or proof.engine
+        (folder / path.name).write_text(text)
+        files.append(folder / path.name)
+    engine = "smtbmc yices" if mode == "cover" else (planted and proof.search) or proof.engine
     depth = f"depth {proof.induction if mode == 'prove' else proof.depth}\n"
-    if edit and proof.skip:
+    if planted and proof.skip:
         depth += f"skip {proof.skip}\n"
     # What only helps an induction to close is no property: a fault must be found without.
-    options = "-G LEMMAS=0 " if edit and "parameter bit LEMMAS" in files[-1].read_text() else ""
+    options = "-G LEMMAS=0 " if planted and "parameter bit LEMMAS" in files[-1].read_text() else ""
     script = f"read_slang -j 1 --top {proof.name} {options}{' '.join(f.name for f in files)}\nprep -top {proof.name}\n"
     if proof.gated:
         script += "flatten\nopt\nformalff -declockgate\nsetundef -undriven -anyseq\nopt_clean\n"
