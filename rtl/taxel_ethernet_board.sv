@@ -39,6 +39,7 @@ module taxel_ethernet_board #(
 
   logic runs;
   logic reset;
+  initial reset = 1'b1;
   logic [RESET_BITS-1:0] waited;
 
   taxel_synchroniser to_runs (.clk, .from(steady), .to(runs));

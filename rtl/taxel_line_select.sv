@@ -91,4 +91,12 @@ module taxel_line_select #(
     end
   end
 
+  // A line is named before it starts, and what leads to it lies within the chain.
+  always_ff @(posedge clk) begin
+    if (!reset) begin
+      assert (!(start && (!waits || named || weighed)));
+      assert (place <= 8'(COLUMNS) && pulses <= 8'(COLUMNS) && insert <= pulses);
+    end
+  end
+
 endmodule

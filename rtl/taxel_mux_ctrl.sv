@@ -232,4 +232,7 @@ module taxel_mux_ctrl #(
       .csel_din
   );
 
+  // Lines and steps are those of the registers.
+  always_ff @(posedge clk) if (!reset) assert (32'(step) < STEPS && place <= active.lines);
+
 endmodule

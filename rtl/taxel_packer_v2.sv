@@ -429,4 +429,7 @@ module taxel_packer_v2 #(
     end
   end
 
+  // There are no other states.
+  always_ff @(posedge clk) if (!reset) assert (state <= AGE);
+
 endmodule

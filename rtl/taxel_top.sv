@@ -250,4 +250,7 @@ module taxel_top #(
       .clk, .reset, .valid(status_valid), .data(status_data), .ready(status_taken), .tx
   );
 
+  // One version sends at a time.
+  always_ff @(posedge clk) if (!reset) assert (!(tvalid_v1 && tvalid_v2));
+
 endmodule

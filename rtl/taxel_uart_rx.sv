@@ -55,4 +55,6 @@ module taxel_uart_rx #(
     if (reset) {busy, low, valid, broken} <= '0;
   end
 
+  always_ff @(posedge clk) if (!reset) assert (!busy || (bits != 4'd0 && bits <= 4'd10));
+
 endmodule

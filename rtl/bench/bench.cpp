@@ -5,6 +5,7 @@
 // select at any time: where that moves while a ramp rises, they show what they would have done had it been selected all along.
 // It knows nothing of what the logic makes of it.
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <deque>
 #include <memory>
@@ -19,6 +20,15 @@
 // other threads and for objects to be deleted, takes an eighth of the time: the bench knows which, and the logic has neither
 // messages nor objects, nor paths from an input to an output.
 void Vtaxel_top___024root___eval_nba(Vtaxel_top___024root* root);
+
+int broken = 0;  // assertions of modules that did not hold
+
+#ifdef VL_USER_STOP
+void vl_stop(const char* file, int line, const char* module) {
+    std::fprintf(stderr, "%s:%d: %s: an assertion does not hold\n", file, line, module);
+    broken++;
+}
+#endif
 
 namespace {
 
@@ -311,6 +321,8 @@ int bench_sending(Bench* b) { return static_cast<int>(b->to_send.size()); }
 uint64_t bench_sent_at(Bench* b) { return b->sent_at; }
 uint64_t bench_clock(Bench* b) { return b->clock; }
 uint64_t bench_edge(Bench* b) { return b->edges.back(); }
+// How many assertions did not hold since this was last asked.
+int bench_broken(Bench*) { return std::exchange(broken, 0); }
 int bench_recording(Bench* b) { return b->top.record_sync; }
 // Whether a ramp began with two lines driven, or none, since this was last asked.
 int bench_shared(Bench* b) { return std::exchange(b->shared, false); }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Iterable
 from typing import Any
 
@@ -15,6 +16,14 @@ from taxel.wire import Command, Registers
 #: Values of `previous` and `intensity` of the emulated board as parameters of the logic.
 PREVIOUS = {"last_sent": {}, "last_sample": {"PREVIOUS_SAMPLE": 1}}
 INTENSITY = {"value": {}, "difference": {"DIFFERENCE": 1}, "nothing": {"VALUED": 0}}
+
+
+def drawing(seed: int | None, *build: int) -> np.random.Generator:
+    """Return what a test draws by, for such a build; without a seed another one each time, which is printed."""
+    if seed is None:
+        seed = secrets.randbelow(1 << 31)
+    print(f"seed {seed}")
+    return np.random.default_rng([*build, seed])
 
 
 def session(ticks: Any, channels: int, ramp: int) -> int:

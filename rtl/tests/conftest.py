@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-BENCH = Path(__file__).parents[1] / "bench"
-sys.path[:0] = [str(BENCH), str(BENCH / "modules")]
+sys.path.extend(str(Path(__file__).parents[1] / folder) for folder in ("bench", "bench/modules"))
 
 from logic import missing
 

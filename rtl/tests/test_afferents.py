@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from test_frames import clocks, last_faults, pressures, settles, write
+from test_frames import SEEDS, clocks, last_faults, pressures, settles, write
 from test_version_2 import OFTEN
 
-from pair import Pair, answers
+from pair import Pair, answers, drawing
 from taxel.simulate import NOT_RETURNED
 from taxel.wire import Command, Decoder
 
@@ -35,11 +35,12 @@ def write_of_afferents(rng: np.random.Generator, pair: Pair, in_version_2: float
     return write(rng, pair, in_version_2)
 
 
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(("columns", "rows", "channels", "previous", "intensity", "in_version_2"), BUILDS)
 def test_random_pressures_and_thresholds_give_the_emulated_boards_spikes(
-    columns, rows, channels, previous, intensity, in_version_2
+    columns, rows, channels, previous, intensity, in_version_2, seed
 ):
-    rng = np.random.default_rng([columns, rows, channels])
+    rng = drawing(seed, columns, rows, channels)
     options = OFTEN | {"hold_us": 0}  # as of a build of the tests of version 2
     pair = Pair(columns, rows, channels, previous=previous, intensity=intensity, version_2=options, CSEL_CLOCKS=1)
     spiking = 0

@@ -3,18 +3,20 @@
 import numpy as np
 import pytest
 
-from pair import Pair, answers
+from pair import Pair, answers, drawing
 from taxel.simulate import NOT_RETURNED
 from taxel.wire import Command, Decoder, Registers
 
-#: Columns, rows, channels, what a value is compared with, and clocks of half a pulse of the shift registers: lines settle in
-#: random order only where these are short.
+#: Columns, rows, channels, what a value is compared with, clocks of half a pulse of the shift registers: lines settle
+#: in random order only where these are short.
 BUILDS = [
     (8, 8, 16, "last_sent", 1),
     (5, 7, 16, "last_sample", 8),
     (9, 64, 16, "last_sent", 1),
     (3, 20, 64, "last_sent", 8),
 ]
+#: Seeds of random pressures and writes: another one each time, and those that once failed.
+SEEDS = [None]
 
 
 def pressures(rng: np.random.Generator, pair: Pair, before: np.ndarray) -> np.ndarray:
@@ -68,11 +70,16 @@ def clocks(registers: Registers) -> int:
     return round(registers.frame_us * 100)
 
 
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(("columns", "rows", "channels", "previous", "csel_clocks"), BUILDS)
-def test_random_pressures_and_writes_give_the_emulated_boards_datagrams(columns, rows, channels, previous, csel_clocks):
-    rng = np.random.default_rng([columns, rows, channels])
+def test_random_pressures_and_writes_give_the_emulated_boards_datagrams(
+    columns, rows, channels, previous, csel_clocks, seed
+):
+    rng = drawing(seed, columns, rows, channels)
     seed = int(rng.integers(1, 1000))
-    pair = Pair(columns, rows, channels, previous=previous, seed=seed, CSEL_CLOCKS=csel_clocks)
+    # One build looks at what the modules assert.
+    asserts = csel_clocks == 8
+    pair = Pair(columns, rows, channels, previous=previous, seed=seed, asserts=asserts, CSEL_CLOCKS=csel_clocks)
     ticks = np.zeros(pair.array.shape, np.uint16)
     for _ in range(200):
         ticks = pressures(rng, pair, ticks)
@@ -84,7 +91,7 @@ def test_random_pressures_and_writes_give_the_emulated_boards_datagrams(columns,
     pair.finish()
     assert not pair.logic.call("shared")
     assert pair.received == pair.expected
-    assert sum(map(len, pair.received)) > 2_000
+    assert sum(map(len, pair.received)) > 200
     assert answers(pair.serial) == pair.answers
     assert pair.answers.count("bad") > 0
     assert pair.answers.count("ok") > 3

@@ -20,10 +20,10 @@ def with_late_crossings(to):
     """Write the sources with crossings that take each change at once or a clock later, as the proofs have them."""
     for source in RTL.glob("*.sv"):
         shutil.copy(source, to)
-    array = to / "taxel_comparator_array.sv"
-    text = array.read_text()
-    assert text.count("  taxel_synchroniser to_") == 4
-    array.write_text(text.replace("  taxel_synchroniser to_", "  taxel_late_synchroniser to_"))
+    for name, crossings in (("comparator_array", 2), ("announcement", 1)):
+        text = (to / f"taxel_{name}.sv").read_text()
+        assert text.count("  taxel_synchroniser ") == crossings
+        (to / f"taxel_{name}.sv").write_text(text.replace("  taxel_synchroniser ", "  taxel_late_synchroniser "))
     late = (RTL / "formal" / "late_synchroniser.sv").read_text()
     begins = "  always_ff @(posedge clk) begin"
     assert late.count(begins) == 1
@@ -104,7 +104,7 @@ def test_quick_a_read_is_judged_by_the_registers_of_its_frame_however_short_it_i
         ramp = pair.board.registers.ramp
         data, after = b"", 0
         if pair.answered and k % 2:
-            # The ramp's length and the comparators' sense change with a frame, behind a read that may be one clock over.
+            # The ramp's length and the comparators' sense change with a frame, right behind the last read.
             flags, length = 8 | int(rng.integers(0, 2)) << 2, int(rng.integers(1, longest(short) + 1))
             command = Command(0, flags) if rng.random() < 0.5 else Command(4, length)
             data, after = command.to_bytes(), int(rng.integers(0, 300))

@@ -5,8 +5,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-
 from builds import BUILDS, MODULES, kept
+
 from logic import RTL
 
 

@@ -23,8 +23,11 @@ RTL = Path(__file__).parents[1]
 sys.path[:0] = [str(RTL / folder) for folder in ("tools", "tests", "bench", "bench/modules")]
 
 from builds import MODULES  # noqa: E402
-from logic import PACKAGES, QUIET, run  # noqa: E402
 from prove import PROOFS, checked  # noqa: E402
+from test_planted_faults import differs, differs_in_spikes, differs_in_version_2  # noqa: E402
+
+from logic import PACKAGES, QUIET, run  # noqa: E402
+from pair import Pair  # noqa: E402
 
 #: A fault is looked for so long, s.
 LONGEST = 600
@@ -52,15 +55,23 @@ EDITS: dict[str, list[tuple[str, str]]] = {
         (r" \|\| !?(\w*(?:valid|ready|taken|full|room|free|empty|sending|pop|push|waits|allowed)\w*)", ""),
     ],
     "crossing": [
-        (r"\{to, unsettled\} <= \{unsettled, from\}", "{to, unsettled} <= {from, from}"),
+        (r"\{settled, unsettled\} <= \{unsettled, from\}", "{settled, unsettled} <= {from, from}"),
         (r"(taxel_(?:synchroniser|announcement|standing_word|two_clock_memory).*\.(?:from|take|announce)\()(\w)", r"\1!\2"),
-        (r"(?<= )(\w*(?:crossed|before|fast|there|here)\w*) != ", r"!\1 != "), (r"(copied|copy|over|number|came|begins|waits) <= ", r"\1 <= !"),
+        (r"(?<= )(\w*(?:crossed|last|fast|there|here)\w*) != ", r"!\1 != "), (r"(copied|copy|over|number|came|begins|waits) <= ", r"\1 <= !"),
     ],
 }  # fmt: skip
 
 
 #: Where clocks meet.
-CROSSINGS = ("announcement", "comparator_array", "ethernet_board", "standing_word", "synchroniser", "uart_rx", "udp_sender")
+CROSSINGS = (
+    "announcement",
+    "comparator_array",
+    "ethernet_board",
+    "standing_word",
+    "synchroniser",
+    "uart_rx",
+    "udp_sender",
+)
 
 
 @dataclass(frozen=True)
@@ -171,10 +182,6 @@ def by_frames(source: Path) -> str | None:
 
 def frames(source: Path) -> int:
     """Return 0 where whole frames of these sources are the emulated board's."""
-    from test_planted_faults import differs, differs_in_spikes, differs_in_version_2
-
-    from pair import Pair
-
     return int(
         differs(Pair(8, 8, source=source)) or differs_in_version_2(source) or differs_in_spikes(source, "difference")
     )

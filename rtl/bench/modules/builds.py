@@ -14,6 +14,7 @@ def held(**fields: int) -> str:
 #: Modules, each with the parameters of its builds.
 MODULES = {
     "afferents": ["COLUMNS=3 STEPS=2 ADDRESS_BITS=5", "COLUMNS=1 STEPS=1 ADDRESS_BITS=5"],
+    "announcement": [""],
     "answer_queue": [""],
     "change_detector": [
         "COLUMNS=3 ROWS=6 CHANNELS=4 STEPS=2",
@@ -39,7 +40,7 @@ MODULES = {
         "ROWS=64 MOST=128 VALUED=0 HEARTBEAT_US=30000",
     ],
     "power_law": [""],
-    "ramp_counter": [""],
+    "ramp_counter": ["", "DELAY=6", "DELAY=9"],
     "random_lines": [""],
     "refresh": ["EVERY=1000"],
     "register_file": [
@@ -47,6 +48,7 @@ MODULES = {
         f"COLUMNS=128 ROWS=128 CHANNELS=64 STEPS=2 {held(lines=127, wire_version=1)}",
     ],
     "session": [""],
+    "standing_word": ["BITS=11"],
     "status_sender": ["FAULT_CLOCKS=1000 ROWS=7 COLUMNS=128", "FAULT_CLOCKS=300 ROWS=64 COLUMNS=64 CHANNELS=64"],
     "stream_register": ["BITS=12"],
     "synchroniser": [""],
@@ -56,6 +58,7 @@ MODULES = {
         for link_bytes in (1, 4)
     ],
     "totals": [""],
+    "two_clock_memory": ["BITS=5 PLACES=3"],
     "uart_rx": ["CLOCKS=8", "CLOCKS=17"],
     "uart_tx": ["CLOCKS=5"],
     "udp_sender": ["MOST=90"],

@@ -65,7 +65,9 @@ async def each_read_has_a_ramp_and_is_reported(dut):
         # A next read may begin with its step: the ramp has to fall before it.
         most = 3 * read - 5
         length = within(1, most)
-        ticks = [random.choice([NOT_RETURNED, *(within(0, length + 9, length) for _ in range(4))]) for _ in range(channels)]
+        ticks = [
+            random.choice([NOT_RETURNED, *(within(0, length + 9, length) for _ in range(4))]) for _ in range(channels)
+        ]
         inverted = random.random() < 0.3
         reads.append((ticks, inverted))
         expected.append((ticks, length))

@@ -56,14 +56,15 @@ async def in_time_a_single_line_is_driven(dut):
         for _ in range(early - 1):
             await clock()
         assert pulses == 0
+        # It rises with the clock behind the start, where data and clock have stood.
+        late = max(0, half - min(level_stood, data_stood))
         dut.start.value = 1
         await clock()
         dut.start.value = 0
         on = whole and at < line and lines <= known
-        needed = line - at if on else max(lines - at if at < lines else 0, line + 1)
+        out = lines - at if at < lines else 0
+        needed = line - at if on else max(out, line + 1)
         if whole:
-            # It rises with the clock behind the start, where data and clock have stood.
-            late = 0 if on else max(0, half + 3 - early)
             assert level == (late == 0)
             left = late + 2 * half * needed - half
             jumps += 1

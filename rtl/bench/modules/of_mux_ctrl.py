@@ -141,4 +141,4 @@ async def every_clock_of_the_scan(dut):
             committed, taken_at = (dict(held), (markers, starts)), clock
         await FallingEdge(dut.clk)
     assert frames > 20
-    assert settled_reads > 50
+    assert settled_reads > 20

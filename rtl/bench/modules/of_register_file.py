@@ -58,7 +58,11 @@ def attempt(held, build):
         "step_read": random.choice([held["step_period"], (held["ramp"] + 5 + 2) // 3, 4]),
         "ramp": 3 * held["step_read"] - 5,
     }
-    near = [edges.get(f["name"], 0) + random.choice([-1, 0, 1]), held[f["name"]] + random.choice([-1, 0, 1]), random.choice([0, 1, 2, 3, 15, 26, 75, 255, 300])]
+    near = [
+        edges.get(f["name"], 0) + random.choice([-1, 0, 1]),
+        held[f["name"]] + random.choice([-1, 0, 1]),
+        random.choice([0, 1, 2, 3, 15, 26, 75, 255, 300]),
+    ]
     bits = (1 << f["bits"]) - 1
     changed = held | {f["name"]: random.choice([*near, random.getrandbits(f["bits"]), bits]) & bits}
     value = word(changed, f["register"])

@@ -1,4 +1,4 @@
-"""The serial line's receiver: bytes of any phase, with bits up to 2.7 % too long or short; none without start and stop bits."""
+"""The serial line's receiver: bytes of any phase, bits up to 2.7 % off; none without a start bit and a stop bit."""
 
 import random
 

@@ -1,9 +1,10 @@
-"""Run the cocotb tests of one module in Verilator, or of all; exit with 2 where one fails. With the Python of `.venv-rtl`.
+"""Run the cocotb tests of one module in Verilator, or of all; exit with 2 where one fails.
 
-Each run draws another seed and prints it. One that the repository's own sources fail with is added to `kept_seeds.txt`. A
-simulation that does not end is ended.
+Each run draws another seed and prints it. One that the repository's own sources fail with is added to `kept_seeds.txt`.
+A simulation that does not end is ended. It wants the Python of `.venv-rtl`.
 
-Usage: python rtl/bench/modules/run.py [MODULE [PARAMETER=VALUE ...]] [--seed N] [--source FOLDER] [--trace] [--jobs N]
+Usage: python rtl/bench/modules/run.py [MODULE [PARAMETER=VALUE ...]] [--seed N] [--runs N] [--source FOLDER] [--trace]
+       python rtl/bench/modules/run.py [--jobs N]
 """
 
 import argparse
@@ -49,8 +50,11 @@ def free_folder(kind: str) -> tuple[Path, TextIO]:
     raise AssertionError
 
 
-def passes(module: str, parameters: list[str], seed: int, source: Path, trace: bool) -> bool:
-    """Build a module and run its tests; return whether all pass. With `trace` its waveforms go to `rtl/build`."""
+def failing(module: str, parameters: list[str], seeds: list[int], source: Path, trace: bool) -> int | None:
+    """Build a module and run its tests with each seed; return the first that fails.
+
+    With `trace` waveforms go to `rtl/build`.
+    """
     root = Path(verilator.__file__).parent
     os.environ |= {"VERILATOR_ROOT": str(root), "PATH": f"{root}/bin:{os.environ['PATH']}"}
     top = f"taxel_{module}"
@@ -79,26 +83,29 @@ def passes(module: str, parameters: list[str], seed: int, source: Path, trace: b
     # Processes that this one starts have this limit each.
     resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST))
     results = folder / f"{module}.xml"
-    try:
-        runner.test(
-            hdl_toplevel=top,
-            test_module=f"of_{module}",
-            test_dir=HERE,
-            build_dir=folder,
-            results_xml=str(results),
-            seed=seed,
-            test_args=["--trace", "--trace-file", str(folder / "dump.vcd")] if trace else [],
-        )
-        tests, failures = get_results(results)
-    except (RuntimeError, subprocess.CalledProcessError, SystemExit) as error:
-        print(f"{module}: the simulation ended early, or took {LONGEST} s: {error}")
-        return False
-    finally:
+    for seed in seeds:
+        print(f"seed {seed}", flush=True)
+        tests = failures = 0
+        try:
+            runner.test(
+                hdl_toplevel=top,
+                test_module=f"of_{module}",
+                test_dir=HERE,
+                build_dir=folder,
+                results_xml=str(results),
+                seed=seed,
+                test_args=["--trace", "--trace-file", str(folder / "dump.vcd")] if trace else [],
+            )
+            tests, failures = get_results(results)
+        except (RuntimeError, subprocess.CalledProcessError, SystemExit) as error:
+            print(f"{module}: the simulation ended early, or took {LONGEST} s: {error}")
         if trace:
             waves = RTL / "build" / f"{module}-{seed}.vcd"
             shutil.copy(folder / "dump.vcd", waves)
             print(f"waveforms: {waves}")
-    return tests > 0 and not failures
+        if failures or not tests:
+            return seed
+    return None
 
 
 def all_pass(jobs: int) -> bool:
@@ -126,15 +133,16 @@ def main() -> int:
     parser.add_argument("module", nargs="?", help="all where none is named")
     parser.add_argument("parameters", nargs="*", metavar="PARAMETER=VALUE")
     parser.add_argument("--seed", type=int, help="of what the test draws; another one each time where none is given")
+    parser.add_argument("--runs", type=int, default=1, help="with so many seeds, where none is given")
     parser.add_argument("--source", type=Path, default=RTL, help="a folder of other sources than rtl")
     parser.add_argument("--trace", action="store_true", help="write waveforms")
     parser.add_argument("--jobs", type=int, default=2, help="tests at a time, of all modules")
     given = parser.parse_args()
     if given.module is None:
         return 0 if all_pass(given.jobs) else 2
-    seed = secrets.randbelow(1 << 31) if given.seed is None else given.seed
-    print(f"seed {seed}", flush=True)
-    if passes(given.module, given.parameters, seed, given.source, given.trace):
+    seeds = [secrets.randbelow(1 << 31) for _ in range(given.runs)] if given.seed is None else [given.seed]
+    seed = failing(given.module, given.parameters, seeds, given.source, given.trace)
+    if seed is None:
         return 0
     if given.source.resolve() == RTL.resolve():
         keep(given.module, " ".join(given.parameters), seed)
