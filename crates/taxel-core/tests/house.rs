@@ -13,16 +13,14 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-core",
         &[
-            &["error", "frame_noise"],
+            &["error"],
             &["reading"],
             &["allowed", "vectors"],
             &["parameters", "array"],
             &["events", "frames", "spikes"],
             &["held"],
             &["rest"],
-            &["baseline", "circuit"],
-            &["tracked_rest"],
-            &["preload", "touch_counts"],
+            &["circuit", "health"],
             &["wire", "contact", "neuron"],
             &["board"],
             &["encode"],

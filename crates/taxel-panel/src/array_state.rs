@@ -11,8 +11,7 @@ use super::time_columns::{COLUMN_US, MISSING, TimeColumns, column_of};
 use super::weights::Weights;
 use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
-use taxel_core::rest::{NOISE_FLOOR, Rest, Value};
-use taxel_core::tracked_rest::TrackedRest;
+use taxel_core::rest::{NOISE_FLOOR, Rest, TrackedRest, Value};
 use taxel_live::pipeline::TaxelChange;
 
 /// Columns of [`COLUMN_US`] after which a change has decayed: 127, less a sixteenth per column, is then 0.

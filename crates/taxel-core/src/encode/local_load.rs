@@ -32,7 +32,7 @@ const MEANS_OF_REST: [[f64; 2]; 2] = [[0.0, 10.0], [0.0, 50.0]];
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LocalRest {
-    /// Begins at the tare and follows each taxel's value: [`Baseline::tracked`](crate::baseline::Baseline::tracked).
+    /// Begins at the tare and follows each taxel's value: [`Baseline::tracked`](crate::rest::Baseline::tracked).
     #[default]
     Tracked,
     /// The tare.

@@ -3,8 +3,7 @@
 use super::blocks::{BLOCK, Block, in_blocks};
 use super::loaded::Paired;
 use super::tare::Tare;
-use crate::baseline::{Baseline, FAR_NOISE, stands_out_from};
-use crate::rest::Value;
+use crate::rest::{Baseline, FAR_NOISE, Value, stands_out_from};
 use crate::vectors::wide;
 use crate::{Array, Result};
 

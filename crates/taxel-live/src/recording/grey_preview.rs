@@ -3,8 +3,7 @@
 use std::collections::VecDeque;
 
 use taxel_core::encode::Tare;
-use taxel_core::rest::{NOISE_FLOOR, Rest, Value};
-use taxel_core::tracked_rest::TrackedRest;
+use taxel_core::rest::{NOISE_FLOOR, Rest, TrackedRest, Value};
 
 /// White is the largest value of this period, us.
 const SCALE_US: i64 = 10_000_000;

@@ -344,7 +344,7 @@ impl SourceWriter {
     }
 
     /// Subtracts a tare's rest from the previews from now on; without a tare it is the
-    /// rest that [`TrackedRest`](taxel_core::tracked_rest::TrackedRest) finds.
+    /// rest that [`TrackedRest`](taxel_core::rest::TrackedRest) finds.
     pub fn tare(&self, tare: &Tare) {
         self.grey_scale().tare(tare);
     }

@@ -7,9 +7,8 @@ use std::sync::Arc;
 
 use taxel_core::Array;
 use taxel_core::array::Places;
-use taxel_core::frame_noise::FrameNoise;
 use taxel_core::held::UNKNOWN;
-use taxel_core::rest::above_noise;
+use taxel_core::rest::{FrameNoise, above_noise};
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::Remarks;

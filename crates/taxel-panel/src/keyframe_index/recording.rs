@@ -17,7 +17,7 @@ use super::{Activity, ChangeReader, KeyframeIndex, ReadOutcome};
 use crate::array_state::{ArrayState, Keyframe};
 use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
-use taxel_core::preload::{LOADED_TICKS, place, preload};
+use taxel_core::rest::{LOADED_TICKS, preload, preload_text};
 use taxel_live::clock::{BoardClock, Pace, leaves};
 use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::{
@@ -286,7 +286,7 @@ impl RecordingIndex {
         self.verdict = contents.verdict;
         self.pace = contents.clock.pace();
         let columns = usize::from(self.header.array.columns);
-        self.preload_at = place(&preload(&state.rests_less(), columns, LOADED_TICKS), columns, (0, 0));
+        self.preload_at = preload_text(&preload(&state.rests_less(), columns, LOADED_TICKS), columns, (0, 0));
         state.update_curve();
         let columns = state.time_columns().clone();
         let whole =

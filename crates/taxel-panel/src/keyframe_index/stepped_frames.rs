@@ -1,8 +1,7 @@
 //! The frames of the sources of a recording, their values in whole steps of the unit.
 
 use taxel_core::held::UNKNOWN;
-use taxel_core::rest::NOISE_FLOOR;
-use taxel_core::tracked_rest::TrackedRest;
+use taxel_core::rest::{NOISE_FLOOR, TrackedRest};
 
 use crate::array_state::RestSource;
 

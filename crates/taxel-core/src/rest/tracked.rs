@@ -10,8 +10,8 @@
 
 use std::collections::HashMap;
 
-use crate::baseline::{Baseline, FAR_NOISE, stands_out_from};
-use crate::rest::Value;
+use super::baseline::{Baseline, FAR_NOISE, stands_out_from};
+use super::value::Value;
 
 /// The shortest quiet stretch, us.
 pub const QUIET_US: i64 = 500_000;

@@ -1,6 +1,6 @@
 //! The preload of a sensor: a load during the quiet stretch that its rest was first taken from, which was removed later.
 
-use crate::tracked_rest::TOUCHED_TOGETHER;
+use super::tracked::TOUCHED_TOGETHER;
 
 /// A taxel lay under a load if its rest was later less by more than so many ticks.
 pub const LOADED_TICKS: f64 = 8.0;
@@ -34,7 +34,7 @@ pub fn preload(less: &[f64], columns: usize, above: f64) -> Vec<f64> {
 /// Describes the rows and columns of the preload of a sensor whose first taxel is in this row and column, and its maximum;
 /// empty without a preload.
 #[must_use]
-pub fn place(preload: &[f64], columns: usize, corner: (usize, usize)) -> String {
+pub fn preload_text(preload: &[f64], columns: usize, corner: (usize, usize)) -> String {
     let loaded = || (0..preload.len()).filter(|&k| preload[k] > 0.0);
     let span = |name: &str, places: &mut dyn Iterator<Item = usize>| {
         let (least, most) = places.fold((usize::MAX, 0), |(least, most), at| (least.min(at), most.max(at)));
@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn taxels_that_rested_higher_together_are_found_and_bad_ones_and_drift_are_not() {
-        let place_of = |less: &[f64], columns| place(&preload(less, columns, LOADED_TICKS), columns, (0, 0));
+        let place_of = |less: &[f64], columns| preload_text(&preload(less, columns, LOADED_TICKS), columns, (0, 0));
         let with = |places: &[(usize, usize)], load: f64| {
             let mut all = vec![0.0; 48];
             places.iter().for_each(|&(y, x)| all[y * 8 + x] = load);
@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn places_count_from_the_corner_and_loads_have_three_digits() {
         let preload = [0.0, 0.0, 0.0, 0.0, 0.012_345, 0.0];
-        assert_eq!(place(&preload, 3, (10, 20)), "row 11, column 21 (up to 0.0123 above rest)");
-        assert_eq!(place(&preload.map(|load| load * 1e5), 3, (0, 0)), "row 1, column 1 (up to 1234 above rest)");
+        assert_eq!(preload_text(&preload, 3, (10, 20)), "row 11, column 21 (up to 0.0123 above rest)");
+        assert_eq!(preload_text(&preload.map(|load| load * 1e5), 3, (0, 0)), "row 1, column 1 (up to 1234 above rest)");
     }
 }

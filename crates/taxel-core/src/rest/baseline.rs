@@ -6,7 +6,7 @@
 //!
 //! Reading: between two samples the earlier value holds, and it decides whether the taxel is near its rest.
 
-use crate::rest::{Value, touched_from};
+use super::value::{Value, touched_from};
 use crate::vectors::wide;
 
 /// Time constant of the tracked rest of a taxel whose value is near it, s.

@@ -2,8 +2,8 @@
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use taxel_core::Array;
+use taxel_core::health::{TaxelCounts, TouchCounts};
 use taxel_core::rest::Value;
-use taxel_core::touch_counts::{TaxelCounts, TouchCounts};
 
 /// Counts by taxel index, of events of a patch whose first taxel is in this row and column.
 fn of_patch(array: &Array, row: usize, column: usize, patch: (usize, usize), seed: u64) -> Vec<TaxelCounts> {

@@ -7,8 +7,7 @@
 
 use crate::Array;
 use crate::held::UNKNOWN;
-use crate::rest::{NOISE_FLOOR, Value};
-use crate::tracked_rest::{TaxelGrid, TrackedRest};
+use crate::rest::{NOISE_FLOOR, TaxelGrid, TrackedRest, Value};
 
 /// Width of a bin, us.
 pub const BIN_US: i64 = 50_000;
