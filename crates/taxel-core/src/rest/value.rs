@@ -25,7 +25,7 @@ pub fn touched_from(rest: f64, noise_floor: f64) -> f64 {
 #[inline(always)]
 #[must_use]
 pub fn above_noise(value: u16, rest: u16, noise_floor: u16) -> u16 {
-    let above = value.less(rest);
+    let above = value.above(rest);
     if above > noise_floor { above } else { 0 }
 }
 
@@ -36,14 +36,14 @@ pub trait Value: Copy + PartialOrd {
 
     /// This value minus the rest; 0 if it is lower, or if either is unknown.
     #[must_use]
-    fn less(self, rest: Self) -> Self;
+    fn above(self, rest: Self) -> Self;
 }
 
 impl Value for u16 {
     const NO_REST: Self = crate::held::UNKNOWN;
 
     #[inline(always)]
-    fn less(self, rest: Self) -> Self {
+    fn above(self, rest: Self) -> Self {
         // Branch-free: a processor cannot predict which taxels are pressed.
         if self == crate::held::UNKNOWN { 0 } else { self.saturating_sub(rest) }
     }
@@ -53,7 +53,7 @@ impl Value for f64 {
     const NO_REST: Self = f64::INFINITY;
 
     #[inline(always)]
-    fn less(self, rest: Self) -> Self {
+    fn above(self, rest: Self) -> Self {
         (self - rest).max(0.0)
     }
 }
@@ -104,7 +104,7 @@ impl<V: Value> Rest<V> {
     #[inline(always)]
     #[must_use]
     pub fn above(&self, taxel: usize, value: V) -> V {
-        value.less(self.values[taxel])
+        value.above(self.values[taxel])
     }
 }
 
