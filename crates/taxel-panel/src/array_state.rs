@@ -5,10 +5,10 @@
 
 use std::sync::Arc;
 
-use super::centre::Coordinates;
+use super::load::Coordinates;
 use super::load::Load;
 use super::time_columns::{COLUMN_US, MISSING, TimeColumns, column_of};
-use super::weights::Weights;
+use super::load::Weights;
 use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::rest::{NOISE_FLOOR, Rest, TrackedRest, Value};
@@ -535,7 +535,7 @@ impl ArrayState {
 
 #[cfg(test)]
 mod tests {
-    use super::super::time_columns::SPAN;
+    use crate::time_columns::SPAN;
     use super::*;
 
     fn blank(taxels: usize) -> Keyframe {

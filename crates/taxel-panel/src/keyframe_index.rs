@@ -18,7 +18,7 @@ use taxel_live::pipeline::TaxelChange;
 
 use super::array_state::{Keyframe, RestSource};
 use super::time_columns::TimeColumns;
-use super::weights::Weights;
+use super::load::Weights;
 
 pub use activity::Activity;
 

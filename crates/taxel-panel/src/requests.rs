@@ -1,5 +1,10 @@
 //! The requests that do not concern the client's own view, and may take long: docs/panel-protocol.md, *From the client*.
 
+pub(super) mod labels;
+pub(super) mod opening;
+mod recording;
+pub(super) mod registers;
+
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,18 +14,17 @@ use taxel_core::held::UNKNOWN;
 use taxel_live::locked::lock;
 use taxel_live::ports::ports;
 
-use super::clients::Broadcast;
+use super::hub::clients::Broadcast;
 use super::handler::{Cut, Detected, LabelRow, TrainingResult};
 use super::hub::Hub;
-use super::indexed::{Indexed, OpenRecording};
-use super::labels::LabelChange;
-use super::live_source::LiveSource;
-use super::messages::{FoundDetection, InterfaceAddress, Message};
+use super::hub::indexed::{Indexed, OpenRecording};
+use super::hub::labels::LabelChange;
+use super::hub::live_source::LiveSource;
+use super::protocol::messages::{FoundDetection, InterfaceAddress, Message};
 use super::readout_encoders::ReadoutEncoders;
-use super::recorder::RecordingPlan;
-use super::refusal::{Answer, Refusal};
-use super::request::{Id, RecordRequest, Request, RestHow, Taxel};
-use super::{label_requests, recording_session, registers};
+use super::hub::recorder::RecordingPlan;
+use super::protocol::refusal::{Answer, Refusal};
+use super::protocol::request::{Id, RecordRequest, Request, RestHow, Taxel};
 
 /// Carries out a request; `shown` is the recording that the client shows. Returns the message for that client alone.
 ///
@@ -32,7 +36,7 @@ pub(super) async fn carry_out(
     shown: Option<&OpenRecording>,
     request: Request,
 ) -> Answer<Option<Message>> {
-    let change = |change| label_requests::change(&hub, shown, vec![change]);
+    let change = |change| labels::change(&hub, shown, vec![change]);
     match request {
         Request::Set { values } => registers::set(&hub, &values).await?,
         Request::Read {} => registers::read(&hub).await?,
@@ -44,11 +48,11 @@ pub(super) async fn carry_out(
         Request::Stop {} => hub.recorder.end()?,
         Request::Note { text } => board(&hub)?.handle.note(&text.0)?,
         Request::Mark { label, t_us, source, replaces_us } => {
-            let row = label_requests::row(shown, label, t_us.0, source);
+            let row = labels::row(shown, label, t_us.0, source);
             change(LabelChange::Mark(LabelRow { replaces_us: replaces_us.map(|t| t.0), ..row })).await?;
         }
         Request::Marks { labels } => {
-            label_requests::change(&hub, shown, label_requests::marks(shown, labels.0)?).await?;
+            labels::change(&hub, shown, labels::marks(shown, labels.0)?).await?;
         }
         Request::Rename { label_id, label } => {
             change(LabelChange::Rename { id: number(label_id), label: label.0 }).await?
@@ -56,7 +60,7 @@ pub(super) async fn carry_out(
         Request::Move { label_id, t_us } => change(LabelChange::Move { id: number(label_id), t_us: t_us.0 }).await?,
         Request::Delete { label_id } => change(LabelChange::Delete { id: number(label_id) }).await?,
         Request::Settle { conflict_id, keep } => {
-            label_requests::settle(&hub, shown, number(conflict_id), keep).await?;
+            labels::settle(&hub, shown, number(conflict_id), keep).await?;
         }
         Request::Health {} => return health(&hub, shown).await.map(Some),
         Request::Cut { start_us, stop_us, name } => {
@@ -183,7 +187,7 @@ fn record(hub: &Arc<Hub>, request: RecordRequest) -> Answer {
         advance,
         label: label.map(|label| label.0),
     };
-    recording_session::start(hub, plan).map_err(|reason| Refusal { reason, field: Some("name".to_owned()) })
+    recording::start(hub, plan).map_err(|reason| Refusal { reason, field: Some("name".to_owned()) })
 }
 
 // ---------------------------------------------------------------------------------------------- training

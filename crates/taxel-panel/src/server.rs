@@ -1,5 +1,7 @@
 //! The HTTP server: the page's files for every program on this machine, the web socket for those that have the token.
 
+mod connections;
+
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -13,14 +15,13 @@ use axum::response::{IntoResponse, Response};
 use tokio::sync::watch;
 
 use super::assets::asset;
-use super::connections::LimitedListener;
+use connections::LimitedListener;
 use super::handler::RequestHandlers;
 use super::hub::Hub;
-use super::label_requests;
-use super::limits::MOST_BYTES;
-use super::opening;
+use super::protocol::limits::MOST_BYTES;
 use super::options::PanelOptions;
-use super::registers::prepare;
+use super::requests::registers::prepare;
+use super::requests::{labels, opening};
 use super::session;
 use taxel_live::pipeline::Handle;
 use taxel_live::{Error, Result};
@@ -178,7 +179,7 @@ async fn serve(listener: std::net::TcpListener, gate: Arc<Gate>) {
             prepare(&hub).await;
         }
     });
-    let followed = tokio::spawn(label_requests::follow(Arc::clone(&gate.hub)));
+    let followed = tokio::spawn(labels::follow(Arc::clone(&gate.hub)));
     // The recording to show first is read while the browser starts; the client that opens it gets the error, if any.
     let hub = Arc::clone(&gate.hub);
     let first = tokio::spawn(async move {

@@ -79,7 +79,7 @@ impl TaxelHistory {
 
 #[cfg(test)]
 mod tests {
-    use super::super::time_columns::COLUMN_US;
+    use crate::time_columns::COLUMN_US;
     use super::*;
 
     fn change(t: i64, taxel: u32, ticks: u16) -> TaxelChange {

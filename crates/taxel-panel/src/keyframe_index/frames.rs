@@ -17,10 +17,10 @@ pub use super::stepped_frames::{FramePlace, FrameRest, FrameSource};
 use super::stepped_frames::{SteppedFrames, ValueSteps};
 use super::{ChangeReader, FrameSources, KeyframeIndex, ReadOutcome};
 use crate::array_state::{Keyframe, RestSource};
-use crate::centre::Coordinates;
+use crate::load::Coordinates;
 use crate::load::Load;
 use crate::time_columns::{COLUMN_US, MISSING, MISSING_SUM, OF_SOURCE, TimeColumns, column_of};
-use crate::weights::Weights;
+use crate::load::Weights;
 
 /// Memory that the curves may take, bytes.
 const TIME_COLUMN_BYTES: usize = 256 << 20;
@@ -403,7 +403,7 @@ impl KeyframeIndex for Arc<FrameIndex> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::player::{Player, ViewOptions};
+    use crate::view::player::{Player, ViewOptions};
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
     fn place(name: &str, left: u16) -> FramePlace {

@@ -247,7 +247,7 @@ mod tests {
 
     use super::*;
     use crate::keyframe_index::recording::tests::held_at;
-    use crate::player::{Player, ViewOptions};
+    use crate::view::player::{Player, ViewOptions};
     use crate::time_columns::COLUMN_US;
 
     #[test]

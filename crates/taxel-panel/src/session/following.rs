@@ -5,12 +5,12 @@ use std::sync::Arc;
 use taxel_live::Result;
 use taxel_live::locked::lock;
 
-use crate::encoded_spikes::EncodedSpikes;
-use crate::frame::{self, About};
-use crate::live_source::LiveSource;
-use crate::player::{Player, ViewOptions};
+use crate::view::encoded_spikes::EncodedSpikes;
+use crate::view::frame::{self, About};
+use crate::hub::live_source::LiveSource;
+use crate::view::player::{Player, ViewOptions};
 use crate::readout_encoders::ViewEncoder;
-use crate::refusal::{Answer, Refusal};
+use crate::protocol::refusal::{Answer, Refusal};
 use crate::taxel_history::TaxelHistory;
 use crate::time_columns::{COLUMN_US, column_of};
 

@@ -7,11 +7,11 @@ use serde_json::Value;
 use tokio::sync::{Semaphore, mpsc};
 
 use crate::hub::Hub;
-use crate::indexed::OpenRecording;
-use crate::limits::MOST_BYTES;
-use crate::messages::Message;
-use crate::refusal::Refusal;
-use crate::request::Request;
+use crate::hub::indexed::OpenRecording;
+use crate::protocol::limits::MOST_BYTES;
+use crate::protocol::messages::Message;
+use crate::protocol::refusal::Refusal;
+use crate::protocol::request::Request;
 use crate::requests::carry_out;
 
 /// Maximum number of pending requests, but for those that change labels: a person's work is not refused.

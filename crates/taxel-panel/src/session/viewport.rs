@@ -9,21 +9,19 @@ use taxel_live::locked::lock;
 use super::delivered::Delivered;
 use super::following::Following;
 use super::playback::Playback;
-use crate::encoded_spikes::EncodedSpikes;
-use crate::folder::size;
-use crate::frame::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
+use crate::view::encoded_spikes::EncodedSpikes;
+use crate::hub::folder::size;
+use crate::view::frame::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
 use crate::hub::Hub;
-use crate::indexed::OpenRecording;
+use crate::hub::indexed::OpenRecording;
 use crate::keyframe_index::KeyframeIndex;
-use crate::label_requests;
-use crate::live_source::LiveSource;
-use crate::messages::{Message, ViewState};
-use crate::opening;
-use crate::player::{Player, ViewOptions};
+use crate::hub::live_source::LiveSource;
+use crate::protocol::messages::{Message, ViewState};
+use crate::view::player::{Player, ViewOptions};
 use crate::readout_encoders::{ReadoutEncoders, ViewEncoder};
-use crate::refusal::{Answer, Refusal};
-use crate::request::Taxel;
-use crate::requests::readout_of;
+use crate::protocol::refusal::{Answer, Refusal};
+use crate::protocol::request::Taxel;
+use crate::requests::{labels, opening, readout_of};
 use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
 
 /// Where in its source a view is.
@@ -527,7 +525,7 @@ impl Viewport {
         // The reason names the file.
         let refused = |error: taxel_live::Error| Refusal { reason: error.to_string(), field: Some("name".to_owned()) };
         let indexed = opening::index(hub, &name, trial.as_deref()).await.map_err(refused)?;
-        let labels = label_requests::read(hub, &name, indexed.us()).await;
+        let labels = labels::read(hub, &name, indexed.us()).await;
         let bytes = size(&hub.folder.file(&name).map_err(refused)?).map_err(refused)?;
         let (file, out) =
             (hub.folder.file(&name).map_err(refused)?, hub.folder.file(&readout_of(&name)).map_err(refused)?);
@@ -557,7 +555,7 @@ mod tests {
     use taxel_core::encode::{ChangeEvents, Composite, Encoder, Fa1};
 
     use super::*;
-    use crate::indexed::Indexed;
+    use crate::hub::indexed::Indexed;
     use crate::keyframe_index::recording::{RecordingIndex, tests::recorded};
 
     /// The `spikes` message, and whether it is of the readout's encoder.

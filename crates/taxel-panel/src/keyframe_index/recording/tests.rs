@@ -6,9 +6,9 @@ use taxel_core::encode::{ChangeEvents, Encoder};
 use taxel_core::wire::{Command, Registers};
 
 use super::*;
-use crate::encoded_spikes::EncodedSpikes;
-use crate::frame::{About, of_player};
-use crate::player::{Player, ViewOptions};
+use crate::view::encoded_spikes::EncodedSpikes;
+use crate::view::frame::{About, of_player};
+use crate::view::player::{Player, ViewOptions};
 use crate::readout_encoders::ViewEncoder;
 use crate::time_columns::SPAN;
 use taxel_live::recording::{Writer, WriterOptions};

@@ -2,18 +2,18 @@
 
 /// Why a request is refused, and which register or key is at fault.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Refusal {
-    pub(super) reason: String,
-    pub(super) field: Option<String>,
+pub(crate) struct Refusal {
+    pub(crate) reason: String,
+    pub(crate) field: Option<String>,
 }
 
 impl Refusal {
-    pub(super) fn of(field: &str, reason: impl std::fmt::Display) -> Self {
+    pub(crate) fn of(field: &str, reason: impl std::fmt::Display) -> Self {
         Self { reason: format!("{field}: {reason}"), field: Some(field.to_owned()) }
     }
 
     /// Of work that panicked.
-    pub(super) fn bug(what: &str) -> Self {
+    pub(crate) fn bug(what: &str) -> Self {
         format!("{what} failed within taxel; please report it").into()
     }
 }
@@ -36,4 +36,4 @@ impl From<taxel_live::Error> for Refusal {
     }
 }
 
-pub(super) type Answer<T = ()> = Result<T, Refusal>;
+pub(crate) type Answer<T = ()> = Result<T, Refusal>;

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use taxel_live::recording::now_ns;
 
-use super::array_state::{ArrayState, RestSource};
+use crate::array_state::{ArrayState, RestSource};
 use super::encoded_spikes::EncodedSpikes;
 use super::player::Player;
-use super::taxel_history::TaxelHistory;
-use super::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, OF_SOURCE, SPAN, TimeColumns, column_of};
+use crate::taxel_history::TaxelHistory;
+use crate::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, OF_SOURCE, SPAN, TimeColumns, column_of};
 
 /// Bytes of the header.
 const HEADER: usize = 144;
@@ -18,25 +18,25 @@ const SECTIONS: usize = 64;
 const SECTION_COUNT: usize = 10;
 
 /// The flags of the header.
-pub(super) const LIVE: u16 = 1;
-pub(super) const MOVES: u16 = 2;
-pub(super) const RESTART: u16 = 4;
-pub(super) const RECORDS: u16 = 8;
-pub(super) const FOLLOWS: u16 = 16;
+pub(crate) const LIVE: u16 = 1;
+pub(crate) const MOVES: u16 = 2;
+pub(crate) const RESTART: u16 = 4;
+pub(crate) const RECORDS: u16 = 8;
+pub(crate) const FOLLOWS: u16 = 16;
 const REST_GIVEN: u16 = 32;
 const REST_QUIET: u16 = 64;
 
 /// What a frame contains beside the state of the array.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct About {
-    pub(super) flags: u16,
-    pub(super) number: u32,
+pub(crate) struct About {
+    pub(crate) flags: u16,
+    pub(crate) number: u32,
     /// The first column of time that the client lacks.
-    pub(super) from: i64,
-    pub(super) with_rest: bool,
-    pub(super) watched: Option<u32>,
+    pub(crate) from: i64,
+    pub(crate) with_rest: bool,
+    pub(crate) watched: Option<u32>,
     /// Width of a column of time, us.
-    pub(super) column_us: i64,
+    pub(crate) column_us: i64,
 }
 
 /// Raster and curves in the width that a frame shows, from narrower columns and from up to two stores.
@@ -122,7 +122,7 @@ impl<'a> ShownColumns<'a> {
 }
 
 /// Frame of the newest state, and its last column. `narrow` has the columns where they are narrower than the state's.
-pub(super) fn of_state(
+pub(crate) fn of_state(
     state: &mut ArrayState,
     narrow: Option<&mut Player>,
     columns: u16,
@@ -148,7 +148,7 @@ pub(super) fn of_state(
 
 /// Frame of a source at the time of playback, and its last column. The columns are those of `window`, or else those up to that
 /// time.
-pub(super) fn of_player(player: &mut Player, window: Option<&mut Player>, about: About) -> (Vec<u8>, i64) {
+pub(crate) fn of_player(player: &mut Player, window: Option<&mut Player>, about: About) -> (Vec<u8>, i64) {
     player.state_mut().update_curve();
     let player = &*player;
     let beside = match window {

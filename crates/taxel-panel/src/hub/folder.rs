@@ -13,25 +13,25 @@ use taxel_live::{Error, Result, open_regular};
 use tokio::sync::OwnedMutexGuard;
 
 use super::indexed::Indexed;
-use super::keyframe_index::frames::FrameIndex;
-use super::keyframe_index::recording::RecordingIndex;
+use crate::keyframe_index::frames::FrameIndex;
+use crate::keyframe_index::recording::RecordingIndex;
 
 /// Maximum number of recordings in a list.
 const MOST_LISTED: usize = 1000;
 
 /// A recording in the folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Listed {
-    pub(super) name: String,
-    pub(super) bytes: u64,
-    pub(super) modified_ns: u64,
+pub(crate) struct Listed {
+    pub(crate) name: String,
+    pub(crate) bytes: u64,
+    pub(crate) modified_ns: u64,
 }
 
 /// A file, and its trial where it holds several.
-pub(super) type Key = (PathBuf, Option<String>);
+pub(crate) type Key = (PathBuf, Option<String>);
 
 /// The recordings of a folder, with the keyframe indices of those that were opened.
-pub(super) struct Folder {
+pub(crate) struct Folder {
     path: PathBuf,
     /// The indices in use, so that a recording is indexed once however many clients show it, with the sizes of the files.
     indices: Mutex<HashMap<Key, (u64, WeakIndex)>>,
@@ -43,16 +43,16 @@ pub(super) struct Folder {
 
 impl Folder {
     /// `path` is canonical.
-    pub(super) fn new(path: PathBuf) -> Self {
+    pub(crate) fn new(path: PathBuf) -> Self {
         Self { path, indices: Mutex::default(), last: Mutex::default(), turns: Mutex::default() }
     }
 
-    pub(super) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
     /// The recordings of these names, newest first.
-    pub(super) fn list(&self, names: Vec<String>) -> Vec<Listed> {
+    pub(crate) fn list(&self, names: Vec<String>) -> Vec<Listed> {
         let mut files = vec![];
         for name in names.into_iter().filter(|name| checked_name(name).is_ok()) {
             let path = self.path.join(&name);
@@ -67,7 +67,7 @@ impl Folder {
     }
 
     /// The readouts and plain rules by name: the `.json` that begin as one.
-    pub(super) fn readouts(&self) -> Vec<String> {
+    pub(crate) fn readouts(&self) -> Vec<String> {
         let names = std::fs::read_dir(&self.path).into_iter().flatten().flatten();
         let mut names: Vec<_> = names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
         names.retain(|name| name.ends_with(".json") && checked_name(name).is_ok() && self.begins_as_readout(name));
@@ -87,7 +87,7 @@ impl Folder {
     /// # Errors
     ///
     /// `Core(Problem)` for a name that leads out of the folder.
-    pub(super) fn file(&self, name: &str) -> Result<PathBuf> {
+    pub(crate) fn file(&self, name: &str) -> Result<PathBuf> {
         checked_name(name)?;
         let path = self.path.join(name);
         // A link may lead out of the folder.
@@ -100,7 +100,7 @@ impl Folder {
     }
 
     /// Waits until no other client has this file indexed, which two would read twice.
-    pub(super) async fn turn(&self, key: &Key) -> OwnedMutexGuard<()> {
+    pub(crate) async fn turn(&self, key: &Key) -> OwnedMutexGuard<()> {
         let turn = {
             let mut turns = lock(&self.turns);
             turns.retain(|_, turn| turn.strong_count() > 0);
@@ -114,18 +114,18 @@ impl Folder {
     }
 
     /// An index that is in memory, of a file of this size.
-    pub(super) fn stored_index(&self, key: &Key, bytes: u64) -> Option<Indexed> {
+    pub(crate) fn stored_index(&self, key: &Key, bytes: u64) -> Option<Indexed> {
         lock(&self.indices).get(key).filter(|(length, _)| *length == bytes).and_then(|(_, index)| index.upgrade())
     }
 
     /// Remembers an index for as long as it is shown; the last one for longer.
-    pub(super) fn remember(&self, key: Key, bytes: u64, indexed: &Indexed) {
+    pub(crate) fn remember(&self, key: Key, bytes: u64, indexed: &Indexed) {
         *lock(&self.last) = Some(indexed.clone());
         lock(&self.indices).insert(key, (bytes, WeakIndex::of(indexed)));
     }
 
     /// Forgets an index, so that it is built anew.
-    pub(super) fn forget(&self, key: &Key) {
+    pub(crate) fn forget(&self, key: &Key) {
         lock(&self.indices).remove(key);
     }
 }
@@ -135,7 +135,7 @@ impl Folder {
 /// # Errors
 ///
 /// `Io` where it cannot be read.
-pub(super) fn size(path: &Path) -> Result<u64> {
+pub(crate) fn size(path: &Path) -> Result<u64> {
     let failed = Error::file(path);
     let about = match std::fs::metadata(path) {
         Ok(about) if about.is_dir() => std::fs::read_dir(path),

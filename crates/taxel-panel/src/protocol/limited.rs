@@ -6,22 +6,22 @@ use serde_json::Value;
 
 /// A whole number from `LEAST` to `MOST`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Whole<const LEAST: i64, const MOST: i64>(pub(super) i64);
+pub(crate) struct Whole<const LEAST: i64, const MOST: i64>(pub(crate) i64);
 
 /// A time of the board's clock, us.
-pub(super) type BoardTime = Whole<{ -(1 << 52) }, { 1 << 52 }>;
+pub(crate) type BoardTime = Whole<{ -(1 << 52) }, { 1 << 52 }>;
 
 /// A number; limits are in thousandths.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Number<const LEAST: i64, const MOST: i64>(pub(super) f64);
+pub(crate) struct Number<const LEAST: i64, const MOST: i64>(pub(crate) f64);
 
 /// A text of 1 to `MOST` characters, none of them a control character, and not all of them white space.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Text<const MOST: usize>(pub(super) String);
+pub(crate) struct Text<const MOST: usize>(pub(crate) String);
 
 /// One value or more.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct OneOrMore<T>(pub(super) Vec<T>);
+pub(crate) struct OneOrMore<T>(pub(crate) Vec<T>);
 
 impl<'de, const LEAST: i64, const MOST: i64> Deserialize<'de> for Whole<LEAST, MOST> {
     fn deserialize<D: Deserializer<'de>>(value: D) -> Result<Self, D::Error> {
@@ -68,7 +68,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrMore<T> {
 #[derive(schemars::JsonSchema)]
 #[schemars(untagged, inline)]
 #[allow(dead_code)]
-pub(super) enum RegisterValue {
+pub(crate) enum RegisterValue {
     Flag(bool),
     Number(i64),
 }

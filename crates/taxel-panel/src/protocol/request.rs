@@ -10,16 +10,16 @@ use super::limits::MOST_CREDITS;
 use super::refusal::{Answer, Refusal};
 
 /// Number of a label or of a conflict.
-pub(super) type Id = Whole<1, { i64::MAX }>;
+pub(crate) type Id = Whole<1, { i64::MAX }>;
 
 /// A taxel, column and row.
-pub(super) type Taxel = (u16, u16);
+pub(crate) type Taxel = (u16, u16);
 
 /// A request of a client.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(tag = "type"))]
-pub(super) enum Request {
+pub(crate) enum Request {
     /// Credits for `n` more frames.
     Credit { n: Whole<1, { MOST_CREDITS as i64 }> },
     /// Send this taxel's history; `null` for none.
@@ -134,7 +134,7 @@ pub(super) enum Request {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(inline))]
-pub(super) enum RestHow {
+pub(crate) enum RestHow {
     Now,
     Lowest,
 }
@@ -143,7 +143,7 @@ pub(super) enum RestHow {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(inline))]
-pub(super) enum Keep {
+pub(crate) enum Keep {
     Acknowledged,
     File,
 }
@@ -152,21 +152,21 @@ pub(super) enum Keep {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(inline))]
-pub(super) struct RecordRequest {
-    pub(super) name: Text<100>,
-    pub(super) index: Option<Whole<0, 999_999>>,
-    pub(super) countdown_s: Option<Number<0, 60_000>>,
-    pub(super) length_s: Option<Number<10, 86_400_000>>,
-    pub(super) advance: Option<bool>,
-    pub(super) label: Option<Text<200>>,
-    pub(super) format: Option<RecordingFormat>,
+pub(crate) struct RecordRequest {
+    pub(crate) name: Text<100>,
+    pub(crate) index: Option<Whole<0, 999_999>>,
+    pub(crate) countdown_s: Option<Number<0, 60_000>>,
+    pub(crate) length_s: Option<Number<10, 86_400_000>>,
+    pub(crate) advance: Option<bool>,
+    pub(crate) label: Option<Text<200>>,
+    pub(crate) format: Option<RecordingFormat>,
 }
 
 /// The kind of file that is recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(inline))]
-pub(super) enum RecordingFormat {
+pub(crate) enum RecordingFormat {
     #[default]
     Mcap,
     /// Raw bytes alone.
@@ -177,16 +177,16 @@ pub(super) enum RecordingFormat {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct MarkedTimes {
-    pub(super) label: Text<200>,
-    pub(super) t_us: OneOrMore<BoardTime>,
-    pub(super) source: Option<Text<64>>,
-    pub(super) replaces_us: Option<OneOrMore<BoardTime>>,
+pub(crate) struct MarkedTimes {
+    pub(crate) label: Text<200>,
+    pub(crate) t_us: OneOrMore<BoardTime>,
+    pub(crate) source: Option<Text<64>>,
+    pub(crate) replaces_us: Option<OneOrMore<BoardTime>>,
 }
 
 impl Request {
     /// Whether it changes labels.
-    pub(super) fn changes_labels(&self) -> bool {
+    pub(crate) fn changes_labels(&self) -> bool {
         matches!(
             self,
             Self::Mark { .. }
@@ -203,7 +203,7 @@ impl Request {
     /// # Errors
     ///
     /// The refusal, which names the key at fault.
-    pub(super) fn read(what: &str, mut keys: Map<String, Value>) -> Answer<Self> {
+    pub(crate) fn read(what: &str, mut keys: Map<String, Value>) -> Answer<Self> {
         keys.remove("type");
         keys.remove("id");
         serde_path_to_error::deserialize(json!({ what: keys })).map_err(|error| {

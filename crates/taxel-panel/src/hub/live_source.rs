@@ -14,13 +14,13 @@ use taxel_live::locked::lock;
 use taxel_live::pipeline::{Counters, Handle, LiveOptions, OutputDetection, StatedTare, ViewerEvents};
 use taxel_live::recording::now_ns;
 
-use super::array_state::{ArrayState, Keyframe};
+use crate::array_state::{ArrayState, Keyframe};
 use super::clients::MOST_WAITING;
-use super::keyframe_index::live::{LiveIndex, REACH_US};
-use super::keyframe_index::{Activity, KeyframeIndex};
-use super::messages::{Latency, Lost, Message};
-use super::readout_encoders::ReadoutEncoders;
-use super::time_columns::{COLUMN_US, TimeColumns};
+use crate::keyframe_index::live::{LiveIndex, REACH_US};
+use crate::keyframe_index::{Activity, KeyframeIndex};
+use crate::protocol::messages::{Latency, Lost, Message};
+use crate::readout_encoders::ReadoutEncoders;
+use crate::time_columns::{COLUMN_US, TimeColumns};
 
 /// The time shown follows the host's clock this far behind it while no events arrive, ns: events arrive within that.
 const BEHIND_NS: i64 = 40_000_000;
@@ -29,17 +29,17 @@ const BEHIND_NS: i64 = 40_000_000;
 const STALLED_US: i64 = 200_000;
 
 /// A live source with the state and the keyframe index that its events make.
-pub(super) struct LiveSource {
-    pub(super) handle: Handle,
+pub(crate) struct LiveSource {
+    pub(crate) handle: Handle,
     events: Mutex<ViewerEvents>,
     detections: channel::Receiver<OutputDetection>,
-    pub(super) state: Mutex<ArrayState>,
-    pub(super) index: LiveIndex,
-    pub(super) activity: Mutex<Activity>,
+    pub(crate) state: Mutex<ArrayState>,
+    pub(crate) index: LiveIndex,
+    pub(crate) activity: Mutex<Activity>,
     /// The labels of the readout that runs.
-    pub(super) labels: Option<Vec<String>>,
+    pub(crate) labels: Option<Vec<String>>,
     /// The encoders of that readout.
-    pub(super) encoders: ReadoutEncoders,
+    pub(crate) encoders: ReadoutEncoders,
     /// Events that found no room in the queue from the pipeline.
     missing: AtomicU64,
     /// Whether the state has the rest that was given with the readout.
@@ -75,22 +75,22 @@ fn labels_and_encoders(options: &LiveOptions) -> taxel_core::Result<Option<(Vec<
 
 /// What arrived since the last call of [`LiveSource::receive`].
 #[derive(Default)]
-pub(super) struct ReceivedState {
+pub(crate) struct ReceivedState {
     /// A new frame can be shown.
-    pub(super) frame: bool,
+    pub(crate) frame: bool,
     /// The board was reset.
-    pub(super) reset: bool,
+    pub(crate) reset: bool,
     /// Taxels were zeroed.
-    pub(super) zeroed: bool,
+    pub(crate) zeroed: bool,
     /// New detections.
-    pub(super) detections: Vec<OutputDetection>,
+    pub(crate) detections: Vec<OutputDetection>,
 }
 
 impl LiveSource {
     /// # Errors
     ///
     /// `Core(Problem)` where the source has ended.
-    pub(super) fn new(handle: Handle, noise_floor: u8) -> Result<Self> {
+    pub(crate) fn new(handle: Handle, noise_floor: u8) -> Result<Self> {
         let (detections, events) = (handle.detections(MOST_WAITING), handle.events()?);
         let options = handle.options();
         let (labels, encoders) = labels_and_encoders(options)?.unzip();
@@ -114,13 +114,13 @@ impl LiveSource {
         })
     }
 
-    pub(super) fn array(&self) -> &Array {
+    pub(crate) fn array(&self) -> &Array {
         self.index.array()
     }
 
     /// The message of its counters; rates are those of the last `seconds`, since the counters `before`.
     #[allow(clippy::cast_precision_loss)]
-    pub(super) fn counters(
+    pub(crate) fn counters(
         &self,
         now: &Counters,
         before: Option<&Counters>,
@@ -167,12 +167,12 @@ impl LiveSource {
     }
 
     /// Events that only the panel lacks.
-    pub(super) fn missing(&self) -> u64 {
+    pub(crate) fn missing(&self) -> u64 {
         self.missing.load(Ordering::Relaxed)
     }
 
     /// Applies what the pipeline has copied; it copies more often while a client is connected.
-    pub(super) fn receive(&self, has_clients: bool) -> ReceivedState {
+    pub(crate) fn receive(&self, has_clients: bool) -> ReceivedState {
         let mut received = ReceivedState::default();
         let events = lock(&self.events);
         events.set_watched(has_clients);
@@ -243,7 +243,7 @@ impl LiveSource {
     }
 
     /// Moves the time shown on while no events arrive; that of a stalled source from where it is.
-    pub(super) fn follow_clock(&self, offset: Offset) {
+    pub(crate) fn follow_clock(&self, offset: Offset) {
         let mut silence = lock(&self.silence);
         if let Some((arrived_ns, t)) = silence.latest.take() {
             let late = offset.board_us(arrived_ns) - t;

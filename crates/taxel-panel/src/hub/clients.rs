@@ -5,14 +5,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use tokio::sync::{broadcast, watch};
 
-use super::messages::Message;
+use crate::protocol::messages::Message;
 
 /// Messages that wait for one client at most.
-pub(super) const MOST_WAITING: usize = 256;
+pub(crate) const MOST_WAITING: usize = 256;
 
 /// A message to all clients.
 #[derive(Debug, Clone)]
-pub(super) enum Broadcast {
+pub(crate) enum Broadcast {
     /// The same text for everybody.
     Text(Arc<str>),
     /// Counters, to which each session adds those of its client.
@@ -26,7 +26,7 @@ pub(super) enum Broadcast {
 }
 
 /// Counts the connected clients and sends messages to all of them.
-pub(super) struct Clients {
+pub(crate) struct Clients {
     messages: broadcast::Sender<Broadcast>,
     /// Counts up when a new frame can be shown.
     frames: watch::Sender<u64>,
@@ -34,7 +34,7 @@ pub(super) struct Clients {
 }
 
 /// The place of a connected client; dropping it frees the place.
-pub(super) struct ClientSlot(Arc<AtomicUsize>);
+pub(crate) struct ClientSlot(Arc<AtomicUsize>);
 
 impl Drop for ClientSlot {
     fn drop(&mut self) {
@@ -43,7 +43,7 @@ impl Drop for ClientSlot {
 }
 
 impl Clients {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             messages: broadcast::channel(MOST_WAITING).0,
             frames: watch::channel(0).0,
@@ -52,31 +52,31 @@ impl Clients {
     }
 
     /// Counts another client, unless `most` are connected.
-    pub(super) fn admit(&self, most: usize) -> Option<ClientSlot> {
+    pub(crate) fn admit(&self, most: usize) -> Option<ClientSlot> {
         let before = self.count.fetch_add(1, Ordering::Relaxed);
         let slot = ClientSlot(Arc::clone(&self.count));
         (before < most).then_some(slot)
     }
 
-    pub(super) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.count.load(Ordering::Relaxed)
     }
 
-    pub(super) fn send(&self, message: Broadcast) {
+    pub(crate) fn send(&self, message: Broadcast) {
         // Without a client the channel reports an error, which loses nothing.
         let _ = self.messages.send(message);
     }
 
-    pub(super) fn send_message(&self, message: &Message) {
+    pub(crate) fn send_message(&self, message: &Message) {
         self.send(Broadcast::Text(message.text().into()));
     }
 
     /// Announces to all sessions that a new frame can be shown.
-    pub(super) fn new_frame(&self) {
+    pub(crate) fn new_frame(&self) {
         self.frames.send_modify(|n| *n += 1);
     }
 
-    pub(super) fn subscribe(&self) -> (broadcast::Receiver<Broadcast>, watch::Receiver<u64>) {
+    pub(crate) fn subscribe(&self) -> (broadcast::Receiver<Broadcast>, watch::Receiver<u64>) {
         (self.messages.subscribe(), self.frames.subscribe())
     }
 }

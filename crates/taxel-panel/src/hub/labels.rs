@@ -6,13 +6,13 @@ use std::sync::{Arc, Mutex};
 use taxel_live::locked::lock;
 use tokio::sync::{OwnedMutexGuard, oneshot};
 
-use super::handler::{LabelConflict, LabelEdit, LabelRow, LabelTable};
-use super::messages::{Conflict, Label, Message};
-use super::refusal::Answer;
+use crate::handler::{LabelConflict, LabelEdit, LabelRow, LabelTable};
+use crate::protocol::messages::{Conflict, Label, Message};
+use crate::protocol::refusal::Answer;
 
 /// A change of the labels of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum LabelChange {
+pub(crate) enum LabelChange {
     Mark(LabelRow),
     Rename { id: u64, label: String },
     Move { id: u64, t_us: i64 },
@@ -28,7 +28,7 @@ impl LabelRow {
 
 impl LabelChange {
     /// The time that it sets, us.
-    pub(super) fn t_us(&self) -> Option<i64> {
+    pub(crate) fn t_us(&self) -> Option<i64> {
         match self {
             Self::Mark(row) => Some(row.t_us),
             Self::Move { t_us, .. } => Some(*t_us),
@@ -37,7 +37,7 @@ impl LabelChange {
     }
 
     /// The same change at a whole multiple of `us`: at a frame, where frames are numbered.
-    pub(super) fn at_whole(self, us: i64) -> Self {
+    pub(crate) fn at_whole(self, us: i64) -> Self {
         let whole = |t: i64| t.div_euclid(us) * us;
         match self {
             Self::Mark(row) => Self::Mark(LabelRow { t_us: whole(row.t_us), ..row }),
@@ -65,7 +65,7 @@ impl LabelChange {
 }
 
 /// An edit, and the number of the label that it changes.
-pub(super) type NumberedEdit = (Option<u64>, LabelEdit);
+pub(crate) type NumberedEdit = (Option<u64>, LabelEdit);
 
 fn place_of(labels: &[Label], id: u64) -> Result<usize, String> {
     labels.iter().position(|label| label.label_id == id && !label.row.is_removal()).ok_or_else(|| {
@@ -82,14 +82,14 @@ fn set(labels: &mut Vec<Label>, id: u64, row: Option<LabelRow>) {
 }
 
 /// A request that waits to be written with others.
-pub(super) struct WaitingChanges {
-    pub(super) changes: Vec<LabelChange>,
-    pub(super) answer: oneshot::Sender<Answer>,
+pub(crate) struct WaitingChanges {
+    pub(crate) changes: Vec<LabelChange>,
+    pub(crate) answer: oneshot::Sender<Answer>,
 }
 
 /// The labels of the recordings that clients have opened, by the recordings' names.
 #[derive(Default)]
-pub(super) struct LabelTables(Mutex<Tables>);
+pub(crate) struct LabelTables(Mutex<Tables>);
 
 #[derive(Default)]
 struct Tables {
@@ -105,7 +105,7 @@ struct KnownTable {
     labels: Option<Vec<Label>>,
     conflict: LabelConflict,
     conflict_id: u64,
-    /// What [`LabelRequests::stamp`](super::LabelRequests::stamp) returned, or its reason, before it was read.
+    /// What [`LabelRequests::stamp`](crate::LabelRequests::stamp) returned, or its reason, before it was read.
     stamp: String,
     /// One us of the file in the view.
     us: i64,
@@ -114,7 +114,7 @@ struct KnownTable {
 }
 
 /// Name of the file that holds the labels of a recording.
-pub(super) fn file_of(recording: &str) -> String {
+pub(crate) fn file_of(recording: &str) -> String {
     let stem = recording.rsplit_once('.').map_or(recording, |(stem, _)| stem);
     format!("{stem}.notes.csv")
 }
@@ -125,48 +125,48 @@ impl LabelTables {
     }
 
     /// Number of labels of a recording, once they have been read.
-    pub(super) fn count(&self, recording: &str) -> Option<usize> {
+    pub(crate) fn count(&self, recording: &str) -> Option<usize> {
         let counted = |labels: &Vec<Label>| labels.iter().filter(|label| !label.row.is_removal()).count();
         lock(&self.0).tables.get(recording)?.labels.as_ref().map(counted)
     }
 
     /// The recordings whose tables were opened, with one us of their files in the view.
-    pub(super) fn opened(&self) -> Vec<(String, i64)> {
+    pub(crate) fn opened(&self) -> Vec<(String, i64)> {
         let known = lock(&self.0);
         known.tables.iter().filter(|(_, table)| table.us > 0).map(|(name, table)| (name.clone(), table.us)).collect()
     }
 
     /// Waits until no other request reads or writes the table of a recording.
-    pub(super) async fn turn(&self, recording: &str) -> OwnedMutexGuard<()> {
+    pub(crate) async fn turn(&self, recording: &str) -> OwnedMutexGuard<()> {
         let turn = self.with(recording, |table| Arc::clone(&table.turn));
         turn.lock_owned().await
     }
 
-    pub(super) fn stamp(&self, recording: &str) -> String {
+    pub(crate) fn stamp(&self, recording: &str) -> String {
         self.with(recording, |table| table.stamp.clone())
     }
 
     /// Notes that a table is read now, with its stamp.
-    pub(super) fn opens(&self, recording: &str, stamp: String, us: i64) {
+    pub(crate) fn opens(&self, recording: &str, stamp: String, us: i64) {
         self.with(recording, |table| (table.stamp, table.us) = (stamp, us));
     }
 
     /// Notes that a table that was written is followed from now on, as of a recording that runs.
-    pub(super) fn follows(&self, recording: &str, us: i64) {
+    pub(crate) fn follows(&self, recording: &str, us: i64) {
         self.with(recording, |table| table.us = us);
     }
 
     /// Adds changes to those that are written next.
-    pub(super) fn wait(&self, recording: &str, waiting: WaitingChanges) {
+    pub(crate) fn wait(&self, recording: &str, waiting: WaitingChanges) {
         self.with(recording, |table| table.waiting.push(waiting));
     }
 
-    pub(super) fn take_waiting(&self, recording: &str) -> Vec<WaitingChanges> {
+    pub(crate) fn take_waiting(&self, recording: &str) -> Vec<WaitingChanges> {
         self.with(recording, |table| std::mem::take(&mut table.waiting))
     }
 
     /// The edits of requests, each made on what those before it leave.
-    pub(super) fn edits(&self, recording: &str, waiting: &[WaitingChanges]) -> Vec<Result<Vec<NumberedEdit>, String>> {
+    pub(crate) fn edits(&self, recording: &str, waiting: &[WaitingChanges]) -> Vec<Result<Vec<NumberedEdit>, String>> {
         let mut labels = self.with(recording, |table| table.labels.clone().unwrap_or_default());
         let mut edits = |waiting: &WaitingChanges| {
             let before = labels.clone();
@@ -180,7 +180,7 @@ impl LabelTables {
     }
 
     /// Notes the rows that labels have now, before [`LabelTables::replace`], so that they keep their numbers.
-    pub(super) fn renumber(&self, recording: &str, rows: impl IntoIterator<Item = (u64, Option<LabelRow>)>) {
+    pub(crate) fn renumber(&self, recording: &str, rows: impl IntoIterator<Item = (u64, Option<LabelRow>)>) {
         self.with(recording, |table| {
             let Some(labels) = &mut table.labels else { return };
             rows.into_iter().for_each(|(id, row)| set(labels, id, row));
@@ -189,7 +189,7 @@ impl LabelTables {
 
     /// Replaces the labels of a recording by those of its table, `None` where there is none; unchanged ones keep their numbers.
     /// Returns whether anything has changed.
-    pub(super) fn replace(&self, recording: &str, read: Option<LabelTable>) -> bool {
+    pub(crate) fn replace(&self, recording: &str, read: Option<LabelTable>) -> bool {
         let mut known = lock(&self.0);
         let Tables { tables, last_id, last_conflict } = &mut *known;
         let table = tables.entry(recording.to_owned()).or_default();
@@ -214,7 +214,7 @@ impl LabelTables {
     }
 
     /// The conflict of this number; `None` if it is over or is another by now.
-    pub(super) fn conflict(&self, recording: &str, conflict_id: u64) -> Option<LabelConflict> {
+    pub(crate) fn conflict(&self, recording: &str, conflict_id: u64) -> Option<LabelConflict> {
         self.with(recording, |table| {
             let holds = table.conflict_id == conflict_id && !table.conflict.is_empty();
             holds.then(|| table.conflict.clone())
@@ -222,7 +222,7 @@ impl LabelTables {
     }
 
     /// The `labels` message.
-    pub(super) fn message(&self, recording: &str) -> Message {
+    pub(crate) fn message(&self, recording: &str) -> Message {
         self.with(recording, |table| {
             let shown = table.labels.iter().flatten().filter(|label| !label.row.is_removal());
             let LabelConflict { missing, returned, new } = table.conflict.clone();

@@ -13,8 +13,8 @@ use taxel_live::clock::Pace;
 use taxel_live::pipeline::{Arrival, LiveOptions, OutputDetection};
 use taxel_live::ports::Port;
 
-use super::handler::{LabelRow, UnhealthyTaxels, UserPreset};
-use super::readout_encoders::ReadoutEncoders;
+use crate::handler::{LabelRow, UnhealthyTaxels, UserPreset};
+use crate::readout_encoders::ReadoutEncoders;
 use super::refusal::Refusal;
 
 /// A message of the server.
@@ -23,7 +23,7 @@ use super::refusal::Refusal;
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
 // A message is made, written as text, and dropped.
 #[allow(clippy::large_enum_variant)]
-pub(super) enum Message {
+pub(crate) enum Message {
     /// The server and what it shows; sent again when any of it changes (`listen`, `delta_intensity`, `control`).
     Hello {
         /// 1.
@@ -300,19 +300,19 @@ pub(super) enum Message {
 
 impl Message {
     /// The text that is sent.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         json!(self).to_string()
     }
 
-    pub(super) fn refused(id: Value, what: String, Refusal { reason, field }: Refusal) -> Self {
+    pub(crate) fn refused(id: Value, what: String, Refusal { reason, field }: Refusal) -> Self {
         Self::Refused { id, what, reason, field }
     }
 
-    pub(super) fn warning(text: impl std::fmt::Display) -> Self {
+    pub(crate) fn warning(text: impl std::fmt::Display) -> Self {
         Self::Warning { text: text.to_string() }
     }
 
-    pub(super) fn detection(output: &OutputDetection) -> Self {
+    pub(crate) fn detection(output: &OutputDetection) -> Self {
         let OutputDetection { detection, reported_us, .. } = output;
         Self::Detection {
             label: detection.label.clone(),
@@ -324,7 +324,7 @@ impl Message {
         }
     }
 
-    pub(super) fn zeroed<'a>(zeroed: impl IntoIterator<Item = &'a encode::Zeroing>) -> Self {
+    pub(crate) fn zeroed<'a>(zeroed: impl IntoIterator<Item = &'a encode::Zeroing>) -> Self {
         Self::Zeroed { taxels: zeroed.into_iter().map(Zeroing::from).collect() }
     }
 }
@@ -332,7 +332,7 @@ impl Message {
 /// A sensor.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct ArrayInfo {
+pub(crate) struct ArrayInfo {
     // Pitch and places are as in files.
     #[serde(flatten)]
     #[cfg_attr(feature = "development", schemars(with = "shapes::Array"))]
@@ -352,35 +352,35 @@ impl From<&Array> for ArrayInfo {
 /// What was lost, by cause.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct Lost {
+pub(crate) struct Lost {
     /// Messages.
-    pub(super) kernel: u64,
+    pub(crate) kernel: u64,
     /// Datagrams.
-    pub(super) queue: u64,
+    pub(crate) queue: u64,
     /// Datagrams of version 2 that never arrived intact.
-    pub(super) wire: u64,
+    pub(crate) wire: u64,
     /// Bytes that were no words.
-    pub(super) damaged: u64,
+    pub(crate) damaged: u64,
     /// Taxels outside the array.
-    pub(super) outside: u64,
+    pub(crate) outside: u64,
     /// Events that found no room before the readout.
-    pub(super) readout: u64,
+    pub(crate) readout: u64,
     /// Events that only the panel's curves and its past lack: its held values are right again within 0.1 s.
-    pub(super) panel: u64,
+    pub(crate) panel: u64,
 }
 
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct Latency {
-    pub(super) decode: Quantiles,
+pub(crate) struct Latency {
+    pub(crate) decode: Quantiles,
     /// Of detections, from known to reported.
-    pub(super) report: Quantiles,
+    pub(crate) report: Quantiles,
 }
 
 /// A taxel that was zeroed.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct Zeroing {
+pub(crate) struct Zeroing {
     taxel: (u16, u16),
     t_us: i64,
     /// Its rest now, ticks.
@@ -398,16 +398,16 @@ impl From<&encode::Zeroing> for Zeroing {
 /// An IPv4 address and its network interface.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct InterfaceAddress {
-    pub(super) host: String,
-    pub(super) name: String,
+pub(crate) struct InterfaceAddress {
+    pub(crate) host: String,
+    pub(crate) name: String,
 }
 
 /// What the recorder does.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(inline))]
-pub(super) enum RecorderPhase {
+pub(crate) enum RecorderPhase {
     Idle,
     Countdown,
     Recording,
@@ -417,103 +417,103 @@ pub(super) enum RecorderPhase {
 /// The last recording.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct LastRecording {
-    pub(super) file: String,
-    pub(super) verdict: String,
+pub(crate) struct LastRecording {
+    pub(crate) file: String,
+    pub(crate) verdict: String,
 }
 
 /// A recording of the folder.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct FileInfo {
-    pub(super) name: String,
-    pub(super) bytes: u64,
-    pub(super) modified_ns: u64,
+pub(crate) struct FileInfo {
+    pub(crate) name: String,
+    pub(crate) bytes: u64,
+    pub(crate) modified_ns: u64,
     /// Number of its labels, once they have been read.
-    pub(super) labels: Option<usize>,
+    pub(crate) labels: Option<usize>,
 }
 
 /// A detection in a recording.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct FoundDetection {
-    pub(super) label: String,
-    pub(super) t_us: i64,
-    pub(super) known_us: i64,
+pub(crate) struct FoundDetection {
+    pub(crate) label: String,
+    pub(crate) t_us: i64,
+    pub(crate) known_us: i64,
 }
 
 /// A recording of frames.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct FrameRecording {
-    pub(super) count: u64,
-    pub(super) unit: String,
+pub(crate) struct FrameRecording {
+    pub(crate) count: u64,
+    pub(crate) unit: String,
     /// A value is `(ticks - zero) * step`.
-    pub(super) step: f64,
-    pub(super) zero: u16,
+    pub(crate) step: f64,
+    pub(crate) zero: u16,
     /// Steps above rest up to which a taxel is not loaded.
-    pub(super) floor: u16,
+    pub(crate) floor: u16,
     /// The force of 1 in the sums of the curves, N, where values are in kPa and the area of each taxel is known: each counts by
     /// its area; else null, and 1 is a step.
-    pub(super) newtons: Option<f64>,
+    pub(crate) newtons: Option<f64>,
     /// A number where the frames have no times: frame k is then at k times that many us, in all messages; show the number,
     /// no seconds. Tables of labels hold the numbers.
-    pub(super) number_us: Option<i64>,
-    pub(super) sources: Vec<FrameSourceInfo>,
+    pub(crate) number_us: Option<i64>,
+    pub(crate) sources: Vec<FrameSourceInfo>,
     /// Taxels that never count as above rest.
-    pub(super) flickering: Vec<(usize, usize)>,
-    pub(super) trial: Option<String>,
+    pub(crate) flickering: Vec<(usize, usize)>,
+    pub(crate) trial: Option<String>,
     /// The trials of a file with several.
-    pub(super) trials: Vec<String>,
+    pub(crate) trials: Vec<String>,
     /// These are only the frames at the beginning of a large text table, and reading it all takes about so many seconds;
     /// `loading` follows each second, and then `opened` again, with all of it, at the same time of the view.
-    pub(super) left_s: Option<f64>,
+    pub(crate) left_s: Option<f64>,
 }
 
 /// A source of frames; sources stand side by side in `array`.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct FrameSourceInfo {
-    pub(super) name: String,
+pub(crate) struct FrameSourceInfo {
+    pub(crate) name: String,
     /// Its first column.
-    pub(super) left: u16,
-    pub(super) rows: u16,
-    pub(super) columns: u16,
+    pub(crate) left: u16,
+    pub(crate) rows: u16,
+    pub(crate) columns: u16,
     /// `given`: 0, as the unit is one of force or pressure; `quiet`: that of a quiet stretch, tracked from there; `none`: nothing
     /// was quiet, the values are above 0.
     #[cfg_attr(feature = "development", schemars(with = "shapes::RestSource"))]
-    pub(super) rest: &'static str,
+    pub(crate) rest: &'static str,
     /// Whether values fall from that of a quiet stretch, so that less may mean more pressure.
-    pub(super) falls: bool,
+    pub(crate) falls: bool,
     /// Where something lay in that stretch and was taken away later, as text (`rows 2 to 4, columns 5 to 7 (up to 41 above
     /// rest)`); empty where nothing did.
-    pub(super) preload_at: String,
+    pub(crate) preload_at: String,
 }
 
 /// A marker of the board's own recording.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct Marker {
-    pub(super) t_us: i64,
-    pub(super) start: bool,
+pub(crate) struct Marker {
+    pub(crate) t_us: i64,
+    pub(crate) start: bool,
 }
 
 /// A note of a recording.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct RecordedNote {
+pub(crate) struct RecordedNote {
     /// Null where it is about the whole recording.
-    pub(super) t_us: Option<i64>,
-    pub(super) text: String,
+    pub(crate) t_us: Option<i64>,
+    pub(crate) text: String,
     /// Empty for all sources.
-    pub(super) source: String,
+    pub(crate) source: String,
 }
 
 /// What a view does.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(inline))]
-pub(super) enum ViewState {
+pub(crate) enum ViewState {
     /// The live source.
     Following,
     Playing,
@@ -523,24 +523,24 @@ pub(super) enum ViewState {
 /// A label of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct Label {
+pub(crate) struct Label {
     /// Valid as long as the server runs.
-    pub(super) label_id: u64,
+    pub(crate) label_id: u64,
     #[serde(flatten)]
-    pub(super) row: LabelRow,
+    pub(crate) row: LabelRow,
 }
 
 /// What another program's text of a table lacks. A row without a `label` says that the note at `replaces_us` counts no more.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct Conflict {
-    pub(super) conflict_id: u64,
+pub(crate) struct Conflict {
+    pub(crate) conflict_id: u64,
     /// Acknowledged by `done`, and not in it.
-    pub(super) missing: Vec<LabelRow>,
+    pub(crate) missing: Vec<LabelRow>,
     /// Deleted, moved or renamed, which was acknowledged, and in it again.
-    pub(super) returned: Vec<LabelRow>,
+    pub(crate) returned: Vec<LabelRow>,
     /// The other labels that it has since; they are not in conflict, and in `labels` as well.
-    pub(super) new: Vec<LabelRow>,
+    pub(crate) new: Vec<LabelRow>,
 }
 
 /// What types of the core look like as JSON.
@@ -551,10 +551,10 @@ mod shapes {
 
     use schemars::JsonSchema;
 
-    pub(super) type Registers = BTreeMap<String, crate::limited::RegisterValue>;
+    pub(crate) type Registers = BTreeMap<String, crate::protocol::limited::RegisterValue>;
 
     #[derive(JsonSchema)]
-    pub(super) struct Array {
+    pub(crate) struct Array {
         rows: u16,
         columns: u16,
         /// A number of mm, or a pair for rows and columns; null where it is not known. A pitch of 1 mm is a pair.
@@ -594,7 +594,7 @@ mod shapes {
 
     #[derive(JsonSchema)]
     #[schemars(rename_all = "snake_case", inline)]
-    pub(super) enum RestSource {
+    pub(crate) enum RestSource {
         Given,
         Quiet,
         None,
@@ -602,7 +602,7 @@ mod shapes {
 
     #[derive(JsonSchema)]
     #[schemars(untagged, inline)]
-    pub(super) enum Id {
+    pub(crate) enum Id {
         Number(i64),
         Text(String),
     }

@@ -8,13 +8,13 @@ use taxel_core::problem;
 use taxel_live::Result;
 use taxel_live::recording::Reader;
 
-use super::clients::Broadcast;
-use super::folder::size;
-use super::handler::{FramesRead, Opening, ReadFile, Reply};
-use super::hub::Hub;
-use super::indexed::Indexed;
-use super::keyframe_index::recording::RecordingIndex;
-use super::messages::Message;
+use crate::hub::clients::Broadcast;
+use crate::hub::folder::size;
+use crate::handler::{FramesRead, Opening, ReadFile, Reply};
+use crate::hub::Hub;
+use crate::hub::indexed::Indexed;
+use crate::keyframe_index::recording::RecordingIndex;
+use crate::protocol::messages::Message;
 
 /// How often the progress of reading a file is sent.
 const PROGRESS_EVERY: Duration = Duration::from_secs(1);
@@ -25,8 +25,8 @@ const PROGRESS_EVERY: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 ///
-/// As [`Folder::file`](super::folder::Folder::file); the reader's reason where it is no recording.
-pub(super) async fn index(hub: &Arc<Hub>, name: &str, trial: Option<&str>) -> Result<Indexed> {
+/// As [`Folder::file`](crate::hub::folder::Folder::file); the reader's reason where it is no recording.
+pub(crate) async fn index(hub: &Arc<Hub>, name: &str, trial: Option<&str>) -> Result<Indexed> {
     let path = hub.folder.file(name)?;
     let bytes = size(&path)?;
     let key = (path.clone(), trial.map(str::to_owned));

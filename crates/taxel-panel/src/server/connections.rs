@@ -21,13 +21,13 @@ const MOST: usize = 512;
 const QUIET: Duration = Duration::from_secs(40);
 
 /// Accepts connections while there are fewer than [`MOST`].
-pub(super) struct LimitedListener {
+pub(crate) struct LimitedListener {
     listener: TcpListener,
     permits: Arc<Semaphore>,
 }
 
 impl LimitedListener {
-    pub(super) fn new(listener: TcpListener) -> Self {
+    pub(crate) fn new(listener: TcpListener) -> Self {
         Self { listener, permits: Arc::new(Semaphore::new(MOST)) }
     }
 }
@@ -55,7 +55,7 @@ impl Listener for LimitedListener {
 }
 
 /// A connection that counts against the limit until it is dropped.
-pub(super) struct LimitedConnection {
+pub(crate) struct LimitedConnection {
     stream: TcpStream,
     quiet: Pin<Box<Sleep>>,
     _permit: OwnedSemaphorePermit,

@@ -8,10 +8,10 @@ use std::sync::Arc;
 use taxel_core::encode::Stream;
 use taxel_core::{Array, Events, Hint, Intensities, Spike, SpikeKind, problem};
 
-use super::keyframe_index::FrameSources;
-use super::messages::Message;
-use super::readout_encoders::ViewEncoder;
-use super::time_columns::{SPAN, column_of};
+use crate::keyframe_index::FrameSources;
+use crate::protocol::messages::Message;
+use crate::readout_encoders::ViewEncoder;
+use crate::time_columns::{SPAN, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
@@ -24,7 +24,7 @@ const PIECE: usize = 1 << 16;
 
 /// An encoder applied to the changes of a board, or to the frames of each source.
 #[derive(Clone)]
-pub(super) struct EncodedSpikes {
+pub(crate) struct EncodedSpikes {
     name: String,
     of_readout: bool,
     /// One of a board; of frames one a source.
@@ -82,7 +82,7 @@ impl EncodedSpikes {
     /// # Errors
     ///
     /// `Core(Problem)` where the encoder does not fit the array.
-    pub(super) fn new(
+    pub(crate) fn new(
         encoder: &ViewEncoder,
         array: &Array,
         column_us: i64,
@@ -102,7 +102,7 @@ impl EncodedSpikes {
     /// # Errors
     ///
     /// `Core(Problem)` where the encoder does not fit a sensor, or the frames have no times.
-    pub(super) fn of_frames(
+    pub(crate) fn of_frames(
         encoder: &ViewEncoder,
         frames: &Arc<dyn FrameSources>,
         column_us: i64,
@@ -130,7 +130,7 @@ impl EncodedSpikes {
     /// # Errors
     ///
     /// `Core(Problem)` where the encoder does not encode them.
-    pub(super) fn check(mut self) -> Result<()> {
+    pub(crate) fn check(mut self) -> Result<()> {
         if let Some(frames) = self.frames.clone() {
             let second = (0..self.encoders.len()).filter_map(|source| frames.frame(source, 1));
             if let Some(t) = second.map(|(t, _)| t).max() {
@@ -147,7 +147,7 @@ impl EncodedSpikes {
     }
 
     /// Encodes the next changes; frames are read from their index as time advances.
-    pub(super) fn push(&mut self, changes: &[TaxelChange]) {
+    pub(crate) fn push(&mut self, changes: &[TaxelChange]) {
         if self.frames.is_some() {
             return;
         }
@@ -158,7 +158,7 @@ impl EncodedSpikes {
     }
 
     /// Informs the encoder that no change before `t` (us) will follow; frames up to then are encoded.
-    pub(super) fn advance(&mut self, t: i64) {
+    pub(crate) fn advance(&mut self, t: i64) {
         self.push_frames(t);
         if self.failed.is_none() {
             let from = self.pending.len();
@@ -236,7 +236,7 @@ impl EncodedSpikes {
     }
 
     /// Appends these columns of time, one byte per row.
-    pub(super) fn write(&self, columns: Range<i64>, out: &mut Vec<u8>) {
+    pub(crate) fn write(&self, columns: Range<i64>, out: &mut Vec<u8>) {
         let mut place = self.columns.partition_point(|&(number, _)| number < columns.start);
         for column in columns {
             match self.columns.get(place) {
@@ -250,12 +250,12 @@ impl EncodedSpikes {
     }
 
     /// Why the encoder stopped, if it did.
-    pub(super) fn failed(&self) -> Option<&str> {
+    pub(crate) fn failed(&self) -> Option<&str> {
         self.failed.as_deref()
     }
 
     /// The `spikes` message of the pending spikes, if there are any.
-    pub(super) fn message(&mut self) -> Option<Message> {
+    pub(crate) fn message(&mut self) -> Option<Message> {
         if self.pending.is_empty() {
             return None;
         }

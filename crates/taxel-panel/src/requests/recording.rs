@@ -8,10 +8,10 @@ use taxel_live::locked::lock;
 use taxel_live::pipeline::{LiveSummary, Record};
 use taxel_live::recording::Compression;
 
-use super::hub::Hub;
-use super::messages::Message;
-use super::recorder::{Phase, RecorderState, RecordingPlan};
-use super::request::RecordingFormat;
+use crate::hub::Hub;
+use crate::protocol::messages::Message;
+use crate::hub::recorder::{Phase, RecorderState, RecordingPlan};
+use crate::protocol::request::RecordingFormat;
 
 /// How often progress is sent to the clients.
 const PROGRESS_EVERY: Duration = Duration::from_secs(1);
@@ -27,7 +27,7 @@ const RECORD: u32 = 1 << 16;
 /// # Errors
 ///
 /// Refused while the recorder is busy, and where the file exists.
-pub(super) fn start(hub: &Arc<Hub>, plan: RecordingPlan) -> Result<(), String> {
+pub(crate) fn start(hub: &Arc<Hub>, plan: RecordingPlan) -> Result<(), String> {
     let file = plan.file();
     let path = hub.folder.file(&file).map_err(|error| error.to_string())?;
     if path.exists() {

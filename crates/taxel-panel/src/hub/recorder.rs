@@ -7,21 +7,21 @@ use taxel_live::locked::lock;
 use taxel_live::recording::numbered;
 use tokio::sync::Notify;
 
-use super::messages::{LastRecording, Message, RecorderPhase};
-use super::request::RecordingFormat;
+use crate::protocol::messages::{LastRecording, Message, RecorderPhase};
+use crate::protocol::request::RecordingFormat;
 
 /// What is to be recorded.
 #[derive(Debug, Clone)]
-pub(super) struct RecordingPlan {
-    pub(super) name: String,
+pub(crate) struct RecordingPlan {
+    pub(crate) name: String,
     /// Number of the next recording, appended to the name.
-    pub(super) index: Option<u32>,
-    pub(super) format: RecordingFormat,
-    pub(super) countdown: Duration,
-    pub(super) length: Option<Duration>,
+    pub(crate) index: Option<u32>,
+    pub(crate) format: RecordingFormat,
+    pub(crate) countdown: Duration,
+    pub(crate) length: Option<Duration>,
     /// Whether the next recording begins by itself.
-    pub(super) advance: bool,
-    pub(super) label: Option<String>,
+    pub(crate) advance: bool,
+    pub(crate) label: Option<String>,
 }
 
 impl RecordingFormat {
@@ -36,7 +36,7 @@ impl RecordingFormat {
 
 impl RecordingPlan {
     /// Name of the next file.
-    pub(super) fn file(&self) -> String {
+    pub(crate) fn file(&self) -> String {
         let plain = format!("{}.{}", self.name, self.format.ending());
         match self.index {
             Some(index) => numbered(plain.as_ref(), index).to_string_lossy().into_owned(),
@@ -47,7 +47,7 @@ impl RecordingPlan {
 
 /// What the recorder does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Phase {
+pub(crate) enum Phase {
     #[default]
     Idle,
     /// The recording begins at this time.
@@ -58,36 +58,36 @@ pub(super) enum Phase {
 }
 
 #[derive(Debug, Default)]
-pub(super) struct RecorderState {
-    pub(super) phase: Phase,
-    pub(super) plan: Option<RecordingPlan>,
+pub(crate) struct RecorderState {
+    pub(crate) phase: Phase,
+    pub(crate) plan: Option<RecordingPlan>,
     /// File and verdict of the last recording.
-    pub(super) last: Option<(String, String)>,
+    pub(crate) last: Option<(String, String)>,
     /// Why the last recording ended early or did not begin.
-    pub(super) error: Option<String>,
+    pub(crate) error: Option<String>,
 }
 
 /// Starts and ends recordings, and tells clients how far the present one is.
 #[derive(Debug, Default)]
-pub(super) struct RecorderControl {
-    pub(super) state: Mutex<RecorderState>,
-    pub(super) stop: Notify,
+pub(crate) struct RecorderControl {
+    pub(crate) state: Mutex<RecorderState>,
+    pub(crate) stop: Notify,
 }
 
 impl RecorderControl {
     /// The file that is being recorded.
-    pub(super) fn file(&self) -> Option<String> {
+    pub(crate) fn file(&self) -> Option<String> {
         let state = lock(&self.state);
         let records = matches!(state.phase, Phase::Recording(_) | Phase::Finishing);
         state.plan.as_ref().filter(|_| records).map(RecordingPlan::file)
     }
 
-    pub(super) fn is_busy(&self) -> bool {
+    pub(crate) fn is_busy(&self) -> bool {
         lock(&self.state).phase != Phase::Idle
     }
 
     /// The `recorder` message.
-    pub(super) fn message(&self) -> Message {
+    pub(crate) fn message(&self) -> Message {
         let state = lock(&self.state);
         let plan = state.plan.as_ref();
         let length = plan.and_then(|plan| plan.length);
@@ -126,7 +126,7 @@ impl RecorderControl {
     /// # Errors
     ///
     /// Refused while the recorder is busy.
-    pub(super) fn plan(&self, plan: RecordingPlan) -> Result<(), String> {
+    pub(crate) fn plan(&self, plan: RecordingPlan) -> Result<(), String> {
         let mut state = lock(&self.state);
         if state.phase != Phase::Idle {
             return Err("a recording runs already: stop it first".to_owned());
@@ -142,7 +142,7 @@ impl RecorderControl {
     /// # Errors
     ///
     /// Refused while the recorder is idle.
-    pub(super) fn end(&self) -> Result<(), String> {
+    pub(crate) fn end(&self) -> Result<(), String> {
         let mut state = lock(&self.state);
         if state.phase == Phase::Idle {
             return Err("nothing is recorded".to_owned());

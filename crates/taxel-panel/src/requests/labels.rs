@@ -6,16 +6,16 @@ use std::time::Duration;
 
 use tokio::sync::oneshot;
 
-use super::clients::Broadcast;
-use super::handler::{EditOutcome, LabelRow, LabelTable};
-use super::hub::Hub;
-use super::indexed::OpenRecording;
-use super::labels::{LabelChange, NumberedEdit, WaitingChanges, file_of};
-use super::limited::{OneOrMore, Text};
-use super::limits::MOST_MARKS;
-use super::messages::Message;
-use super::refusal::{Answer, Refusal};
-use super::request::{Keep, MarkedTimes};
+use crate::hub::clients::Broadcast;
+use crate::handler::{EditOutcome, LabelRow, LabelTable};
+use crate::hub::Hub;
+use crate::hub::indexed::OpenRecording;
+use crate::hub::labels::{LabelChange, NumberedEdit, WaitingChanges, file_of};
+use crate::protocol::limited::{OneOrMore, Text};
+use crate::protocol::limits::MOST_MARKS;
+use crate::protocol::messages::Message;
+use crate::protocol::refusal::{Answer, Refusal};
+use crate::protocol::request::{Keep, MarkedTimes};
 
 /// How often the tables that were opened are checked for changes of other programs.
 const FOLLOW_EVERY: Duration = Duration::from_millis(300);
@@ -23,8 +23,8 @@ const FOLLOW_EVERY: Duration = Duration::from_millis(300);
 // ---------------------------------------------------------------------------------------------- reading
 
 /// Reads the labels of a recording from their file; one us of the file is `us` in the view
-/// ([`Indexed::us`](super::indexed::Indexed::us)).
-pub(super) async fn read(hub: &Hub, recording: &str, us: i64) -> Answer {
+/// ([`Indexed::us`](crate::hub::indexed::Indexed::us)).
+pub(crate) async fn read(hub: &Hub, recording: &str, us: i64) -> Answer {
     let stamp = stamp(hub, recording).await;
     let known = hub.labels.count(recording).is_some();
     if reread(hub, recording, stamp, us).await? && known {
@@ -56,7 +56,7 @@ async fn reread(hub: &Hub, recording: &str, stamp: String, us: i64) -> Answer<bo
 }
 
 /// Reads tables again that have changed; never returns.
-pub(super) async fn follow(hub: Arc<Hub>) {
+pub(crate) async fn follow(hub: Arc<Hub>) {
     loop {
         tokio::time::sleep(FOLLOW_EVERY).await;
         for (recording, us) in hub.labels.opened() {
@@ -76,14 +76,14 @@ pub(super) async fn follow(hub: Arc<Hub>) {
 // ---------------------------------------------------------------------------------------------- changing
 
 /// A label of the trial that is shown.
-pub(super) fn row(shown: Option<&OpenRecording>, label: Text<200>, t_us: i64, source: Option<Text<64>>) -> LabelRow {
+pub(crate) fn row(shown: Option<&OpenRecording>, label: Text<200>, t_us: i64, source: Option<Text<64>>) -> LabelRow {
     let source = source.map(|source| source.0).unwrap_or_default();
     let trial = shown.and_then(|shown| shown.indexed.trial()).unwrap_or_default().to_owned();
     LabelRow { label: label.0, t_us, source, trial, replaces_us: None, host_ns: None }
 }
 
 /// The changes of `marks`: several labels, each at one time or more.
-pub(super) fn marks(shown: Option<&OpenRecording>, labels: Vec<MarkedTimes>) -> Answer<Vec<LabelChange>> {
+pub(crate) fn marks(shown: Option<&OpenRecording>, labels: Vec<MarkedTimes>) -> Answer<Vec<LabelChange>> {
     let mut changes = vec![];
     for MarkedTimes { label, t_us: OneOrMore(times), source, replaces_us } in labels {
         if replaces_us.as_ref().is_some_and(|replaced| replaced.0.len() != times.len()) {
@@ -109,7 +109,7 @@ fn recording_of(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<(String, i64
 }
 
 /// Changes labels of the recording that is shown or being recorded; returns when the table with all of the changes is on the disk.
-pub(super) async fn change(hub: &Hub, shown: Option<&OpenRecording>, changes: Vec<LabelChange>) -> Answer {
+pub(crate) async fn change(hub: &Hub, shown: Option<&OpenRecording>, changes: Vec<LabelChange>) -> Answer {
     let (name, us) = recording_of(hub, shown)?;
     let changes: Vec<_> = changes.into_iter().map(|change| change.at_whole(us)).collect();
     for (shown, t_us) in changes.iter().filter_map(|change| shown.zip(change.t_us())) {
@@ -170,7 +170,7 @@ async fn write(hub: &Hub, name: &str, us: i64, edits: Vec<Result<Vec<NumberedEdi
 }
 
 /// Ends the conflict of this number as the client chose.
-pub(super) async fn settle(hub: &Hub, shown: Option<&OpenRecording>, id: u64, keep: Keep) -> Answer {
+pub(crate) async fn settle(hub: &Hub, shown: Option<&OpenRecording>, id: u64, keep: Keep) -> Answer {
     let (name, us) = recording_of(hub, shown)?;
     let restore = keep == Keep::Acknowledged;
     let table = hub.folder.file(&file_of(&name))?;

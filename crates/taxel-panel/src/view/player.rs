@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use taxel_core::problem;
 
-use super::array_state::{ArrayState, FORGET};
+use crate::array_state::{ArrayState, FORGET};
 use super::encoded_spikes::EncodedSpikes;
-use super::keyframe_index::{ChangeReader, KeyframeIndex, ReadOutcome};
-use super::readout_encoders::ViewEncoder;
-use super::taxel_history::TaxelHistory;
-use super::time_columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
+use crate::keyframe_index::{ChangeReader, KeyframeIndex, ReadOutcome};
+use crate::readout_encoders::ViewEncoder;
+use crate::taxel_history::TaxelHistory;
+use crate::time_columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
@@ -20,7 +20,7 @@ const HISTORY_CHANGES: u64 = 2_000_000;
 /// What a view shows of a source.
 #[derive(Debug, Clone)]
 pub struct ViewOptions {
-    /// Width of a column of time, us ([`is_column`](super::time_columns::is_column)).
+    /// Width of a column of time, us ([`is_column`](crate::time_columns::is_column)).
     pub column_us: i64,
     /// The taxel whose history is shown.
     pub watched: Option<u32>,
@@ -236,11 +236,11 @@ impl Player {
         self.history.as_ref()
     }
 
-    pub(super) fn spikes(&self) -> Option<&EncodedSpikes> {
+    pub(crate) fn spikes(&self) -> Option<&EncodedSpikes> {
         self.spikes.as_ref()
     }
 
-    pub(super) fn spikes_mut(&mut self) -> Option<&mut EncodedSpikes> {
+    pub(crate) fn spikes_mut(&mut self) -> Option<&mut EncodedSpikes> {
         self.spikes.as_mut()
     }
 

@@ -6,10 +6,10 @@ use taxel_core::wire::{Command, Registers};
 use taxel_live::locked::lock;
 use tokio::sync::OwnedMutexGuard;
 
-use super::handler::UserPresets;
-use super::hub::Hub;
-use super::presets;
-use super::refusal::{Answer, Refusal};
+use crate::handler::UserPresets;
+use crate::hub::Hub;
+use crate::hub::presets;
+use crate::protocol::refusal::{Answer, Refusal};
 
 const NOT_CONNECTED: &str = "the board's serial line is not connected: give --control, or connect it here";
 
@@ -20,7 +20,7 @@ const ALL: [u8; 6] = [1, 2, 3, 4, 0, 5];
 const READABLE: [u8; 7] = [0, 1, 2, 3, 4, 5, 7];
 
 /// Reads all registers from the board.
-pub(super) async fn read(hub: &Hub) -> Answer {
+pub(crate) async fn read(hub: &Hub) -> Answer {
     if hub.board().control.is_none() {
         return Err(NOT_CONNECTED.into());
     }
@@ -88,7 +88,7 @@ async fn write(hub: &Hub, target: Registers, all: bool) -> Answer {
 }
 
 /// `set`: writes single registers.
-pub(super) async fn set(hub: &Hub, values: &Map<String, Value>) -> Answer {
+pub(crate) async fn set(hub: &Hub, values: &Map<String, Value>) -> Answer {
     let names: Vec<String> = values.keys().cloned().collect();
     let mut wanted = vec![];
     for (name, value) in values {
@@ -113,7 +113,7 @@ pub(super) async fn set(hub: &Hub, values: &Map<String, Value>) -> Answer {
 }
 
 /// `send_all`: writes every register again.
-pub(super) async fn send_all(hub: &Hub) -> Answer {
+pub(crate) async fn send_all(hub: &Hub) -> Answer {
     let target = hub.board().registers;
     write(hub, target, true).await
 }
@@ -150,7 +150,7 @@ async fn write_presets(hub: &Hub, turn: OwnedMutexGuard<()>) -> Answer {
 }
 
 /// `preset_apply`: writes the registers of a preset.
-pub(super) async fn apply_preset(hub: &Hub, name: &str) -> Answer {
+pub(crate) async fn apply_preset(hub: &Hub, name: &str) -> Answer {
     reread_presets(hub).await?;
     let live = hub.live().ok_or("no board is listened to")?;
     let array = live.array();
@@ -171,7 +171,7 @@ pub(super) async fn apply_preset(hub: &Hub, name: &str) -> Answer {
 }
 
 /// `preset_save`: saves the registers that the board holds under a new name.
-pub(super) async fn save_preset(hub: &Hub, name: &str) -> Answer {
+pub(crate) async fn save_preset(hub: &Hub, name: &str) -> Answer {
     let turn = hub.file_turn().await;
     read_presets(hub).await?;
     let exists = PRESETS.iter().any(|preset| preset.name == name) || hub.presets().presets.contains_key(name);
@@ -184,7 +184,7 @@ pub(super) async fn save_preset(hub: &Hub, name: &str) -> Answer {
 }
 
 /// `preset_delete`: deletes a preset of the user.
-pub(super) async fn delete_preset(hub: &Hub, name: &str) -> Answer {
+pub(crate) async fn delete_preset(hub: &Hub, name: &str) -> Answer {
     let turn = hub.file_turn().await;
     read_presets(hub).await?;
     if hub.presets().presets.remove(name).is_none() {
@@ -196,7 +196,7 @@ pub(super) async fn delete_preset(hub: &Hub, name: &str) -> Answer {
 }
 
 /// Reads what only the request handler knows: presets, and registers that are not known.
-pub(super) async fn prepare(hub: &Hub) {
+pub(crate) async fn prepare(hub: &Hub) {
     // Without a file there are no presets of the user; a damaged one is reported where a preset is applied.
     let _ = reread_presets(hub).await;
     // Where the board does not answer now, its registers stay unknown, as the page then shows.

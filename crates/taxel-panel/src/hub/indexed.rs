@@ -3,12 +3,12 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::array_state::RestSource;
-use super::keyframe_index::KeyframeIndex;
-use super::keyframe_index::frames::{FrameIndex, FramePlace};
-use super::keyframe_index::recording::RecordingIndex;
-use super::messages::{FoundDetection, FrameRecording, FrameSourceInfo, Marker, Message, RecordedNote};
-use super::time_columns::{COLUMN_US, TimeColumns};
+use crate::array_state::RestSource;
+use crate::keyframe_index::KeyframeIndex;
+use crate::keyframe_index::frames::{FrameIndex, FramePlace};
+use crate::keyframe_index::recording::RecordingIndex;
+use crate::protocol::messages::{FoundDetection, FrameRecording, FrameSourceInfo, Marker, Message, RecordedNote};
+use crate::time_columns::{COLUMN_US, TimeColumns};
 
 /// A label may lie so long before the first event or after the last one, us.
 const LATE_LABEL_US: i64 = 1_000_000;
@@ -18,22 +18,22 @@ const MOST_DETECTIONS: usize = 10_000;
 
 /// An indexed recording.
 #[derive(Debug, Clone)]
-pub(super) enum Indexed {
+pub(crate) enum Indexed {
     Events(Arc<RecordingIndex>),
     Frames(Arc<FrameIndex>),
 }
 
 /// The recording that a client shows.
 #[derive(Debug, Clone)]
-pub(super) struct OpenRecording {
-    pub(super) name: String,
+pub(crate) struct OpenRecording {
+    pub(crate) name: String,
     /// Its trial, where the file holds several.
-    pub(super) trial: Option<String>,
-    pub(super) indexed: Indexed,
+    pub(crate) trial: Option<String>,
+    pub(crate) indexed: Indexed,
 }
 
 impl Indexed {
-    pub(super) fn index(&self) -> Arc<dyn KeyframeIndex> {
+    pub(crate) fn index(&self) -> Arc<dyn KeyframeIndex> {
         match self {
             Self::Events(index) => Arc::new(Arc::clone(index)),
             Self::Frames(index) => Arc::new(Arc::clone(index)),
@@ -41,7 +41,7 @@ impl Indexed {
     }
 
     /// The trial of its file that it is, where the file has several.
-    pub(super) fn trial(&self) -> Option<&str> {
+    pub(crate) fn trial(&self) -> Option<&str> {
         match self {
             Self::Events(_) => None,
             Self::Frames(index) => index.file.trial.as_deref(),
@@ -49,7 +49,7 @@ impl Indexed {
     }
 
     /// Time in the index of one us of the file: above 1 where frames are numbered, one a us.
-    pub(super) fn us(&self) -> i64 {
+    pub(crate) fn us(&self) -> i64 {
         match self {
             Self::Events(_) => 1,
             Self::Frames(index) => index.file.number_us.unwrap_or(1),
@@ -57,7 +57,7 @@ impl Indexed {
     }
 
     /// Refuses a label outside the recording: a late label of its last touch may lie a little after the last event.
-    pub(super) fn check_label(&self, name: &str, t_us: i64) -> Result<(), String> {
+    pub(crate) fn check_label(&self, name: &str, t_us: i64) -> Result<(), String> {
         let Some((first, last)) = self.index().range() else { return Ok(()) };
         let late_us = match self {
             Self::Events(_) => LATE_LABEL_US,
@@ -78,7 +78,7 @@ impl Indexed {
     }
 
     /// The `overview` message.
-    pub(super) fn overview(&self, name: &str) -> Message {
+    pub(crate) fn overview(&self, name: &str) -> Message {
         let (start_us, step_us, bins, events) = match self {
             Self::Events(index) => {
                 let (start, step, events) = &index.event_rate;
@@ -95,7 +95,7 @@ impl Indexed {
     }
 
     /// The `opened` message; `bytes` is the size of the file, `train` the command that trains on its labels.
-    pub(super) fn opened(&self, name: &str, bytes: u64, train: String, begun: Instant) -> Message {
+    pub(crate) fn opened(&self, name: &str, bytes: u64, train: String, begun: Instant) -> Message {
         let index = self.index();
         let range = index.range();
         // The end of the column, which has all of its force.

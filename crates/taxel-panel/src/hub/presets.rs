@@ -7,17 +7,17 @@ use taxel_core::Array;
 use taxel_core::wire::Registers;
 use taxel_core::wire::registers::{PRESETS, Preset};
 
-use super::handler::{PresetValue, UserPreset};
+use crate::handler::{PresetValue, UserPreset};
 
 /// The built-in presets that a board of this array can hold; all of them without a board.
-pub(super) fn fitting(held: &Registers, array: Option<&Array>) -> Vec<&'static Preset> {
+pub(crate) fn fitting(held: &Registers, array: Option<&Array>) -> Vec<&'static Preset> {
     let Some(array) = array else { return PRESETS.iter().collect() };
     let fits = |preset: &&Preset| held.with_preset(&preset.registers, array).check(array).is_ok();
     Registers::presets(array, held.channels).filter(fits).collect()
 }
 
 /// Name of the built-in preset that equals these registers, whatever the version of the wire.
-pub(super) fn built_in_equal_to(held: &Registers, array: Option<&Array>) -> Option<String> {
+pub(crate) fn built_in_equal_to(held: &Registers, array: Option<&Array>) -> Option<String> {
     let equals = |preset: &&Preset| match array {
         Some(array) => held.with_preset(&preset.registers, array) == *held,
         None => preset.registers == *held,
@@ -26,7 +26,7 @@ pub(super) fn built_in_equal_to(held: &Registers, array: Option<&Array>) -> Opti
 }
 
 /// Name of the user's preset that equals these registers.
-pub(super) fn equal_to(held: &Registers, presets: &BTreeMap<String, UserPreset>) -> Option<String> {
+pub(crate) fn equal_to(held: &Registers, presets: &BTreeMap<String, UserPreset>) -> Option<String> {
     let values = json!(held);
     presets.iter().find(|(_, preset)| json!(preset) == values).map(|(name, _)| name.clone())
 }
@@ -36,12 +36,12 @@ pub(super) fn equal_to(held: &Registers, presets: &BTreeMap<String, UserPreset>)
 /// # Errors
 ///
 /// Why the preset, which may have been edited by hand, holds no registers.
-pub(super) fn to_registers(preset: &UserPreset) -> Result<Registers, String> {
+pub(crate) fn to_registers(preset: &UserPreset) -> Result<Registers, String> {
     serde_json::from_value(json!(preset)).map_err(|error| error.to_string())
 }
 
 /// A preset of these registers.
-pub(super) fn from_registers(registers: &Registers) -> UserPreset {
+pub(crate) fn from_registers(registers: &Registers) -> UserPreset {
     let held = match json!(registers) {
         Value::Object(held) => held,
         _ => Map::new(),
