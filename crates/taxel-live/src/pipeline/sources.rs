@@ -14,8 +14,8 @@ use taxel_core::problem;
 
 use super::counters::{Counters, SourceCounts};
 use super::options::LiveOptions;
-use super::record::COUNTS_EVERY;
-use super::recorder::{Host, RecordingPart};
+use super::record_stage::COUNTS_EVERY;
+use super::running_recording::{Host, RecordingPart};
 use super::shared::PipelineShared;
 use super::source::{FurtherSource, LineInput, LineReader, SourceKind, TextLine};
 use crate::locked::lock;

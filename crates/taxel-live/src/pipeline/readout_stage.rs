@@ -8,7 +8,7 @@ use super::readout_queue::{BatchEnd, QuietUntil};
 use super::running_readout::RunningReadout;
 use super::shared::PipelineShared;
 
-pub(super) struct ReadOutStage {
+pub(super) struct ReadoutStage {
     /// Whether there is a readout at all.
     is_on: bool,
     /// The readout, while it runs in this thread.
@@ -21,7 +21,7 @@ pub(super) struct ReadOutStage {
     announced: Option<i64>,
 }
 
-impl ReadOutStage {
+impl ReadoutStage {
     pub(super) fn new(readout: Option<RunningReadout>) -> Self {
         Self { is_on: readout.is_some(), readout, separated: None, nothing: vec![], announced: None }
     }

@@ -23,7 +23,7 @@ use crate::{Error, Result};
 ///
 /// The file is locked from the reservation on. An existing file is replaced only when there is data to replace it: if
 /// no data arrive, it stays.
-pub(super) struct Recorder {
+pub(super) struct RunningRecording {
     record: Record,
     header: Header,
     has_notes: AtomicBool,
@@ -95,7 +95,7 @@ impl RecordingPart {
     }
 }
 
-impl Recorder {
+impl RunningRecording {
     fn new(record: &Record, header: Header) -> Self {
         Self {
             record: record.clone(),
@@ -147,13 +147,13 @@ impl Recorder {
         sources: &[FurtherSource],
         place: &Origin,
     ) -> Result<Self> {
-        let (recorder, file) = Self::open(record, options, sources, place)?;
+        let (recording, file) = Self::open(record, options, sources, place)?;
         let new = file.is_new();
-        *lock(&recorder.reserved) = Some(file);
+        *lock(&recording.reserved) = Some(file);
         if new {
-            recorder.create_once()?;
+            recording.create_once()?;
         }
-        Ok(recorder)
+        Ok(recording)
     }
 
     /// A recording that begins while the pipeline runs: the file is reserved now, and written later.
@@ -163,17 +163,17 @@ impl Recorder {
         sources: &[FurtherSource],
         place: &Origin,
     ) -> Result<Self> {
-        let (recorder, file) = Self::open(record, options, sources, place)?;
-        let recorder = Self { since: Some(Box::default()), ..recorder };
+        let (recording, file) = Self::open(record, options, sources, place)?;
+        let recording = Self { since: Some(Box::default()), ..recording };
         if kind_of_name(&record.path)? == "lsa" {
-            *lock(&recorder.reserved) = Some(file);
-            return Ok(recorder);
+            *lock(&recording.reserved) = Some(file);
+            return Ok(recording);
         }
         // Without other sources the file waits for the board's first stamp, so that its times are the pipeline's.
-        let for_clock = recorder.header.sources.is_empty();
-        let writer = Writer::plan(file, &recorder.header, record.compression, for_clock);
+        let for_clock = recording.header.sources.is_empty();
+        let writer = Writer::plan(file, &recording.header, record.compression, for_clock);
         let clock = Mutex::new(if for_clock { RecordingClock::Waits } else { RecordingClock::Unknown });
-        Ok(Self { file: OnceLock::from(RecordingFile::Mcap(Box::new(writer))), clock, ..recorder })
+        Ok(Self { file: OnceLock::from(RecordingFile::Mcap(Box::new(writer))), clock, ..recording })
     }
 
     /// A recording whose file is opened and locked, but not changed.

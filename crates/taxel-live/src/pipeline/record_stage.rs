@@ -11,9 +11,9 @@ use taxel_core::wire::{DatagramInfo, Registers, SenderDecoder};
 use taxel_core::{Events, Marker};
 
 use super::counters::Counters;
-use super::decode::fresh_decoder;
+use super::decode_stage::fresh_decoder;
 use super::preview_buffer::PreviewBuffer;
-use super::recorder::Recorder;
+use super::running_recording::RunningRecording;
 use super::shared::{EndedRecording, PipelineShared};
 use crate::Result;
 use crate::capture::Batch;
@@ -50,16 +50,16 @@ impl RecordStage {
     }
 
     pub(super) fn runs(&self) -> bool {
-        lock(&self.shared.recording.recorder).is_some()
+        lock(&self.shared.recording.running).is_some()
     }
 
     /// Calls `work` with the running recording. An error ends the pipeline if the recording was requested at its start,
     /// and only the recording if it began later.
-    fn with(&self, work: impl FnOnce(&mut Recorder) -> Result<()>) -> Result<()> {
-        let mut slot = lock(&self.shared.recording.recorder);
-        let Some(recorder) = &mut *slot else { return Ok(()) };
-        match work(recorder) {
-            Err(error) if recorder.since().is_some() => {
+    fn with(&self, work: impl FnOnce(&mut RunningRecording) -> Result<()>) -> Result<()> {
+        let mut slot = lock(&self.shared.recording.running);
+        let Some(recording) = &mut *slot else { return Ok(()) };
+        match work(recording) {
+            Err(error) if recording.since().is_some() => {
                 *slot = None;
                 lock(&self.shared.recording.broken).get_or_insert(error);
                 self.shared.recording.runs.store(false, Ordering::Release);
@@ -70,7 +70,7 @@ impl RecordStage {
     }
 
     pub(super) fn datagrams(&self, batch: &Batch) -> Result<()> {
-        self.with(|recorder| recorder.datagrams(batch))
+        self.with(|recording| recording.datagrams(batch))
     }
 
     /// Records a change of the board that a datagram showed: a reset, or another version of the wire.
@@ -79,10 +79,10 @@ impl RecordStage {
             return Ok(());
         }
         let wire = info.changed.then_some(BoardChangeKind::Wire { version: info.version, asked: false });
-        self.with(|recorder| {
-            recorder.check_version(info.version)?;
+        self.with(|recording| {
+            recording.check_version(info.version)?;
             for change in wire.into_iter().chain(info.reset.then_some(BoardChangeKind::Reset)) {
-                recorder.board_change(&BoardChange { at_ns, t_us: info.now, change })?;
+                recording.board_change(&BoardChange { at_ns, t_us: info.now, change })?;
             }
             Ok(())
         })
@@ -91,18 +91,18 @@ impl RecordStage {
     /// Records that the board was set to another version of the wire; `t_us` is its latest time.
     pub(super) fn asked_for_version(&self, version: u8, t_us: Option<i64>) -> Result<()> {
         let change = BoardChangeKind::Wire { version, asked: true };
-        self.with(|recorder| recorder.board_change(&BoardChange { at_ns: now_ns(), t_us, change }))
+        self.with(|recording| recording.board_change(&BoardChange { at_ns: now_ns(), t_us, change }))
     }
 
     pub(super) fn registers(&self, registers: &Registers) -> Result<()> {
-        self.with(|recorder| recorder.registers(registers))
+        self.with(|recording| recording.registers(registers))
     }
 
     pub(super) fn markers(&self, markers: &[Marker]) -> Result<()> {
         if markers.is_empty() {
             return Ok(());
         }
-        self.with(|recorder| markers.iter().try_for_each(|marker| recorder.marker(*marker)))?;
+        self.with(|recording| markers.iter().try_for_each(|marker| recording.marker(*marker)))?;
         self.shared.preview_around(markers.iter().map(|marker| marker.t));
         Ok(())
     }
@@ -119,28 +119,28 @@ impl RecordStage {
         let Some(origin_us) = by_event.or(by_marker) else { return Ok(()) };
         self.origin = None;
         let mut timed = true;
-        self.with(|recorder| {
-            timed = recorder.is_timed();
-            recorder.set_origin(origin_us)
+        self.with(|recording| {
+            timed = recording.is_timed();
+            recording.set_origin(origin_us)
         })?;
         if timed { Ok(()) } else { self.earlier_zeroings() }
     }
 
     /// Ends the running recording, and starts the next one, if there is one, with the taxels' values. What was decoded
     /// so far belongs to the former, what arrives from now on to the latter.
-    pub(super) fn switch(&mut self, next: Option<Box<Recorder>>, held: &Held) -> Result<EndedRecording> {
+    pub(super) fn switch(&mut self, next: Option<Box<RunningRecording>>, held: &Held) -> Result<EndedRecording> {
         let now = self.shared.counters();
-        let ended = lock(&self.shared.recording.recorder).take();
+        let ended = lock(&self.shared.recording.running).take();
         self.origin = None;
         if let Some(mut next) = next {
             if let Err(error) = next.begin(&now, held.values()) {
-                *lock(&self.shared.recording.recorder) = ended;
+                *lock(&self.shared.recording.running) = ended;
                 return Err(error);
             }
             self.origin = Some(Box::new(fresh_decoder(&self.shared.options)));
             self.tared = false;
             let timed = next.is_timed();
-            *lock(&self.shared.recording.recorder) = Some(*next);
+            *lock(&self.shared.recording.running) = Some(*next);
             if timed {
                 self.earlier_zeroings()?;
             }
@@ -152,13 +152,13 @@ impl RecordStage {
     /// Records earlier zeroings, which remain valid in a new recording.
     fn earlier_zeroings(&self) -> Result<()> {
         let zeroed: Vec<Zeroing> = self.shared.published().zeroed.values().copied().collect();
-        self.with(|recorder| zeroed.iter().try_for_each(|zeroing| recorder.zeroing(zeroing)))
+        self.with(|recording| zeroed.iter().try_for_each(|zeroing| recording.zeroing(zeroing)))
     }
 
     /// Records zeroings; on an error the caller zeroes nothing.
     pub(super) fn zeroings(&self, zeroings: &[Zeroing]) -> Result<()> {
-        match &*lock(&self.shared.recording.recorder) {
-            Some(recorder) => zeroings.iter().try_for_each(|zeroing| recorder.zeroing(zeroing)),
+        match &*lock(&self.shared.recording.running) {
+            Some(recording) => zeroings.iter().try_for_each(|zeroing| recording.zeroing(zeroing)),
             None => Ok(()),
         }
     }
@@ -182,10 +182,10 @@ impl RecordStage {
         times.into_iter().for_each(|t| self.preview_buffer.around(t));
         let columns = self.shared.options.array.columns;
         let mut preview_buffer = std::mem::replace(&mut self.preview_buffer, PreviewBuffer::new());
-        let outcome = self.with(|recorder| {
+        let outcome = self.with(|recording| {
             preview_buffer
                 .take_wanted()
-                .try_for_each(|preview| recorder.preview(preview.at_ns, preview.t_us, columns, &preview.held))
+                .try_for_each(|preview| recording.preview(preview.at_ns, preview.t_us, columns, &preview.held))
         });
         self.preview_buffer = preview_buffer;
         outcome
@@ -207,12 +207,12 @@ impl RecordStage {
             self.counted = Instant::now();
         }
         let (capture, bridged) = (self.shared.receiver.counts(), self.shared.receiver.bridged());
-        self.with(|recorder| {
+        self.with(|recording| {
             if let Some(tare) = tare {
-                recorder.tare(&tare)?;
+                recording.tare(&tare)?;
             }
-            recorder.flush()?;
-            if due { recorder.counts(&Counters { capture, bridged, ..counters }) } else { Ok(()) }
+            recording.flush()?;
+            if due { recording.counts(&Counters { capture, bridged, ..counters }) } else { Ok(()) }
         })
     }
 }

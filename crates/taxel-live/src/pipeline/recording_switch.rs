@@ -9,7 +9,7 @@ use taxel_core::problem;
 
 use super::counters::{Counters, LiveSummary, SourceCounts};
 use super::options::{LiveOptions, Record};
-use super::recorder::{Host, Recorder, RecordingPart, losses};
+use super::running_recording::{Host, RunningRecording, RecordingPart, losses};
 use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
 use super::sources::{NumberStream, losses_of_lines};
 use crate::capture::Origin;
@@ -18,7 +18,7 @@ use crate::recording::{RecordingCounts, Verdict};
 use crate::{Error, Result};
 
 /// Starts and ends the recordings of a pipeline.
-pub(super) struct Recordings {
+pub(super) struct RecordingSwitch {
     shared: Arc<PipelineShared>,
     /// The other sources of a recording, by name.
     boards: Vec<(String, Arc<PipelineShared>)>,
@@ -27,7 +27,7 @@ pub(super) struct Recordings {
     replacing: Mutex<()>,
 }
 
-impl Recordings {
+impl RecordingSwitch {
     pub(super) fn new(
         shared: Arc<PipelineShared>,
         boards: Vec<(String, Arc<PipelineShared>)>,
@@ -44,7 +44,7 @@ impl Recordings {
         }
         let options = &self.shared.options;
         let header = LiveOptions { registers: *lock(&self.shared.registers), ..options.clone() };
-        let next = Recorder::reserve(record, &header, &self.shared.sources, self.shared.receiver.place())?;
+        let next = RunningRecording::reserve(record, &header, &self.shared.sources, self.shared.receiver.place())?;
         self.replace(Some(next))
     }
 
@@ -67,7 +67,7 @@ impl Recordings {
     }
 
     /// Ends the running recording and starts the next one, if there is one; returns how the first ended.
-    fn replace(&self, next: Option<Recorder>) -> Result<Option<LiveSummary>> {
+    fn replace(&self, next: Option<RunningRecording>) -> Result<Option<LiveSummary>> {
         let replacing = lock(&self.replacing);
         let mut sources = BTreeMap::new();
         let mut ended = vec![];
@@ -76,28 +76,28 @@ impl Recordings {
             let part = RecordingPart { host, name: name.clone() };
             let place = board.receiver.place();
             let part = next.as_ref().map(|next| next.part_of(part, &board.options, place)).transpose()?;
-            let (recorder, counts) = replace_of(board, part)?;
+            let (recording, counts) = replace_of(board, part)?;
             let counters =
-                recorder.as_ref().and_then(Recorder::since).map_or_else(Counters::default, |s| counts.since(s));
+                recording.as_ref().and_then(RunningRecording::since).map_or_else(Counters::default, |s| counts.since(s));
             sources.insert(name.clone(), SourceCounts::Board(Box::new(counters)));
-            ended.push((recorder, counts));
+            ended.push((recording, counts));
         }
         for (name, numbers) in &self.numbers {
             let track = next.as_ref().map(|next| next.track_of(name)).transpose()?;
             sources.insert(name.clone(), numbers.record_into(track));
         }
-        let (recorder, counters) = replace_of(&self.shared, next)?;
+        let (recording, counters) = replace_of(&self.shared, next)?;
         // The parts must end before the whole recording.
         for (part, counts) in ended {
             part.map_or(Ok(None), |part| part.finish(&counts))?;
         }
         drop(replacing);
         self.take_error()?;
-        let Some(recorder) = recorder else { return Ok(None) };
+        let Some(recording) = recording else { return Ok(None) };
         let came =
-            Counters { sources, ..recorder.since().map_or_else(Counters::default, |since| counters.since(since)) };
-        let lost = recorder.losses(&counters);
-        let path = recorder.finish(&counters)?;
+            Counters { sources, ..recording.since().map_or_else(Counters::default, |since| counters.since(since)) };
+        let lost = recording.losses(&counters);
+        let path = recording.finish(&counters)?;
         let verdict =
             verdict(&self.shared.options.name, self.shared.receiver.place(), &came, came.nothing_came(), &lost);
         let tare = self.shared.published().tare.clone();
@@ -105,15 +105,15 @@ impl Recordings {
     }
 }
 
-/// Makes the decoding thread of one board record into `next`, or not at all; returns the previous recorder.
-fn replace_of(shared: &PipelineShared, next: Option<Recorder>) -> Result<EndedRecording> {
+/// Makes the decoding thread of one board record into `next`, or not at all; returns the recording that ran.
+fn replace_of(shared: &PipelineShared, next: Option<RunningRecording>) -> Result<EndedRecording> {
     // Set before the request, so that the recording runs for callers that ask after this call.
     shared.recording.runs.fetch_or(next.is_some(), Ordering::AcqRel);
     let (answer, ended) = channel::bounded(1);
     shared.request(PipelineRequest::Record(next.map(Box::new), answer));
     let ended = shared.wait(&ended).and_then(std::convert::identity);
     if ended.is_err() {
-        shared.recording.runs.store(lock(&shared.recording.recorder).is_some(), Ordering::Release);
+        shared.recording.runs.store(lock(&shared.recording.running).is_some(), Ordering::Release);
     }
     ended
 }
