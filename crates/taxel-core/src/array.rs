@@ -163,7 +163,7 @@ impl Array {
                     let right = if is_area { "above 0 and finite" } else { "finite" };
                     return Err(problem!(
                         "{name} of the taxel at {} is {value}: must be {right}",
-                        self.place_of(taxel)
+                        self.position_text(taxel)
                     ));
                 }
             }
@@ -171,7 +171,7 @@ impl Array {
         Ok(())
     }
 
-    /// Number of places in the grid, whether a taxel exists there or not.
+    /// Number of cells in the grid, whether a taxel exists there or not.
     #[must_use]
     pub fn len(&self) -> usize {
         usize::from(self.rows) * usize::from(self.columns)
@@ -191,7 +191,7 @@ impl Array {
 
     /// Where a taxel is, in text for people; `taxel` is its index, row by row.
     #[must_use]
-    pub fn place_of(&self, taxel: usize) -> String {
+    pub fn position_text(&self, taxel: usize) -> String {
         let columns = usize::from(self.columns).max(1);
         format!("row {}, column {}", taxel / columns, taxel % columns)
     }

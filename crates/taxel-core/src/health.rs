@@ -47,7 +47,7 @@ pub struct TaxelCounts {
     pub by_itself: u32,
 }
 
-/// The present touch of a taxel's place.
+/// The present touch of a taxel's position.
 #[derive(Debug, Clone, Copy, Default)]
 struct PresentTouch {
     present: bool,
@@ -62,8 +62,8 @@ struct PresentTouch {
 pub struct TouchCounts {
     grid: TaxelGrid,
     exists: Option<Vec<bool>>,
-    /// By taxel index: 1 + its place in the vectors below; 0 for a taxel that is not counted.
-    places: Vec<u32>,
+    /// By taxel index: 1 + its slot in the vectors below; 0 for a taxel that is not counted.
+    slots: Vec<u32>,
     /// The indices of the counted taxels.
     taxels: Vec<u32>,
     /// Number of each taxel's neighbours that exist.
@@ -85,7 +85,7 @@ impl TouchCounts {
         let mut counts = Self {
             grid,
             exists: array.exists.clone(),
-            places: vec![0; grid.taxels],
+            slots: vec![0; grid.taxels],
             taxels: vec![],
             neighbours: vec![],
             rest: TrackedRest::sparse(grid.taxels, grid.columns, NOISE_FLOOR),
@@ -117,7 +117,7 @@ impl TouchCounts {
     /// whether the taxel itself changed, not what a state of version 2 says of it.
     pub fn event(&mut self, t: i64, taxel: usize, ticks: u16, up: bool, changed: bool) {
         let value = if ticks == UNKNOWN {
-            let held = self.place(taxel).map_or(f32::NAN, |place| self.bins[place].held);
+            let held = self.slot(taxel).map_or(f32::NAN, |slot| self.bins[slot].held);
             (if held.is_nan() { 0.0 } else { held }) + if up { 4.0 } else { -4.0 }
         } else {
             ticks.into()
@@ -131,11 +131,11 @@ impl TouchCounts {
         if self.end.is_none_or(|end| t >= end) {
             self.advance(t);
         }
-        let place = match self.place(taxel) {
-            Some(place) if !self.bins[place].held.is_nan() => place,
+        let slot = match self.slot(taxel) {
+            Some(slot) if !self.bins[slot].held.is_nan() => slot,
             _ => self.begin(taxel),
         };
-        let bin = &mut self.bins[place];
+        let bin = &mut self.bins[slot];
         bin.held = value;
         bin.greatest = bin.greatest.max(value);
         bin.changes += u32::from(changed);
@@ -152,22 +152,22 @@ impl TouchCounts {
         self.end = Some(self.end.unwrap_or_else(|| next(t)));
     }
 
-    /// The place of a taxel's counts, if it is counted.
+    /// The slot of a taxel's counts, if it is counted.
     #[inline]
-    fn place(&self, taxel: usize) -> Option<usize> {
-        (self.places[taxel] as usize).checked_sub(1)
+    fn slot(&self, taxel: usize) -> Option<usize> {
+        (self.slots[taxel] as usize).checked_sub(1)
     }
 
-    /// Counts a taxel and its neighbours from its first value on; returns its place.
+    /// Counts a taxel and its neighbours from its first value on; returns its slot.
     #[cold]
     fn begin(&mut self, taxel: usize) -> usize {
         for near in self.grid.around(taxel, 1) {
-            if self.places[near] == 0 {
+            if self.slots[near] == 0 {
                 self.add(near);
                 self.rest.add(near as u32);
             }
         }
-        self.places[taxel] as usize - 1
+        self.slots[taxel] as usize - 1
     }
 
     /// Counts a taxel that was not counted so far.
@@ -179,39 +179,39 @@ impl TouchCounts {
         self.bins.push(Bin { held: f32::NAN, greatest: f32::NAN, changes: 0 });
         self.counts.push(TaxelCounts::default());
         self.touch.push(PresentTouch::default());
-        self.places[taxel] = self.taxels.len() as u32;
+        self.slots[taxel] = self.taxels.len() as u32;
     }
 
-    /// The places of the counted taxels up to `reach` rows and columns around that at `place`.
-    fn around(&self, place: usize, reach: usize) -> impl Iterator<Item = usize> {
-        let others = self.grid.around(self.taxels[place] as usize, reach);
-        others.filter_map(|neighbour| self.place(neighbour)).filter(move |&neighbour| neighbour != place)
+    /// The slots of the counted taxels up to `reach` rows and columns around that at `slot`.
+    fn around(&self, slot: usize, reach: usize) -> impl Iterator<Item = usize> {
+        let others = self.grid.around(self.taxels[slot] as usize, reach);
+        others.filter_map(|neighbour| self.slot(neighbour)).filter(move |&neighbour| neighbour != slot)
     }
 
     fn end_bin(&mut self, t: i64) {
         self.count_changes();
         let (mut near, mut down) = (vec![0_u8; self.bins.len()], vec![0_u8; self.bins.len()]);
-        for (place, rest) in self.rest.rests().enumerate() {
-            let bin = self.bins[place];
+        for (slot, rest) in self.rest.rests().enumerate() {
+            let bin = self.bins[slot];
             // A taxel's first value is its rest.
             let Some(rest) = rest.map(|rest| rest as f32) else { continue };
             if bin.greatest.is_nan() || bin.greatest - rest < TOUCH {
                 continue;
             }
-            self.counts[place].pressed += 1;
-            for neighbour in self.around(place, 1) {
+            self.counts[slot].pressed += 1;
+            for neighbour in self.around(slot, 1) {
                 near[neighbour] += 1;
                 down[neighbour] += u8::from(bin.held - rest >= TOUCH);
             }
         }
-        for (place, &neighbours) in self.neighbours.iter().enumerate() {
-            let (touch, counts) = (&mut self.touch[place], &mut self.counts[place]);
-            let begins = !touch.present && neighbours >= 3 && 4 * near[place] >= 3 * neighbours;
+        for (slot, &neighbours) in self.neighbours.iter().enumerate() {
+            let (touch, counts) = (&mut self.touch[slot], &mut self.counts[slot]);
+            let begins = !touch.present && neighbours >= 3 && 4 * near[slot] >= 3 * neighbours;
             if begins {
                 *touch = PresentTouch { present: true, changed: false };
             }
-            touch.changed |= self.bins[place].changes > 0;
-            if touch.present && 4 * down[place] <= neighbours {
+            touch.changed |= self.bins[slot].changes > 0;
+            if touch.present && 4 * down[slot] <= neighbours {
                 counts.touches += 1;
                 counts.missed += u32::from(!touch.changed);
                 touch.present = false;
@@ -224,18 +224,18 @@ impl TouchCounts {
     }
 
     fn count_changes(&mut self) {
-        for place in 0..self.bins.len() {
-            let changes = self.bins[place].changes;
+        for slot in 0..self.bins.len() {
+            let changes = self.bins[slot].changes;
             if changes == 0 {
                 continue;
             }
             let (mut most, mut second) = (0, 0);
-            for neighbour in self.around(place, 2) {
+            for neighbour in self.around(slot, 2) {
                 let nearby = self.bins[neighbour].changes;
                 (most, second) = if nearby > most { (nearby, most) } else { (most, second.max(nearby)) };
             }
-            self.counts[place].changed += 1;
-            self.counts[place].by_itself += u32::from(changes >= OFTEN && changes > BY_ITSELF * second);
+            self.counts[slot].changed += 1;
+            self.counts[slot].by_itself += u32::from(changes >= OFTEN && changes > BY_ITSELF * second);
         }
     }
 }

@@ -171,8 +171,8 @@ impl Live {
         let receiver = receiver()?;
         let recording = match (&record, host) {
             (None, _) => None,
-            (Some(record), None) => Some(RunningRecording::create(record, &options, &sources, receiver.place())?),
-            (Some(record), Some(host)) => Some(RunningRecording::join(host, record, &options, receiver.place())),
+            (Some(record), None) => Some(RunningRecording::create(record, &options, &sources, receiver.origin())?),
+            (Some(record), Some(host)) => Some(RunningRecording::join(host, record, &options, receiver.origin())),
         };
         let published = PublishedState { frame: vec![0; options.array.len()], ..PublishedState::default() };
         let shared = Arc::new(PipelineShared {
@@ -235,10 +235,10 @@ impl Live {
         self.shared.receiver.address()
     }
 
-    /// The source of datagrams.
+    /// Where datagrams come from.
     #[must_use]
-    pub fn place(&self) -> &Origin {
-        self.shared.receiver.place()
+    pub fn origin(&self) -> &Origin {
+        self.shared.receiver.origin()
     }
 
     /// A handle with the operations that other threads may use while the pipeline runs.
@@ -421,7 +421,7 @@ impl Live {
         let path = recording.map_or(Ok(None), |recording| recording.finish(&counters))?;
         let lost = running_recording::losses(&counters, None);
         let verdict =
-            recording_switch::verdict(&self.shared.options.name, self.place(), &counters, counters.nothing_came(), &lost);
+            recording_switch::verdict(&self.shared.options.name, self.origin(), &counters, counters.nothing_came(), &lost);
         joined?;
         self.check()?;
         ended?;

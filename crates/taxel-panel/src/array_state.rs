@@ -93,7 +93,7 @@ fn tracked_from(columns: usize, values: &[u16]) -> TrackedRest {
 #[derive(Debug, Clone)]
 pub struct ArrayState {
     /// Column and row of each taxel, looked up because a division per change would dominate the cost.
-    places: Arc<[(u16, u16)]>,
+    positions: Arc<[(u16, u16)]>,
     floor: u16,
     /// Ticks above rest that count as none in the sums.
     sum_floor: u16,
@@ -138,9 +138,9 @@ impl ArrayState {
         let columns = usize::from(array.columns).max(1);
         // An array has 65 535 rows and columns at most.
         #[allow(clippy::cast_possible_truncation)]
-        let place = |taxel: usize| ((taxel % columns) as u16, (taxel / columns) as u16);
+        let position = |taxel: usize| ((taxel % columns) as u16, (taxel / columns) as u16);
         let mut state = Self {
-            places: (0..from.held.len()).map(place).collect(),
+            positions: (0..from.held.len()).map(position).collect(),
             floor,
             sum_floor: floor,
             columns,
@@ -207,7 +207,7 @@ impl ArrayState {
     fn sum_above_rest(&mut self) {
         self.load = Load::default();
         self.loads.fill(Load::default());
-        for taxel in 0..self.places.len() {
+        for taxel in 0..self.positions.len() {
             self.change_above_rest(taxel, 0, self.above(taxel));
         }
     }
@@ -220,7 +220,7 @@ impl ArrayState {
     /// Updates the sums for a taxel that was `before` ticks above rest and is `now`.
     fn change_above_rest(&mut self, taxel: usize, before: u16, now: u16) {
         self.load.change(taxel, (before, now), self.floor, &self.centre, &self.weights);
-        if let Some(&source) = self.source_of.get(usize::from(self.places[taxel].0)) {
+        if let Some(&source) = self.source_of.get(usize::from(self.positions[taxel].0)) {
             self.loads[source].change(taxel, (before, now), self.floor, &self.centre, &self.weights);
         }
     }
@@ -237,7 +237,7 @@ impl ArrayState {
                 _ => column_of(t, self.column_us),
             };
             self.time_columns
-                .count(column, together.iter().map(|change| (self.places[change.taxel as usize].1, change.up)));
+                .count(column, together.iter().map(|change| (self.positions[change.taxel as usize].1, change.up)));
         }
     }
 
@@ -522,7 +522,7 @@ impl ArrayState {
 
     /// Whether any taxel of a source has a value.
     fn knows(&self, source: usize) -> bool {
-        let mut held = self.places.iter().zip(self.held.values());
+        let mut held = self.positions.iter().zip(self.held.values());
         held.any(|(&(x, _), &held)| held != UNKNOWN && self.source_of[usize::from(x)] == source)
     }
 

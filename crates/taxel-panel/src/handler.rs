@@ -197,7 +197,7 @@ pub trait BoardRequests: Send + Sync {
     fn board_lines(&self) -> Reply<BoardLines>;
 
     /// Connects the board's serial line, or disconnects it.
-    fn connect(&self, place: Option<&str>) -> Reply<()>;
+    fn connect(&self, address: Option<&str>) -> Reply<()>;
 
     /// Receives the board's datagrams on another address.
     fn listen(&self, host: &str, port: u16) -> Reply<()>;

@@ -239,7 +239,7 @@ impl Hub {
             live: live.is_some(),
             array: live.map(|live| ArrayInfo::from(live.array())),
             options: live.map(|live| Box::new(live.handle.options().clone())),
-            udp: live.and_then(|live| match live.handle.place() {
+            udp: live.and_then(|live| match live.handle.origin() {
                 Origin::Udp(address) => Some(address.to_string()),
                 Origin::Bridge(_) => None,
             }),

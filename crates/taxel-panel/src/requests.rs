@@ -122,15 +122,15 @@ fn check_restart(hub: &Hub) -> Answer {
 }
 
 /// Connects the board's serial line, or disconnects it.
-async fn control(hub: &Hub, place: Option<String>) -> Answer {
+async fn control(hub: &Hub, address: Option<String>) -> Answer {
     let connected = {
-        let place = place.clone();
-        hub.ask(move |handlers| handlers.board.connect(place.as_deref())).await
+        let address = address.clone();
+        hub.ask(move |handlers| handlers.board.connect(address.as_deref())).await
     };
-    let connects = place.is_some();
+    let connects = address.is_some();
     {
         let mut board = hub.board();
-        board.control = place.filter(|_| connected.is_ok());
+        board.control = address.filter(|_| connected.is_ok());
         board.known = false;
     }
     hub.clients.send(Broadcast::Hello);

@@ -63,10 +63,10 @@ impl Panel {
     /// `Socket` where the port is taken, `File` where the folder does not exist, or the system gives no random numbers.
     pub fn start(options: PanelOptions, live: Option<Handle>, handlers: RequestHandlers) -> Result<Self> {
         let folder = options.folder.canonicalize().map_err(Error::file(&options.folder))?;
-        let place = format!("panel {}", options.address);
-        let listener = std::net::TcpListener::bind(options.address).map_err(Error::socket(&place))?;
-        listener.set_nonblocking(true).map_err(Error::socket(&place))?;
-        let address = listener.local_addr().map_err(Error::socket(&place))?;
+        let name = format!("panel {}", options.address);
+        let listener = std::net::TcpListener::bind(options.address).map_err(Error::socket(&name))?;
+        listener.set_nonblocking(true).map_err(Error::socket(&name))?;
+        let address = listener.local_addr().map_err(Error::socket(&name))?;
         let token = token()?;
         let hub = Hub::new(PanelOptions { folder, address, ..options }, live, handlers)?;
         let (end, ended) = watch::channel(false);
@@ -75,14 +75,14 @@ impl Panel {
             .enable_all()
             .max_blocking_threads(8)
             .build()
-            .map_err(Error::socket(&place))?;
+            .map_err(Error::socket(&name))?;
         let thread = std::thread::Builder::new()
             .name("taxel-panel".to_owned())
             .spawn(move || {
                 runtime.block_on(serve(listener, gate));
                 runtime.shutdown_timeout(Duration::from_secs(2));
             })
-            .map_err(Error::socket(&place))?;
+            .map_err(Error::socket(&name))?;
         Ok(Self { hub, address, token, end, thread: Some(thread) })
     }
 

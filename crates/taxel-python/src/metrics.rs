@@ -46,7 +46,7 @@ fn to_metric(json: &str) -> PyResult<Metric> {
     Metric::from_json(json).map_err(core)
 }
 
-/// Which spikes and targets (ms) belong together, pattern by pattern: a pair of places each.
+/// Which spikes and targets (ms) belong together, pattern by pattern: a pair of indices each.
 #[pyfunction]
 pub fn match_spikes(
     py: Python<'_>,

@@ -57,9 +57,9 @@ impl Board {
         if self.is_asynchronous() {
             self.queue_crossings(any, read, &mut sink);
         } else if any {
-            for (place, &x) in (0_u64..).zip(&lines) {
+            for (n, &x) in (0_u64..).zip(&lines) {
                 if self.comparators.line_changed[usize::from(x)] {
-                    self.line(x, self.time + place * u64::from(registers.line_period), read, &mut sink);
+                    self.line(x, self.time + n * u64::from(registers.line_period), read, &mut sink);
                 }
             }
         }
@@ -214,7 +214,7 @@ impl Board {
         let taxels = (0..array.rows)
             .map(|y| ((x, y), array.index(x, y)))
             .filter(|&(_, taxel)| exists(taxel))
-            .map(|(place, taxel)| (place, comparators.values[taxel]));
+            .map(|(position, taxel)| (position, comparators.values[taxel]));
         link.states(now, taxels, counts, sink);
     }
 

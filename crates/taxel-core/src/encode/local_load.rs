@@ -219,9 +219,9 @@ impl LargestSum {
         largest
     }
 
-    /// Sets the rest of the taxel at `place`, row by row, from now on.
-    pub fn set_rest(&mut self, place: usize, rest: f64) {
-        self.0.set_rest_at(place, rest);
+    /// Sets the rest of a taxel, by index, from now on.
+    pub fn set_rest(&mut self, taxel: usize, rest: f64) {
+        self.0.set_rest_at(taxel, rest);
     }
 }
 
@@ -252,8 +252,8 @@ impl Measure for SumLevels {
         true
     }
 
-    fn set_rest(&mut self, place: usize, rest: f64) {
-        self.sums.set_rest_at(place, rest);
+    fn set_rest(&mut self, taxel: usize, rest: f64) {
+        self.sums.set_rest_at(taxel, rest);
     }
 
     fn emit(&mut self, t: i64, _loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>) {

@@ -168,15 +168,15 @@ impl Encoding for Moments {
             levels,
             first_graded: self.level_trains(),
             graded: self.all_graded(),
-            centre: self.centre.then(|| [array.columns, array.rows].map(|places| (places.max(2) - 1) as f64 / 2.0)),
-            place: [0.0; CENTRE],
+            centre: self.centre.then(|| [array.columns, array.rows].map(|count| (count.max(2) - 1) as f64 / 2.0)),
+            position: [0.0; CENTRE],
             ages: self.all_ages(),
             every: self.tonic_ms.map(|every| micros("tonic_ms", every)).transpose()?,
             due: VecDeque::new(),
         };
-        // Channels are all places here; `loaded` defines which taxels exist.
-        let places = Array { exists: None, ..array.clone() };
-        Ok(Box::new(Sampled::new(self, passing, &places, self.period_ms)?))
+        // Channels are all taxels here; `loaded` defines which taxels exist.
+        let grid = Array { exists: None, ..array.clone() };
+        Ok(Box::new(Sampled::new(self, passing, &grid, self.period_ms)?))
     }
 
     fn trains(&self, _array: &Array) -> usize {
@@ -257,7 +257,7 @@ struct LevelPass {
     /// Half of the columns and rows, where the centre is emitted; `None` where it is not.
     centre: Option<[f64; 2]>,
     /// The place of the centre in the last sample.
-    place: [f64; CENTRE],
+    position: [f64; CENTRE],
     /// The ages that have a train each, us.
     ages: Vec<i64>,
     /// The time at which each level was reached, us; `None` below it.
@@ -277,7 +277,7 @@ impl LevelPass {
             return;
         }
         let (LoadedSums { total, peak, x, y }, unit) = match &self.way {
-            Some(Way::Places(at)) => (self.loaded.sums_at(held, |place| at[place]), [1.0; 2]),
+            Some(Way::Places(at)) => (self.loaded.sums_at(held, |taxel| at[taxel]), [1.0; 2]),
             Some(Way::Pitch(Pitch { rows, columns })) => (self.loaded.sums(held), [*columns, *rows]),
             None => (self.loaded.sums(held), [0.0; 2]),
         };
@@ -288,7 +288,7 @@ impl LevelPass {
         if let Some(half) = self.centre {
             let LoadedSums { total, x, y, .. } = self.loaded.sums(held);
             let [column, row] = [x / total / half[0] - 1.0, y / total / half[1] - 1.0];
-            self.place = [column, column * column, row, row * row];
+            self.position = [column, column * column, row, row * row];
         }
     }
 
@@ -309,12 +309,12 @@ impl LevelPass {
             let value = self.moments[moment];
             emit(n, value.abs().ln_1p().copysign(value) as f32);
         }
-        let places = if self.centre.is_some() { &self.place[..] } else { &[] };
-        for (n, &value) in places.iter().enumerate() {
+        let position = if self.centre.is_some() { &self.position[..] } else { &[] };
+        for (n, &value) in position.iter().enumerate() {
             emit(self.graded.len() + n, value as f32);
         }
         if let Some(reached) = self.ages.partition_point(|&age| age <= t - since).checked_sub(1) {
-            emit(self.graded.len() + places.len() + reached, 1.0);
+            emit(self.graded.len() + position.len() + reached, 1.0);
         }
     }
 

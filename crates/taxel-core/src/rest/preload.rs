@@ -36,8 +36,8 @@ pub fn preload(less: &[f64], columns: usize, above: f64) -> Vec<f64> {
 #[must_use]
 pub fn preload_text(preload: &[f64], columns: usize, corner: (usize, usize)) -> String {
     let loaded = || (0..preload.len()).filter(|&k| preload[k] > 0.0);
-    let span = |name: &str, places: &mut dyn Iterator<Item = usize>| {
-        let (least, most) = places.fold((usize::MAX, 0), |(least, most), at| (least.min(at), most.max(at)));
+    let span = |name: &str, indices: &mut dyn Iterator<Item = usize>| {
+        let (least, most) = indices.fold((usize::MAX, 0), |(least, most), at| (least.min(at), most.max(at)));
         if least == most { format!("{name} {least}") } else { format!("{name}s {least} to {most}") }
     };
     let most = preload.iter().copied().fold(0.0, f64::max);
@@ -58,11 +58,11 @@ mod tests {
 
     #[test]
     fn taxels_that_rested_higher_together_are_found_and_bad_ones_and_drift_are_not() {
-        let place_of = |less: &[f64], columns| preload_text(&preload(less, columns, LOADED_TICKS), columns, (0, 0));
-        let with = |places: &[(usize, usize)], load: f64| {
+        let text_of = |less: &[f64], columns| preload_text(&preload(less, columns, LOADED_TICKS), columns, (0, 0));
+        let with = |loaded: &[(usize, usize)], load: f64| {
             let mut all = vec![0.0; 48];
-            places.iter().for_each(|&(y, x)| all[y * 8 + x] = load);
-            place_of(&all, 8)
+            loaded.iter().for_each(|&(y, x)| all[y * 8 + x] = load);
+            text_of(&all, 8)
         };
         assert_eq!(
             with(&[(2, 5), (3, 5), (3, 6), (0, 0)], 41.23),
@@ -71,9 +71,9 @@ mod tests {
         assert_eq!(with(&[(1, 5), (1, 6), (1, 7)], 9.0), "row 1, column 6 (up to 9 above rest)");
         assert_eq!(with(&[(1, 5), (1, 6)], 90.0), "", "a pair is bad");
         assert_eq!(with(&[(2, 5), (3, 5), (3, 6)], 8.0), "", "no more than noise and drift");
-        assert_eq!(place_of(&[20.0; 48], 8), "", "all drift");
-        assert_eq!(place_of(&[f64::NAN; 48], 8), "");
-        assert_eq!(place_of(&[20.0; 4], 4), "");
+        assert_eq!(text_of(&[20.0; 48], 8), "", "all drift");
+        assert_eq!(text_of(&[f64::NAN; 48], 8), "");
+        assert_eq!(text_of(&[20.0; 4], 4), "");
     }
 
     #[test]

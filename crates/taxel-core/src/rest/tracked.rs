@@ -16,7 +16,7 @@ use super::value::Value;
 /// The shortest quiet stretch, us.
 pub const QUIET_US: i64 = 500_000;
 
-/// Number of taxels among a place and its 8 neighbours that a touch moves at least, on a grid.
+/// Number of taxels among a taxel and its 8 neighbours that a touch moves at least, on a grid.
 pub const TOUCHED_TOGETHER: usize = 3;
 
 /// The fewest samples of a quiet stretch: fewer do not show that it was quiet.
@@ -99,8 +99,8 @@ impl RestStretch {
         }
         let mut near = HashMap::new();
         for taxel in moved {
-            for place in grid.around(index(taxel), 1) {
-                let together = near.entry(place).or_insert(0);
+            for neighbour in grid.around(index(taxel), 1) {
+                let together = near.entry(neighbour).or_insert(0);
                 *together += 1;
                 if *together >= TOUCHED_TOGETHER {
                     return false;

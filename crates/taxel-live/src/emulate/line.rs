@@ -173,10 +173,10 @@ mod tests {
 
     #[test]
     fn a_file_is_not_replaced_by_a_line() {
-        let place = std::env::temp_dir().join(format!("taxel-{}-no-line", std::process::id()));
-        std::fs::write(&place, "kept").expect("room");
-        assert!(PseudoTerminal::open(&place, 115_200).is_err());
-        assert_eq!(std::fs::read_to_string(&place).expect("still there"), "kept");
-        std::fs::remove_file(&place).expect("ours");
+        let path = std::env::temp_dir().join(format!("taxel-{}-no-line", std::process::id()));
+        std::fs::write(&path, "kept").expect("room");
+        assert!(PseudoTerminal::open(&path, 115_200).is_err());
+        assert_eq!(std::fs::read_to_string(&path).expect("still there"), "kept");
+        std::fs::remove_file(&path).expect("ours");
     }
 }

@@ -44,8 +44,8 @@ impl Handle {
 
     /// The source of datagrams.
     #[must_use]
-    pub fn place(&self) -> &Origin {
-        self.shared.receiver.place()
+    pub fn origin(&self) -> &Origin {
+        self.shared.receiver.origin()
     }
 
     /// As [`Live::counters`](super::Live::counters).

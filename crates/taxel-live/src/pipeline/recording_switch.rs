@@ -44,7 +44,7 @@ impl RecordingSwitch {
         }
         let options = &self.shared.options;
         let header = LiveOptions { registers: *lock(&self.shared.registers), ..options.clone() };
-        let next = RunningRecording::reserve(record, &header, &self.shared.sources, self.shared.receiver.place())?;
+        let next = RunningRecording::reserve(record, &header, &self.shared.sources, self.shared.receiver.origin())?;
         self.replace(Some(next))
     }
 
@@ -74,8 +74,8 @@ impl RecordingSwitch {
         for (name, board) in &self.boards {
             let host: Weak<dyn Host> = Arc::<PipelineShared>::downgrade(&self.shared);
             let part = RecordingPart { host, name: name.clone() };
-            let place = board.receiver.place();
-            let part = next.as_ref().map(|next| next.part_of(part, &board.options, place)).transpose()?;
+            let origin = board.receiver.origin();
+            let part = next.as_ref().map(|next| next.part_of(part, &board.options, origin)).transpose()?;
             let (recording, counts) = replace_of(board, part)?;
             let counters =
                 recording.as_ref().and_then(RunningRecording::since).map_or_else(Counters::default, |s| counts.since(s));
@@ -99,7 +99,7 @@ impl RecordingSwitch {
         let lost = recording.losses(&counters);
         let path = recording.finish(&counters)?;
         let verdict =
-            verdict(&self.shared.options.name, self.shared.receiver.place(), &came, came.nothing_came(), &lost);
+            verdict(&self.shared.options.name, self.shared.receiver.origin(), &came, came.nothing_came(), &lost);
         let tare = self.shared.published().tare.clone();
         Ok(Some(LiveSummary { counters: came, verdict, path, tare }))
     }
@@ -121,7 +121,7 @@ fn replace_of(shared: &PipelineShared, next: Option<RunningRecording>) -> Result
 /// What was lost of each source, or that nothing arrived.
 pub(super) fn verdict(
     name: &str,
-    place: &Origin,
+    origin: &Origin,
     counters: &Counters,
     nothing: bool,
     lost: &RecordingCounts,
@@ -129,7 +129,7 @@ pub(super) fn verdict(
     let of_board =
         |counters: &Counters, lost: &RecordingCounts| lost.verdict().doubtful(counters.decoding.totals.doubtful_after);
     let verdict = if nothing {
-        Verdict::nothing_arrived(nothing_arrived(place, counters.seconds))
+        Verdict::nothing_arrived(nothing_arrived(origin, counters.seconds))
     } else {
         of_board(counters, lost)
     };
@@ -146,10 +146,10 @@ pub(super) fn verdict(
 }
 
 /// What a user should check if nothing arrived.
-fn nothing_arrived(place: &Origin, seconds: f64) -> String {
-    let ask = match place {
+fn nothing_arrived(origin: &Origin, seconds: f64) -> String {
+    let ask = match origin {
         Origin::Udp(address) => format!("does the board send to this machine, and to port {}?", address.port()),
         Origin::Bridge(_) => "does the board send to the computer that bridges it?".to_owned(),
     };
-    format!("nothing arrived at {place} in {seconds:.1} s: {ask}")
+    format!("nothing arrived at {origin} in {seconds:.1} s: {ask}")
 }

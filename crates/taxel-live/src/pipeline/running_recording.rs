@@ -112,16 +112,16 @@ impl RunningRecording {
     }
 
     /// A part of another pipeline's recording.
-    pub(super) fn join(host: RecordingPart, record: &Record, options: &LiveOptions, place: &Origin) -> Self {
+    pub(super) fn join(host: RecordingPart, record: &Record, options: &LiveOptions, origin: &Origin) -> Self {
         let name = host.name.clone();
-        let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(place), now_ns());
+        let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(origin), now_ns());
         Self { host: Some(host), ..Self::new(record, Header { name, ..board }) }
     }
 
     /// A part of another pipeline's recording that begins while this pipeline's board is being received.
-    pub(super) fn part_of(&self, host: RecordingPart, options: &LiveOptions, place: &Origin) -> Result<Self> {
+    pub(super) fn part_of(&self, host: RecordingPart, options: &LiveOptions, origin: &Origin) -> Result<Self> {
         let track = self.track_of(&host.name)?;
-        let part = Self::join(host, &self.record, options, place);
+        let part = Self::join(host, &self.record, options, origin);
         Ok(Self {
             file: OnceLock::from(RecordingFile::Track(Box::new(track))),
             since: Some(Box::default()),
@@ -145,9 +145,9 @@ impl RunningRecording {
         record: &Record,
         options: &LiveOptions,
         sources: &[FurtherSource],
-        place: &Origin,
+        origin: &Origin,
     ) -> Result<Self> {
-        let (recording, file) = Self::open(record, options, sources, place)?;
+        let (recording, file) = Self::open(record, options, sources, origin)?;
         let new = file.is_new();
         *lock(&recording.reserved) = Some(file);
         if new {
@@ -161,9 +161,9 @@ impl RunningRecording {
         record: &Record,
         options: &LiveOptions,
         sources: &[FurtherSource],
-        place: &Origin,
+        origin: &Origin,
     ) -> Result<Self> {
-        let (recording, file) = Self::open(record, options, sources, place)?;
+        let (recording, file) = Self::open(record, options, sources, origin)?;
         let recording = Self { since: Some(Box::default()), ..recording };
         if kind_of_name(&record.path)? == "lsa" {
             *lock(&recording.reserved) = Some(file);
@@ -181,9 +181,9 @@ impl RunningRecording {
         record: &Record,
         options: &LiveOptions,
         sources: &[FurtherSource],
-        place: &Origin,
+        origin: &Origin,
     ) -> Result<(Self, OutputFile)> {
-        let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(place), now_ns());
+        let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(origin), now_ns());
         let sources = sources.iter().map(FurtherSource::header).collect::<taxel_core::Result<_>>()?;
         let decoding = Decoding { difference: options.differences, ..Decoding::default() };
         let header = Header { decoding, name: options.name.clone(), sources, ..board };
@@ -424,8 +424,8 @@ fn unpoisoned(writer: Mutex<LsaWriter>) -> LsaWriter {
 }
 
 /// The source of datagrams, as text for files.
-fn origin_text(place: &Origin) -> String {
-    match place {
+fn origin_text(origin: &Origin) -> String {
+    match origin {
         Origin::Udp(address) => format!("udp {address}"),
         Origin::Bridge(name) => name.clone(),
     }

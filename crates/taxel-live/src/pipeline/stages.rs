@@ -244,14 +244,14 @@ impl Stages {
         for &(x, y) in taxels {
             let mut zeroing = Zeroing { t, x, y, rest: 0.0, before: None };
             zeroing.check(array)?;
-            let place = array.index(x, y);
-            let held = self.decode.held().values()[place];
+            let taxel = array.index(x, y);
+            let held = self.decode.held().values()[taxel];
             if held == UNKNOWN {
                 return Err(problem!("taxel at row {y}, column {x}: no event so far, so its value is unknown").into());
             }
             zeroing.rest = held.into();
-            let tared = published.rest.get(place).copied().flatten();
-            zeroing.before = published.zeroed.get(&place).map(|earlier| earlier.rest).or(tared);
+            let tared = published.rest.get(taxel).copied().flatten();
+            zeroing.before = published.zeroed.get(&taxel).map(|earlier| earlier.rest).or(tared);
             zeroings.push(zeroing);
         }
         drop(published);

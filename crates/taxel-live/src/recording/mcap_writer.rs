@@ -57,7 +57,7 @@ pub struct SourceWriter {
     stream: Option<StreamColumns>,
     /// Number of columns of the array.
     columns: usize,
-    /// Number of places in the array.
+    /// Number of cells in the array.
     taxels: usize,
     grey_scale: Mutex<GreyScale>,
 }

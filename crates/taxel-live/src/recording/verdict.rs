@@ -366,8 +366,8 @@ impl Verdict {
         let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
         for (cause, n) in found() {
             // Of version 2 each is decoded once.
-            let place = if cause == REPEATED { &mut self.noted } else { &mut self.damaged };
-            place.insert(cause.clone(), *n);
+            let counts = if cause == REPEATED { &mut self.noted } else { &mut self.damaged };
+            counts.insert(cause.clone(), *n);
         }
         if !self.damaged.is_empty() {
             self.status = self.status.max(RecordingStatus::Damaged);

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::array_state::RestSource;
 use crate::keyframe_index::KeyframeIndex;
-use crate::keyframe_index::frames::{FrameIndex, FramePlace};
+use crate::keyframe_index::frames::{FrameIndex, FrameArea};
 use crate::keyframe_index::recording::RecordingIndex;
 use crate::protocol::messages::{FoundDetection, FrameRecording, FrameSourceInfo, Marker, Message, RecordedNote};
 use crate::time_columns::{COLUMN_US, TimeColumns};
@@ -154,11 +154,11 @@ impl Indexed {
 /// What `opened` says of frames.
 fn about_frames(index: &FrameIndex) -> FrameRecording {
     let file = &index.file;
-    let source = |(place, rest, falls, preload_at): (&FramePlace, RestSource, bool, &str)| FrameSourceInfo {
-        name: place.name.clone(),
-        left: place.left,
-        rows: place.rows,
-        columns: place.columns,
+    let source = |(area, rest, falls, preload_at): (&FrameArea, RestSource, bool, &str)| FrameSourceInfo {
+        name: area.name.clone(),
+        left: area.left,
+        rows: area.rows,
+        columns: area.columns,
         rest: rest.name(),
         falls,
         preload_at: preload_at.to_owned(),
@@ -171,7 +171,7 @@ fn about_frames(index: &FrameIndex) -> FrameRecording {
         floor: index.floor,
         newtons: index.newtons,
         number_us: file.number_us,
-        sources: index.places().map(source).collect(),
+        sources: index.areas().map(source).collect(),
         flickering: index.flickering().collect(),
         trial: file.trial.clone(),
         trials: file.trials.clone(),

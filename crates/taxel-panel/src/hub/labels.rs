@@ -48,11 +48,11 @@ impl LabelChange {
 
     /// The change of the table's rows. `labels` are those as this and the changes before it leave them.
     fn edit(self, labels: &mut Vec<Label>) -> Result<NumberedEdit, String> {
-        let (id, place) = match self {
+        let (id, index) = match self {
             Self::Mark(row) => return Ok((None, LabelEdit { old: None, new: Some(row) })),
-            Self::Rename { id, .. } | Self::Move { id, .. } | Self::Delete { id } => (id, place_of(labels, id)?),
+            Self::Rename { id, .. } | Self::Move { id, .. } | Self::Delete { id } => (id, index_of(labels, id)?),
         };
-        let old = labels[place].row.clone();
+        let old = labels[index].row.clone();
         let new = match self {
             Self::Rename { label, .. } => Some(LabelRow { label, ..old.clone() }),
             Self::Move { t_us, .. } => Some(LabelRow { t_us, host_ns: None, ..old.clone() }),
@@ -67,7 +67,7 @@ impl LabelChange {
 /// An edit, and the number of the label that it changes.
 pub(crate) type NumberedEdit = (Option<u64>, LabelEdit);
 
-fn place_of(labels: &[Label], id: u64) -> Result<usize, String> {
+fn index_of(labels: &[Label], id: u64) -> Result<usize, String> {
     labels.iter().position(|label| label.label_id == id && !label.row.is_removal()).ok_or_else(|| {
         format!("label_id: there is no label {id}; it was deleted or changed, perhaps by another client or program")
     })
@@ -197,7 +197,7 @@ impl LabelTables {
         let mut before = table.labels.clone().unwrap_or_default();
         let mut number = |row: LabelRow| {
             let same = before.iter().position(|label| label.row == row);
-            let id = same.map(|place| before.remove(place).label_id).unwrap_or_else(|| {
+            let id = same.map(|index| before.remove(index).label_id).unwrap_or_else(|| {
                 *last_id += 1;
                 *last_id
             });

@@ -122,11 +122,11 @@ impl LiveIndex {
         let from = self.range().map_or(0, |(_, latest)| latest - SPAN * column_us);
         let (number, held, since) = {
             let ring = self.ring();
-            let place = ring.keyframe_at(from).unwrap_or(0);
-            let stored = ring.pieces.get(place);
+            let index = ring.keyframe_at(from).unwrap_or(0);
+            let stored = ring.pieces.get(index);
             let held = stored.and_then(|stored| stored.piece.held.as_ref());
             (
-                ring.first + place as u64,
+                ring.first + index as u64,
                 held.map_or(UNKNOWN, |held| held[taxel as usize]),
                 stored.and_then(|k| k.piece.since),
             )
@@ -211,12 +211,12 @@ impl KeyframeIndex for LiveIndex {
 
     fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)> {
         let ring = self.ring();
-        let place = ring.keyframe_at(t).ok_or_else(|| problem!("no events yet"))?;
-        let stored = &ring.pieces[place];
+        let index = ring.keyframe_at(t).ok_or_else(|| problem!("no events yet"))?;
+        let stored = &ring.pieces[index];
         let held = stored.piece.held.clone().unwrap_or_default();
         let rest = stored.rest.as_ref().map_or_else(|| held.clone(), |rest| rest.to_vec());
         let keyframe = Keyframe { latest: stored.piece.since, events: stored.piece.before, held, rest, tracked: None };
-        let number = ring.first + place as u64;
+        let number = ring.first + index as u64;
         drop(ring);
         Ok((keyframe, Box::new(LiveChanges { index: self.clone(), number, held_returned: Some(number) })))
     }
@@ -237,7 +237,7 @@ impl KeyframeIndex for LiveIndex {
 
     fn events_before(&self, t: i64) -> u64 {
         let ring = self.ring();
-        ring.keyframe_at(t).map_or(0, |place| ring.pieces[place].piece.before)
+        ring.keyframe_at(t).map_or(0, |index| ring.pieces[index].piece.before)
     }
 }
 

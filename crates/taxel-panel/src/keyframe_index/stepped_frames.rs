@@ -13,7 +13,7 @@ const REST_MOVED: f64 = 0.5;
 
 /// Where a source's frames are in the array of the recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FramePlace {
+pub struct FrameArea {
     /// Name of the source.
     pub name: String,
     /// Its first column in the array of the recording.
@@ -47,7 +47,7 @@ pub struct FrameRest {
 #[derive(Debug, Clone)]
 pub struct FrameSource<'a> {
     /// Where they are in the array.
-    pub place: FramePlace,
+    pub area: FrameArea,
     /// Their times, us, ascending.
     pub t: Vec<i64>,
     /// Their values row by row, frame after frame; NaN where one is missing.
@@ -68,7 +68,7 @@ impl FrameSource<'_> {
             RestSource::Quiet => {}
         }
         let begins: Vec<f64> = values.iter().map(|rest| rest * ticks_by_unit).collect();
-        let mut tracked = TrackedRest::new(self.place.columns.into(), NOISE_FLOOR, begins);
+        let mut tracked = TrackedRest::new(self.area.columns.into(), NOISE_FLOOR, begins);
         if *falls {
             tracked = tracked.falling();
         }
@@ -99,7 +99,7 @@ impl FrameSource<'_> {
 /// The frames of a source, in steps.
 #[derive(Debug, Clone)]
 pub(super) struct SteppedFrames {
-    pub(super) place: FramePlace,
+    pub(super) area: FrameArea,
     pub(super) t: Vec<i64>,
     /// Row by row, frame after frame; [`UNKNOWN`] where a value is missing.
     ticks: Vec<u16>,
@@ -119,7 +119,7 @@ impl SteppedFrames {
             // No value is above the greatest; a taxel without a rest would get that of its first value.
             flickering.iter().for_each(|&cell| rest[cell] = UNKNOWN - 1);
         }
-        Self { place: from.place, t: from.t, ticks, rest_source, falls, flickering, preload_at, rests }
+        Self { area: from.area, t: from.t, ticks, rest_source, falls, flickering, preload_at, rests }
     }
 
     /// The rest of its cells at a frame; before the first one, that of the first.
@@ -133,7 +133,7 @@ impl SteppedFrames {
     }
 
     pub(super) fn cells(&self) -> usize {
-        usize::from(self.place.rows) * usize::from(self.place.columns)
+        usize::from(self.area.rows) * usize::from(self.area.columns)
     }
 
     pub(super) fn frame(&self, k: usize) -> &[u16] {
@@ -147,8 +147,8 @@ impl SteppedFrames {
 
     /// The taxels of its cells in an array of `columns` columns, row by row.
     pub(super) fn taxels(&self, columns: u16) -> impl Iterator<Item = usize> + use<> {
-        let (left, width, columns) = (self.place.left, self.place.columns, usize::from(columns));
-        (0..usize::from(self.place.rows))
+        let (left, width, columns) = (self.area.left, self.area.columns, usize::from(columns));
+        (0..usize::from(self.area.rows))
             .flat_map(move |y| (0..usize::from(width)).map(move |x| y * columns + usize::from(left) + x))
     }
 }

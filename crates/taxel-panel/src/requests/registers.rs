@@ -120,8 +120,8 @@ pub(crate) async fn send_all(hub: &Hub) -> Answer {
 
 /// The name that comes first in a reason.
 fn field_of(reason: &str, names: &[String]) -> Option<String> {
-    let place = |name: &String| reason.find(name.as_str()).map(|place| (place, name.clone()));
-    names.iter().filter_map(place).min().map(|(_, name)| name)
+    let start = |name: &String| reason.find(name.as_str()).map(|start| (start, name.clone()));
+    names.iter().filter_map(start).min().map(|(_, name)| name)
 }
 
 // ---------------------------------------------------------------------------------------------- presets

@@ -144,7 +144,7 @@ impl Viewport {
     /// Board time of the view, us.
     fn t(&self) -> Option<i64> {
         match &self.position {
-            Position::At(Some(place)) => Some(place.player.t()),
+            Position::At(Some(position)) => Some(position.player.t()),
             Position::At(None) => None,
             Position::Following => self.live.as_ref().and_then(|live| lock(&live.state).latest()),
         }
@@ -163,12 +163,12 @@ impl Viewport {
     /// Moves a playing view on; returns whether it has arrived to the end of its recording.
     pub(super) async fn play_on(&mut self) -> bool {
         let Some(t) = self.playback.now() else { return false };
-        let moved = self.with_place(move |place| {
+        let moved = self.with_position(move |position| {
             // A window that the view leaves moves with it.
-            if let Some(window) = place.window.as_mut().filter(|window| window.t() < t) {
+            if let Some(window) = position.window.as_mut().filter(|window| window.t() < t) {
                 window.advance(t)?;
             }
-            place.player.advance(t)
+            position.player.advance(t)
         });
         match moved.await {
             Ok(more) => {
@@ -220,8 +220,8 @@ impl Viewport {
         let needs_rest = |rests: u64| self.delivered.needs_rest(rests, moves != 0);
         let (bytes, last, rests) = match &mut self.position {
             Position::Following => self.following.frame(self.live.as_ref()?, about, needs_rest),
-            Position::At(place) => {
-                let SourcePosition { player, window } = &mut **place.as_mut()?;
+            Position::At(position) => {
+                let SourcePosition { player, window } = &mut **position.as_mut()?;
                 let rests = Some(player.state().rests()).filter(|rests| needs_rest(*rests));
                 let about = About { with_rest: rests.is_some(), ..about };
                 let (bytes, last) = frame::of_player(player, window.as_mut(), about);
@@ -237,9 +237,9 @@ impl Viewport {
         self.options.encoder.as_ref()?;
         let spikes = match &mut self.position {
             Position::Following => self.following.encode(self.live.as_ref()?),
-            Position::At(place) => {
-                let place = place.as_mut()?;
-                place.window.as_mut().unwrap_or(&mut place.player).spikes_mut()
+            Position::At(position) => {
+                let position = position.as_mut()?;
+                position.window.as_mut().unwrap_or(&mut position.player).spikes_mut()
             }
         }?;
         let (message, failed) = (spikes.message(), spikes.failed().map(str::to_owned));
@@ -253,20 +253,20 @@ impl Viewport {
 
     // ------------------------------------------------------------------------------------------ moving
 
-    /// Works on the place in another thread: a disk may be slow.
-    async fn with_place<T: Send + 'static>(
+    /// Works on the position in another thread: a disk may be slow.
+    async fn with_position<T: Send + 'static>(
         &mut self,
         work: impl FnOnce(&mut SourcePosition) -> taxel_live::Result<T> + Send + 'static,
     ) -> Answer<T> {
-        let Position::At(place) = &mut self.position else { return Err("the view follows the newest".into()) };
-        let Some(mut place) = place.take() else { return Err("the view is gone: open it again".into()) };
+        let Position::At(position) = &mut self.position else { return Err("the view follows the newest".into()) };
+        let Some(mut position) = position.take() else { return Err("the view is gone: open it again".into()) };
         let worked = tokio::task::spawn_blocking(move || {
-            let outcome = work(&mut place);
-            (place, outcome)
+            let outcome = work(&mut position);
+            (position, outcome)
         });
         match worked.await {
-            Ok((place, outcome)) => {
-                self.position = Position::At(Some(place));
+            Ok((position, outcome)) => {
+                self.position = Position::At(Some(position));
                 Ok(outcome?)
             }
             Err(_) => {
@@ -292,7 +292,7 @@ impl Viewport {
         let options = ViewOptions { whole, ..self.options.clone() };
         // A window whose columns the client has already stays as it is.
         let same = match &mut self.position {
-            Position::At(Some(place)) if !self.delivered.is_restart() => place.window.take(),
+            Position::At(Some(position)) if !self.delivered.is_restart() => position.window.take(),
             _ => None,
         };
         let end = self.window_us;
@@ -307,11 +307,11 @@ impl Viewport {
             let window = same.map_or_else(|| Player::open(index, end, options), Ok)?;
             Ok(SourcePosition { player, window: Some(window) })
         });
-        let place = opened.await.map_err(|_| Refusal::bug("the view")).and_then(|opened| Ok(opened?));
-        if place.is_err() {
+        let position = opened.await.map_err(|_| Refusal::bug("the view")).and_then(|opened| Ok(opened?));
+        if position.is_err() {
             self.restart();
         }
-        self.position = Position::At(Some(Box::new(place?)));
+        self.position = Position::At(Some(Box::new(position?)));
         self.delivered.invalidate_rest();
         self.dirty = true;
         self.following.stop_encoding();
@@ -469,13 +469,13 @@ impl Viewport {
         self.pause().await?;
         for _ in 0..steps.unsigned_abs() {
             let moved = if steps > 0 {
-                self.with_place(|place| {
-                    let next = place.player.next_stamp()?;
-                    next.map_or(Ok(None), |t| place.player.advance(t).map(|_| Some(t)))
+                self.with_position(|position| {
+                    let next = position.player.next_stamp()?;
+                    next.map_or(Ok(None), |t| position.player.advance(t).map(|_| Some(t)))
                 })
                 .await?
             } else {
-                let before = self.with_place(|place| place.player.last_stamp()).await?;
+                let before = self.with_position(|position| position.player.last_stamp()).await?;
                 if let Some(t) = before {
                     self.seek(t).await?;
                 }

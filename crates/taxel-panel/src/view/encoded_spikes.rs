@@ -207,13 +207,13 @@ impl EncodedSpikes {
         self.pending[from..].sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
         for spike in &self.pending[from..] {
             let column = column_of((spike.t * 1000.0).floor() as i64, self.column_us);
-            let place = match self.columns.back() {
+            let index = match self.columns.back() {
                 Some((last, _)) if *last == column => self.columns.len() - 1,
                 _ => match self.columns.binary_search_by_key(&column, |&(number, _)| number) {
-                    Ok(place) => place,
-                    Err(place) => {
-                        self.columns.insert(place, (column, vec![0; rows]));
-                        place
+                    Ok(index) => index,
+                    Err(index) => {
+                        self.columns.insert(index, (column, vec![0; rows]));
+                        index
                     }
                 },
             };
@@ -222,7 +222,7 @@ impl EncodedSpikes {
             let encoder = &self.encoders[next.saturating_sub(1)];
             let row = (spike.train - encoder.first) as usize * encoder.rows / encoder.stream.trains().max(1);
             let row = row.min(rows - 1);
-            let cell = &mut self.columns[place].1[row];
+            let cell = &mut self.columns[index].1[row];
             let (ups, downs) = (*cell & 15, *cell >> 4);
             *cell = if spike.value < 0.0 { ups | (downs + 1).min(15) << 4 } else { (ups + 1).min(15) | downs << 4 };
         }
@@ -237,12 +237,12 @@ impl EncodedSpikes {
 
     /// Appends these columns of time, one byte per row.
     pub(crate) fn write(&self, columns: Range<i64>, out: &mut Vec<u8>) {
-        let mut place = self.columns.partition_point(|&(number, _)| number < columns.start);
+        let mut index = self.columns.partition_point(|&(number, _)| number < columns.start);
         for column in columns {
-            match self.columns.get(place) {
+            match self.columns.get(index) {
                 Some((number, rows)) if *number == column => {
                     out.extend_from_slice(rows);
-                    place += 1;
+                    index += 1;
                 }
                 _ => out.resize(out.len() + usize::from(self.array.rows), 0),
             }
@@ -280,12 +280,12 @@ impl EncodedSpikes {
         let columns = u32::from(self.array.columns.max(1));
         // A taxel lies on the array, whose sides fit.
         #[allow(clippy::cast_possible_truncation)]
-        let place = |taxel: u32| ((taxel % columns) as u16, (taxel / columns) as u16);
+        let position = |taxel: u32| ((taxel % columns) as u16, (taxel / columns) as u16);
         let valued = changes.iter().any(|change| change.ticks != UNKNOWN);
         Events {
             t: changes.iter().map(|c| c.t).collect(),
-            x: changes.iter().map(|c| place(c.taxel).0).collect(),
-            y: changes.iter().map(|c| place(c.taxel).1).collect(),
+            x: changes.iter().map(|c| position(c.taxel).0).collect(),
+            y: changes.iter().map(|c| position(c.taxel).1).collect(),
             p: changes.iter().map(|c| c.up).collect(),
             intensity: valued.then(|| Intensities {
                 ticks: changes.iter().map(|c| if c.ticks == UNKNOWN { 0 } else { c.ticks }).collect(),

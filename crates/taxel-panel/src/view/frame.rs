@@ -180,12 +180,12 @@ fn write(
     let count = usize::try_from(range.end - range.start).unwrap_or(0);
     let mut out = Vec::with_capacity(HEADER + taxels * 5 + count * (2 * rows + 22) + 64);
     out.resize(HEADER, 0);
-    let mut places = [(0_usize, 0_usize); SECTION_COUNT];
+    let mut sections = [(0_usize, 0_usize); SECTION_COUNT];
     let mut section = |out: &mut Vec<u8>, number: usize, write: &dyn Fn(&mut Vec<u8>)| {
         out.resize(out.len().next_multiple_of(8), 0);
         let begin = out.len();
         write(out);
-        places[number] = (begin, out.len() - begin);
+        sections[number] = (begin, out.len() - begin);
     };
     let values =
         |values: &[u16], out: &mut Vec<u8>| values.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
@@ -230,7 +230,7 @@ fn write(
         put(12, &(rows as u16).to_le_bytes());
         put(44, &(about.column_us as u32).to_le_bytes());
         put(56, &(count as u32).to_le_bytes());
-        for (number, (begin, length)) in places.iter().enumerate().filter(|(_, (_, length))| *length > 0) {
+        for (number, (begin, length)) in sections.iter().enumerate().filter(|(_, (_, length))| *length > 0) {
             put(SECTIONS + 8 * number, &(*begin as u32).to_le_bytes());
             put(SECTIONS + 8 * number + 4, &(*length as u32).to_le_bytes());
         }

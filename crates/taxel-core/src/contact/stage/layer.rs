@@ -3,7 +3,7 @@
 use super::super::bonded::MOST_SWEPT;
 use super::super::push::Sinking;
 use super::super::{BodyShape, Bonded, Motion, Scene, Taxels};
-use super::groups::{GROUPS, place};
+use super::groups::{GROUPS, steps_before};
 use crate::{Array, Result, Stop};
 
 /// Stress that no taxel senses, MPa: a millionth of a newton on it, a hundred-thousandth of what the thesis could detect.
@@ -121,13 +121,13 @@ impl LayerScene {
         clean: &mut [f32],
         stop: Stop<'_>,
     ) -> Result<()> {
-        (0..GROUPS).try_for_each(|group| self.group(group, place(frame, group, frame_us), taxels, clean, stop))
+        (0..GROUPS).try_for_each(|group| self.group(group, steps_before(frame, group, frame_us), taxels, clean, stop))
     }
 
-    /// Writes what a group of lines reads, `place` steps after the start, into `clean`.
-    fn group(&mut self, group: usize, place: f64, taxels: &Taxels, clean: &mut [f32], stop: Stop<'_>) -> Result<()> {
-        let number = place as usize / self.every;
-        let share = (place / self.every as f64 - number as f64) as f32;
+    /// Writes what a group of lines reads, `steps` steps after the start, into `clean`.
+    fn group(&mut self, group: usize, steps: f64, taxels: &Taxels, clean: &mut [f32], stop: Stop<'_>) -> Result<()> {
+        let number = steps as usize / self.every;
+        let share = (steps / self.every as f64 - number as f64) as f32;
         self.solve(number, stop)?;
         self.solve(number + 1, stop)?;
         let frame = |number: usize| self.solved.iter().find(|solved| solved.number == number).expect("solved above");

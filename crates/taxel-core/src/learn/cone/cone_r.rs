@@ -376,7 +376,7 @@ impl ConeRProblem {
         let (silent, all) = (self.rows.silent.len(), self.rows());
         let mut shares = vec![0.0; all];
         for (&row, &share) in multipliers.rows.iter().zip(&multipliers.values) {
-            let Some(place) = shares.get_mut(row) else {
+            let Some(entry) = shares.get_mut(row) else {
                 return Err(problem!("start"; ": a multiplier of row {row}, there are {all} rows"));
             };
             let low = if row < silent { 0.0 } else { objective.kink_of_c().1 };
@@ -386,7 +386,7 @@ impl ConeRProblem {
                     low + 1.0
                 ));
             }
-            *place = share;
+            *entry = share;
         }
         Ok(WarmStart { weights, shares: Some(shares) })
     }

@@ -14,7 +14,7 @@ use crate::{Result, Stop};
 /// cannot be raised takes 16.
 const MOST_PARTS: usize = 16;
 
-/// A target's row that is to be raised: its place among the targets, the potential wanted there, and the rise to it, mV.
+/// A target's row that is to be raised: its index among the targets, the potential wanted there, and the rise to it, mV.
 struct RaisedRow {
     target: usize,
     wanted: f64,

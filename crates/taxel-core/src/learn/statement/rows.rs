@@ -416,7 +416,7 @@ impl Statement {
 
     /// Whether `t` is a point of the grid.
     pub(crate) fn is_point(&self, example: &Example, t: f64) -> bool {
-        Grid::new(example.start, self.neuron.step_ms).place(t).is_point()
+        Grid::new(example.start, self.neuron.step_ms).locate(t).is_point()
     }
 
     /// Whether `t` is in a window of silence, and neither a target nor in the refractory time after one.

@@ -71,15 +71,15 @@ mod tests {
     #[test]
     fn a_damaged_stamp_makes_times_doubtful_from_there_on() {
         for flipped in [1 << 11, 1 << 14, 1 << 15] {
-            for place in 0..3 {
+            for word in 0..3 {
                 let mut datagrams: Vec<_> = regular(1, 100).collect();
-                datagrams[50].0[place] ^= flipped;
+                datagrams[50].0[word] ^= flipped;
                 let (decoder, events) = decode(datagrams);
-                assert_eq!(decoder.totals().jumps, 1, "{flipped} at {place}");
+                assert_eq!(decoder.totals().jumps, 1, "{flipped} at {word}");
                 let after = decoder.totals().doubtful_after.unwrap();
-                let (wrong, at) = (events.t[150 + place], events.t[149]);
-                assert!(wrong != 510_000 + 100 * place as i64);
-                assert_eq!(after, at, "{flipped} at {place}");
+                let (wrong, at) = (events.t[150 + word], events.t[149]);
+                assert!(wrong != 510_000 + 100 * word as i64);
+                assert_eq!(after, at, "{flipped} at {word}");
                 assert!(events.t[299] - events.t[0] > 7_000_000, "a turn too late");
             }
         }

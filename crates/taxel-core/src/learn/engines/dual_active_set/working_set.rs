@@ -33,7 +33,7 @@ impl DualActiveSet {
         let slot = self.free.pop().unwrap_or(self.rows.len());
         if slot == self.rows.len() {
             self.rows.push(row);
-            self.place.push(None);
+            self.positions.push(None);
             self.multipliers.push(0.0);
             self.excess.push(0.0);
             if self.coefficients.len() < self.rows.len() * self.stride {

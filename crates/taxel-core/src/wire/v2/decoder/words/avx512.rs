@@ -187,20 +187,20 @@ impl Constants {
         // Lanes without an event repeat the last one, so that the loop has one of two lengths, which a processor can
         // predict.
         let repeated = _mm512_min_epu16(_mm512_set1_epi16(found.n as i16 - 1), self.lane);
-        let places = _mm512_permutexvar_epi16(repeated, found.position);
+        let indices = _mm512_permutexvar_epi16(repeated, found.position);
         let values = _mm512_permutexvar_epi16(repeated, found.ticks);
         if found.n > EIGHT {
             let (mut at, mut ticks) = (WordLanes([0; WORDS]), WordLanes([0; WORDS]));
             // SAFETY: both arrays are 64 bytes long and aligned to cache lines; the positions are those of events.
             unsafe {
-                _mm512_store_si512(at.0.as_mut_ptr().cast(), places);
+                _mm512_store_si512(at.0.as_mut_ptr().cast(), indices);
                 _mm512_store_si512(ticks.0.as_mut_ptr().cast(), values);
                 store_many(&at, &ticks, t, held);
             }
             return;
         }
         // SAFETY: the positions are those of events.
-        unsafe { store_eight(_mm512_castsi512_si128(places), _mm512_castsi512_si128(values), t, held) }
+        unsafe { store_eight(_mm512_castsi512_si128(indices), _mm512_castsi512_si128(values), t, held) }
     }
 }
 
@@ -208,12 +208,12 @@ impl Constants {
 ///
 /// The positions must be in `held`.
 #[inline(never)]
-unsafe fn store_many(places: &WordLanes, values: &WordLanes, t: i64, held: &mut ValuesByLine) {
-    for (&place, &value) in places.0.iter().zip(&values.0) {
+unsafe fn store_many(indices: &WordLanes, values: &WordLanes, t: i64, held: &mut ValuesByLine) {
+    for (&index, &value) in indices.0.iter().zip(&values.0) {
         // SAFETY: the caller guarantees this.
         unsafe {
-            *held.values.get_unchecked_mut(usize::from(place)) = value;
-            *held.since.get_unchecked_mut(usize::from(place)) = t;
+            *held.values.get_unchecked_mut(usize::from(index)) = value;
+            *held.since.get_unchecked_mut(usize::from(index)) = t;
         }
     }
 }

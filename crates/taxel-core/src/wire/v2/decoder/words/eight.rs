@@ -17,7 +17,7 @@ const _: () = assert!(HEADER_BYTES >= REGISTER);
 /// Positions count from 1 in 16 bits, and sums saturate at this value; words that reach it are decoded one by one.
 pub(crate) const FULL: u16 = u16::MAX;
 
-/// Indices for `pshufb`: those from place `k` on move the first `16 - k` bytes of a register to the front, with zeros
+/// Indices for `pshufb`: those from index `k` on move the first `16 - k` bytes of a register to the front, with zeros
 /// after them.
 static TO_START: [u8; 2 * REGISTER] = {
     let mut out = [0x80; 2 * REGISTER];
@@ -29,7 +29,7 @@ static TO_START: [u8; 2 * REGISTER] = {
     out
 };
 
-/// Masks: from place `8 - k` on, `k` lanes of ones, then zeros.
+/// Masks: from index `8 - k` on, `k` lanes of ones, then zeros.
 static FIRST_LANES: [u32; 2 * EIGHT] = {
     let mut out = [0; 2 * EIGHT];
     let mut k = 0;
@@ -74,7 +74,7 @@ impl Eight {
         let count = count.min(EIGHT);
         // SAFETY: of words of 4 bytes only the lanes of those words are read, by a mask of eight of 16 entries from 0
         // to 8 on. Of words of 2 bytes, the 16 bytes up to the last word's end are read; bytes before the first word
-        // belong to the header. The shuffle's table has 16 bytes from each place 0 to 16 on.
+        // belong to the header. The shuffle's table has 16 bytes from each index 0 to 16 on.
         unsafe {
             let words = datagram.as_ptr().add(at);
             let lanes = _mm_cmpgt_epi16(_mm_set1_epi16(count as i16), _mm_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7));
@@ -239,19 +239,19 @@ impl Eight {
 ///
 /// # Safety
 ///
-/// The machine must have SSE 4.1; all eight places must be in `held`.
+/// The machine must have SSE 4.1; all eight indices must be in `held`.
 #[inline]
 #[target_feature(enable = "sse4.1")]
-pub(super) unsafe fn store_eight(places: __m128i, values: __m128i, t: i64, held: &mut ValuesByLine) {
+pub(super) unsafe fn store_eight(indices: __m128i, values: __m128i, t: i64, held: &mut ValuesByLine) {
     // Extracts the lanes from registers: loads from memory would wait for the store.
     let halves = |lanes| [_mm_cvtsi128_si64(lanes) as u64, _mm_extract_epi64::<1>(lanes) as u64];
-    for (places, values) in halves(places).into_iter().zip(halves(values)) {
+    for (indices, values) in halves(indices).into_iter().zip(halves(values)) {
         for shift in [0, 16, 32, 48] {
-            let place = usize::from((places >> shift) as u16);
+            let index = usize::from((indices >> shift) as u16);
             // SAFETY: the caller guarantees this.
             unsafe {
-                *held.values.get_unchecked_mut(place) = (values >> shift) as u16;
-                *held.since.get_unchecked_mut(place) = t;
+                *held.values.get_unchecked_mut(index) = (values >> shift) as u16;
+                *held.since.get_unchecked_mut(index) = t;
             }
         }
     }
