@@ -29,7 +29,7 @@ pub(super) trait Rule: Send + Clone + 'static {
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>);
 
     /// Whether a block takes so long to compute that the rule prefetches parts of the `next` frame between blocks.
-    const ASKS: bool = false;
+    const PREFETCHES: bool = false;
 
     /// Emits the spikes that are due before `t` (exclusive) while the last sample holds.
     fn pass(&mut self, _t: i64, _out: &mut Vec<Spike>) {}
@@ -336,7 +336,7 @@ impl<R: Rule> Stream for Sampled<R> {
                 .with_hint("period_ms", Hint::Give));
         }
         let (now, later) = (NextFrame::after(values), NextFrame::unknown());
-        let (mut now, later) = if R::ASKS { (later, now) } else { (now, later) };
+        let (mut now, later) = if R::PREFETCHES { (later, now) } else { (now, later) };
         let values = match &mut self.above {
             Some(above) if values.len() == above.frame.len() => {
                 above.held.values_mut().copy_from_slice(values);

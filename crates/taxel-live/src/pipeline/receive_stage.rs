@@ -8,7 +8,7 @@ use crate::Result;
 use crate::capture::Batch;
 
 /// Time for which datagrams are gathered during a recording without a readout: this costs half the CPU.
-const TOGETHER: Duration = Duration::from_millis(1);
+const GATHER: Duration = Duration::from_millis(1);
 
 pub(super) struct ReceiveStage {
     shared: Arc<PipelineShared>,
@@ -23,7 +23,7 @@ impl ReceiveStage {
 
     /// Moves receiving to a separate thread; without a readout it may gather datagrams.
     pub(super) fn move_to_thread(&self, reads_out: bool) -> Result<()> {
-        self.shared.receiver.receive_in_thread(if reads_out { Duration::ZERO } else { TOGETHER })
+        self.shared.receiver.receive_in_thread(if reads_out { Duration::ZERO } else { GATHER })
     }
 
     /// Waits for datagrams at most `wait`; returns false and an empty batch if none arrived.

@@ -1,4 +1,6 @@
-//! How a request is refused.
+//! How a request is refused, and the words of the page for what helps.
+
+use taxel_core::{Hint, Reason};
 
 /// Why a request is refused, and which register or key is at fault.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,7 +34,21 @@ impl From<&str> for Refusal {
 
 impl From<taxel_live::Error> for Refusal {
     fn from(error: taxel_live::Error) -> Self {
-        error.to_string().into()
+        words(&error).into()
+    }
+}
+
+/// An error as the page shows it, with its remedy.
+pub(crate) fn words(error: &taxel_live::Error) -> String {
+    let reason = if let taxel_live::Error::Core(core) = error { core.reason() } else { None };
+    let Some(Reason { text, argument: Some(argument), hint: Some(hint) }) = reason else { return error.to_string() };
+    match hint {
+        Hint::Give => format!("{text}; give {argument}"),
+        Hint::Larger => format!("{text}; a larger {argument} reads more"),
+        Hint::LayOut => format!(
+            "{text}; give {argument}, or rows and columns in a layout file, if they are a grid's taxels row by row"
+        ),
+        Hint::Pitch => format!("{text}; give {argument} with the pitch in mm, or pitch_mm in a layout file"),
     }
 }
 

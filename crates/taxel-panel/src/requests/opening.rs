@@ -15,6 +15,7 @@ use crate::hub::Hub;
 use crate::hub::indexed::Indexed;
 use crate::keyframe_index::recording::RecordingIndex;
 use crate::protocol::messages::Message;
+use crate::protocol::refusal::words;
 
 /// How often the progress of reading a file is sent.
 const PROGRESS_EVERY: Duration = Duration::from_secs(1);
@@ -102,7 +103,7 @@ async fn read_whole(hub: Arc<Hub>, name: String, key: (PathBuf, Option<String>),
         }
         Err(error) => {
             hub.folder.forget(&key);
-            hub.clients.send_message(&Message::warning(format!("{error}; only its beginning is shown")));
+            hub.clients.send_message(&Message::warning(format!("{}; only its beginning is shown", words(&error))));
         }
     }
 }

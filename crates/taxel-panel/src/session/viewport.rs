@@ -19,7 +19,7 @@ use crate::hub::live_source::LiveSource;
 use crate::protocol::messages::{Message, ViewState};
 use crate::view::player::{Player, ViewOptions};
 use crate::readout_encoders::{ReadoutEncoders, ViewEncoder};
-use crate::protocol::refusal::{Answer, Refusal};
+use crate::protocol::refusal::{Answer, Refusal, words};
 use crate::protocol::request::Taxel;
 use crate::requests::{labels, opening, readout_of};
 use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
@@ -242,7 +242,7 @@ impl Viewport {
                 position.window.as_mut().unwrap_or(&mut position.player).spikes_mut()
             }
         }?;
-        let (message, failed) = (spikes.message(), spikes.failed().map(str::to_owned));
+        let (message, failed) = (spikes.message(), spikes.failed().map(words));
         if let Some(reason) = failed {
             (self.options.encoder, self.requested_encoder) = (None, None);
             self.following.stop_encoding();
@@ -280,7 +280,7 @@ impl Viewport {
     async fn seek(&mut self, t: i64) -> Answer {
         let index = self.index()?;
         if let Err(error) = self.choose_encoder(&index) {
-            self.warnings.push(error.to_string());
+            self.warnings.push(words(&error));
         }
         // For the past of a live source at wide columns, the shared state has them all.
         let live = self.live.as_ref().filter(|_| self.recording.is_none() && self.options.column_us > COLUMN_US);
@@ -346,7 +346,7 @@ impl Viewport {
         });
         if let Err(error) = started {
             (self.options.encoder, self.requested_encoder) = (None, None);
-            self.warnings.push(error.to_string());
+            self.warnings.push(words(&error));
         }
     }
 
@@ -419,7 +419,7 @@ impl Viewport {
             let index = self.index()?;
             self.requested_encoder = encoder;
             let chosen = self.choose_encoder(&index);
-            chosen.map_err(|error| Refusal { reason: error.to_string(), field: Some("encoder".to_owned()) })?;
+            chosen.map_err(|error| Refusal { reason: words(&error), field: Some("encoder".to_owned()) })?;
         }
         self.reopen().await
     }
@@ -523,7 +523,7 @@ impl Viewport {
     ) -> Answer<Vec<Message>> {
         let begun = Instant::now();
         // The reason names the file.
-        let refused = |error: taxel_live::Error| Refusal { reason: error.to_string(), field: Some("name".to_owned()) };
+        let refused = |error: taxel_live::Error| Refusal { reason: words(&error), field: Some("name".to_owned()) };
         let indexed = opening::index(hub, &name, trial.as_deref()).await.map_err(refused)?;
         let labels = labels::read(hub, &name, indexed.us()).await;
         let bytes = size(&hub.folder.file(&name).map_err(refused)?).map_err(refused)?;

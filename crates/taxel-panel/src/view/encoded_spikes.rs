@@ -13,7 +13,7 @@ use crate::protocol::messages::Message;
 use crate::readout_encoders::ViewEncoder;
 use crate::time_columns::{SPAN, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
-use taxel_live::Result;
+use taxel_live::{Error, Result};
 use taxel_live::pipeline::TaxelChange;
 
 /// Maximum number of spikes in a message.
@@ -39,7 +39,7 @@ pub(crate) struct EncodedSpikes {
     pending: Vec<Spike>,
     left_out: usize,
     /// Why the encoder stopped.
-    failed: Option<String>,
+    failed: Option<Error>,
 }
 
 /// The encoder of a source.
@@ -58,7 +58,7 @@ impl EncodedSpikes {
         let ViewEncoder { encoder, name, of_readout } = encoder;
         let (mut encoders, mut first) = (vec![], 0);
         for sensor in sensors {
-            let stream = encoder.stream(sensor).map_err(|error| problem!("encoder {name}: {error}"))?;
+            let stream = encoder.stream(sensor).map_err(|error| error.in_part(&format!("encoder {name}")))?;
             let trains = u32::try_from(stream.trains()).map_err(|_| problem!("encoder {name}: too many trains"))?;
             encoders.push(SourceEncoder { stream, first, rows: sensor.rows.into(), next: 0 });
             first += trains;
@@ -137,7 +137,7 @@ impl EncodedSpikes {
                 self.push_frames(t);
             }
         }
-        self.failed.map_or(Ok(()), |reason| Err(problem!("{reason}").into()))
+        self.failed.map_or(Ok(()), Err)
     }
 
     /// Drops the spikes of what the encoder begins with, which are none of the view.
@@ -196,7 +196,7 @@ impl EncodedSpikes {
     fn note_outcome(&mut self, pushed: taxel_core::Result<()>, from: usize) {
         match pushed {
             Ok(()) => self.count(from),
-            Err(error) => self.failed = Some(format!("encoder {}: {error}", self.name)),
+            Err(error) => self.failed = Some(error.in_part(&format!("encoder {}", self.name)).into()),
         }
     }
 
@@ -250,8 +250,8 @@ impl EncodedSpikes {
     }
 
     /// Why the encoder stopped, if it did.
-    pub(crate) fn failed(&self) -> Option<&str> {
-        self.failed.as_deref()
+    pub(crate) fn failed(&self) -> Option<&Error> {
+        self.failed.as_ref()
     }
 
     /// The `spikes` message of the pending spikes, if there are any.
