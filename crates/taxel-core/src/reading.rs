@@ -16,18 +16,18 @@ pub struct Unfit {
 }
 
 impl Unfit {
-    /// The whole error for a text that describes `what`.
+    /// The whole error for a text that describes `subject`.
     #[must_use]
-    pub fn text(&self, what: &str) -> String {
+    pub fn text(&self, subject: &str) -> String {
         let colon = if self.message.starts_with(" is ") && self.path.is_empty() { "" } else { ": " };
-        format!("{what}{colon}{}{}", self.path, self.message)
+        format!("{subject}{colon}{}{}", self.path, self.message)
     }
 
-    /// The error of the parameter, for a caller who passed `what` its parameters.
+    /// The error of the parameter, for a caller who passed `subject` its parameters.
     #[must_use]
-    pub fn problem(self, what: &str) -> Error {
+    pub fn problem(self, subject: &str) -> Error {
         match self.path.find(['.', '[']).map_or((self.path.as_str(), ""), |end| self.path.split_at(end)) {
-            ("", _) => Error::Problem(self.text(what).into()),
+            ("", _) => Error::Problem(self.text(subject).into()),
             (argument, rest) => Error::argument(argument, &format!("{rest}{}", self.message)),
         }
     }

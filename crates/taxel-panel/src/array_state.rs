@@ -507,8 +507,8 @@ impl ArrayState {
     fn store_curve(&mut self, column: i64) {
         let missing = self.frames.is_some() && self.held.values().iter().all(|&value| value == UNKNOWN);
         let curve = |load: &Load| load.curve(&self.centre, &self.weights);
-        let whole = if missing { MISSING } else { curve(&self.load) };
-        self.time_columns.set_curve(column, whole);
+        let total = if missing { MISSING } else { curve(&self.load) };
+        self.time_columns.set_curve(column, total);
         if self.time_columns.value_count() > 0 {
             let channels = (0..self.time_columns.channel_count()).map(|channel| self.above(channel).into());
             let sources = self.loads.iter().enumerate().flat_map(|(source, load)| match self.knows(source) {

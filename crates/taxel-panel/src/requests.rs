@@ -173,7 +173,7 @@ fn record(hub: &Arc<Hub>, request: RecordRequest) -> Answer {
     let RecordRequest { name, index, countdown_s, length_s, advance, label, format } = request;
     let advance = advance.unwrap_or(false);
     if advance && (index.is_none() || length_s.is_none()) {
-        return Err(Refusal::of("advance", "needs an index and a length"));
+        return Err(Refusal::of_field("advance", "needs an index and a length"));
     }
     if hub.live().is_none() {
         return Err("no board is listened to: nothing to record".into());
@@ -210,7 +210,7 @@ pub(super) fn readout_of(recording: &str) -> String {
 
 /// Runs a readout: on the recording that is shown, or on the live source from now on.
 async fn read_out(hub: &Hub, shown: Option<&OpenRecording>, readout: String) -> Answer<Option<Message>> {
-    let path = hub.folder.file(&readout).map_err(|error| Refusal::of("readout", error))?;
+    let path = hub.folder.file(&readout).map_err(|error| Refusal::of_field("readout", error))?;
     let Some(OpenRecording { name, trial, .. }) = shown.cloned() else {
         check_restart(hub)?;
         hub.ask(move |handlers| handlers.board.read_out(&path)).await?;
@@ -259,12 +259,12 @@ async fn health(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<Message> {
 async fn cut(hub: &Hub, shown: Option<&OpenRecording>, (start_us, stop_us): (i64, i64), to: &str) -> Answer<Message> {
     let OpenRecording { name, trial, indexed } = shown.ok_or("cut: open a recording first")?.clone();
     if start_us >= stop_us {
-        return Err(Refusal::of("stop_us", "must lie after start_us"));
+        return Err(Refusal::of_field("stop_us", "must lie after start_us"));
     }
     let (path, us) = (hub.folder.file(&name)?, indexed.us());
-    let out = hub.folder.file(to).map_err(|error| Refusal::of("name", error))?;
+    let out = hub.folder.file(to).map_err(|error| Refusal::of_field("name", error))?;
     if out.exists() {
-        return Err(Refusal::of("name", format!("{to} exists already; name another")));
+        return Err(Refusal::of_field("name", format!("{to} exists already; name another")));
     }
     // The first frame from the start on, and the first after the end.
     let in_file = |t: i64| -(-t).div_euclid(us);

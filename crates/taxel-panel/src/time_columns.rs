@@ -81,7 +81,7 @@ struct ColumnShape {
 }
 
 impl ColumnShape {
-    fn of(array: &Array) -> Self {
+    fn new(array: &Array) -> Self {
         let channels = if array.is_channels() && array.len() <= MOST_CHANNELS { array.len() } else { 0 };
         Self { rows: array.rows.into(), channels, sources: 0 }
     }
@@ -125,7 +125,7 @@ impl TimeColumns {
     /// Columns of an array that take at most about `bytes` bytes: the oldest blocks are dropped.
     #[must_use]
     pub fn new(array: &Array, bytes: usize) -> Self {
-        let shape = ColumnShape::of(array);
+        let shape = ColumnShape::new(array);
         let block = shape.block_bytes();
         Self {
             shape,
@@ -168,7 +168,7 @@ impl TimeColumns {
     /// Bytes that `columns` columns of an array take.
     #[must_use]
     pub fn bytes_for(array: &Array, columns: i64) -> usize {
-        (usize::try_from(columns / BLOCK).unwrap_or(0) + 2) * ColumnShape::of(array).block_bytes()
+        (usize::try_from(columns / BLOCK).unwrap_or(0) + 2) * ColumnShape::new(array).block_bytes()
     }
 
     /// Rows of the array.

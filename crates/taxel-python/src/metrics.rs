@@ -59,8 +59,8 @@ pub fn match_spikes(
     enter(py, |stop| {
         let each = spikes.iter().zip(&targets).enumerate();
         each.map(|(p, (spikes, targets))| {
-            let (what, wanted) = (format!("spikes[{p}]"), format!("targets[{p}]"));
-            matching::match_spikes((&what, spikes), (&wanted, targets), window_ms, stop)
+            let (name, wanted) = (format!("spikes[{p}]"), format!("targets[{p}]"));
+            matching::match_spikes((&name, spikes), (&wanted, targets), window_ms, stop)
         })
         .collect()
     })

@@ -185,9 +185,9 @@ impl Board {
     /// Sends what is due at the end of a frame: all words of version 1; for version 2 events, promises, states and
     /// totals.
     fn end_frame(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
-        let every = self.version_2.states_us * 100;
-        if every > 0 {
-            self.refresh.frame(&self.active, every);
+        let period = self.version_2.states_us * 100;
+        if period > 0 {
+            self.refresh.frame(&self.active, period);
         }
         if self.active.wire_version == 1 {
             self.link.flush_words(&mut self.counts, sink);

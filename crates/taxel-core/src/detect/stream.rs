@@ -278,15 +278,15 @@ impl ReadoutStream {
         }
     }
 
-    fn check_shape(&self, other: &Array) -> Result<()> {
-        let (mine, theirs) = ((self.array.rows, self.array.columns), (other.rows, other.columns));
-        if mine != theirs {
+    fn check_shape(&self, array: &Array) -> Result<()> {
+        let (expected, given) = ((self.array.rows, self.array.columns), (array.rows, array.columns));
+        if expected != given {
             return Err(problem!(
                 "input from {} x {} taxels: this readout reads {} x {}",
-                theirs.0,
-                theirs.1,
-                mine.0,
-                mine.1
+                given.0,
+                given.1,
+                expected.0,
+                expected.1
             ));
         }
         Ok(())

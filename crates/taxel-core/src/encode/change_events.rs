@@ -101,11 +101,11 @@ impl Rule for ChangeRule {
                 for (lane, (&new, last)) in new.iter().zip(last.iter_mut()).enumerate() {
                     if moved(new, *last) {
                         let units = (new - *last) / floor;
-                        let whole = match self.rounding {
+                        let rounded = match self.rounding {
                             Rounding::Truncate => units.trunc(),
                             Rounding::Floor => units.floor(),
                         };
-                        let value = whole.clamp(-self.most, self.most);
+                        let value = rounded.clamp(-self.most, self.most);
                         out.push(Spike { t: ms(t), train: (block * BLOCK + lane) as u32, value });
                         *last = new;
                     }

@@ -105,12 +105,12 @@ impl Channels {
             return Err(problem!("frame at {t} us: {} values, must be {rows} x {columns}", values.len()));
         }
         let Some(taxels) = &self.taxels else {
-            let (whole, rest) = values.as_chunks::<BLOCK>();
-            take(t, whole, held, changed, next)?;
+            let (full, rest) = values.as_chunks::<BLOCK>();
+            take(t, full, held, changed, next)?;
             if !rest.is_empty() {
                 let mut new = [0.0; BLOCK];
                 new[..rest.len()].copy_from_slice(rest);
-                take(t, &[new], &mut held[whole.len()..], &mut changed[whole.len()..], next)?;
+                take(t, &[new], &mut held[full.len()..], &mut changed[full.len()..], next)?;
             }
             return Ok(());
         };

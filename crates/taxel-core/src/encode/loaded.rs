@@ -151,9 +151,9 @@ pub(super) struct LoadedSums {
 }
 
 impl Loaded {
-    /// Starts with no taxel loaded; `what` names the encoder in an error.
-    pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
-        let rest = require_tare(what, tare)?.rest_of(array)?;
+    /// Starts with no taxel loaded; `subject` names the encoder in an error.
+    pub(super) fn new(subject: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
+        let rest = require_tare(subject, tare)?.rest_of(array)?;
         let paired = Paired::new(usize::from(array.rows), usize::from(array.columns));
         let mut fresh = Self { paired, noise_floor, rest };
         (0..array.len()).for_each(|taxel| fresh.update_threshold(taxel));
@@ -227,7 +227,7 @@ impl std::ops::Deref for Loaded {
     }
 }
 
-/// The tare of an encoder that needs one; `what` names the encoder in an error.
-pub(super) fn require_tare<'a>(what: &str, tare: Option<&'a Tare>) -> Result<&'a Tare> {
-    tare.ok_or_else(|| problem!("{what} without a tare").with_hint("tare", Hint::Give))
+/// The tare of an encoder that needs one; `subject` names the encoder in an error.
+pub(super) fn require_tare<'a>(subject: &str, tare: Option<&'a Tare>) -> Result<&'a Tare> {
+    tare.ok_or_else(|| problem!("{subject} without a tare").with_hint("tare", Hint::Give))
 }

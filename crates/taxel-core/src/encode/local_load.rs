@@ -157,10 +157,10 @@ impl LocalLoad {
     }
 
     fn sampled(&self, array: &Array, emit: Emit) -> Result<Sampled<LocalLoadRule>> {
-        let whole = |ms: f64| us(ms).round() as i64;
+        let whole_us = |ms: f64| us(ms).round() as i64;
         let windows: Vec<PastWindow> = self
             .windows()
-            .map(|([from, to], quantities)| PastWindow { from: whole(from), to: whole(to), quantities })
+            .map(|([from, to], quantities)| PastWindow { from: whole_us(from), to: whole_us(to), quantities })
             .collect();
         let recent = RecentSamples::new(windows[0].quantities, &windows);
         let rule = LocalLoadRule { sums: self.sums(array, &self.running_us())?, recent, quantities: vec![], emit };

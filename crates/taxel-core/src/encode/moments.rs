@@ -171,7 +171,7 @@ impl Encoding for Moments {
             centre: self.centre.then(|| [array.columns, array.rows].map(|count| (count.max(2) - 1) as f64 / 2.0)),
             position: [0.0; CENTRE],
             ages: self.all_ages(),
-            every: self.tonic_ms.map(|every| micros("tonic_ms", every)).transpose()?,
+            interval_us: self.tonic_ms.map(|interval_us| micros("tonic_ms", interval_us)).transpose()?,
             due: VecDeque::new(),
         };
         // Channels are all taxels here; `loaded` defines which taxels exist.
@@ -263,7 +263,7 @@ struct LevelPass {
     /// The time at which each level was reached, us; `None` below it.
     since: Vec<Option<i64>>,
     /// Period of the tonic spikes, us.
-    every: Option<i64>,
+    interval_us: Option<i64>,
     /// The time of a level's next tonic spike, the level, and when it was reached; the period is the same for all, so
     /// the queue is ordered by time.
     due: VecDeque<(i64, usize, i64)>,
@@ -321,22 +321,22 @@ impl LevelPass {
     /// Notes that a level is reached: its tonic spikes begin.
     fn reach(&mut self, t: i64, level: usize, out: &mut Vec<Spike>) {
         self.since[level] = Some(t);
-        if let Some(every) = self.every {
+        if let Some(interval_us) = self.interval_us {
             out.push(Spike { t: ms(t), train: (2 * self.levels.len() + level) as u32, value: 1.0 });
-            self.due.push_back((t + every, level, t));
+            self.due.push_back((t + interval_us, level, t));
         }
     }
 
     /// Emits the tonic spikes before `t` (with `at_too` also at `t`).
     fn emit_tonic(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
-        let Some(every) = self.every else { return };
+        let Some(interval_us) = self.interval_us else { return };
         while let Some(&(due, level, since)) = self.due.front()
             && (due < t || (at_too && due == t))
         {
             self.due.pop_front();
             if self.since[level] == Some(since) {
                 out.push(Spike { t: ms(due), train: (2 * self.levels.len() + level) as u32, value: 1.0 });
-                self.due.push_back((due + every, level, since));
+                self.due.push_back((due + interval_us, level, since));
             }
         }
     }

@@ -184,8 +184,8 @@ impl TrackedRest {
         Self { falls: true, ..self }
     }
 
-    /// The rest of those of an array's `taxels` that [`TrackedRest::add`] names, none so far: the others count as taxels
-    /// without a value.
+    /// Tracks only those of an array's `taxels` that [`TrackedRest::add`] names; none at first. All other taxels have no
+    /// value.
     #[must_use]
     pub fn sparse(taxels: usize, columns: usize, noise_floor: f64) -> Self {
         let grid = TaxelGrid { taxels, columns: columns.max(1) };

@@ -6,7 +6,7 @@ pub(in crate::wire) mod clock;
 mod counts;
 mod filling;
 mod pairing;
-mod whole;
+mod fill;
 
 pub use clock::FARTHEST_BACK;
 pub use counts::Counts;

@@ -244,7 +244,7 @@ impl DecodeStage {
     }
 
     /// Number of decoded datagrams.
-    pub(super) fn decoded(&self) -> u64 {
+    pub(super) fn datagram_count(&self) -> u64 {
         self.decoded
     }
 

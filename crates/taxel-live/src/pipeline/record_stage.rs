@@ -114,8 +114,8 @@ impl RecordStage {
         let Some(origin) = &mut self.origin else { return Ok(()) };
         let mut events = Events::empty(self.shared.options.array.clone());
         origin.push(bytes, Some(at_ns / 1000), &mut events);
-        let by_event = stamps.0.zip(events.t.first()).map(|(ours, theirs)| ours - theirs);
-        let by_marker = stamps.1.zip(events.markers.first()).map(|(ours, theirs)| ours - theirs.t);
+        let by_event = stamps.0.zip(events.t.first()).map(|(stamp, decoded)| stamp - decoded);
+        let by_marker = stamps.1.zip(events.markers.first()).map(|(stamp, marker)| stamp - marker.t);
         let Some(origin_us) = by_event.or(by_marker) else { return Ok(()) };
         self.origin = None;
         let mut timed = true;

@@ -55,8 +55,8 @@ impl RecordingSwitch {
 
     /// As [`Handle::records`](super::Handle::records).
     pub(super) fn run(&self) -> bool {
-        let whole = |board: &Arc<PipelineShared>| lock(&board.recording.broken).is_none();
-        self.shared.recording.runs.load(Ordering::Acquire) && self.boards.iter().all(|(_, board)| whole(board))
+        let is_sound = |board: &Arc<PipelineShared>| lock(&board.recording.broken).is_none();
+        self.shared.recording.runs.load(Ordering::Acquire) && self.boards.iter().all(|(_, board)| is_sound(board))
     }
 
     /// The error that ended a recording early, of this board or another one.

@@ -161,11 +161,11 @@ impl NumberStream {
     /// Reads lines until the end, in a separate thread; a failed line is opened again. `begun` is a reader that was
     /// opened before and has read up to the start of a line.
     pub(super) fn read(self: &Arc<Self>, input: &LineInput, begun: Option<LineReader>) -> Result<JoinHandle<()>> {
-        let whole = begun.is_some();
+        let from_line_start = begun.is_some();
         let (numbers, mut reader) = (Arc::clone(self), begun.map_or_else(|| LineReader::open(input), Ok)?);
         let thread = std::thread::Builder::new().name("taxel-lines".to_owned());
         let job = move || {
-            if let Err(error) = numbers.read_lines(&mut reader, !whole)
+            if let Err(error) = numbers.read_lines(&mut reader, !from_line_start)
                 && !numbers.ends.load(Ordering::Acquire)
                 && let Some(host) = numbers.part.host.upgrade()
             {

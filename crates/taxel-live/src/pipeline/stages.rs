@@ -126,7 +126,7 @@ impl Stages {
         self.observers.datagrams(&batch, silent_until);
         self.receive.reuse(batch);
         self.observers.tick(self.decode.held());
-        self.record.previews(self.decode.decoded(), self.decode.held(), false)?;
+        self.record.previews(self.decode.datagram_count(), self.decode.held(), false)?;
         if self.observers.frame(self.decode.held()) {
             self.record.progress()?;
         }
@@ -182,7 +182,7 @@ impl Stages {
     fn finish(&mut self) -> Result<()> {
         self.decode.finish();
         self.flush_events()?;
-        self.record.previews(self.decode.decoded(), self.decode.held(), true)?;
+        self.record.previews(self.decode.datagram_count(), self.decode.held(), true)?;
         let quiet = self.decode.quiet_until(self.receive.silent_until()).filter(|_| self.readout.is_on());
         self.observers.finish(self.decode.held());
         self.readout.close(&self.shared, quiet);
@@ -209,7 +209,7 @@ impl Stages {
     }
 
     fn switch_recording(&mut self, next: Option<Box<RunningRecording>>) -> Result<EndedRecording> {
-        self.record.previews(self.decode.decoded(), self.decode.held(), true)?;
+        self.record.previews(self.decode.datagram_count(), self.decode.held(), true)?;
         if next.is_some() {
             self.move_to_threads()?;
         }

@@ -71,8 +71,8 @@ impl GreyScale {
             *self = Self::new(held.len());
         }
         if !self.tared {
-            let begin = || TrackedRest::new(columns, NOISE_FLOOR, vec![f64::NO_REST; held.len()]);
-            let tracked = self.tracked.get_or_insert_with(begin);
+            let fresh_rest = || TrackedRest::new(columns, NOISE_FLOOR, vec![f64::NO_REST; held.len()]);
+            let tracked = self.tracked.get_or_insert_with(fresh_rest);
             tracked.take(t_us, held.iter().map(|&value| if value == 0 { f32::NAN } else { value.into() }));
             for (taxel, rest) in tracked.rests().enumerate() {
                 self.rest.track(taxel, rest.unwrap_or(f64::NO_REST));

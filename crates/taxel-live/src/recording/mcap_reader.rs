@@ -202,7 +202,7 @@ impl Reader {
                 let silent = self.is_silent(source).then(RecordingCounts::default);
                 self.ends.get(name).cloned().or(silent).map(|counts| FileEnding::Finished { counts })
             }
-            whole => whole.clone(),
+            ending => ending.clone(),
         };
         Ok(Self { source, ending, ..self.clone() })
     }
@@ -214,8 +214,8 @@ impl Reader {
     }
 
     /// Refuses more bytes of a source than may be in memory.
-    fn fits(&self, what: &str, size: usize) -> Result<()> {
-        limits::in_memory(&self.blocks.path, what, size as u64, self.memory)
+    fn fits(&self, subject: &str, size: usize) -> Result<()> {
+        limits::in_memory(&self.blocks.path, subject, size as u64, self.memory)
     }
 
     /// Whether the summary lists no datagram, line or frame of a source.
@@ -268,9 +268,9 @@ impl Reader {
             // Arrival numbers tell which datagrams are there twice, unless who wrote the file gave all of them one number.
             let again = match topic {
                 Topic::Datagrams if !remarks.numbers.are_one() => remarks.numbers.repeated(),
-                _ if topic == data => recorded(topic).or(total).map_or(0, |whole| read.saturating_sub(whole)),
+                _ if topic == data => recorded(topic).or(total).map_or(0, |listed| read.saturating_sub(listed)),
                 // Another program may have added some.
-                _ => total.map_or(0, |whole| read.saturating_sub(whole)),
+                _ => total.map_or(0, |listed| read.saturating_sub(listed)),
             };
             repeated += again;
             let listed = unread.messages.get(&topic).copied().unwrap_or(0);

@@ -412,21 +412,21 @@ impl Verdict {
 
     /// As [`Self::combine`], of stretches of one recording: what all of them lost is what the whole lost, and counts once.
     fn of_stretches(parts: Vec<(String, Self)>) -> Self {
-        let mut whole = Self::combine(parts.clone());
+        let mut combined = Self::combine(parts.clone());
         let all = parts.iter().map(|(_, part)| [&part.lost, &part.damaged, &part.noted]);
-        for (k, sums) in [&mut whole.lost, &mut whole.damaged, &mut whole.noted].into_iter().enumerate() {
+        for (k, sums) in [&mut combined.lost, &mut combined.damaged, &mut combined.noted].into_iter().enumerate() {
             for (cause, sum) in sums {
                 let least = all.clone().map(|numbers| numbers[k].get(cause).copied().unwrap_or(0)).min();
                 *sum -= least.unwrap_or(0) * (parts.len() as u64).saturating_sub(1);
             }
         }
-        for k in (1..whole.steps_back.len()).rev() {
-            if whole.steps_back[..k].contains(&whole.steps_back[k]) {
-                whole.steps_back.remove(k);
+        for k in (1..combined.steps_back.len()).rev() {
+            if combined.steps_back[..k].contains(&combined.steps_back[k]) {
+                combined.steps_back.remove(k);
             }
         }
-        whole.stretch_of = parts.into_iter().find_map(|(_, part)| part.stretch_of);
-        whole
+        combined.stretch_of = parts.into_iter().find_map(|(_, part)| part.stretch_of);
+        combined
     }
 
     fn combine_with(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
@@ -436,12 +436,12 @@ impl Verdict {
         {
             return first.clone();
         }
-        let mut whole = Self { status: RecordingStatus::Complete, ..Self::default() };
+        let mut combined = Self { status: RecordingStatus::Complete, ..Self::default() };
         let mut named: Vec<(String, Self)> = vec![];
         for (name, part) in parts {
-            whole.status = whole.status.max(part.status);
+            combined.status = combined.status.max(part.status);
             for (sums, counts) in
-                [(&mut whole.lost, &part.lost), (&mut whole.damaged, &part.damaged), (&mut whole.noted, &part.noted)]
+                [(&mut combined.lost, &part.lost), (&mut combined.damaged, &part.damaged), (&mut combined.noted, &part.noted)]
             {
                 for (cause, n) in counts {
                     let sum = sums.entry(cause.clone()).or_default();
@@ -453,13 +453,13 @@ impl Verdict {
             let name = if taken(&name) { unique.unwrap_or_default() } else { name };
             named.push((name, part));
         }
-        whole.change(|verdict| {
+        combined.change(|verdict| {
             // The earliest of those that there are.
             verdict.doubtful_after_us = named.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
             verdict.steps_back = named.iter().flat_map(|(_, part)| part.steps_back.clone()).collect();
             verdict.parts = named;
         });
-        whole
+        combined
     }
 
     /// The verdict on the recording whose times are later by so many us.
@@ -503,8 +503,8 @@ impl Verdict {
 }
 
 /// A number and what it counts, in the plural unless it is 1.
-fn counted(n: u64, what: &str) -> String {
-    numbered(n, &format!("{what}s"))
+fn counted(n: u64, noun: &str) -> String {
+    numbered(n, &format!("{noun}s"))
 }
 
 /// A number and what it counts, which is given in the plural: of 1 the first word that ends in s, its noun, is in the singular.

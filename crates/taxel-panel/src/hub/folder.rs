@@ -121,7 +121,7 @@ impl Folder {
     /// Remembers an index for as long as it is shown; the last one for longer.
     pub(crate) fn remember(&self, key: Key, bytes: u64, indexed: &Indexed) {
         *lock(&self.last) = Some(indexed.clone());
-        lock(&self.indices).insert(key, (bytes, WeakIndex::of(indexed)));
+        lock(&self.indices).insert(key, (bytes, WeakIndex::downgrade(indexed)));
     }
 
     /// Forgets an index, so that it is built anew.
@@ -153,7 +153,7 @@ enum WeakIndex {
 }
 
 impl WeakIndex {
-    fn of(indexed: &Indexed) -> Self {
+    fn downgrade(indexed: &Indexed) -> Self {
         match indexed {
             Indexed::Events(index) => Self::Events(Arc::downgrade(index)),
             Indexed::Frames(index) => Self::Frames(Arc::downgrade(index)),

@@ -38,10 +38,10 @@ impl LabelChange {
 
     /// The same change at a whole multiple of `us`: at a frame, where frames are numbered.
     pub(crate) fn at_whole(self, us: i64) -> Self {
-        let whole = |t: i64| t.div_euclid(us) * us;
+        let rounded = |t: i64| t.div_euclid(us) * us;
         match self {
-            Self::Mark(row) => Self::Mark(LabelRow { t_us: whole(row.t_us), ..row }),
-            Self::Move { id, t_us } => Self::Move { id, t_us: whole(t_us) },
+            Self::Mark(row) => Self::Mark(LabelRow { t_us: rounded(row.t_us), ..row }),
+            Self::Move { id, t_us } => Self::Move { id, t_us: rounded(t_us) },
             change => change,
         }
     }

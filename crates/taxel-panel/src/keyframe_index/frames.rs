@@ -84,12 +84,12 @@ impl FrameIndex {
     /// Indexes frames of sources that have areas in `array`.
     #[must_use]
     pub fn new(array: Array, file: FrameFile, sources: Vec<FrameSource<'_>>) -> Self {
-        let steps = ValueSteps::of(sources.iter().map(|source| source.values), array.len());
+        let steps = ValueSteps::fitting(sources.iter().map(|source| source.values), array.len());
         let floor = sources.iter().map(|source| source.floor(steps)).max().unwrap_or(0);
         let sources: Vec<SteppedFrames> = sources.into_iter().map(|source| SteppedFrames::new(source, steps)).collect();
         let first = sources.iter().filter_map(|source| source.t.first()).min();
         let last = sources.iter().filter_map(|source| source.t.last()).max();
-        let (weights, newtons) = Weights::of(&array, &file.unit);
+        let (weights, newtons) = Weights::new(&array, &file.unit);
         let mut index = Self {
             file,
             step: steps.size,
@@ -187,7 +187,7 @@ impl FrameIndex {
                 columns.set_values(column, &values);
             }
         }
-        let whole = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
+        let complete = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
         // Noise is what is above a rest that was found: above a given one any value is load.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let most = |(source, noise): (&SteppedFrames, FrameNoise)| match source.rest_source {
@@ -195,7 +195,7 @@ impl FrameIndex {
             RestSource::Given | RestSource::None => 0,
         };
         let noise = self.sources.iter().zip(noise).map(most).collect();
-        self.time_columns = whole.then(|| columns.with_noise(noise));
+        self.time_columns = complete.then(|| columns.with_noise(noise));
     }
 
     /// The number of sources that have a curve each.

@@ -155,10 +155,10 @@ impl LiveIndex {
 impl Ring {
     /// Index of the last piece with a keyframe at or before `t`, or of the first one.
     fn keyframe_at(&self, t: i64) -> Option<usize> {
-        let whole = |stored: &Arc<StoredPiece>| stored.piece.held.is_some();
+        let has_values = |stored: &Arc<StoredPiece>| stored.piece.held.is_some();
         let last =
-            self.pieces.iter().rposition(|stored| whole(stored) && stored.piece.since.is_none_or(|since| since <= t));
-        last.or_else(|| self.pieces.iter().position(whole))
+            self.pieces.iter().rposition(|stored| has_values(stored) && stored.piece.since.is_none_or(|since| since <= t));
+        last.or_else(|| self.pieces.iter().position(has_values))
     }
 }
 

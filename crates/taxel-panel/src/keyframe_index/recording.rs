@@ -289,9 +289,9 @@ impl RecordingIndex {
         self.preload_at = preload_text(&preload(&state.rests_less(), columns, LOADED_TICKS), columns, (0, 0));
         state.update_curve();
         let columns = state.time_columns().clone();
-        let whole =
+        let complete =
             columns.reach().zip(contents.first).is_none_or(|((begin, _), first)| begin <= column_of(first, COLUMN_US));
-        self.time_columns = whole.then_some(columns);
+        self.time_columns = complete.then_some(columns);
         Ok(())
     }
 

@@ -163,16 +163,16 @@ pub(super) struct ValueSteps {
 impl ValueSteps {
     /// Steps for these values: of 1 where all are whole and not too far apart, else as small as 16 bits allow.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub(super) fn of<'a>(values: impl Iterator<Item = &'a [f32]>, taxels: usize) -> Self {
-        let (mut least, mut most, mut whole) = (0.0_f32, 0.0_f32, true);
+    pub(super) fn fitting<'a>(values: impl Iterator<Item = &'a [f32]>, taxels: usize) -> Self {
+        let (mut least, mut most, mut integers) = (0.0_f32, 0.0_f32, true);
         for &value in values.flatten().filter(|value| value.is_finite()) {
             (least, most) = (least.min(value), most.max(value));
-            whole &= value.fract() == 0.0;
+            integers &= value.fract() == 0.0;
         }
         let (least, range) = (f64::from(least), f64::from(most) - f64::from(least));
         // The sum over the array has 32 bits.
         let steps = MOST_STEPS.min(u32::MAX as usize / taxels.max(1)) as f64;
-        let size = if whole && range <= MOST_STEPS as f64 { 1.0 } else { range / steps };
+        let size = if integers && range <= MOST_STEPS as f64 { 1.0 } else { range / steps };
         Self { size, zero: (-least / size).ceil() as u16 }
     }
 

@@ -36,8 +36,8 @@ impl Coordinates {
         let ((left, right), (top, bottom)) = (range(x), range(y));
         let extent = (right - left).max(bottom - top);
         let step = if extent > 0.0 { extent / STEPS } else { 1.0 };
-        let whole = |at: f64, from: f64| ((at - from) / step).round() as u16;
-        let places = x.iter().zip(y).map(|(&x, &y)| (whole(x, left), whole(y, top))).collect();
+        let steps = |at: f64, from: f64| ((at - from) / step).round() as u16;
+        let places = x.iter().zip(y).map(|(&x, &y)| (steps(x, left), steps(y, top))).collect();
         Self { places, scale: Some(((left, top), step)) }
     }
 

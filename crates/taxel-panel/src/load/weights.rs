@@ -27,7 +27,7 @@ impl Weights {
     /// The weights of values in this unit, and the force that 1 in the sum of values is (N): of pressures where the area
     /// of each taxel is known, else `None`.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)]
-    pub(crate) fn of(array: &Array, unit: &str) -> (Self, Option<f64>) {
+    pub(crate) fn new(array: &Array, unit: &str) -> (Self, Option<f64>) {
         let Some(areas) = array.areas_mm2().filter(|_| unit == "kPa") else { return (Self::default(), None) };
         let there = areas.iter().enumerate().filter(|&(taxel, _)| array.has(taxel)).map(|(_, &area)| area);
         let (least, largest) = there.fold((f64::INFINITY, 0.0_f64), |(least, most), a| (least.min(a), most.max(a)));
@@ -70,7 +70,7 @@ mod tests {
     #[test]
     fn a_pressure_counts_by_its_taxel_s_area_where_all_are_known_and_differ() {
         let array = feet(Some(vec![50.0, 200.0, 9e9]), Some(PlaceUnit::Mm));
-        let (weights, newtons) = Weights::of(&array, "kPa");
+        let (weights, newtons) = Weights::new(&array, "kPa");
         let weighted = weights.weighed(0, 41).wrapping_add(weights.weighed(1, 5));
         // 41 kPa on 50 mm2 and 5 kPa on 200 mm2 are 3.05 N.
         let force = f64::from(weights.sum(46, weighted)) * newtons.expect("a force");
@@ -83,7 +83,7 @@ mod tests {
             (feet(None, Some(PlaceUnit::Mm)), "kPa", None),
             (Array::unmeasured(2, 3, "mat"), "kPa", None),
         ] {
-            let (weights, newtons) = Weights::of(&array, unit);
+            let (weights, newtons) = Weights::new(&array, unit);
             assert_eq!((weights.weighed(1, 5), weights.sum(45, 0), newtons), (0, 45, force));
         }
     }

@@ -25,8 +25,8 @@ pub(crate) struct OneOrMore<T>(pub(crate) Vec<T>);
 
 impl<'de, const LEAST: i64, const MOST: i64> Deserialize<'de> for Whole<LEAST, MOST> {
     fn deserialize<D: Deserializer<'de>>(value: D) -> Result<Self, D::Error> {
-        let whole = Value::deserialize(value)?.as_i64().filter(|whole| (LEAST..=MOST).contains(whole));
-        whole.map(Self).ok_or_else(|| D::Error::custom(format!("must be a whole number from {LEAST} to {MOST}")))
+        let number = Value::deserialize(value)?.as_i64().filter(|number| (LEAST..=MOST).contains(number));
+        number.map(Self).ok_or_else(|| D::Error::custom(format!("must be a whole number from {LEAST} to {MOST}")))
     }
 }
 

@@ -289,7 +289,8 @@ pub(crate) enum Message {
         #[cfg_attr(feature = "development", schemars(with = "Option<shapes::Id>"))]
         id: Value,
         /// The `type` of the request.
-        what: String,
+        #[serde(rename = "what")]
+        request: String,
         reason: String,
         /// The register or key at fault.
         field: Option<String>,
@@ -304,8 +305,8 @@ impl Message {
         json!(self).to_string()
     }
 
-    pub(crate) fn refused(id: Value, what: String, Refusal { reason, field }: Refusal) -> Self {
-        Self::Refused { id, what, reason, field }
+    pub(crate) fn refused(id: Value, request: String, Refusal { reason, field }: Refusal) -> Self {
+        Self::Refused { id, request, reason, field }
     }
 
     pub(crate) fn warning(text: impl std::fmt::Display) -> Self {

@@ -10,13 +10,13 @@ pub(crate) struct Refusal {
 }
 
 impl Refusal {
-    pub(crate) fn of(field: &str, reason: impl std::fmt::Display) -> Self {
+    pub(crate) fn of_field(field: &str, reason: impl std::fmt::Display) -> Self {
         Self { reason: format!("{field}: {reason}"), field: Some(field.to_owned()) }
     }
 
     /// Of work that panicked.
-    pub(crate) fn bug(what: &str) -> Self {
-        format!("{what} failed within taxel; please report it").into()
+    pub(crate) fn bug(work: &str) -> Self {
+        format!("{work} failed within taxel; please report it").into()
     }
 }
 

@@ -203,16 +203,16 @@ impl Request {
     /// # Errors
     ///
     /// The refusal, which names the key at fault.
-    pub(crate) fn read(what: &str, mut keys: Map<String, Value>) -> Answer<Self> {
+    pub(crate) fn read(kind: &str, mut keys: Map<String, Value>) -> Answer<Self> {
         keys.remove("type");
         keys.remove("id");
-        serde_path_to_error::deserialize(json!({ what: keys })).map_err(|error| {
+        serde_path_to_error::deserialize(json!({ kind: keys })).map_err(|error| {
             let key = |segment: &Segment| match segment {
                 Segment::Map { key } => Some(key.clone()),
                 _ => None,
             };
             match error.path().iter().filter_map(key).next_back() {
-                Some(key) => Refusal::of(&key, error.inner()),
+                Some(key) => Refusal::of_field(&key, error.inner()),
                 None => error.inner().to_string().into(),
             }
         })

@@ -87,10 +87,10 @@ pub(crate) fn marks(shown: Option<&OpenRecording>, labels: Vec<MarkedTimes>) -> 
     let mut changes = vec![];
     for MarkedTimes { label, t_us: OneOrMore(times), source, replaces_us } in labels {
         if replaces_us.as_ref().is_some_and(|replaced| replaced.0.len() != times.len()) {
-            return Err(Refusal::of("replaces_us", "must have one time for each of t_us"));
+            return Err(Refusal::of_field("replaces_us", "must have one time for each of t_us"));
         }
         if changes.len() + times.len() > MOST_MARKS {
-            return Err(Refusal::of("labels", format!("must be at most {MOST_MARKS} labels at a time")));
+            return Err(Refusal::of_field("labels", format!("must be at most {MOST_MARKS} labels at a time")));
         }
         let row = row(shown, label, 0, source);
         changes.extend(times.iter().enumerate().map(|(k, t_us)| {
@@ -176,7 +176,7 @@ pub(crate) async fn settle(hub: &Hub, shown: Option<&OpenRecording>, id: u64, ke
     let table = hub.folder.file(&file_of(&name))?;
     let _turn = hub.labels.turn(&name).await;
     let conflict = hub.labels.conflict(&name, id).ok_or_else(|| {
-        Refusal::of("conflict_id", "this conflict is settled, or the file has changed since: look at it again")
+        Refusal::of_field("conflict_id", "this conflict is settled, or the file has changed since: look at it again")
     })?;
     let recording = name.clone();
     let read = hub.ask(move |handlers| handlers.labels.settle(&table, &recording, us, &conflict, restore)).await?;

@@ -97,10 +97,10 @@ pub(crate) async fn set(hub: &Hub, values: &Map<String, Value>) -> Answer {
             value => value.as_u64().and_then(|n| u32::try_from(n).ok()),
         };
         let number = number
-            .ok_or_else(|| Refusal::of(name, "must be a whole number of 0 or more, in the register's own unit"))?;
+            .ok_or_else(|| Refusal::of_field(name, "must be a whole number of 0 or more, in the register's own unit"))?;
         match name.as_str() {
-            "record" => return Err(Refusal::of(name, "is written by record and stop")),
-            "channels" => return Err(Refusal::of(name, "is the board's build")),
+            "record" => return Err(Refusal::of_field(name, "is written by record and stop")),
+            "channels" => return Err(Refusal::of_field(name, "is the board's build")),
             _ => wanted.push((name.clone(), number)),
         }
     }
@@ -157,15 +157,15 @@ pub(crate) async fn apply_preset(hub: &Hub, name: &str) -> Answer {
     ensure_known(hub).await?;
     let of_user = hub.presets().presets.get(name).cloned();
     let target = if PRESETS.iter().any(|preset| preset.name == name) {
-        let preset = Registers::preset_on(name, array).map_err(|error| Refusal::of("name", error))?;
+        let preset = Registers::preset_on(name, array).map_err(|error| Refusal::of_field("name", error))?;
         hub.board().registers.with_preset(&preset, array)
     } else if let Some(of_user) = of_user {
         // A preset of the user holds every register, also the version of the wire.
         let of_user =
-            presets::to_registers(&of_user).map_err(|error| Refusal::of("name", format!("preset {name}: {error}")))?;
+            presets::to_registers(&of_user).map_err(|error| Refusal::of_field("name", format!("preset {name}: {error}")))?;
         Registers { lines: of_user.lines.min(array.columns), ..of_user }
     } else {
-        return Err(Refusal::of("name", format!("there is no preset {name}")));
+        return Err(Refusal::of_field("name", format!("there is no preset {name}")));
     };
     write(hub, target, false).await
 }
@@ -176,7 +176,7 @@ pub(crate) async fn save_preset(hub: &Hub, name: &str) -> Answer {
     read_presets(hub).await?;
     let exists = PRESETS.iter().any(|preset| preset.name == name) || hub.presets().presets.contains_key(name);
     if exists {
-        return Err(Refusal::of("name", format!("{name} is taken: delete it first, or name another")));
+        return Err(Refusal::of_field("name", format!("{name} is taken: delete it first, or name another")));
     }
     let held = Registers { record: false, ..hub.board().registers };
     hub.presets().presets.insert(name.to_owned(), presets::from_registers(&held));
@@ -190,7 +190,7 @@ pub(crate) async fn delete_preset(hub: &Hub, name: &str) -> Answer {
     if hub.presets().presets.remove(name).is_none() {
         let built_in = PRESETS.iter().any(|preset| preset.name == name);
         let why = if built_in { "is built in" } else { "is no preset of yours" };
-        return Err(Refusal::of("name", format!("{name} {why}")));
+        return Err(Refusal::of_field("name", format!("{name} {why}")));
     }
     write_presets(hub, turn).await
 }

@@ -59,7 +59,7 @@ impl PendingRequests {
         &self,
         hub: &Arc<Hub>,
         id: Value,
-        what: String,
+        kind: String,
         request: Request,
         bytes: usize,
         shown: Option<OpenRecording>,
@@ -70,7 +70,7 @@ impl PendingRequests {
         };
         let Ok(permit) = Arc::clone(permits).try_acquire_many_owned(count as u32) else {
             let refusal = Refusal::from("too many requests at a time: wait for their answers");
-            return Some(Message::refused(id, what, refusal));
+            return Some(Message::refused(id, kind, refusal));
         };
         let (hub, answers) = (Arc::clone(hub), self.answers.clone());
         tokio::spawn(async move {
@@ -85,7 +85,7 @@ impl PendingRequests {
                     }
                     Message::Done { id }
                 }
-                Err(refusal) => Message::refused(id, what, refusal),
+                Err(refusal) => Message::refused(id, kind, refusal),
             };
             let _ = answers.send(last).await;
             drop(permit);

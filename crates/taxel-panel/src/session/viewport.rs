@@ -284,12 +284,12 @@ impl Viewport {
         }
         // For the past of a live source at wide columns, the shared state has them all.
         let live = self.live.as_ref().filter(|_| self.recording.is_none() && self.options.column_us > COLUMN_US);
-        let whole = live.map(|live| {
+        let all_columns = live.map(|live| {
             let mut state = lock(&live.state);
             state.update_curve();
             Arc::new(state.time_columns().clone())
         });
-        let options = ViewOptions { whole, ..self.options.clone() };
+        let options = ViewOptions { all_columns, ..self.options.clone() };
         // A window whose columns the client has already stays as it is.
         let same = match &mut self.position {
             Position::At(Some(position)) if !self.delivered.is_restart() => position.window.take(),
@@ -401,7 +401,7 @@ impl Viewport {
         let array = index.array();
         let (rows, columns) = (array.rows, array.columns);
         if taxel.is_some_and(|(x, y)| x >= columns || y >= rows) {
-            return Err(Refusal::of("taxel", format!("must be [x, y] on {rows} rows x {columns} columns, or null")));
+            return Err(Refusal::of_field("taxel", format!("must be [x, y] on {rows} rows x {columns} columns, or null")));
         }
         self.options.watched = taxel.and_then(|(x, y)| u32::try_from(array.index(x, y)).ok());
         if !matches!(self.position, Position::Following) {
@@ -427,7 +427,7 @@ impl Viewport {
     pub(super) async fn zoom(&mut self, column_us: i64, end_us: Option<i64>) -> Answer {
         if !is_column(column_us) {
             let (least, most) = COLUMNS_US;
-            return Err(Refusal::of("column_us", format!("must be {least} times a power of two, up to {most}")));
+            return Err(Refusal::of_field("column_us", format!("must be {least} times a power of two, up to {most}")));
         }
         self.options.column_us = column_us;
         self.window_us = end_us.filter(|_| !matches!(self.position, Position::Following));

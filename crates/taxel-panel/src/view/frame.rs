@@ -42,9 +42,9 @@ pub(crate) struct About {
 /// Raster and curves in the width that a frame shows, from narrower columns and from up to two stores.
 struct ShownColumns<'a> {
     of_view: &'a TimeColumns,
-    /// First column of `of_view`; earlier ones come from `whole`.
+    /// First column of `of_view`; earlier ones come from `all_columns`.
     first_of_view: i64,
-    whole: Option<&'a TimeColumns>,
+    all_columns: Option<&'a TimeColumns>,
     /// Up to when columns are known, us, and the last stored column.
     latest: Option<i64>,
     last: i64,
@@ -58,7 +58,7 @@ impl<'a> ShownColumns<'a> {
     fn new(
         of_view: &'a TimeColumns,
         first_of_view: i64,
-        whole: Option<&'a TimeColumns>,
+        all_columns: Option<&'a TimeColumns>,
         latest: Option<i64>,
         column_us: i64,
         noise: (u32, &'a [u32]),
@@ -67,13 +67,13 @@ impl<'a> ShownColumns<'a> {
         let last = latest.map_or(i64::MIN, |t| column_of(t, stored_us));
         // A view that has played for long has dropped the beginning of its own columns.
         let first_of_view = first_of_view.max(of_view.reach().map_or(i64::MAX, |(first, _)| first));
-        Self { of_view, first_of_view, whole, latest, last, factor: column_us / stored_us, noise }
+        Self { of_view, first_of_view, all_columns, latest, last, factor: column_us / stored_us, noise }
     }
 
     /// The first known column.
     fn first(&self) -> i64 {
         let first = self
-            .whole
+            .all_columns
             .and_then(TimeColumns::reach)
             .map_or(self.first_of_view, |(first, _)| first.min(self.first_of_view));
         first.div_euclid(self.factor)
@@ -83,7 +83,7 @@ impl<'a> ShownColumns<'a> {
     fn parts(&self, column: i64) -> [(&TimeColumns, Range<i64>); 2] {
         let parts = column * self.factor..((column + 1) * self.factor).min(self.last + 1);
         let of_view = self.first_of_view.clamp(parts.start, parts.end.max(parts.start));
-        [(self.whole.unwrap_or(self.of_view), parts.start..of_view), (self.of_view, of_view..parts.end)]
+        [(self.all_columns.unwrap_or(self.of_view), parts.start..of_view), (self.of_view, of_view..parts.end)]
     }
 
     fn raster(&self, column: i64, out: &mut Vec<u8>) {
@@ -158,9 +158,9 @@ pub(crate) fn of_player(player: &mut Player, window: Option<&mut Player>, about:
         }
         None => player,
     };
-    let (of_view, first_of_view, whole) = beside.time_columns();
+    let (of_view, first_of_view, all_columns) = beside.time_columns();
     let noise = player.index().time_columns().map_or((0, &[][..]), |all| (all.noise(), all.source_noise()));
-    let shown = ShownColumns::new(of_view, first_of_view, whole, beside.state().latest(), about.column_us, noise);
+    let shown = ShownColumns::new(of_view, first_of_view, all_columns, beside.state().latest(), about.column_us, noise);
     write(player.state(), player.index().array().columns, &shown, beside.history(), beside.spikes(), about)
 }
 

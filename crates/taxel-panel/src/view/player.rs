@@ -27,14 +27,14 @@ pub struct ViewOptions {
     /// The encoder whose spikes are shown.
     pub encoder: Option<ViewEncoder>,
     /// Raster and curves of the whole source, where its keyframe index does not store them.
-    pub whole: Option<Arc<TimeColumns>>,
+    pub all_columns: Option<Arc<TimeColumns>>,
 }
 
 impl ViewOptions {
     /// Columns of `column_us` without history and spikes.
     #[must_use]
     pub fn plain(column_us: i64) -> Self {
-        Self { column_us, watched: None, encoder: None, whole: None }
+        Self { column_us, watched: None, encoder: None, all_columns: None }
     }
 
     /// Whether the columns are narrower than those that keyframe indices store.
@@ -71,7 +71,7 @@ impl Player {
         let (first, last) = index.range().ok_or_else(|| problem!("nothing to show: it holds no events"))?;
         let t = t.clamp(first, last);
         let span = SPAN * options.column_us;
-        let stored = !options.is_narrow() && (index.time_columns().is_some() || options.whole.is_some());
+        let stored = !options.is_narrow() && (index.time_columns().is_some() || options.all_columns.is_some());
         let needs_changes = options.watched.is_some() || options.encoder.is_some();
         let dense = index.events_before(t).saturating_sub(index.events_before(t - span)) > HISTORY_CHANGES;
         let before = if stored && (!needs_changes || dense) { 0 } else { span };
@@ -247,8 +247,8 @@ impl Player {
     /// Raster and curves of the state, the first column that they hold, and those of the whole source for earlier columns.
     #[must_use]
     pub fn time_columns(&self) -> (&TimeColumns, i64, Option<&TimeColumns>) {
-        let whole =
-            if self.options.is_narrow() { None } else { self.options.whole.as_deref().or(self.index.time_columns()) };
-        (self.state.time_columns(), self.first_of_view, whole)
+        let all_columns =
+            if self.options.is_narrow() { None } else { self.options.all_columns.as_deref().or(self.index.time_columns()) };
+        (self.state.time_columns(), self.first_of_view, all_columns)
     }
 }

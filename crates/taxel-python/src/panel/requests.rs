@@ -104,10 +104,10 @@ impl FileRequests for PythonHandler {
     }
 
     fn read(&self, path: &Path, trial: Option<&str>, opening: Opening) -> Reply<ReadFile> {
-        let whole = opening == Opening::Whole;
+        let is_whole = opening == Opening::Whole;
         self.call(|handler| {
             let (events, frames): (Option<PathBuf>, Option<ReadFrames<'_>>) =
-                handler.call_method1("read", (path, trial, whole))?.extract()?;
+                handler.call_method1("read", (path, trial, is_whole))?.extract()?;
             match (events, frames) {
                 (_, Some(frames)) => Ok(ReadFile::Frames(FramesRead(Box::new(to_index(handler.py(), frames)?)))),
                 (Some(path), None) => Ok(ReadFile::Events(path)),

@@ -402,8 +402,8 @@ impl Statement {
     }
 
     /// Whether two patterns have the same inputs and the same targets before `t`.
-    pub(crate) fn is_same_before(&self, t: f64, pattern: usize, other: usize) -> bool {
-        let [a, b] = [pattern, other].map(|p| &self.examples[p]);
+    pub(crate) fn is_same_before(&self, t: f64, pattern: usize, second: usize) -> bool {
+        let [a, b] = [pattern, second].map(|p| &self.examples[p]);
         let fired = |example: &'_ Example| example.targets.partition_point(|&target| target < t);
         let raised = self.neuron.first_threshold == FirstThreshold::Base || a.start == b.start;
         raised && a.before(t) == b.before(t) && a.targets[..fired(a)] == b.targets[..fired(b)]

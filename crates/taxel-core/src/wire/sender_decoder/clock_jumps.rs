@@ -1,6 +1,6 @@
 //! Detects where the times of version 1 jump ahead of the host's clock, as they do after a damaged stamp: the stamps that
-//! follow seem to lie a turn of the 16-bit counter later, and all times since are 6.5536 s too late. So they do after a reset of
-//! the board, by what was left of the turn.
+//! follow seem to lie a turn of the 16-bit counter later, and all times since are 6.5536 s too late. A reset of the board has
+//! the same effect: times are late by the rest of the turn.
 
 use crate::events::FARTHEST_BACK_US;
 

@@ -14,9 +14,9 @@ pub(super) const EVEN: usize = 64;
 
 /// A datagram's bytes but for its checksum, and that checksum; it must have four bytes.
 #[inline(always)]
-pub(super) fn split(datagram: &[u8]) -> (&[u8], u32) {
-    let (summed, sum) = datagram.split_at(datagram.len() - 4);
-    (summed, u32::from_le_bytes([sum[0], sum[1], sum[2], sum[3]]))
+pub(super) fn split_checksum(datagram: &[u8]) -> (&[u8], u32) {
+    let (body, sum) = datagram.split_at(datagram.len() - 4);
+    (body, u32::from_le_bytes([sum[0], sum[1], sum[2], sum[3]]))
 }
 
 /// The CRC-32C of bytes.

@@ -107,10 +107,10 @@ impl CholeskyFactor {
             for d in &mut *column {
                 *d /= pivot;
             }
-            for (i, other) in after.chunks_exact_mut(rows).enumerate() {
+            for (i, later) in after.chunks_exact_mut(rows).enumerate() {
                 let by = column[i];
                 limits[k + 1 + i] -= by * limit;
-                for (product, d) in other[k + 1 + i..].iter_mut().zip(&column[i..]) {
+                for (product, d) in later[k + 1 + i..].iter_mut().zip(&column[i..]) {
                     *product -= by * d;
                 }
             }
@@ -122,9 +122,9 @@ impl CholeskyFactor {
             }
             column[self.inverse.len()..width].fill(0.0);
         }
-        for (j, (column, &other)) in self.l.chunks_exact_mut(self.stride).skip(m).zip(&taken).enumerate() {
+        for (j, (column, &row)) in self.l.chunks_exact_mut(self.stride).skip(m).zip(&taken).enumerate() {
             for (to, &k) in column[m + j..width].iter_mut().zip(&taken[j..]) {
-                *to = inner_products[other * rows + k];
+                *to = inner_products[row * rows + k];
             }
             column[self.inverse.len()..width].fill(0.0);
         }

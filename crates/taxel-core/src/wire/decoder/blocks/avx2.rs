@@ -91,8 +91,8 @@ fn mask(lanes: __m256i) -> u32 {
 #[inline]
 #[target_feature(enable = "avx2")]
 fn paired_lanes(position: __m256i) -> bool {
-    let other = _mm256_or_si256(_mm256_slli_epi32::<16>(position), _mm256_srli_epi32::<16>(position));
-    _mm256_movemask_epi8(_mm256_cmpeq_epi16(position, other)) == -1
+    let swapped = _mm256_or_si256(_mm256_slli_epi32::<16>(position), _mm256_srli_epi32::<16>(position));
+    _mm256_movemask_epi8(_mm256_cmpeq_epi16(position, swapped)) == -1
 }
 
 /// See [`super::blocks`].
@@ -118,7 +118,7 @@ pub(super) unsafe fn blocks(
     let (last_column, last_row) =
         (_mm256_set1_epi16(columns.min(64) as i16 - 1), _mm256_set1_epi16(rows.min(64) as i16 - 1));
     let low_bits = |v: __m256i| _mm256_movemask_epi8(v) as u32;
-    let (zero, one) = (_mm256_setzero_si256(), _mm256_set1_epi16(1));
+    let (zero, ones) = (_mm256_setzero_si256(), _mm256_set1_epi16(1));
     let last_lane = _mm256_set1_epi16(i16::from_le_bytes([14, 15]));
 
     // State from the word before a block: its taxel, and whether it is a change whose intensity may be the block's
@@ -153,7 +153,7 @@ pub(super) unsafe fn blocks(
         }
         let values = _mm256_or_si256(_mm256_maddubs_epi16(sevens, low), _mm256_slli_epi16::<14>(head));
         let intensities = low_bits(_mm256_slli_epi16::<2>(head)) & FIRSTS;
-        let polarity = _mm256_and_si256(_mm256_srli_epi16::<6>(head), one);
+        let polarity = _mm256_and_si256(_mm256_srli_epi16::<6>(head), ones);
         let base = state.latest as u16;
         let ahead = _mm256_sub_epi16(values, _mm256_set1_epi16(base as i16));
         let start = _mm256_set1_epi64x(state.latest * STAMP_US);

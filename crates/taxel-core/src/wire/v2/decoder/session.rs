@@ -85,8 +85,8 @@ impl BoardSession {
 
     /// Whether a number came before, with other contents.
     pub(super) fn differs(&self, number: i64, sum: u32) -> bool {
-        let within = (self.highest - WINDOW as i64 + 1..=self.highest).contains(&number);
-        within && self.has(number) && self.sums.get(self.index_of_sum(number)) != Some(&(sum as u16))
+        let in_window = (self.highest - WINDOW as i64 + 1..=self.highest).contains(&number);
+        in_window && self.has(number) && self.sums.get(self.index_of_sum(number)) != Some(&(sum as u16))
     }
 
     /// Whether as many datagrams differ as came at all, and more than another board sends by chance in that order.

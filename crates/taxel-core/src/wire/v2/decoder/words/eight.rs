@@ -95,7 +95,7 @@ impl Eight {
     /// As for [`Self::read`]; eight words must be readable at `words`.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
-    pub(super) unsafe fn whole<const VALUE: u32>(words: *const u8, passed: u16, held: &ValuesByLine) -> Option<Self> {
+    pub(super) unsafe fn read_unaligned<const VALUE: u32>(words: *const u8, passed: u16, held: &ValuesByLine) -> Option<Self> {
         let lanes = _mm_set1_epi16(-1);
         // SAFETY: eight words of 4 or 2 bytes are readable, as the caller guarantees.
         unsafe {
@@ -126,7 +126,7 @@ impl Eight {
         passed: u16,
         held: &ValuesByLine,
     ) -> Option<Self> {
-        let (zero, one) = (_mm_setzero_si128(), _mm_set1_epi16(1));
+        let (zero, ones) = (_mm_setzero_si128(), _mm_set1_epi16(1));
         let (control, skip, value) = if VALUE == 8 {
             let seven = _mm_set1_epi16(0x7f);
             (seven, _mm_and_si128(_mm_srli_epi16::<8>(head), seven), _mm_and_si128(head, _mm_set1_epi16(0xff)))
@@ -140,13 +140,13 @@ impl Eight {
         }
         // Branch-free: a processor cannot predict which datagram of a scene has an advance.
         let advance = if VALUE == 8 {
-            _mm_slli_epi16::<6>(_mm_add_epi16(value, one))
+            _mm_slli_epi16::<6>(_mm_add_epi16(value, ones))
         } else {
             let small = _mm_cmpeq_epi16(_mm_subs_epu16(value, _mm_set1_epi16(2)), zero);
-            _mm_blendv_epi8(_mm_set1_epi16(-1), _mm_slli_epi16::<14>(_mm_add_epi16(value, one)), small)
+            _mm_blendv_epi8(_mm_set1_epi16(-1), _mm_slli_epi16::<14>(_mm_add_epi16(value, ones)), small)
         };
         // Sums saturate, and no position of the arrays allowed here equals the saturated value.
-        let steps = _mm_blendv_epi8(_mm_add_epi16(skip, one), advance, advances);
+        let steps = _mm_blendv_epi8(_mm_add_epi16(skip, ones), advance, advances);
         let mut sums = _mm_and_si128(steps, lanes);
         sums = _mm_adds_epu16(sums, _mm_bslli_si128::<2>(sums));
         sums = _mm_adds_epu16(sums, _mm_bslli_si128::<4>(sums));
@@ -157,7 +157,7 @@ impl Eight {
         let events = _mm_movemask_epi8(_mm_packs_epi16(_mm_andnot_si128(advances, lanes), zero)) as usize;
         // SAFETY: the mask has eight bits, and each entry of the table 16 bytes.
         let front = unsafe { _mm_loadu_si128(TO_FRONT.as_ptr().add(events & 0xff).cast()) };
-        let position = _mm_shuffle_epi8(_mm_sub_epi16(sums, one), front);
+        let position = _mm_shuffle_epi8(_mm_sub_epi16(sums, ones), front);
         let ticks = _mm_shuffle_epi8(value, front);
         let p = _mm_shuffle_epi8(_mm_srli_epi16::<15>(head), front);
         let x = _mm_srl_epi16(position, _mm_cvtsi32_si128(i32::from(held.stride)));
