@@ -150,7 +150,7 @@ pub struct Detected {
 /// How much of a file is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Opening {
-    /// Of a large text table the beginning, so that something is shown soon; of any other file all.
+    /// The beginning of a large text table, so that something is shown soon; all of any other file.
     Beginning,
     /// All of it.
     Whole,

@@ -20,7 +20,7 @@ pub const LATE_US: i64 = 120_000;
 /// Columns of time in a block of a [`TimeColumns`].
 const BLOCK: i64 = 250;
 
-/// Of channels up to this number each has a curve of its own.
+/// Maximum number of channels that each have a curve.
 const MOST_CHANNELS: usize = 64;
 
 /// What is stored of a source: its sum, and the bits of the coordinates of its centre.

@@ -78,7 +78,7 @@ pub struct ConeXFitOut {
     status: &'static str,
     weights: Column<f64>,
     objective: f64,
-    /// Of l1, l2 and B.
+    /// The parts of l1, l2 and B.
     parts: [f64; 3],
     gap: f64,
     violation: f64,

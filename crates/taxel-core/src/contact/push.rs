@@ -63,7 +63,7 @@ impl Push {
                 // The rim of a touch moves from cell to cell, so that force has steps that come from the grid alone: the
                 // mean over points within a cell removes them.
                 Box::new(move |depth| {
-                    // Of many cells the rim is a small part: one point does.
+                    // With many cells the rim is a small part: one point is enough.
                     let many = {
                         sinking.find(layer, &[(&shape, at, depth)]);
                         sinking.cells.len() > MOST_SWEPT

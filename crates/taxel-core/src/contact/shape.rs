@@ -257,7 +257,7 @@ mod tests {
                 .collect(),
             pitch_mm: 0.1,
         };
-        // Of two chords across each other through a point of a disc the shorter one has, in the mean, this many diameters.
+        // Mean length of the shorter of two perpendicular chords through a point of a disc, in diameters.
         let disc = 4.359 * 8.0 / std::f64::consts::PI * (1.0 - 0.5_f64.sqrt());
         for (shape, height, width, map_width) in [
             (BodyShape::Sphere { radius_mm: 5.0 }, 0.5, 4.359, disc),

@@ -65,7 +65,8 @@ pub struct Verdict {
     pub doubtful_after_us: Option<i64>,
     /// Where times step back, in the order of arrival; of many the largest steps.
     pub steps_back: Vec<StepBack>,
-    /// Of a stretch of a recording the name of the whole, whose losses these are: several stretches have them once.
+    /// The name of the recording that this is a stretch of: the losses are those of the recording, and several stretches
+    /// have them once.
     pub stretch_of: Option<String>,
     /// The verdicts of the recordings or sources that this one is made of, by name.
     pub parts: Vec<(String, Verdict)>,
@@ -86,7 +87,7 @@ pub struct RecordingCounts {
     /// Whether datagrams came several a message (`UDP_GRO`), so that the kernel may have dropped several at once.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub several_a_message: bool,
-    /// Of a file without its end: datagrams or lines whose arrival numbers it lacks, but for those dropped by the queue.
+    /// Datagrams or lines whose arrival numbers a file without its end lacks, but for those dropped by the queue.
     #[serde(skip)]
     pub left_out: u64,
     /// Arrival number of the first datagram or line recorded.
@@ -365,7 +366,7 @@ impl Verdict {
         ];
         let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
         for (cause, n) in found() {
-            // Of version 2 each is decoded once.
+            // Version 2 decodes each datagram once.
             let counts = if cause == REPEATED { &mut self.noted } else { &mut self.damaged };
             counts.insert(cause.clone(), *n);
         }
@@ -516,9 +517,9 @@ fn numbered(n: u64, plural: &str) -> String {
 
 /// What the text says of the bytes of lines that have no end or no beginning.
 const OF_UNFINISHED_LINES: &str = "bytes of unfinished lines";
-/// Of a recording that began while its board was received: the jumps of time before it, since which all times are doubtful.
+/// The jumps of time before a recording that began while its board was received: all times since are doubtful.
 pub(crate) const JUMPED_BEFORE: &str = "jumps_of_time_before_it";
-/// Of a file without its end: what it lacks by its arrival numbers.
+/// What a file without its end lacks by its arrival numbers.
 const LEFT_OUT: &str = "dropped_or_left_out";
 /// Damage that is of a file as a whole, and that each of its sources has.
 const OF_THE_FILE: [&str; 7] =

@@ -28,7 +28,7 @@ const TIME_COLUMN_BYTES: usize = 256 << 20;
 /// Bins of the overview.
 const BINS: i64 = 1000;
 
-/// Of so many sources at most each has a curve of its sum.
+/// Maximum number of sources that each have a curve of their sum.
 const MOST_SOURCES: usize = 4;
 
 /// Number of changes that are read at once.

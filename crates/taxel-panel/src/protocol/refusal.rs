@@ -14,7 +14,7 @@ impl Refusal {
         Self { reason: format!("{field}: {reason}"), field: Some(field.to_owned()) }
     }
 
-    /// Of work that panicked.
+    /// The refusal of work that panicked.
     pub(crate) fn bug(work: &str) -> Self {
         format!("{work} failed within taxel; please report it").into()
     }

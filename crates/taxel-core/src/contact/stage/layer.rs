@@ -36,7 +36,7 @@ struct Solved {
     base: Vec<f32>,
 }
 
-/// So many frames lie between two solutions where a whole array is touched.
+/// Number of frames between two solutions where a whole array is touched.
 const SELDOM: usize = 4;
 
 impl LayerScene {

@@ -65,7 +65,7 @@ pub struct Decoder {
     sessions: Vec<BoardSession>,
     /// Missing sequence numbers of sessions that are no longer kept.
     missed_before: u64,
-    /// Of these sessions, by how much fewer numbers were missing when they were dropped than when a recording began.
+    /// Missing numbers of these sessions when a recording began, less those when they were dropped.
     filled_before: i64,
     /// The host's clock when the last datagram arrived, and the latest time at that moment, us.
     last_arrival: Option<(i64, i64)>,

@@ -38,7 +38,7 @@ pub(super) struct Blocks {
     pub(super) file: File,
     pub(super) length: u64,
     pub(super) blocks: Vec<FileBlock>,
-    /// Of each offset where something was skipped, the number of blocks before it and what the message indexes around it list.
+    /// For each offset where something was skipped: the number of blocks before it, and what the message indexes around it list.
     pub(super) skipped: Vec<(usize, Option<IndexedChunks>)>,
     pub(super) summary: Option<FileSummary>,
 }

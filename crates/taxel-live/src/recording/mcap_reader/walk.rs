@@ -44,7 +44,7 @@ pub(super) struct FileWalk<'a> {
     /// The final counts of the other sources.
     pub(super) ends: BTreeMap<String, RecordingCounts>,
     pub(super) blocks: Vec<FileBlock>,
-    /// Of each offset where something was skipped, the number of blocks before it and what the message indexes between these
+    /// For each offset where something was skipped: the number of blocks before it, and what the message indexes between these
     /// blocks and the next one list; none where bytes are missing or too many, as these indexes may be of other chunks.
     pub(super) skipped: Vec<(usize, Option<IndexedChunks>)>,
     /// What message indexes list since the last block, and what was skipped since.

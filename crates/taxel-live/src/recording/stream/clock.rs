@@ -94,7 +94,7 @@ enum StampStep {
     Fits(f64),
     /// Behind it, by less than a restart.
     Back,
-    /// So far behind that the clock has begun anew: what it lacks, us.
+    /// Farther behind, so the clock has begun anew: what it lacks, us.
     Anew(f64),
     /// Farther ahead than the time that has passed.
     Ahead,
