@@ -233,7 +233,9 @@ impl Array {
     pub fn pitch(&self, subject: &str) -> Result<Pitch> {
         let name = &self.name;
         self.pitch_mm.ok_or_else(|| match self.places {
-            None => problem!("{subject} needs mm, and the pitch of {name} is not known").with_hint("array", Hint::Pitch),
+            None => {
+                problem!("{subject} needs mm, and the pitch of {name} is not known").with_hint("array", Hint::Pitch)
+            }
             Some(_) => problem!("{subject} needs one pitch, and {name} has a place for each taxel"),
         })
     }

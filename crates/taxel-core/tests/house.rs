@@ -88,8 +88,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
 ];
 
 /// Words that name nothing: what is declared has a noun of its field. `other` may be the second of two values of a type.
-const REFUSED: [&str; 11] =
-    ["of", "one", "own", "other", "every", "whole", "mine", "theirs", "its", "what", "which"];
+const REFUSED: [&str; 11] = ["of", "one", "own", "other", "every", "whole", "mine", "theirs", "its", "what", "which"];
 
 type Name = Vec<String>;
 
@@ -307,7 +306,8 @@ fn refused(text: &str) -> Vec<&str> {
     let declared = |&(before, word, behind): &(&str, &str, &str)| {
         let line = &before[before.rfind('\n').map_or(0, |end| end + 1)..];
         let typed = behind.trim_start().starts_with(':') && !behind.trim_start().starts_with("::");
-        let second = word == "other" && [": Self", ": &Self", ": &mut Self"].iter().any(|of_type| behind.starts_with(of_type));
+        let second =
+            word == "other" && [": Self", ": &Self", ": &mut Self"].iter().any(|of_type| behind.starts_with(of_type));
         let keyword = line.trim_end().rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
         let pattern = |keyword: &str, end: &str| {
             line.rfind(keyword).is_some_and(|begin| !line[begin + keyword.len()..].contains(end))
@@ -356,14 +356,16 @@ fn what_is_declared_has_a_noun() {
     let mut found = vec![];
     for (package, _) in FLOORS {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join(package).join("src");
-        for file in files(&root).into_iter().filter(|file| !file.ends_with("tests.rs") && !file.ends_with("sending.rs")) {
+        for file in files(&root).into_iter().filter(|file| !file.ends_with("tests.rs") && !file.ends_with("sending.rs"))
+        {
             let text = bare(&fs::read_to_string(&file).unwrap());
             let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
             found.extend(refused(text).into_iter().map(|word| format!("{}: {word}", file.display())));
         }
     }
     assert!(found.is_empty(), "words of REFUSED are declared: {found:#?}");
-    let text = "fn of(a: u8, what: &str, other: &Self) { let (one, two) = a; b.map(|&its| its); for every in x.own {} }";
+    let text =
+        "fn of(a: u8, what: &str, other: &Self) { let (one, two) = a; b.map(|&its| its); for every in x.own {} }";
     assert_eq!(refused(text), ["of", "what", "one", "its", "every"]);
     assert!(refused("let second = first.own; call(a, |x| x == other); path::of(a); if a == one {}").is_empty());
 }

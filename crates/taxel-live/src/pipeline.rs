@@ -15,13 +15,13 @@ mod observers;
 mod options;
 mod output;
 mod preview_buffer;
-mod readout_stage;
 mod readout_queue;
+mod readout_stage;
 mod receive_stage;
 mod record_stage;
-mod running_recording;
 mod recording_switch;
 mod running_readout;
+mod running_recording;
 mod sending;
 mod shared;
 mod sink;
@@ -56,10 +56,10 @@ pub use handle::Handle;
 pub use options::{LiveOptions, Record, StatedTare};
 use output::DetectionOutput;
 use readout_queue::ReadoutQueue;
-use running_recording::{RunningRecording, RecordingPart};
 use recording_switch::RecordingSwitch;
 pub use running_readout::ReadoutSetup;
 use running_readout::RunningReadout;
+use running_recording::{RecordingPart, RunningRecording};
 use sending::Sending;
 pub use sending::{Destination, Sent};
 use shared::{PipelineShared, PublishedState, RecordingSlot};
@@ -206,8 +206,13 @@ impl Live {
         let boards = others.boards.iter().map(|(name, board)| (name.clone(), Arc::clone(&board.shared)));
         let recording_switch = RecordingSwitch::new(Arc::clone(&shared), boards.collect(), others.numbers.clone());
         let others = Mutex::new(others);
-        let mut live =
-            Self { shared: Arc::clone(&shared), detections, threads: vec![], others, recording_switch: Arc::new(recording_switch) };
+        let mut live = Self {
+            shared: Arc::clone(&shared),
+            detections,
+            threads: vec![],
+            others,
+            recording_switch: Arc::new(recording_switch),
+        };
         // The destinations come first: a device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|sending| Box::new(sending) as Box<dyn Sink>);
         let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
@@ -420,8 +425,13 @@ impl Live {
         let recording = lock(&self.shared.recording.running).take();
         let path = recording.map_or(Ok(None), |recording| recording.finish(&counters))?;
         let lost = running_recording::losses(&counters, None);
-        let verdict =
-            recording_switch::verdict(&self.shared.options.name, self.origin(), &counters, counters.nothing_came(), &lost);
+        let verdict = recording_switch::verdict(
+            &self.shared.options.name,
+            self.origin(),
+            &counters,
+            counters.nothing_came(),
+            &lost,
+        );
         joined?;
         self.check()?;
         ended?;

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use super::load::Coordinates;
 use super::load::Load;
-use super::time_columns::{COLUMN_US, MISSING, TimeColumns, column_of};
 use super::load::Weights;
+use super::time_columns::{COLUMN_US, MISSING, TimeColumns, column_of};
 use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::rest::{NOISE_FLOOR, Rest, TrackedRest, Value};
@@ -535,8 +535,8 @@ impl ArrayState {
 
 #[cfg(test)]
 mod tests {
-    use crate::time_columns::SPAN;
     use super::*;
+    use crate::time_columns::SPAN;
 
     fn blank(taxels: usize) -> Keyframe {
         Keyframe::blank(taxels)

@@ -21,16 +21,16 @@ use taxel_live::pipeline::{Counters, Handle};
 use taxel_live::recording::now_ns;
 use tokio::sync::{Notify, OwnedMutexGuard};
 
+use super::handler::{Reply, RequestHandlers, UserPresets};
+use super::options::PanelOptions;
+use super::protocol::limits::{MOST_BYTES, MOST_CREDITS};
+use super::protocol::messages::{ArrayInfo, FileInfo, Message};
+use super::time_columns::{COLUMN_US, COLUMNS_US, SPAN};
 use clients::{Broadcast, Clients};
 use folder::{Folder, Listed};
-use super::handler::{Reply, RequestHandlers, UserPresets};
 use labels::LabelTables;
-use super::protocol::limits::{MOST_BYTES, MOST_CREDITS};
 use live_source::LiveSource;
-use super::protocol::messages::{ArrayInfo, FileInfo, Message};
-use super::options::PanelOptions;
 use recorder::RecorderControl;
-use super::time_columns::{COLUMN_US, COLUMNS_US, SPAN};
 
 /// How often new events are fetched from the live source.
 const RECEIVE_EVERY: Duration = Duration::from_millis(16);

@@ -40,6 +40,6 @@ pub use handler::{
     TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
-pub use keyframe_index::frames::{FrameFile, FrameIndex, FrameArea, FrameRest, FrameSource};
+pub use keyframe_index::frames::{FrameArea, FrameFile, FrameIndex, FrameRest, FrameSource};
 pub use options::PanelOptions;
 pub use server::Panel;

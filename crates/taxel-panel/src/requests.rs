@@ -14,17 +14,17 @@ use taxel_core::held::UNKNOWN;
 use taxel_live::locked::lock;
 use taxel_live::ports::ports;
 
-use super::hub::clients::Broadcast;
 use super::handler::{Cut, Detected, LabelRow, TrainingResult};
 use super::hub::Hub;
+use super::hub::clients::Broadcast;
 use super::hub::indexed::{Indexed, OpenRecording};
 use super::hub::labels::LabelChange;
 use super::hub::live_source::LiveSource;
-use super::protocol::messages::{FoundDetection, InterfaceAddress, Message};
-use super::readout_encoders::ReadoutEncoders;
 use super::hub::recorder::RecordingPlan;
+use super::protocol::messages::{FoundDetection, InterfaceAddress, Message};
 use super::protocol::refusal::{Answer, Refusal};
 use super::protocol::request::{Id, RecordRequest, Request, RestHow, Taxel};
+use super::readout_encoders::ReadoutEncoders;
 
 /// Carries out a request; `shown` is the recording that the client shows. Returns the message for that client alone.
 ///

@@ -15,14 +15,14 @@ use axum::response::{IntoResponse, Response};
 use tokio::sync::watch;
 
 use super::assets::asset;
-use connections::LimitedListener;
 use super::handler::RequestHandlers;
 use super::hub::Hub;
-use super::protocol::limits::MOST_BYTES;
 use super::options::PanelOptions;
+use super::protocol::limits::MOST_BYTES;
 use super::requests::registers::prepare;
 use super::requests::{labels, opening};
 use super::session;
+use connections::LimitedListener;
 use taxel_live::pipeline::Handle;
 use taxel_live::{Error, Result};
 

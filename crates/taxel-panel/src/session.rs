@@ -16,14 +16,14 @@ use axum::extract::ws::WebSocket;
 use serde_json::{Map, Value};
 use tokio::sync::{broadcast, mpsc, watch};
 
-use super::hub::clients::{Broadcast, ClientSlot};
-use super::view::frame::RECORDS;
 use super::hub::Hub;
+use super::hub::clients::{Broadcast, ClientSlot};
 use super::protocol::limits::MOST_BYTES;
 use super::protocol::messages::Message;
 use super::protocol::refusal::{Answer, Refusal};
-use super::requests::registers::prepare;
 use super::protocol::request::Request;
+use super::requests::registers::prepare;
+use super::view::frame::RECORDS;
 use connection::{Closing, Connection, GOING_AWAY, Incoming, POLICY, TOO_BIG};
 use flow::{FRAME_TIME, FlowControl};
 use pending::PendingRequests;

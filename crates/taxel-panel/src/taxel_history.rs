@@ -79,8 +79,8 @@ impl TaxelHistory {
 
 #[cfg(test)]
 mod tests {
-    use crate::time_columns::COLUMN_US;
     use super::*;
+    use crate::time_columns::COLUMN_US;
 
     fn change(t: i64, taxel: u32, ticks: u16) -> TaxelChange {
         TaxelChange { t, taxel, ticks, up: true, repaired: false }

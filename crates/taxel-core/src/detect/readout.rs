@@ -88,7 +88,9 @@ impl Readout {
             }
             if cell.neuron.after_spike != self.after_spike {
                 let (trained, expected) = (word(&cell.neuron.after_spike), word(&self.after_spike));
-                return Err(problem!("{label}: trained for after_spike {trained}, this readout is for after_spike {expected}"));
+                return Err(problem!(
+                    "{label}: trained for after_spike {trained}, this readout is for after_spike {expected}"
+                ));
             }
             if !(0.0..=LONGEST_DELAY_MS).contains(&cell.delay_ms) {
                 return Err(problem!("{label}: delay_ms is {}: must be from 0 to {LONGEST_DELAY_MS}", cell.delay_ms));

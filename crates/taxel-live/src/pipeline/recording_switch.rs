@@ -9,7 +9,7 @@ use taxel_core::problem;
 
 use super::counters::{Counters, LiveSummary, SourceCounts};
 use super::options::{LiveOptions, Record};
-use super::running_recording::{Host, RunningRecording, RecordingPart, losses};
+use super::running_recording::{Host, RecordingPart, RunningRecording, losses};
 use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
 use super::sources::{NumberStream, losses_of_lines};
 use crate::capture::Origin;
@@ -77,8 +77,10 @@ impl RecordingSwitch {
             let origin = board.receiver.origin();
             let part = next.as_ref().map(|next| next.part_of(part, &board.options, origin)).transpose()?;
             let (recording, counts) = replace_of(board, part)?;
-            let counters =
-                recording.as_ref().and_then(RunningRecording::since).map_or_else(Counters::default, |s| counts.since(s));
+            let counters = recording
+                .as_ref()
+                .and_then(RunningRecording::since)
+                .map_or_else(Counters::default, |s| counts.since(s));
             sources.insert(name.clone(), SourceCounts::Board(Box::new(counters)));
             ended.push((recording, counts));
         }

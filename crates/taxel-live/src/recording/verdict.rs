@@ -441,9 +441,11 @@ impl Verdict {
         let mut named: Vec<(String, Self)> = vec![];
         for (name, part) in parts {
             combined.status = combined.status.max(part.status);
-            for (sums, counts) in
-                [(&mut combined.lost, &part.lost), (&mut combined.damaged, &part.damaged), (&mut combined.noted, &part.noted)]
-            {
+            for (sums, counts) in [
+                (&mut combined.lost, &part.lost),
+                (&mut combined.damaged, &part.damaged),
+                (&mut combined.noted, &part.noted),
+            ] {
                 for (cause, n) in counts {
                     let sum = sums.entry(cause.clone()).or_default();
                     *sum = add(cause, *sum, *n);

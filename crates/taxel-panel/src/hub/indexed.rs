@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::array_state::RestSource;
 use crate::keyframe_index::KeyframeIndex;
-use crate::keyframe_index::frames::{FrameIndex, FrameArea};
+use crate::keyframe_index::frames::{FrameArea, FrameIndex};
 use crate::keyframe_index::recording::RecordingIndex;
 use crate::protocol::messages::{FoundDetection, FrameRecording, FrameSourceInfo, Marker, Message, RecordedNote};
 use crate::time_columns::{COLUMN_US, TimeColumns};

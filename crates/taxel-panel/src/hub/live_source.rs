@@ -14,8 +14,8 @@ use taxel_live::locked::lock;
 use taxel_live::pipeline::{Counters, Handle, LiveOptions, OutputDetection, StatedTare, ViewerEvents};
 use taxel_live::recording::now_ns;
 
-use crate::array_state::{ArrayState, Keyframe};
 use super::clients::MOST_WAITING;
+use crate::array_state::{ArrayState, Keyframe};
 use crate::keyframe_index::live::{LiveIndex, REACH_US};
 use crate::keyframe_index::{Activity, KeyframeIndex};
 use crate::protocol::messages::{Latency, Lost, Message};

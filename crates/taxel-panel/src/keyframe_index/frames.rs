@@ -19,8 +19,8 @@ use super::{ChangeReader, FrameSources, KeyframeIndex, ReadOutcome};
 use crate::array_state::{Keyframe, RestSource};
 use crate::load::Coordinates;
 use crate::load::Load;
-use crate::time_columns::{COLUMN_US, MISSING, MISSING_SUM, OF_SOURCE, TimeColumns, column_of};
 use crate::load::Weights;
+use crate::time_columns::{COLUMN_US, MISSING, MISSING_SUM, OF_SOURCE, TimeColumns, column_of};
 
 /// Memory that the curves may take, bytes.
 const TIME_COLUMN_BYTES: usize = 256 << 20;

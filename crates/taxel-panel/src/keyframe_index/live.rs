@@ -156,8 +156,10 @@ impl Ring {
     /// Index of the last piece with a keyframe at or before `t`, or of the first one.
     fn keyframe_at(&self, t: i64) -> Option<usize> {
         let has_values = |stored: &Arc<StoredPiece>| stored.piece.held.is_some();
-        let last =
-            self.pieces.iter().rposition(|stored| has_values(stored) && stored.piece.since.is_none_or(|since| since <= t));
+        let last = self
+            .pieces
+            .iter()
+            .rposition(|stored| has_values(stored) && stored.piece.since.is_none_or(|since| since <= t));
         last.or_else(|| self.pieces.iter().position(has_values))
     }
 }
@@ -247,8 +249,8 @@ mod tests {
 
     use super::*;
     use crate::keyframe_index::recording::tests::held_at;
-    use crate::view::player::{Player, ViewOptions};
     use crate::time_columns::COLUMN_US;
+    use crate::view::player::{Player, ViewOptions};
 
     #[test]
     fn a_minute_is_stored_and_a_view_of_the_past_equals_what_was_decoded() {

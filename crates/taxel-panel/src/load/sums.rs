@@ -1,8 +1,8 @@
 //! The load on a sensor, or on a part of it, as sums from which single taxels can be taken away again.
 
 use super::centre::Coordinates;
-use crate::time_columns::{Curve, NOTHING};
 use super::weights::Weights;
+use crate::time_columns::{Curve, NOTHING};
 
 /// Sums over taxels, modulo 2^64: a decrease wraps, and the sums are right.
 #[derive(Debug, Clone, Copy, Default)]

@@ -13,9 +13,9 @@ use taxel_live::clock::Pace;
 use taxel_live::pipeline::{Arrival, LiveOptions, OutputDetection};
 use taxel_live::ports::Port;
 
+use super::refusal::Refusal;
 use crate::handler::{LabelRow, UnhealthyTaxels, UserPreset};
 use crate::readout_encoders::ReadoutEncoders;
-use super::refusal::Refusal;
 
 /// A message of the server.
 #[derive(Debug, Clone, Serialize)]

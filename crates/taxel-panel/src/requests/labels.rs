@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use tokio::sync::oneshot;
 
-use crate::hub::clients::Broadcast;
 use crate::handler::{EditOutcome, LabelRow, LabelTable};
 use crate::hub::Hub;
+use crate::hub::clients::Broadcast;
 use crate::hub::indexed::OpenRecording;
 use crate::hub::labels::{LabelChange, NumberedEdit, WaitingChanges, file_of};
 use crate::protocol::limited::{OneOrMore, Text};

@@ -8,10 +8,10 @@ use taxel_core::problem;
 use taxel_live::Result;
 use taxel_live::recording::Reader;
 
-use crate::hub::clients::Broadcast;
-use crate::hub::folder::size;
 use crate::handler::{FramesRead, Opening, ReadFile, Reply};
 use crate::hub::Hub;
+use crate::hub::clients::Broadcast;
+use crate::hub::folder::size;
 use crate::hub::indexed::Indexed;
 use crate::keyframe_index::recording::RecordingIndex;
 use crate::protocol::messages::Message;

@@ -9,8 +9,8 @@ use taxel_live::pipeline::{LiveSummary, Record};
 use taxel_live::recording::Compression;
 
 use crate::hub::Hub;
-use crate::protocol::messages::Message;
 use crate::hub::recorder::{Phase, RecorderState, RecordingPlan};
+use crate::protocol::messages::Message;
 use crate::protocol::request::RecordingFormat;
 
 /// How often progress is sent to the clients.

@@ -96,8 +96,9 @@ pub(crate) async fn set(hub: &Hub, values: &Map<String, Value>) -> Answer {
             Value::Bool(flag) => Some(u32::from(*flag)),
             value => value.as_u64().and_then(|n| u32::try_from(n).ok()),
         };
-        let number = number
-            .ok_or_else(|| Refusal::of_field(name, "must be a whole number of 0 or more, in the register's own unit"))?;
+        let number = number.ok_or_else(|| {
+            Refusal::of_field(name, "must be a whole number of 0 or more, in the register's own unit")
+        })?;
         match name.as_str() {
             "record" => return Err(Refusal::of_field(name, "is written by record and stop")),
             "channels" => return Err(Refusal::of_field(name, "is the board's build")),
@@ -161,8 +162,8 @@ pub(crate) async fn apply_preset(hub: &Hub, name: &str) -> Answer {
         hub.board().registers.with_preset(&preset, array)
     } else if let Some(of_user) = of_user {
         // A preset of the user holds every register, also the version of the wire.
-        let of_user =
-            presets::to_registers(&of_user).map_err(|error| Refusal::of_field("name", format!("preset {name}: {error}")))?;
+        let of_user = presets::to_registers(&of_user)
+            .map_err(|error| Refusal::of_field("name", format!("preset {name}: {error}")))?;
         Registers { lines: of_user.lines.min(array.columns), ..of_user }
     } else {
         return Err(Refusal::of_field("name", format!("there is no preset {name}")));

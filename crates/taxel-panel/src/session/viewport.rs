@@ -9,20 +9,20 @@ use taxel_live::locked::lock;
 use super::delivered::Delivered;
 use super::following::Following;
 use super::playback::Playback;
-use crate::view::encoded_spikes::EncodedSpikes;
-use crate::hub::folder::size;
-use crate::view::frame::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
 use crate::hub::Hub;
+use crate::hub::folder::size;
 use crate::hub::indexed::OpenRecording;
-use crate::keyframe_index::KeyframeIndex;
 use crate::hub::live_source::LiveSource;
+use crate::keyframe_index::KeyframeIndex;
 use crate::protocol::messages::{Message, ViewState};
-use crate::view::player::{Player, ViewOptions};
-use crate::readout_encoders::{ReadoutEncoders, ViewEncoder};
 use crate::protocol::refusal::{Answer, Refusal, words};
 use crate::protocol::request::Taxel;
+use crate::readout_encoders::{ReadoutEncoders, ViewEncoder};
 use crate::requests::{labels, opening, readout_of};
 use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
+use crate::view::encoded_spikes::EncodedSpikes;
+use crate::view::frame::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
+use crate::view::player::{Player, ViewOptions};
 
 /// Where in its source a view is.
 enum Position {
@@ -401,7 +401,10 @@ impl Viewport {
         let array = index.array();
         let (rows, columns) = (array.rows, array.columns);
         if taxel.is_some_and(|(x, y)| x >= columns || y >= rows) {
-            return Err(Refusal::of_field("taxel", format!("must be [x, y] on {rows} rows x {columns} columns, or null")));
+            return Err(Refusal::of_field(
+                "taxel",
+                format!("must be [x, y] on {rows} rows x {columns} columns, or null"),
+            ));
         }
         self.options.watched = taxel.and_then(|(x, y)| u32::try_from(array.index(x, y)).ok());
         if !matches!(self.position, Position::Following) {

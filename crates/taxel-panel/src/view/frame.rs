@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use taxel_live::recording::now_ns;
 
-use crate::array_state::{ArrayState, RestSource};
 use super::encoded_spikes::EncodedSpikes;
 use super::player::Player;
+use crate::array_state::{ArrayState, RestSource};
 use crate::taxel_history::TaxelHistory;
 use crate::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, OF_SOURCE, SPAN, TimeColumns, column_of};
 

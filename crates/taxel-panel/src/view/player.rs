@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use taxel_core::problem;
 
-use crate::array_state::{ArrayState, FORGET};
 use super::encoded_spikes::EncodedSpikes;
+use crate::array_state::{ArrayState, FORGET};
 use crate::keyframe_index::{ChangeReader, KeyframeIndex, ReadOutcome};
 use crate::readout_encoders::ViewEncoder;
 use crate::taxel_history::TaxelHistory;
@@ -247,8 +247,11 @@ impl Player {
     /// Raster and curves of the state, the first column that they hold, and those of the whole source for earlier columns.
     #[must_use]
     pub fn time_columns(&self) -> (&TimeColumns, i64, Option<&TimeColumns>) {
-        let all_columns =
-            if self.options.is_narrow() { None } else { self.options.all_columns.as_deref().or(self.index.time_columns()) };
+        let all_columns = if self.options.is_narrow() {
+            None
+        } else {
+            self.options.all_columns.as_deref().or(self.index.time_columns())
+        };
         (self.state.time_columns(), self.first_of_view, all_columns)
     }
 }

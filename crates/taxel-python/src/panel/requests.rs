@@ -13,7 +13,7 @@ use taxel_core::rest::Value;
 use taxel_core::wire::Command;
 use taxel_live::recording::{self, Remarks};
 use taxel_panel::{
-    Activity, BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, FrameFile, FrameIndex, FrameArea,
+    Activity, BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, FrameArea, FrameFile, FrameIndex,
     FrameRest, FrameSource, FramesRead, LabelConflict, LabelEdit, LabelRequests, LabelRow, LabelTable, Opening,
     PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers, RestSource, TrainingRequests, TrainingResult,
     UnhealthyTaxels, UserPreset, UserPresets,

@@ -95,7 +95,11 @@ impl Eight {
     /// As for [`Self::read`]; eight words must be readable at `words`.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
-    pub(super) unsafe fn read_unaligned<const VALUE: u32>(words: *const u8, passed: u16, held: &ValuesByLine) -> Option<Self> {
+    pub(super) unsafe fn read_unaligned<const VALUE: u32>(
+        words: *const u8,
+        passed: u16,
+        held: &ValuesByLine,
+    ) -> Option<Self> {
         let lanes = _mm_set1_epi16(-1);
         // SAFETY: eight words of 4 or 2 bytes are readable, as the caller guarantees.
         unsafe {
