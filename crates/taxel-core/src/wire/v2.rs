@@ -219,7 +219,7 @@ impl DatagramHeader {
         if datagram.len() > DATAGRAM_BYTES {
             return Err(Refused::Long);
         }
-        let (rest, sum) = checksum::split(datagram);
+        let (rest, sum) = checksum::split_checksum(datagram);
         if checksum::crc32c(rest) != sum {
             return Err(Refused::Checksum);
         }

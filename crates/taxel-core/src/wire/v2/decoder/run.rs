@@ -100,7 +100,7 @@ impl<'a> RunDecoder<'a> {
             let Some(rows) = (unsafe { self.words::<VALUE>(datagram, start as u16, t, room, row, paired) }) else {
                 break;
             };
-            self.session.note(number, sum);
+            self.session.note(number, checksum);
             self.session.latest = self.session.latest.max(header.base);
             *self.latest = (*self.latest).max(t + i64::from(header.span));
             row += rows;
