@@ -248,7 +248,7 @@ impl Hub {
             folder: self.options.folder.display().to_string(),
             open: self.options.open.clone(),
             readout: live.and_then(|live| live.labels.clone()),
-            readout_encoders: live.map(|live| live.encoders.clone()).unwrap_or_default(),
+            readout_encoders: live.map(|live| live.encoders()).unwrap_or_default(),
             encoders: encode::NAMES,
             column_us: COLUMN_US,
             columns_us: COLUMNS_US,

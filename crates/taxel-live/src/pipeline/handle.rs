@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use crossbeam_channel as channel;
-use taxel_core::encode::Zeroing;
+use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 
 use super::copies::Copies;
@@ -178,6 +178,12 @@ impl Handle {
     #[must_use]
     pub fn rest(&self) -> Vec<Option<f64>> {
         self.shared.published().rest.clone()
+    }
+
+    /// The tare that was measured; `None` before the measurement ends, and where none is measured.
+    #[must_use]
+    pub fn measured_tare(&self) -> Option<Tare> {
+        self.shared.published().tare.clone()
     }
 
     /// Number of zeroings.

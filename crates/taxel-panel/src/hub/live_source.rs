@@ -38,8 +38,8 @@ pub(crate) struct LiveSource {
     pub(crate) activity: Mutex<Activity>,
     /// The labels of the readout that runs.
     pub(crate) labels: Option<Vec<String>>,
-    /// The encoders of that readout.
-    pub(crate) encoders: ReadoutEncoders,
+    /// The encoders of that readout, without a tare that is measured.
+    encoders: ReadoutEncoders,
     /// Events that found no room in the queue from the pipeline.
     missing: AtomicU64,
     /// Whether the state has the rest that was given with the readout.
@@ -116,6 +116,19 @@ impl LiveSource {
 
     pub(crate) fn array(&self) -> &Array {
         self.index.array()
+    }
+
+    /// The encoders of the readout that runs, with its tare where that is known.
+    pub(crate) fn encoders(&self) -> ReadoutEncoders {
+        match self.handle.measured_tare() {
+            Some(tare) => self.encoders.with_tare(&tare),
+            None => self.encoders.clone(),
+        }
+    }
+
+    /// Whether the readout's tare is being measured.
+    pub(crate) fn measures_tare(&self) -> bool {
+        self.handle.counters().readout.taring
     }
 
     /// The message of its counters; rates are those of the last `seconds`, since the counters `before`.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Map, Value};
+use taxel_core::problem;
 use taxel_live::locked::lock;
 
 use super::delivered::Delivered;
@@ -242,7 +243,7 @@ impl Viewport {
                 position.window.as_mut().unwrap_or(&mut position.player).spikes_mut()
             }
         }?;
-        let (message, failed) = (spikes.message(), spikes.failed().map(words));
+        let (message, failed) = (spikes.message(), spikes.failed().map(|error| words(&error.clone().into())));
         if let Some(reason) = failed {
             (self.options.encoder, self.requested_encoder) = (None, None);
             self.following.stop_encoding();
@@ -355,15 +356,22 @@ impl Viewport {
     fn choose_encoder(&mut self, index: &Arc<dyn KeyframeIndex>) -> taxel_live::Result<()> {
         self.options.encoder = None;
         let Some(request) = self.requested_encoder.take() else { return Ok(()) };
-        let encoders = match (&self.recording, &self.live) {
-            (None, Some(live)) => &live.encoders,
-            _ => &self.recording_encoders,
+        let live = self.live.as_ref().filter(|_| self.recording.is_none());
+        let encoder = match live {
+            Some(live) => ViewEncoder::requested(&request, &live.encoders())?,
+            None => ViewEncoder::requested(&request, &self.recording_encoders)?,
         };
-        let encoder = ViewEncoder::requested(&request, encoders)?;
-        match index.frames() {
-            Some(frames) => EncodedSpikes::of_frames(&encoder, &frames, COLUMN_US, None)?.check()?,
-            None => drop(encoder.encoder.stream(index.array())?),
+        let stream = match index.frames() {
+            Some(frames) => EncodedSpikes::of_frames(&encoder, &frames, COLUMN_US, None)?.check(),
+            None => encoder.encoder.stream(index.array()).map(drop).map_err(Into::into),
+        };
+        if stream.is_err() && encoder.of_readout && live.is_some_and(|live| live.measures_tare()) {
+            let name = encoder.name;
+            return Err(
+                problem!("encoder {name}: the readout measures its tare; choose the encoder again after that").into()
+            );
         }
+        stream?;
         (self.options.encoder, self.requested_encoder) = (Some(encoder), Some(request));
         Ok(())
     }

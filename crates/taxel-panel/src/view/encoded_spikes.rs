@@ -6,7 +6,7 @@ use std::slice;
 use std::sync::Arc;
 
 use taxel_core::encode::Stream;
-use taxel_core::{Array, Events, Hint, Intensities, Spike, SpikeKind, problem};
+use taxel_core::{Array, Error, Events, Hint, Intensities, Spike, SpikeKind, problem};
 
 use crate::keyframe_index::FrameSources;
 use crate::protocol::messages::Message;
@@ -14,7 +14,7 @@ use crate::readout_encoders::ViewEncoder;
 use crate::time_columns::{SPAN, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
 use taxel_live::pipeline::TaxelChange;
-use taxel_live::{Error, Result};
+use taxel_live::Result;
 
 /// Maximum number of spikes in a message.
 const MOST: usize = 4096;
@@ -137,7 +137,7 @@ impl EncodedSpikes {
                 self.push_frames(t);
             }
         }
-        self.failed.map_or(Ok(()), Err)
+        self.failed.map_or(Ok(()), |error| Err(error.into()))
     }
 
     /// Drops the spikes of what the encoder begins with, which are none of the view.
@@ -196,7 +196,7 @@ impl EncodedSpikes {
     fn note_outcome(&mut self, pushed: taxel_core::Result<()>, from: usize) {
         match pushed {
             Ok(()) => self.count(from),
-            Err(error) => self.failed = Some(error.in_part(&format!("encoder {}", self.name)).into()),
+            Err(error) => self.failed = Some(error.in_part(&format!("encoder {}", self.name))),
         }
     }
 
