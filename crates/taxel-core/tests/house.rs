@@ -312,7 +312,7 @@ fn refused(text: &str) -> Vec<&str> {
         let pattern = |keyword: &str, end: &str| {
             line.rfind(keyword).is_some_and(|begin| !line[begin + keyword.len()..].contains(end))
         };
-        let parameter = line.matches('|').count() % 2 == 1;
+        let parameter = line.replace("||", "").replace("|=", "").matches('|').count() % 2 == 1;
         let binds = pattern("let ", "=") || pattern("for ", " in ") || parameter;
         REFUSED.contains(&word)
             && !before.ends_with(['.', '\''])
