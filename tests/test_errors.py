@@ -47,11 +47,11 @@ def test_an_error_shows_its_argument_once(kind: type[taxel.Error]) -> None:
 
 def test_an_unknown_remedy_is_refused_with_those_that_there_are() -> None:
     with pytest.raises(taxel.ProblemError) as caught:
-        _core.error_line("text", "tare", "pray")
+        helped(taxel.ProblemError("text"), "tare", "pray")
     assert str(caught.value).startswith("hint is ")
     for hint in ("give", "larger", "lay_out", "pitch", "unfelt"):
         assert hint in str(caught.value)
-        assert _core.error_line("text", "THERE", hint).count("THERE") == 1
+        assert str(helped(taxel.ProblemError("text"), "THERE", hint)).count("THERE") == 1
 
 
 def test_the_compiled_part_s_errors_have_them_too() -> None:

@@ -32,7 +32,7 @@ fn silence(before: i64, now: i64) -> i64 {
 /// the values after the semicolon.
 #[macro_export]
 macro_rules! counts_since {
-    ($now:expr, $earlier:expr; $($field:ident),+; $($other:tt)*) => {
-        Self { $($field: $now.$field - $earlier.$field,)+ $($other)* }
+    ($now:expr, $earlier:expr; $($field:ident),+; $($further:tt)*) => {
+        Self { $($field: $now.$field - $earlier.$field,)+ $($further)* }
     };
 }

@@ -32,7 +32,7 @@ mod wire_v2;
 mod _core {
     use pyo3::prelude::*;
     use taxel_core::held::UNKNOWN;
-    use taxel_core::preload::LOADED_TICKS;
+    use taxel_core::rest::LOADED_TICKS;
 
     #[pymodule_export]
     use crate::bridge::{Copies, ParcelFeed};

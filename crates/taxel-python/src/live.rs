@@ -148,7 +148,7 @@ impl Live {
 
     /// Where datagrams come from, in words.
     fn place(&self, py: Python<'_>) -> PyResult<String> {
-        self.with(py, |pipeline| Ok(pipeline.place().to_string()))
+        self.with(py, |pipeline| Ok(pipeline.origin().to_string()))
     }
 
     /// The board's registers, as far as they are known.

@@ -128,14 +128,14 @@ pub(super) const OTHER_BOARD: &str = "datagrams_of_another_board";
 pub(super) const AGAIN: &str = "datagrams_decoded_again";
 /// Jumps of the times of version 1 ahead of the host's clock.
 pub(crate) const JUMPS: &str = "jumps_of_time";
-/// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, stamps that step back,
-/// and how often the clock left that of arrival little by little.
+/// Causes of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, stamps that step
+/// back, and how often the clock left that of arrival little by little.
 pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
 /// Bytes of a stream of numbers that are in no line, and so are lost, and those of lines that have no end or no beginning.
 pub(super) const IN_NO_LINE: &str = "bytes_in_no_line";
 pub(super) const UNFINISHED_LINES: &str = "bytes_of_unfinished_lines";
 pub(super) const ANEW: &str = "clock_began_anew";
-/// Of a stream of numbers: values that a line says are missing (`nan`).
+/// Values of a stream of numbers that a line says are missing (`nan`).
 pub(super) const MISSING: &str = "missing_values";
 pub(super) const BACK: &str = "stamps_out_of_order";
 pub(super) const DRIFTS: &str = "drifts_from_arrival";
