@@ -68,7 +68,7 @@ def info(
     """
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
     from taxel.recording.pressure import above_rest  # noqa: PLC0415
-    from taxel.recording.without_layout import are_spike_trains  # noqa: PLC0415
+    from taxel.recording.recognition import are_spike_trains  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")

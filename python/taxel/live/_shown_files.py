@@ -22,7 +22,7 @@ from taxel.labels import Labels, Note, beside
 from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.health import health
-from taxel.recording.opening import is_recording
+from taxel.recording.recognition import is_recording
 from taxel.recording.rest import flickering, loaded_from, of_frames, ticks_by_unit
 from taxel.recording.text_options import TextOptions
 

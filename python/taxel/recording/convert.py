@@ -23,7 +23,7 @@ from taxel.frames import Frames
 from taxel.recording.contents import Board, Contents, Source, Stream, alone, share_clock, source_from
 from taxel.recording.frames import as_frames, period_us
 from taxel.recording.kinds import ENDINGS
-from taxel.recording.opening import OpenOptions, open_file
+from taxel.recording.opening import open_one
 from taxel.recording.parts import Wire
 from taxel.recording.recording import Recording
 from taxel.recording.stored import is_made, storable
@@ -141,9 +141,7 @@ def _write_lsa(place: Path, of: Source, overwrite: bool) -> None:
 
 def _contents(source: object) -> Contents:
     if isinstance(source, str | os.PathLike):
-        options = OpenOptions()
-        with options.within():
-            source = open_file(Path(checked_path("source", source)), options)
+        source = open_one(checked_path("source", source))
     if isinstance(source, Recording):
         return source._contents
     if not isinstance(source, Events | Frames):

@@ -77,7 +77,7 @@ def _head(path: Path, file: BinaryIO) -> list[str]:
     head = file.readline(_HEAD + 1)
     if len(head) > _HEAD:
         raise FormatError(f"{path}, line 1: more than {_HEAD} bytes; at most that are read")
-    return _names(path, head.removeprefix(b"\xef\xbb\xbf").rstrip(b"\r\n"))
+    return _names(path, head)
 
 
 def _table(path: Path, array: Array | None) -> Events | Frames:
@@ -93,16 +93,9 @@ def _names(path: Path, head: bytes) -> list[str]:
     columns = head.count(b",") + 1
     if columns > COLUMNS:
         raise FormatError(f"{path}, line 1: {columns} columns; at most {COLUMNS} are read")
-    try:
-        text = head.decode()
-    except UnicodeDecodeError:
-        # As in other tables of text.
-        text = head.decode("latin-1")
-    names = [name.strip() for name in text.split(",")]
+    names = names_in(head)
     if names[0] != "t_us" or len(names) < 2:
-        if {"label", "t_us"} <= set(names):
-            raise FormatError(f"{path}, line 1: a table of labels (docs/command-line.md), no recording")
-        begin = repr(head[:40].decode("utf-8", "replace"))
+        begin = repr(_text_of(head)[:40].decode("utf-8", "replace"))
         raise FormatError(
             f"{path}, line 1: {begin}: must be t_us,x,y,p[,intensity][,repaired], or t_us and a column a taxel; "
             + advice(path, "describes a table of another program")
@@ -117,6 +110,21 @@ def _names(path: Path, head: bytes) -> list[str]:
     if repeated is not None:
         raise FormatError(f"{path}, line 1: column {shown(repeated)} stands there twice")
     return names
+
+
+def names_in(head: bytes) -> list[str]:
+    """Return the cells of a first line, without blanks around them."""
+    try:
+        text = _text_of(head).decode()
+    except UnicodeDecodeError:
+        # As in other tables of text.
+        text = _text_of(head).decode("latin-1")
+    return [name.strip() for name in text.split(",")]
+
+
+def _text_of(head: bytes) -> bytes:
+    """Return a first line without the mark of UTF-8 and without its end."""
+    return head.removeprefix(b"\xef\xbb\xbf").rstrip(b"\r\n")
 
 
 def _blocks(path: Path, file: BinaryIO) -> Iterator[_Block]:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.archive import read_array, read_arrays, shapes, stored_names
+from taxel._base.archive import read_array, read_arrays, shapes
 from taxel._base.arguments import short, shown
 from taxel._base.columns import Growing, frozen_whole
 from taxel._base.h5_file import H5File
@@ -32,13 +32,10 @@ from taxel.formats.checks import table as limited
 from taxel.formats.layout import ISO, UNITS_US, Data, Layout, Table, as_size
 from taxel.frames import Frames
 from taxel.recording.contents import Source, source_from
-from taxel.recording.kinds import is_label_table, is_table_of_taxel
 from taxel.recording.once import known
 from taxel.recording.parts import Losses, Origin
-from taxel.recording.read_h5 import is_h5_of_taxel
 
-#: The endings of tables of text, also compressed by gzip, and of files of arrays.
-_TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+#: The endings of files of arrays.
 ARRAYS = (".npy", ".npz", ".h5", ".hdf5")
 
 #: A cell that says a unit, as N, [kPa] or (m/s^2).
@@ -58,31 +55,9 @@ _TIMES = re.compile(
 )
 
 
-def is_of_another_program(path: Path, layout: Layout | None = None) -> bool:
-    """Return whether a file is a table or holds arrays that taxel did not write; false for a file that is not there.
-
-    Arrays that a layout names are those of another program, also where they have names that taxel gives.
-    """
-    ending = Path(path.name.removesuffix(".gz")).suffix.lower()
-    if not path.is_file() or ending not in (*_TABLES, *ARRAYS):
-        return False
-    if ending == ".npz":
-        names = set(stored_names(path))
-        # Other programs name their times t too.
-        says = layout is not None and layout.data is not None and layout.data.array in names
-        return "about" not in names and (says or not ("t" in names and names & {"x", "y", "p", "values"}))
-    if ending == ".h5":
-        return not is_h5_of_taxel(path)
-    if ending == ".csv":
-        return not (is_table_of_taxel(path) or is_label_table(path))
-    return True
-
-
 def is_lone_array(path: Path) -> bool:
-    """Return whether a file that taxel did not write holds one array only, of the shape of frames."""
-    if path.suffix.lower() not in ARRAYS or not is_of_another_program(path):
-        return False
-    shapes = shapes_of(path)
+    """Return whether a file of another program holds one array only, of the shape of frames."""
+    shapes = shapes_of(path) if path.suffix.lower() in ARRAYS else {}
     return len(shapes) == 1 and all(len(shape) in (2, 3) for shape in shapes.values())
 
 

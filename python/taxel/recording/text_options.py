@@ -17,6 +17,7 @@ from taxel.recording.contents import Contents
 from taxel.recording.layout import on_array
 from taxel.recording.opening import SharedOptions, join_feet, open_all, sensors
 from taxel.recording.read_foreign import is_lone_array
+from taxel.recording.recognition import ForeignFile, recognise
 from taxel.recording.recording import Recording
 
 
@@ -78,9 +79,9 @@ class TextOptions(SharedOptions):
 
     def _instead_of_layout(self, path: Path) -> Any:
         """Return an empty layout for an array without one, whose rate `rate_hz` says; else None."""
-        if self.rate_hz is None:
+        if self.rate_hz is None or not path.is_file() or recognise(path) != ForeignFile(has_layout=False):
             return None
-        return Layout(path) if Layout.beside(path) is None and is_lone_array(path) else None
+        return Layout(path) if is_lone_array(path) else None
 
     def _on_array(self, recording: Recording) -> Recording:
         """Return a recording on the sensor of `array`; refuse one that holds a sensor that differs from it."""

@@ -11,14 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.archive import stored_names
 from taxel._base.limits import TIME_US
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._core import FormatError
 from taxel.formats import text
 from taxel.formats.layout import ISO, UNITS_US, advice
-from taxel.recording.kinds import kind_of
 from taxel.recording.read_foreign import (
     ARRAYS,
     MISSING,
@@ -26,7 +24,6 @@ from taxel.recording.read_foreign import (
     arrays_of,
     cells,
     ends_in_separator,
-    is_of_another_program,
     list_arrays,
     seconds_of,
     shapes_of,
@@ -40,23 +37,14 @@ _NO_RATE = "# rate_hz = 100  # frames a second: the file does not say it, and wi
 
 
 def refuse_without_layout(path: Path) -> None:
-    """Refuse a table or arrays that taxel did not write and no layout describes, with the layout that reads them.
+    """Refuse a table or arrays of another program with the layout that reads them; a text without a table is none.
 
-    Its lines hold what the file says; what it does not say is a comment.
+    The lines of the layout hold what the file says; what it does not say is a comment.
 
     Raises
     ------
-    FormatError : it is such a file, or a damaged one
+    FormatError : it holds a table or arrays, or is damaged
     """
-    if are_spike_trains(path):
-        raise FormatError(
-            f"{path}: spike trains, as taxel encode writes them, no recording; taxel info describes them, and "
-            "taxel.SpikeTrains.load reads them"
-        )
-    if not is_of_another_program(path) or (path.suffix.lower() == ".npz" and not stored_names(path)):
-        return
-    if path.suffix.lower() in (".csv", ".h5", ".hdf5"):
-        kind_of(path)  # refuses what is not of the kind that its name says
     if path.suffix.lower() not in ARRAYS:
         lines = text.beginning(path)
         found = _TextTable.of(lines, texts=False)
@@ -78,12 +66,6 @@ def refuse_without_layout(path: Path) -> None:
         holds, lines = list_arrays(shapes), _of_arrays(path, name, shapes)
         says = "says which are the frames" if len(shapes) > 1 else "or rate_hz, says what it is"
     raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
-
-
-def are_spike_trains(path: Path) -> bool:
-    """Return whether a file holds the arrays that `SpikeTrains.save` writes."""
-    is_npz = path.suffix.lower() == ".npz" and path.is_file()
-    return is_npz and {"times", "offsets", "start", "stop"} <= set(stored_names(path))
 
 
 def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
