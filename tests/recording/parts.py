@@ -10,7 +10,7 @@ import numpy as np
 
 from taxel.calibration import Calibration
 from taxel.clock import Clock
-from taxel.recording.contents import Source, parts_of
+from taxel.recording.contents import Source, sections_of
 from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.raw import Datagrams, Samples
 
@@ -50,7 +50,7 @@ OF_BYTES = {"wire.differences", "wire.version_2", "wire.origin_us", "wire.unmark
 def flat(of: Source) -> dict[str, Any]:
     """Return the values of all fields by part and name, each read."""
     values = {}
-    for name, part in parts_of(of).items():
+    for name, part in sections_of(of).items():
         for one in fields(part):
             value = getattr(part, one.name)
             values[f"{name}.{one.name}"] = value() if isinstance(value, Once) else value

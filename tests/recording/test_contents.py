@@ -12,13 +12,13 @@ import pytest
 import taxel
 from taxel import Note
 from taxel.recording.between import between
-from taxel.recording.contents import Board, Contents, Drawn, FrameSource, Source, Stream, parts_of
+from taxel.recording.contents import Board, Contents, Drawn, FrameSource, Source, Stream, sections_of
 from taxel.recording.cut import region
 from taxel.recording.frames import as_frames, calibrate
 from taxel.recording.merge import merge_contents
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import known
-from taxel.recording.parts import Columns, Timing
+from taxel.recording.sections import Columns, Timing
 from taxel.recording.raw import Samples
 from taxel.recording.recording import with_notes
 from taxel.recording.stored import storable
@@ -147,6 +147,6 @@ class Coloured(Board):
 @pytest.mark.parametrize("function", ["between", "region", "on_clock", *KINDS])
 def test_a_part_without_a_rule_is_refused_by_each_function(tmp_path: Path, function: str) -> None:
     of = full(tmp_path, Board)
-    one = Coloured(**parts_of(of.main if function in ("between", "on_clock") else marked(of).main))
+    one = Coloured(**sections_of(of.main if function in ("between", "on_clock") else marked(of).main))
     with pytest.raises((AssertionError, AttributeError), match=r"'red'|'str' object has no attribute 'lines'"):
         FUNCTIONS[function][0](Contents(one, {"board": one, "other": of.sources["other"]}), tmp_path)

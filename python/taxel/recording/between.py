@@ -17,7 +17,7 @@ from taxel import _core
 from taxel._base.files import open_file
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.contents import Board, Contents, S, Source, apply_rule, share_clock
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import UNKNOWN, Once
@@ -34,7 +34,7 @@ def between(of: Contents, start: float, stop: float) -> Contents:
     """
     every, whole = of.sources, _between(of.main, of.sources, start, stop)
     if len(every) == 1:
-        return Contents.of(whole)
+        return Contents.single(whole)
     every_part = {name: _between(source, every, start, stop) for name, source in inside(every).items()}
     apart = Once(lambda: len(every) > 1 and of.main.timing.clock_of is None and not share_clock(every))
     return Contents(whole, Slices(every_part, of.main.origin, apart))
@@ -44,26 +44,26 @@ def _between(of: S, sources: Mapping[str, Source], start: float, stop: float) ->
     """Return a part of a source by time."""
     marks = of.marks
 
-    def rule(part: parts.Part) -> parts.Part:  # noqa: PLR0911  one a type
+    def rule(part: sections.Section) -> sections.Section:  # noqa: PLR0911  one a type
         match part:
-            case parts.Origin() | parts.Sensor() | parts.Wire():
+            case sections.Origin() | sections.Sensor() | sections.Wire():
                 return part
-            case parts.EventTable():
-                return parts.EventTable(Once(lambda: part.events().between(start, stop)))
-            case parts.FrameTable():
+            case sections.EventTable():
+                return sections.EventTable(Once(lambda: part.events().between(start, stop)))
+            case sections.FrameTable():
                 return replace(part, frames=Once(lambda: part.frames().between(start, stop)))
-            case parts.Columns():
-                return parts.Columns(
+            case sections.Columns():
+                return sections.Columns(
                     part.columns, part.samples.to(lambda samples: samples and samples.between(start, stop))
                 )
-            case parts.Settings():
-                return parts.Settings(Once(lambda: _held_at(of, start)), part.registers, part.register_changes)
-            case parts.Timing():
-                return parts.Timing(part.clock, part.clock_of, Once(lambda: _stretch(of, start, stop)))
-            case parts.Losses():
+            case sections.Settings():
+                return sections.Settings(Once(lambda: _held_at(of, start)), part.registers, part.register_changes)
+            case sections.Timing():
+                return sections.Timing(part.clock, part.clock_of, Once(lambda: _stretch(of, start, stop)))
+            case sections.Losses():
                 return replace(part, verdict=Once(lambda: _verdict(of, sources)))
-            case parts.Marks():
-                return parts.Marks(
+            case sections.Marks():
+                return sections.Marks(
                     board_changes=part.board_changes,
                     notes=Once(lambda: tuple(n for n in part.notes() if n.t is not None and start <= n.t < stop)),
                     detections=Once(lambda: part.detections().between(start, stop)),
@@ -111,7 +111,7 @@ def _ends(path: Path) -> bytes:
 class Slices(Mapping[str, Source]):
     """Hold the same part of all sources of a file; refuse access to those whose clock is not that of the interval."""
 
-    def __init__(self, every_part: Mapping[str, Source], origin: parts.Origin, apart: Once[bool]) -> None:
+    def __init__(self, every_part: Mapping[str, Source], origin: sections.Origin, apart: Once[bool]) -> None:
         self._parts, self._origin, self._apart = every_part, origin, apart
 
     def __getitem__(self, name: str) -> Source:
@@ -147,8 +147,8 @@ def _stretch(of: Source, start: float, stop: float) -> tuple[int, int]:
     """Return the first time and the end of a part, limited to those of the whole."""
     t = of.table.t
     whole = (int(t.min()), int(t.max()) + 1) if len(t) else (0, 1)
-    if of.timing.stretch is not None:
-        whole = of.timing.stretch()
+    if of.timing.interval is not None:
+        whole = of.timing.interval()
     first, last = max(whole[0], _whole(start)), min(whole[1], _whole(stop))
     return first, max(first, last)
 

@@ -10,7 +10,7 @@ from typing import Any, NoReturn, TypeVar
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.once import Once, known
 from taxel.recording.verdict import Verdict
 
@@ -26,14 +26,14 @@ __all__ = [
     "alone",
     "apply_rule",
     "name_remarks",
-    "parts_of",
+    "sections_of",
     "several",
     "share_clock",
     "source_from",
     "with_losses",
 ]  # fmt: skip
 
-P = TypeVar("P", parts.Wire, parts.Columns)
+P = TypeVar("P", sections.Wire, sections.Columns)
 S = TypeVar("S", bound="Source")
 
 
@@ -41,12 +41,12 @@ S = TypeVar("S", bound="Source")
 class Source(ABC):
     """Hold what all sources have: the header of a board, of frames, and of a stream of numbers."""
 
-    origin: parts.Origin
-    sensor: parts.Sensor
-    settings: parts.Settings = field(default_factory=parts.Settings, kw_only=True)
-    marks: parts.Marks = field(default_factory=parts.Marks, kw_only=True)
-    timing: parts.Timing = field(default_factory=parts.Timing, kw_only=True)
-    losses: parts.Losses = field(default_factory=parts.Losses, kw_only=True)
+    origin: sections.Origin
+    sensor: sections.Sensor
+    settings: sections.Settings = field(default_factory=sections.Settings, kw_only=True)
+    marks: sections.Marks = field(default_factory=sections.Marks, kw_only=True)
+    timing: sections.Timing = field(default_factory=sections.Timing, kw_only=True)
+    losses: sections.Losses = field(default_factory=sections.Losses, kw_only=True)
 
     @property
     def has_events(self) -> bool:
@@ -60,7 +60,7 @@ class Source(ABC):
 
     def part(self, kind: type[P]) -> P:
         """Return its part of a type, of which there need not be one; else an empty one."""
-        return next((part for part in parts_of(self).values() if isinstance(part, kind)), None) or kind()
+        return next((part for part in sections_of(self).values() if isinstance(part, kind)), None) or kind()
 
     @property
     def columns(self) -> tuple[str, ...] | None:
@@ -77,8 +77,8 @@ class Source(ABC):
 class Board(Source):
     """Hold what a board sent."""
 
-    event_table: parts.EventTable
-    wire: parts.Wire = field(default_factory=parts.Wire)
+    event_table: sections.EventTable
+    wire: sections.Wire = field(default_factory=sections.Wire)
 
     @property
     def table(self) -> Events:
@@ -90,7 +90,7 @@ class Board(Source):
 class FrameSource(Source):
     """Hold frames."""
 
-    frame_table: parts.FrameTable
+    frame_table: sections.FrameTable
 
     @property
     def table(self) -> Frames:
@@ -102,14 +102,14 @@ class FrameSource(Source):
 class Drawn(FrameSource):
     """Hold frames that were drawn of a board's events, whose bytes are still there."""
 
-    wire: parts.Wire = field(default_factory=parts.Wire)
+    wire: sections.Wire = field(default_factory=sections.Wire)
 
 
 @dataclass(frozen=True, eq=False)
 class Stream(FrameSource):
     """Hold a stream of numbers, whose lines are frames of one row."""
 
-    stream: parts.Columns
+    stream: sections.Columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,12 +136,12 @@ class Several(Source):
         self.refuse()
 
 
-def parts_of(of: Source) -> dict[str, parts.Part]:
+def sections_of(of: Source) -> dict[str, sections.Section]:
     """Return the parts of a source by the names of its fields."""
     return {field.name: getattr(of, field.name) for field in fields(of) if field.metadata.get("is_part", True)}
 
 
-def apply_rule(of: S, rule: Callable[[parts.Part], parts.Part | None], lines: Callable[[], Iterable[str]] = tuple) -> S:
+def apply_rule(of: S, rule: Callable[[sections.Section], sections.Section | None], lines: Callable[[], Iterable[str]] = tuple) -> S:
     """Return a source with a rule applied to each of its parts.
 
     Parameters
@@ -152,13 +152,13 @@ def apply_rule(of: S, rule: Callable[[parts.Part], parts.Part | None], lines: Ca
     lines : function that returns lines, optional
         What else is lost.
     """
-    old_parts = parts_of(of)
+    old_parts = sections_of(of)
     after = {name: rule(part) for name, part in old_parts.items()}
     gone = [old_parts[name] for name, part in after.items() if part is None]
     # Only a part whose fields have defaults may be lost.
     none: Callable[[str], Any] = lambda name: type(old_parts[name])()  # type: ignore[call-arg]  # noqa: E731
     changed: dict[str, Any] = {name: none(name) if part is None else part for name, part in after.items()}
-    return with_losses(replace(of, **changed), lambda: [*(line for part in gone for line in part.lines()), *lines()])
+    return with_losses(replace(of, **changed), lambda: [*(line for part in gone for line in part.losses()), *lines()])
 
 
 def with_losses(of: S, lines: Callable[[], Iterable[str]]) -> S:
@@ -169,7 +169,7 @@ def with_losses(of: S, lines: Callable[[], Iterable[str]]) -> S:
 
 def source_from(
     table: Events | Frames,
-    origin: parts.Origin | None = None,
+    origin: sections.Origin | None = None,
     *,
     untimed: bool = False,
     turned: float | None = None,
@@ -189,13 +189,13 @@ def source_from(
     **header
         Its other parts; default: a sensor of the table's array alone.
     """
-    origin = parts.Origin() if origin is None else origin
-    sensor = header.pop("sensor", None) or parts.Sensor(table.array)
+    origin = sections.Origin() if origin is None else origin
+    sensor = header.pop("sensor", None) or sections.Sensor(table.array)
     if isinstance(table, Events):
-        return Board(origin, sensor, parts.EventTable(known(table)), **header)
-    frame_table = parts.FrameTable(known(table), untimed, turned)
+        return Board(origin, sensor, sections.EventTable(known(table)), **header)
+    frame_table = sections.FrameTable(known(table), untimed, turned)
     if columns:
-        return Stream(origin, sensor, frame_table, parts.Columns(tuple(columns)), **header)
+        return Stream(origin, sensor, frame_table, sections.Columns(tuple(columns)), **header)
     return FrameSource(origin, sensor, frame_table, **header)
 
 
@@ -259,14 +259,14 @@ def several(sources: Mapping[str, Source]) -> Several:
     return Several(
         # A source is named after its file and itself.
         replace(first.origin, name=first.origin.name.removesuffix(f" {first.origin.label}"), label=""),
-        parts.Sensor(first.sensor.array, calibration=no),
+        sections.Sensor(first.sensor.array, calibration=no),
         refuse,
         first,
         are_frames=share_clock(sources),
-        settings=parts.Settings(held=no, registers=no, register_changes=no),
+        settings=sections.Settings(held=no, registers=no, register_changes=no),
         marks=replace(first.marks, board_changes=no, zeroings=no),
-        timing=parts.Timing(no, first.timing.clock_of),
-        losses=parts.Losses(
+        timing=sections.Timing(no, first.timing.clock_of),
+        losses=sections.Losses(
             counts=Once(lambda: {name: source.losses.counts() for name, source in sources.items()}),
             verdict=Once(lambda: _verdict(sources)),
             remarks=name_remarks([(name, source.losses.remarks) for name, source in sources.items()]),

@@ -24,7 +24,7 @@ from taxel.recording.contents import Board, Contents, Source, Stream, alone, sha
 from taxel.recording.frames import as_frames, period_us
 from taxel.recording.kinds import ENDINGS
 from taxel.recording.opening import open_one
-from taxel.recording.parts import Wire
+from taxel.recording.sections import Wire
 from taxel.recording.recording import Recording
 from taxel.recording.stored import is_made, storable
 from taxel.recording.write_csv import write_csv
@@ -132,7 +132,7 @@ def _write_lsa(place: Path, of: Source, overwrite: bool) -> None:
         tempfile.TemporaryDirectory(dir=place.parent, prefix=f".{place.name}.") as folder,
     ):
         made = Path(folder) / "made.lsa"
-        payload = of.part(Wire).payload
+        payload = of.section(Wire).payload
         assert payload is not None  # `storable` sets it
         _core.write_lsa(made, payload.tobytes())
         os.replace(made, part)
@@ -146,7 +146,7 @@ def _contents(source: object) -> Contents:
         return source._contents
     if not isinstance(source, Events | Frames):
         raise refused("source", f" is {shown(source)}: must be a Recording, Events, Frames or the name of a file")
-    return Contents.of(source_from(source))
+    return Contents.single(source_from(source))
 
 
 def _counts(of: Source, written: Source) -> dict[str, Any]:

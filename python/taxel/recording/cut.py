@@ -10,7 +10,7 @@ import numpy as np
 from taxel._base.arguments import finite, instance, text, window
 from taxel._core import ProblemError
 from taxel.events import Events
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.changes import Zeroing
 from taxel.recording.contents import Contents, apply_rule
 from taxel.recording.once import Once
@@ -122,31 +122,31 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
         inside = (z for z in every if left <= z.x < right and top <= z.y < bottom)
         return tuple(Zeroing(z.t, z.x - left, z.y - top, z.rest, z.before) for z in inside)
 
-    def rule(part: parts.Part) -> parts.Part | None:  # noqa: PLR0911  one a type
+    def rule(part: sections.Section) -> sections.Section | None:  # noqa: PLR0911  one a type
         match part:
-            case parts.Origin() | parts.Timing() | parts.Losses():
+            case sections.Origin() | sections.Timing() | sections.Losses():
                 return part
-            case parts.Sensor():
+            case sections.Sensor():
                 calibration = part.calibration.to(lambda whole: None if whole is None else whole._region(columns, rows))
-                return parts.Sensor(small, part.side, part.heel, calibration)
-            case parts.Settings():
+                return sections.Sensor(small, part.side, part.heel, calibration)
+            case sections.Settings():
                 inside = np.s_[top:bottom, left:right]
                 held = part.held.to(lambda held: None if held is None else np.ascontiguousarray(held[inside]))
-                return parts.Settings(held, part.registers, part.register_changes)
-            case parts.Marks():
+                return sections.Settings(held, part.registers, part.register_changes)
+            case sections.Marks():
                 return replace(part, zeroings=Once(lambda: zeroings(part.zeroings())))
-            case parts.EventTable():
-                return parts.EventTable(Once(lambda: events(part.events())))
-            case parts.FrameTable():
+            case sections.EventTable():
+                return sections.EventTable(Once(lambda: events(part.events())))
+            case sections.FrameTable():
                 return replace(part, frames=Once(lambda: part.frames().region(columns, rows)))
-            case parts.Columns():
-                return parts.Columns(part.columns[left:right])
-            case parts.Wire():
+            case sections.Columns():
+                return sections.Columns(part.columns[left:right])
+            case sections.Wire():
                 return None
             case _:
                 assert_never(part)
 
-    return Contents.of(apply_rule(of.main, rule, lambda: [*of.main.part(parts.Columns).received(), *of.others()]))
+    return Contents.single(apply_rule(of.main, rule, lambda: [*of.main.section(sections.Columns).received(), *of.others()]))
 
 
 def span_us(recording: Recording) -> tuple[int, int]:

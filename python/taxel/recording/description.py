@@ -21,7 +21,7 @@ from taxel.events import Events
 from taxel.formats.checks import sensor as checked
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import FrameSource, Source, source_from
 from taxel.recording.kinds import verdict_of
@@ -102,7 +102,7 @@ def about_of(place: str, document: str) -> dict[str, Any]:
 
 
 def described_source(
-    table: Events | Frames, held: NDArray[np.uint16] | None, origin: parts.Origin, about: Mapping[str, Any]
+    table: Events | Frames, held: NDArray[np.uint16] | None, origin: sections.Origin, about: Mapping[str, Any]
 ) -> Source:
     """Return a source of a table and of what `about_of` read; its sensor is that of the table."""
     get = about.get
@@ -113,15 +113,15 @@ def described_source(
         untimed=get("untimed", False),
         turned=get("turned"),
         columns=get("columns", ()),
-        sensor=parts.Sensor(table.array, get("side", ""), get("heel", "")),
-        settings=parts.Settings(known(held), known(get("registers")), known(get("register_changes", ()))),
-        marks=parts.Marks(
+        sensor=sections.Sensor(table.array, get("side", ""), get("heel", "")),
+        settings=sections.Settings(known(held), known(get("registers")), known(get("register_changes", ()))),
+        marks=sections.Marks(
             board_changes=known(get("board_changes", ())),
             notes=known(get("notes", ())),
             detections=known(get("detections", none)),
             zeroings=known(get("zeroings", ())),
         ),
-        losses=parts.Losses(
+        losses=sections.Losses(
             counts=known(get("counts", {})),
             verdict=known(get("verdict")),
             remarks=get("remarks", ()),

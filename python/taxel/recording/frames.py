@@ -15,7 +15,7 @@ from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.contents import Board, Contents, Drawn, FrameSource, Source, Stream, several, with_losses
 from taxel.recording.once import UNKNOWN, Once, known
 from taxel.tare import Tare
@@ -86,13 +86,13 @@ def as_frames(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz"
         _ = of.table
     header = {part: getattr(of, part) for part in ("marks", "timing", "losses")}
     # The first frame includes the held values.
-    header["settings"] = parts.Settings(known(None), of.settings.registers, of.settings.register_changes)
+    header["settings"] = sections.Settings(known(None), of.settings.registers, of.settings.register_changes)
     frames = Once(lambda: _draw(of, period))
-    return Drawn(of.origin, of.sensor, parts.FrameTable(frames), of.part(parts.Wire), **header)
+    return Drawn(of.origin, of.sensor, sections.FrameTable(frames), of.section(sections.Wire), **header)
 
 
 def _draw(of: Source, period: int | None) -> Frames:
-    events, held, stretch = of.table, of.settings.held(), of.timing.stretch
+    events, held, stretch = of.table, of.settings.held(), of.timing.interval
     assert isinstance(events, Events)  # the caller checked
     # A value of 65 535 stands for an unknown one.
     begins = None if held is None else np.where(held == UNKNOWN, 0, held)
@@ -133,7 +133,7 @@ def _at_rate(of: Source, rate_hz: float) -> Source:
     def notes(before: tuple[Note, ...]) -> tuple[Note, ...]:
         return tuple(replace(n, t=None if n.t is None else round(n.t * 1e6 / rate_hz)) for n in before)
 
-    frame_table = parts.FrameTable(of.frame_table.frames.to(frames), untimed=False, turned=of.frame_table.turned)
+    frame_table = sections.FrameTable(of.frame_table.frames.to(frames), untimed=False, turned=of.frame_table.turned)
     return replace(of, frame_table=frame_table, marks=replace(of.marks, notes=of.marks.notes.to(notes)))
 
 
@@ -167,4 +167,4 @@ def calibrate(of: Source, rate_hz: float | None = None, rest: Tare | None = None
     )
     if not isinstance(made, Stream):
         return made
-    return with_losses(replace(made, stream=parts.Columns(made.stream.columns)), made.stream.received)
+    return with_losses(replace(made, stream=sections.Columns(made.stream.columns)), made.stream.received)

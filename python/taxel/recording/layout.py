@@ -22,7 +22,7 @@ from taxel.frames import Frames
 from taxel.recording.contents import Board, Contents, FrameSource, S, Source, Stream, alone
 from taxel.recording.frames import times_at
 from taxel.recording.once import known
-from taxel.recording.parts import EventTable, FrameTable
+from taxel.recording.sections import EventTable, FrameTable
 
 #: Units that say nothing: what a table or a stream of numbers holds.
 _UNSAID = ("counts", "as sent")

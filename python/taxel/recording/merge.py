@@ -20,7 +20,7 @@ from taxel.detections import Detections
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, name_remarks, with_losses
 from taxel.recording.kinds import verdict_of
@@ -97,10 +97,10 @@ def merge_contents(recordings: Sequence[Contents], gap: float | None = None, *, 
     merging = _Merging(sources, tables, shifts, lefts, array, beside)
     lost = [line for source in sources for line in source.losses.lost()]
     for recording, source in zip(recordings, sources, strict=True):
-        lost += [*source.part(parts.Wire).lines(), *source.part(parts.Columns).received(), *recording.others()]
+        lost += [*source.section(sections.Wire).losses(), *source.section(sections.Columns).received(), *recording.others()]
     merged = merging.source()
     # `lost` is stored as a value, not as a function of the parts, so that the parts can be freed.
-    return Contents.of(with_losses(merged, known((*lost, *merging.lost))))
+    return Contents.single(with_losses(merged, known((*lost, *merging.lost))))
 
 
 @dataclass
@@ -119,7 +119,7 @@ class _Merging:
         """Return the sources as one."""
         names = ", ".join(source.origin.name for source in self.sources)
         header: dict[str, Any] = {
-            "origin": parts.Origin(Path("merged"), "merged", "merged", source=f"merged of {names}"),
+            "origin": sections.Origin(Path("merged"), "merged", "merged", source=f"merged of {names}"),
             "sensor": self.sensor(),
             "settings": self.settings(),
             "marks": self.marks(),
@@ -129,12 +129,12 @@ class _Merging:
         if self.sources[0].has_events:
             tables = [table for table in self.tables if isinstance(table, Events)]
             return Board(
-                event_table=parts.EventTable(known(_events(tables, self.shifts, self.array, self.lefts))), **header
+                event_table=sections.EventTable(known(_events(tables, self.shifts, self.array, self.lefts))), **header
             )
         columns = self.columns()
         if columns is None:
             return FrameSource(frame_table=self.frame_table(), **header)
-        return Stream(frame_table=self.frame_table(), stream=parts.Columns(columns), **header)
+        return Stream(frame_table=self.frame_table(), stream=sections.Columns(columns), **header)
 
     def agreed(self, values: Iterable[T], empty: T, line: str, key: Callable[[T], object] = lambda value: value) -> T:
         """Return the common value if all recordings agree, else the empty value; then a line says so."""
@@ -156,7 +156,7 @@ class _Merging:
             else None
         )
 
-    def sensor(self) -> parts.Sensor:
+    def sensor(self) -> sections.Sensor:
         """Merge what describes the sensors; what one of them says of its taxels may be lost."""
         array, sensors = self.array, [part.sensor for part in self.sources]
         for part in self.sources:
@@ -170,20 +170,20 @@ class _Merging:
         if self.beside and calibration is not None and len(sensors) > 1:
             self.lost.append("the calibration (it is of one of the sensors)")
             calibration = None
-        return parts.Sensor(
+        return sections.Sensor(
             array,
             self.agreed((sensor.side for sensor in sensors), "", "the side"),
             self.agreed((sensor.heel for sensor in sensors), "", "where the heel lies"),
             known(calibration),
         )
 
-    def settings(self) -> parts.Settings:
+    def settings(self) -> sections.Settings:
         """Merge registers that are equal, and the values that the taxels held at the beginning."""
         settings = [source.settings for source in self.sources]
         registers = [part.registers() for part in settings]
         held = self.held_beside() if self.beside else self.held()
         changes = self.agreed((part.register_changes() for part in settings), (), "the settings of the registers")
-        return parts.Settings(
+        return sections.Settings(
             held=known(held),
             registers=known(
                 self.agreed(registers, None, "the board's registers", lambda held: held and (held, held.array))
@@ -191,7 +191,7 @@ class _Merging:
             register_changes=known(changes),
         )
 
-    def marks(self) -> parts.Marks:
+    def marks(self) -> sections.Marks:
         """Merge what happened at a time; a note with its name stands at the beginning of each recording."""
         changes, notes, found = list[tuple[BoardChange, ...]](), list[Note](), list[Any]()
         for part, table, shift in zip(self.sources, self.tables, self.shifts, strict=True):
@@ -202,31 +202,31 @@ class _Merging:
             found += zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True)
         found.sort(key=lambda row: int(row[2]))
         label, t, when, slope, repaired = ([row[k] for row in found] for k in range(5))
-        return parts.Marks(
+        return sections.Marks(
             board_changes=known(self.agreed(changes, (), "the changes of the board")),
             notes=known(tuple(sorted(notes, key=lambda note: (note.t is None, note.t or 0)))),
             detections=known(Detections._of(label, t, when, slope, repaired=repaired)),
             zeroings=known(self.zeroings()),
         )
 
-    def timing(self) -> parts.Timing:
+    def timing(self) -> sections.Timing:
         """Merge clocks that are equal."""
         clocks = [part.timing.clock() for part in self.sources]
         clock = clocks[0]
         if len(set(self.shifts)) > 1 or not all(c is clock or _same_clock(clock, c) for c in clocks[1:]):
             self.lost += ["arrival times"] * any(map(anything, clocks))
             clock = None
-        return parts.Timing(
+        return sections.Timing(
             known(clock), self.agreed((p.timing.clock_of for p in self.sources), None, "by whose clock times are")
         )
 
-    def losses(self) -> parts.Losses:
+    def losses(self) -> sections.Losses:
         """Merge what was lost; counts only if they are equal."""
         losses = [source.losses for source in self.sources]
         verdict = None
         if any(part.verdict() is not None for part in losses):
             verdict = Verdict._together(_of_files(self.sources, self.shifts))
-        return parts.Losses(
+        return sections.Losses(
             counts=known(self.agreed((part.counts() for part in losses), {}, "what each received and lost, by cause")),
             verdict=known(verdict),
             remarks=name_remarks([(part.origin.name, part.losses.remarks) for part in self.sources]),
@@ -234,11 +234,11 @@ class _Merging:
             rebuilt=known(self.agreed((part.rebuilt() for part in losses), {}, "what reading each had to put up with")),
         )
 
-    def frame_table(self) -> parts.FrameTable:
+    def frame_table(self) -> sections.FrameTable:
         """Merge frames."""
         tables = [table for table in self.tables if isinstance(table, Frames)]
         frames = [source.frame_table for source in self.sources if isinstance(source, FrameSource)]
-        return parts.FrameTable(
+        return sections.FrameTable(
             known(_frames(tables, self.shifts, self.array, self.lefts if self.beside else None)),
             all(part.untimed for part in frames),
             self.agreed((part.turned for part in frames), None, "whether readings were turned"),
@@ -333,15 +333,15 @@ def _of_files(sources: Sequence[Source], shifts: Sequence[int]) -> list[tuple[st
 
 def _end(part: Source) -> int:
     """Return the first time after everything in a recording."""
-    if part.timing.stretch is not None:
-        return part.timing.stretch()[1]
+    if part.timing.interval is not None:
+        return part.timing.interval()[1]
     t = part.table.t
     return max([int(t.max()) if len(t) else 0, *(z.t for z in part.marks.zeroings())]) + 1
 
 
 def _begin(part: Source) -> int:
-    if part.timing.stretch is not None:
-        return part.timing.stretch()[0]
+    if part.timing.interval is not None:
+        return part.timing.interval()[0]
     t = part.table.t
     return int(t.min()) if len(t) else 0
 

@@ -15,7 +15,7 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Contents, Source, alone, apply_rule
 from taxel.recording.kinds import verdict_of
@@ -40,7 +40,7 @@ def on_clock(of: Contents, name: str) -> Contents:
     """
     whole, sources = of.main, of.sources
     path, label = whole.origin.path, whole.origin.label
-    if whole.timing.stretch is not None and whole.timing.clock_of is None:
+    if whole.timing.interval is not None and whole.timing.clock_of is None:
         raise ProblemError(f"{path}: a slice by its own clock; say on_clock({name!r}) before between")
     if name not in (*sources, HOST):
         raise ProblemError(f"{path}: has no clock {name!r}; there are {', '.join((*sources, HOST))}")
@@ -116,26 +116,26 @@ def _move(of: Source, name: str, times: Times | None) -> Source:
         after = steps[0]["after_us"] if doubtful is None and steps else doubtful
         return before if after is None else own_verdict._later(time(after) - after)
 
-    def rule(part: parts.Part) -> parts.Part:  # noqa: PLR0911  one a type
+    def rule(part: sections.Section) -> sections.Section:  # noqa: PLR0911  one a type
         match part:
             # The times in the datagrams stay by the source's own clock.
-            case parts.Origin() | parts.Sensor() | parts.Settings() | parts.Wire():
+            case sections.Origin() | sections.Sensor() | sections.Settings() | sections.Wire():
                 return part
-            case parts.Marks():
-                return parts.Marks(
+            case sections.Marks():
+                return sections.Marks(
                     part.board_changes.to(at), part.notes.to(at), part.detections.to(detections), part.zeroings.to(at)
                 )
-            case parts.Timing():
-                return parts.Timing(part.clock.to(clock), name, part.stretch)
-            case parts.Losses():
+            case sections.Timing():
+                return sections.Timing(part.clock.to(clock), name, part.stretch)
+            case sections.Losses():
                 return replace(part, verdict=part.verdict.to(verdict))
-            case parts.EventTable():
-                return parts.EventTable(part.events.to(events))
-            case parts.FrameTable():
+            case sections.EventTable():
+                return sections.EventTable(part.events.to(events))
+            case sections.FrameTable():
                 return replace(part, frames=part.frames.to(frames))
-            case parts.Columns():
-                return parts.Columns(part.columns)
+            case sections.Columns():
+                return sections.Columns(part.columns)
             case _:
                 assert_never(part)
 
-    return apply_rule(of, rule, of.part(parts.Columns).received)
+    return apply_rule(of, rule, of.section(sections.Columns).received)

@@ -25,7 +25,7 @@ from taxel.formats import Trial
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, several, source_from
 from taxel.recording.kinds import ENDINGS, LABELS
 from taxel.recording.layout import apply_layout, check_size, on_array
@@ -236,9 +236,9 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
                 assert layout is not None  # one without is refused
                 if options.topics.are_given:
                     raise ProblemError(f"{path}: no ROS bag; topic, field, types and ros are of one")
-                contents = Contents.of(read_foreign(path, layout))
+                contents = Contents.single(read_foreign(path, layout))
                 if options.array is not None:
-                    contents = Contents.of(_on_given(contents.main, instance("array", options.array, Array)))
+                    contents = Contents.single(_on_given(contents.main, instance("array", options.array, Array)))
             case TaxelFile(kind):
                 if options.topics.are_given:
                     raise ProblemError(f"{path}: a .{kind}; topic, field, types and ros are of a ROS bag")
@@ -277,8 +277,8 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
     if kind == "mcap":
         return read_mcap(place, pairing)
     if kind == "lsa":
-        return Contents.of(read_lsa(place, array or Array.thesis(), pairing, differences))
-    return Contents.of({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array))
+        return Contents.single(read_lsa(place, array or Array.thesis(), pairing, differences))
+    return Contents.single({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array))
 
 
 def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
@@ -426,15 +426,15 @@ def _recording_of(trial: Trial, place: Path, kind: str, given_layout: str | os.P
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
     )
     label = trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board"
-    origin = parts.Origin(place if place.is_file() else place / trial.name, trial.name, kind, label, trial.source)
-    contents = Contents.of(
+    origin = sections.Origin(place if place.is_file() else place / trial.name, trial.name, kind, label, trial.source)
+    contents = Contents.single(
         source_from(
             trial.recorded,
             origin,
             untimed=not trial.timed,
-            sensor=parts.Sensor(trial.recorded.array, trial.foot),
-            marks=parts.Marks(notes=known(tuple(notes))),
-            losses=parts.Losses(lost=known(_beside_frames(trial))),
+            sensor=sections.Sensor(trial.recorded.array, trial.foot),
+            marks=sections.Marks(notes=known(tuple(notes))),
+            losses=sections.Losses(lost=known(_beside_frames(trial))),
         )
     )
     layout = layout_of(place, given_layout)

@@ -393,7 +393,7 @@ def _rate_hz(recording: Recording) -> float:
 def _times(recording: Recording) -> NDArray[np.int64]:
     """Return the times of the frames of `Recording.frames`."""
     t = recording.events.t
-    stretch = recording._contents.main.timing.stretch
+    stretch = recording._contents.main.timing.interval
     first, stop = (int(t.min()), int(t.max()) + 1) if stretch is None else stretch()
     return np.arange(first, stop, period_us("rate_hz", _rate_hz(recording)), dtype=np.int64)
 
@@ -451,7 +451,7 @@ def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
     -------
     float32, shape (n, rows, columns), ticks
     """
-    recording = Recording(Contents.of(source_from(events)))
+    recording = Recording(Contents.single(source_from(events)))
     drawn = _Drawn.of(recording)
     # The rest is found from the first event on.
     from_first = np.union1d(t, min(t[0], events.t.min())) if len(t) else t

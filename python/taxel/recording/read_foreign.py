@@ -33,7 +33,7 @@ from taxel.formats.layout import ISO, UNITS_US, Data, Layout, Table, as_size
 from taxel.frames import Frames
 from taxel.recording.contents import Source, source_from
 from taxel.recording.once import known
-from taxel.recording.parts import Losses, Origin
+from taxel.recording.sections import Losses, Origin
 
 #: The endings of files of arrays.
 ARRAYS = (".npy", ".npz", ".h5", ".hdf5")

@@ -24,7 +24,7 @@ from taxel.frames import Frames
 from taxel.recording.contents import Source
 from taxel.recording.description import about_of, described_source
 from taxel.recording.layout import check_size
-from taxel.recording.parts import Origin
+from taxel.recording.sections import Origin
 from taxel.recording.write_npz import COLUMNS, DIGEST, EVENTS, PIECE_BYTES, TEXTS, digest_of
 
 #: Columns of events, one entry each.

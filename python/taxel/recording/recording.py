@@ -30,7 +30,7 @@ from taxel.recording.frames import as_frames, at_rate, calibrate
 from taxel.recording.kinds import kind_of_file, verdict_of
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import UNKNOWN, Once
-from taxel.recording.parts import Wire
+from taxel.recording.sections import Wire
 from taxel.recording.raw import Datagrams
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
@@ -218,12 +218,12 @@ class Recording:
     @property
     def is_slice(self) -> bool:
         """Whether this is a part of the file by time, made by `between`."""
-        return self._contents.main.timing.stretch is not None
+        return self._contents.main.timing.interval is not None
 
     @property
     def stretch(self) -> tuple[int, int] | None:
         """The first time and the end of a part by time, us; None of a whole."""
-        stretch = self._contents.main.timing.stretch
+        stretch = self._contents.main.timing.interval
         return None if stretch is None else stretch()
 
     @property
@@ -332,7 +332,7 @@ class Recording:
         if self._contents.is_several:
             # Reading the events raises the error that lists the sources.
             _ = self._contents.main.table
-        datagrams = self._contents.main.part(Wire).datagrams()
+        datagrams = self._contents.main.section(Wire).datagrams()
         if datagrams is not None:
             return datagrams
         if self.is_stream:
@@ -464,10 +464,10 @@ class Recording:
         --------
         >>> import pathlib, tempfile, taxel
         >>> from taxel.recording.contents import Contents, source_from
-        >>> from taxel.recording.parts import Origin
+        >>> from taxel.recording.sections import Origin
         >>> frames = taxel.Frames([[[1.0]], [[2.0]]], [0, 1])
         >>> numbered = source_from(frames, Origin(pathlib.Path("grasp"), "grasp", "icub"), untimed=True)
-        >>> taxel.Recording(Contents.of(numbered)).at_rate(50).frames().t
+        >>> taxel.Recording(Contents.single(numbered)).at_rate(50).frames().t
         array([    0, 20000])
         """
         return Recording(at_rate(self._contents, rate_hz))

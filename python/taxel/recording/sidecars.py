@@ -11,7 +11,7 @@ from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording.contents import Contents, FrameSource, Source, Stream, alone, share_clock
 from taxel.recording.frames import calibrate
 from taxel.recording.once import Once, known
-from taxel.recording.parts import Origin
+from taxel.recording.sections import Origin
 from taxel.recording.recording import Recording
 
 

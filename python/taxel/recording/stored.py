@@ -17,7 +17,7 @@ from taxel.clock import Clock
 from taxel.events import Events
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.contents import (
     Board,
     Contents,
@@ -26,7 +26,7 @@ from taxel.recording.contents import (
     Source,
     Stream,
     apply_rule,
-    parts_of,
+    sections_of,
     several,
     share_clock,
     source_from,
@@ -67,7 +67,7 @@ def storable(of: Contents, place: Path) -> Contents:
     source = _storable(main, ending, place)
     if not isinstance(main, FrameSource) or ending != ".mcap":
         source = _rename(source, place.name, "board")
-    return Contents.of(with_losses(source, of.others))
+    return Contents.single(with_losses(source, of.others))
 
 
 def _rename(of: Source, name: str, label: str) -> Source:
@@ -93,8 +93,8 @@ def _storable(of: Source, ending: str, place: Path) -> Source:
 
 def is_made(of: Source) -> bool:
     """Return whether a file's bytes must be made of the events, as no datagrams contain exactly these events."""
-    has_bytes = bool(of.part(parts.Wire).lines())
-    return of.timing.stretch is not None or of.timing.clock_of is not None or not has_bytes
+    has_bytes = bool(of.section(sections.Wire).losses())
+    return of.timing.interval is not None or of.timing.clock_of is not None or not has_bytes
 
 
 def _sensor(array: Array) -> str:
@@ -105,43 +105,43 @@ def _sensor(array: Array) -> str:
 
 def _arrivals(of: Source) -> list[str]:
     """Return what is lost without arrival times, which datagrams have too."""
-    return ["arrival times"] * (of.timing.clock.holds() and not of.part(parts.Wire).datagrams.holds())
+    return ["arrival times"] * (of.timing.clock.holds() and not of.section(sections.Wire).datagrams.holds())
 
 
 def _table(of: Source, _: Path) -> _Kept:
     """Return what a .npz or a .h5 holds: all but the raw datagrams."""
-    wire, stream = of.part(parts.Wire), of.part(parts.Columns)
+    wire, stream = of.section(sections.Wire), of.section(sections.Columns)
 
-    def rule(part: parts.Part) -> parts.Part | None:
+    def rule(part: sections.Section) -> sections.Section | None:
         match part:
-            case parts.Origin():
+            case sections.Origin():
                 return replace(part, source=part.source or part.name)
             case (
-                parts.Sensor()
-                | parts.Settings()
-                | parts.Marks()
-                | parts.Losses()
-                | parts.EventTable()
-                | parts.FrameTable()
+                sections.Sensor()
+                | sections.Settings()
+                | sections.Marks()
+                | sections.Losses()
+                | sections.EventTable()
+                | sections.FrameTable()
             ):
                 return part
-            case parts.Wire():
-                return parts.Wire()
-            case parts.Columns():
-                return parts.Columns(part.columns)
-            case parts.Timing():
+            case sections.Wire():
+                return sections.Wire()
+            case sections.Columns():
+                return sections.Columns(part.columns)
+            case sections.Timing():
                 return None
             case _:
                 assert_never(part)
 
-    return apply_rule(of, rule), [*_arrivals(of), *wire.lines(with_times=True), *stream.received()]
+    return apply_rule(of, rule), [*_arrivals(of), *wire.losses(with_times=True), *stream.received()]
 
 
 def _bare(of: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
     """Return a table alone, and what is lost of each of the other parts; of the bytes it is given."""
-    others = (part for part in parts_of(of).values() if not isinstance(part, parts.Wire))
-    return source_from(table, losses=parts.Losses(lost=of.losses.lost)), [
-        *(line for part in others for line in part.lines()),
+    others = (part for part in sections_of(of).values() if not isinstance(part, sections.Wire))
+    return source_from(table, losses=sections.Losses(lost=of.losses.lost)), [
+        *(line for part in others for line in part.losses()),
         *_arrivals(of),
         *wire,
     ]
@@ -168,7 +168,7 @@ def _csv(of: Source, place: Path) -> _Kept:
     else:
         lost += [f"the unit ({whole.unit})"] * (whole.unit != "counts")
         table = Frames(whole.values[:, : array.rows, : array.columns], whole.t, array=array)
-    source, lines = _bare(of, table, of.part(parts.Wire).lines(with_times=True))
+    source, lines = _bare(of, table, of.section(sections.Wire).losses(with_times=True))
     return source, [*lines, *lost]
 
 
@@ -179,7 +179,7 @@ def _lsa(of: Source, place: Path) -> _Kept:
     datagrams, made = wire.datagrams(), is_made(of)
     payload = wire.payload if datagrams is None else datagrams.payload
     if made or wire.version_2():
-        of_wire = wire.lines(with_times=True)
+        of_wire = wire.losses(with_times=True)
     else:
         of_wire = ["arrival times, and where datagrams begin"] * wire.datagrams.holds()
     of_wire += ["that intensities are differences"] * wire.differences
@@ -196,7 +196,7 @@ def _lsa(of: Source, place: Path) -> _Kept:
         lost.append("whole turns of 6.5536 s in times")
     source, lines = _bare(of, events, of_wire)
     assert isinstance(source, Board)  # of events
-    return replace(source, wire=parts.Wire(payload=payload)), [*lines, *lost]
+    return replace(source, wire=sections.Wire(payload=payload)), [*lines, *lost]
 
 
 def _mcap(of: Source, place: Path) -> _Kept:
@@ -207,7 +207,7 @@ def _mcap(of: Source, place: Path) -> _Kept:
     samples = of.stream.samples() if isinstance(of, Stream) else None
     events = None if isinstance(of, FrameSource) else known(_board(of, place).table)
     clock = of.timing.usable()
-    wire = _wire(of, clock, lines) if isinstance(of, Board) else parts.Wire()
+    wire = _wire(of, clock, lines) if isinstance(of, Board) else sections.Wire()
     if samples is not None:
         bad = of.losses.counts().get("lines_that_could_not_be_read", 0)
         lines += [f"{bad} lines that could not be read"] * bool(bad)
@@ -218,23 +218,23 @@ def _mcap(of: Source, place: Path) -> _Kept:
         # Frames have the times of the board alone.
         clock = None
         lines += _arrivals(of)
-        lines += of.wire.lines(with_times=True) if isinstance(of, Drawn) else []
+        lines += of.wire.losses(with_times=True) if isinstance(of, Drawn) else []
 
-    def rule(part: parts.Part) -> parts.Part:
+    def rule(part: sections.Section) -> sections.Section:
         match part:
-            case parts.Origin():
+            case sections.Origin():
                 return replace(part, source=part.source or part.name or ("events" if of.has_events else "frames"))
-            case parts.Sensor() | parts.Settings() | parts.Marks() | parts.FrameTable() | parts.Columns():
+            case sections.Sensor() | sections.Settings() | sections.Marks() | sections.FrameTable() | sections.Columns():
                 return part
-            case parts.EventTable():
-                return parts.EventTable(events or part.events)
-            case parts.Timing():
-                lines.extend(part.lines())
-                return parts.Timing(known(clock))
-            case parts.Wire():
+            case sections.EventTable():
+                return sections.EventTable(events or part.events)
+            case sections.Timing():
+                lines.extend(part.losses())
+                return sections.Timing(known(clock))
+            case sections.Wire():
                 return wire
-            case parts.Losses():
-                return parts.Losses(
+            case sections.Losses():
+                return sections.Losses(
                     counts=part.counts,
                     verdict=known(verdict_of(of) if is_file else None),
                     remarks=tuple(dict.fromkeys((*part.remarks, *converted))),
@@ -246,7 +246,7 @@ def _mcap(of: Source, place: Path) -> _Kept:
     return apply_rule(of, rule), lines
 
 
-def _wire(of: Board, clock: Clock | None, lost: list[str]) -> parts.Wire:
+def _wire(of: Board, clock: Clock | None, lost: list[str]) -> sections.Wire:
     """Return the datagrams of a new .mcap: those received, or new ones made of the events."""
     wire = of.wire
     if not is_made(of):
@@ -254,10 +254,10 @@ def _wire(of: Board, clock: Clock | None, lost: list[str]) -> parts.Wire:
         if wire.payload is not None and datagrams() is None:
             datagrams = known(cut_raw(wire.payload))
         return replace(wire, datagrams=datagrams, payload=None)
-    lost += wire.lines()
+    lost += wire.losses()
     origin_us, made, unmarked = encode_events(of.table, of.settings.held(), clock)
     lost += [f"that {len(unmarked) - _MOST} of the events are repaired"] * (len(unmarked) > _MOST)
-    return parts.Wire(
+    return sections.Wire(
         known(made), version_2=known(True), origin_us=origin_us, unmarked=tuple(unmarked[:_MOST].tolist())
     )
 

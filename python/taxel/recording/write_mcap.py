@@ -176,7 +176,7 @@ def _low_rate(of: FrameSource) -> tuple[Frames, tuple[float, str, str]]:
     few = Frames(frames.values[first], frames.t[first], unit=frames.unit, array=frames.array)
     if not len(few):
         return few, (1.0, "none", few.unit)
-    recording = Recording(Contents.of(replace(of, frame_table=replace(of.frame_table, frames=known(few)))))
+    recording = Recording(Contents.single(replace(of, frame_table=replace(of.frame_table, frames=known(few)))))
     above, _, rest = cast("tuple[Frames, float, Rest]", above_rest(recording))
     return above, (1.0 / ticks_by_unit(few), _RESTS.get(rest.source, rest.source), above.unit)
 
