@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formats.making import write_gaitpdb, write_icub, write_pedar, write_tekscan
-from panel.protocol import Client, head, sections_of, section
+from panel.protocol import Client, head, parts_of, section
 
 import taxel
 from taxel import Array, Frames, Places
@@ -198,7 +198,9 @@ def test_an_encoder_that_does_not_fit_frames_is_refused_with_the_reason(tmp_path
 def test_frames_without_times_are_numbered(tmp_path):
     frames = Frames(np.arange(12.0).reshape(4, 1, 3), np.arange(4), array=Array(1, 3))
     trial = taxel.open_all(write_icub(tmp_path))[0]._contents.main
-    taxel.convert(taxel.Recording(Contents.single(source_from(frames, trial.origin, untimed=True))), tmp_path / "grasp.npz")
+    taxel.convert(
+        taxel.Recording(Contents.single(source_from(frames, trial.origin, untimed=True))), tmp_path / "grasp.npz"
+    )
     with Panel(tmp_path / "grasp.npz") as panel, Client(panel) as page:
         about = opened(page, "grasp.npz")
         us = about["frames"]["number_us"]
@@ -432,7 +434,7 @@ def test_each_foot_has_a_sum_and_a_centre(tmp_path, column_us):
         centres = section(frame, 9, "<f4").reshape(-1, 2, 2)
         assert len(sums) == len(centres) == of["count"] > 70
         for number, at, own in zip(range(of["first"], of["first"] + of["count"]), centres, sums, strict=True):
-            ends = [min(end, 5_000_000) for end in sections_of(number, column_us)]
+            ends = [min(end, 5_000_000) for end in parts_of(number, column_us)]
             for k, frames in enumerate(feet):
                 seen = frames.values.reshape(len(frames), -1)[np.searchsorted(frames.t, ends, side="right") - 1]
                 most = seen[np.argmax(seen.sum(axis=1))].astype(float)
@@ -531,7 +533,7 @@ def test_channels_have_a_curve_each(tmp_path, column):
             curves = section(frame, 7, "<u2").reshape(-1, 7)
             assert len(curves) == of["count"] > 100
             for number, curve in enumerate(curves, of["first"]):
-                ends = [min(end, t_us) for end in sections_of(number, column_us)]
+                ends = [min(end, t_us) for end in parts_of(number, column_us)]
                 at = np.searchsorted(frames.t, ends, side="right") - 1
                 np.testing.assert_array_equal(curve * about["frames"]["step"], values[at, 0].max(axis=0))
 

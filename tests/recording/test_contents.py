@@ -18,9 +18,9 @@ from taxel.recording.frames import as_frames, calibrate
 from taxel.recording.merge import merge_contents
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import known
-from taxel.recording.sections import Columns, Timing
 from taxel.recording.raw import Samples
 from taxel.recording.recording import with_notes
+from taxel.recording.sections import Columns, Timing
 from taxel.recording.stored import storable
 
 from .parts import flat, holds, unsaid
@@ -78,7 +78,7 @@ NAMED = {"origin.path", "origin.name", "origin.kind", "origin.label", "origin.so
 FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
     "between": (
         lambda of, _: between(of, 1000.0, 200_000.0),
-        {*TABLE, *TIMED, "settings.held", "timing.stretch", "stream.samples", "losses.verdict"},
+        {*TABLE, *TIMED, "settings.held", "timing.interval", "stream.samples", "losses.verdict"},
     ),
     "region": (
         lambda of, _: region(of, slice(1, 5), slice(None)),
@@ -86,7 +86,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
     ),
     "merge": (
         lambda of, _: merge_contents([of, of], gap=0 if isinstance(of.main, FrameSource) else None),
-        {*TABLE, *TIMED, *NAMED, "losses.verdict", "timing.stretch"},
+        {*TABLE, *TIMED, *NAMED, "losses.verdict", "timing.interval"},
     ),
     "on_clock": (
         lambda of, _: on_clock(of, "other"),
@@ -104,7 +104,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
             {
                 *TABLE,
                 *NAMED,
-                "timing.stretch",
+                "timing.interval",
                 "sensor.calibration",
                 "wire.version_2",
                 "wire.origin_us",

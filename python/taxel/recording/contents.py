@@ -26,6 +26,7 @@ __all__ = [
     "alone",
     "apply_rule",
     "name_remarks",
+    "refuse_several",
     "sections_of",
     "several",
     "share_clock",
@@ -58,9 +59,9 @@ class Source(ABC):
     def table(self) -> Events | Frames:
         """The events or the frames."""
 
-    def part(self, kind: type[P]) -> P:
-        """Return its part of a type, of which there need not be one; else an empty one."""
-        return next((part for part in sections_of(self).values() if isinstance(part, kind)), None) or kind()
+    def section(self, kind: type[P]) -> P:
+        """Return its section of a type; an empty one where it has none."""
+        return next((found for found in sections_of(self).values() if isinstance(found, kind)), None) or kind()
 
     @property
     def columns(self) -> tuple[str, ...] | None:
@@ -116,9 +117,9 @@ class Stream(FrameSource):
 class Several(Source):
     """Hold what a file of several sensors says as a whole; all that is of a single one refuses to be read."""
 
-    refuse: Callable[[], NoReturn] = field(metadata={"is_part": False})
-    first: Source = field(metadata={"is_part": False})
-    are_frames: bool = field(metadata={"is_part": False})
+    refuse: Callable[[], NoReturn] = field(metadata={"is_section": False})
+    first: Source = field(metadata={"is_section": False})
+    are_frames: bool = field(metadata={"is_section": False})
 
     @property
     def has_events(self) -> bool:
@@ -136,35 +137,47 @@ class Several(Source):
         self.refuse()
 
 
-def sections_of(of: Source) -> dict[str, sections.Section]:
-    """Return the parts of a source by the names of its fields."""
-    return {field.name: getattr(of, field.name) for field in fields(of) if field.metadata.get("is_part", True)}
+def refuse_several(source: Source) -> None:
+    """Refuse a file of several sensors as a whole, by an error that lists its sources."""
+    if isinstance(source, Several):
+        source.refuse()
 
 
-def apply_rule(of: S, rule: Callable[[sections.Section], sections.Section | None], lines: Callable[[], Iterable[str]] = tuple) -> S:
-    """Return a source with a rule applied to each of its parts.
+def sections_of(source: Source) -> dict[str, sections.Section]:
+    """Return the sections of a source by the names of its fields."""
+    return {
+        field.name: getattr(source, field.name) for field in fields(source) if field.metadata.get("is_section", True)
+    }
+
+
+def apply_rule(
+    source: S, rule: Callable[[sections.Section], sections.Section | None], losses: Callable[[], Iterable[str]] = tuple
+) -> S:
+    """Return a source with a rule applied to each of its sections.
 
     Parameters
     ----------
-    of : Source
+    source : Source
     rule : function
-        Returns the part's successor, of the same type, or None if it is lost, which `Losses.lost` then says.
-    lines : function that returns lines, optional
+        Returns the section's successor, of the same type, or None if it is lost, which `Losses.lost` then says.
+    losses : function that returns lines, optional
         What else is lost.
     """
-    old_parts = sections_of(of)
-    after = {name: rule(part) for name, part in old_parts.items()}
-    gone = [old_parts[name] for name, part in after.items() if part is None]
-    # Only a part whose fields have defaults may be lost.
-    none: Callable[[str], Any] = lambda name: type(old_parts[name])()  # type: ignore[call-arg]  # noqa: E731
-    changed: dict[str, Any] = {name: none(name) if part is None else part for name, part in after.items()}
-    return with_losses(replace(of, **changed), lambda: [*(line for part in gone for line in part.losses()), *lines()])
+    sections_before = sections_of(source)
+    after = {name: rule(section) for name, section in sections_before.items()}
+    left_out = [sections_before[name] for name, section in after.items() if section is None]
+    # Only a section whose fields have defaults may be lost.
+    none: Callable[[str], Any] = lambda name: type(sections_before[name])()  # type: ignore[call-arg]  # noqa: E731
+    changed: dict[str, Any] = {name: none(name) if section is None else section for name, section in after.items()}
+    return with_losses(
+        replace(source, **changed), lambda: [*(line for section in left_out for line in section.losses()), *losses()]
+    )
 
 
-def with_losses(of: S, lines: Callable[[], Iterable[str]]) -> S:
+def with_losses(source: S, lines: Callable[[], Iterable[str]]) -> S:
     """Return a source with further lines of what is lost, without duplicates."""
-    lost = Once(lambda: tuple(dict.fromkeys((*of.losses.lost(), *lines()))))
-    return replace(of, losses=replace(of.losses, lost=lost))
+    lost = Once(lambda: tuple(dict.fromkeys((*source.losses.lost(), *lines()))))
+    return replace(source, losses=replace(source.losses, lost=lost))
 
 
 def source_from(
@@ -187,7 +200,7 @@ def source_from(
     columns : sequence of str
         Columns of a stream of numbers, as those of `Columns`.
     **header
-        Its other parts; default: a sensor of the table's array alone.
+        Its other sections; default: a sensor of the table's array alone.
     """
     origin = sections.Origin() if origin is None else origin
     sensor = header.pop("sensor", None) or sections.Sensor(table.array)
@@ -215,7 +228,7 @@ class Contents:
     sources: Mapping[str, Source]
 
     @classmethod
-    def of(cls, source: Source) -> Contents:
+    def single(cls, source: Source) -> Contents:
         """Return a recording of one source."""
         return cls(source, {source.origin.label: source})
 
@@ -244,7 +257,7 @@ def alone(sources: Mapping[str, Source]) -> Contents:
 
 
 def several(sources: Mapping[str, Source]) -> Several:
-    """Return the contents of a file of several sensors as a whole; parts of a single one raise an error."""
+    """Return the contents of a file of several sensors as a whole; sections of a single one raise an error."""
     first = next(iter(sources.values()))
     path, names = first.origin.path, ", ".join(sources)
 
@@ -254,24 +267,24 @@ def several(sources: Mapping[str, Source]) -> Several:
             f"{next(iter(sources))!r}]; taxel convert --source NAME writes one to a file of its own"
         )
 
-    no: Once[Any] = Once(refuse)
-    every = [source.losses for source in sources.values()]
+    refused: Once[Any] = Once(refuse)
+    losses_of_each = [source.losses for source in sources.values()]
     return Several(
         # A source is named after its file and itself.
         replace(first.origin, name=first.origin.name.removesuffix(f" {first.origin.label}"), label=""),
-        sections.Sensor(first.sensor.array, calibration=no),
+        sections.Sensor(first.sensor.array, calibration=refused),
         refuse,
         first,
         are_frames=share_clock(sources),
-        settings=sections.Settings(held=no, registers=no, register_changes=no),
-        marks=replace(first.marks, board_changes=no, zeroings=no),
-        timing=sections.Timing(no, first.timing.clock_of),
+        settings=sections.Settings(held=refused, registers=refused, register_changes=refused),
+        marks=replace(first.marks, board_changes=refused, zeroings=refused),
+        timing=sections.Timing(refused, first.timing.clock_of),
         losses=sections.Losses(
             counts=Once(lambda: {name: source.losses.counts() for name, source in sources.items()}),
             verdict=Once(lambda: _verdict(sources)),
             remarks=name_remarks([(name, source.losses.remarks) for name, source in sources.items()]),
-            truncated=any(losses.truncated for losses in every),
-            lost=Once(lambda: tuple(dict.fromkeys(line for losses in every for line in losses.lost()))),
+            truncated=any(losses.truncated for losses in losses_of_each),
+            lost=Once(lambda: tuple(dict.fromkeys(line for losses in losses_of_each for line in losses.lost()))),
         ),
     )
 

@@ -152,14 +152,14 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     >>> taxel.open(place)
     Recording(step.npz: 2 events, 0 to 200 us, 8 x 8 taxels)
     """
-    place = Path(arguments.checked_path("path", path))
-    if is_folder(place):
-        raise ProblemError(f"{place}: a folder; taxel.open_all opens its recordings")
-    every = _open(place, options)
-    if len(every) != 1:
-        names = ", ".join(recording.name for recording in every[:3]) + ", ..." * (len(every) > 3)
-        raise ProblemError(f"{place}: holds {len(every)} recordings ({names}); taxel.open_all opens each")
-    return every[0]
+    file = Path(arguments.checked_path("path", path))
+    if is_folder(file):
+        raise ProblemError(f"{file}: a folder; taxel.open_all opens its recordings")
+    recordings = _open(file, options)
+    if len(recordings) != 1:
+        names = ", ".join(recording.name for recording in recordings[:3]) + ", ..." * (len(recordings) > 3)
+        raise ProblemError(f"{file}: holds {len(recordings)} recordings ({names}); taxel.open_all opens each")
+    return recordings[0]
 
 
 @with_fields_of(OpenOptions)
@@ -258,27 +258,27 @@ def _with_layout(contents: Contents, layout: Layout | None, *, given: bool) -> R
     return Recording(with_sidecars(contents if layout is None else apply_layout(contents, layout, given=given)))
 
 
-def _on_given(of: Source, array: Array) -> Source:
+def _on_given(source: Source, array: Array) -> Source:
     """Return frames of another program on the given sensor: as many rows and columns, or a row of as many channels.
 
     Raises
     ------
     ProblemError : another number of taxels, rows or columns
     """
-    stated = of.sensor.array
+    stated = source.sensor.array
     if stated.shape != (1, array.rows * array.columns):
-        check_size(of.origin.path, stated.shape, array)
+        check_size(source.origin.path, stated.shape, array)
     says_more = array.shape != stated.shape or (array._is_measured and not stated._is_measured)
-    return on_array(of, array) if says_more else of
+    return on_array(source, array) if says_more else source
 
 
-def _read(place: Path, kind: str, array: Array | None, pairing: str, differences: bool) -> Contents:
+def _read(path: Path, kind: str, array: Array | None, pairing: str, differences: bool) -> Contents:
     """Read a file by the reader of its kind."""
     if kind == "mcap":
-        return read_mcap(place, pairing)
+        return read_mcap(path, pairing)
     if kind == "lsa":
-        return Contents.single(read_lsa(place, array or Array.thesis(), pairing, differences))
-    return Contents.single({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array))
+        return Contents.single(read_lsa(path, array or Array.thesis(), pairing, differences))
+    return Contents.single({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](path, array))
 
 
 def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
@@ -378,9 +378,9 @@ def _add_labels(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Record
     return [_with_labels(labels, name, recording) for name, recording in pairs]
 
 
-def _named_beside(place: Path, name: Path, recording: Recording) -> Recording:
+def _named_beside(path: Path, name: Path, recording: Recording) -> Recording:
     """Add the reference events of the folder to the notes of frames that it names; the page opens them one by one."""
-    table, contents = place.parent / LABELS, recording._contents
+    table, contents = path.parent / LABELS, recording._contents
     if any(source.has_events for source in contents.sources.values()):
         return recording
     if not (table.is_file() and is_label_table(table)):
@@ -401,32 +401,32 @@ def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     return Recording(Contents(several(sources), sources))
 
 
-def _notes(labels: Labels, name: Path, of: Source) -> list[Note]:
+def _notes(labels: Labels, name: Path, source: Source) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
-    clock = of.timing.usable()
-    times = labels._of(name, lambda: clock, of.origin.label)
-    which, replaced, labelled = labels_of(of.origin), set[int | None](), set[object]()
-    if beside(of.origin.path).is_file():
-        set_here = Labels(beside(of.origin.path))
-        replaced, labelled = set_here._replaced(*which), {(row.text, row.t) for row in set_here._rows(*which)}
+    clock = source.timing.usable()
+    times = labels._of(name, lambda: clock, source.origin.label)
+    names, replaced, labelled = labels_of(source.origin), set[int | None](), set[object]()
+    if beside(source.origin.path).is_file():
+        set_here = Labels(beside(source.origin.path))
+        replaced, labelled = set_here._replaced(*names), {(row.text, row.t) for row in set_here._rows(*names)}
     return sorted(
         (
             Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))))
-            for label, every in times.items()
-            for t in every
+            for label, label_times in times.items()
+            for t in label_times
             if t not in replaced and (label, int(t)) not in labelled
         ),
         key=lambda note: note.t or 0,
     )
 
 
-def _recording_of(trial: Trial, place: Path, kind: str, given_layout: str | os.PathLike[str] | None) -> Recording:
+def _recording_of(trial: Trial, path: Path, kind: str, given_layout: str | os.PathLike[str] | None) -> Recording:
     """Return a trial of another format as a recording, with its reference events as notes."""
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
     )
     label = trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board"
-    origin = sections.Origin(place if place.is_file() else place / trial.name, trial.name, kind, label, trial.source)
+    origin = sections.Origin(path if path.is_file() else path / trial.name, trial.name, kind, label, trial.source)
     contents = Contents.single(
         source_from(
             trial.recorded,
@@ -437,7 +437,7 @@ def _recording_of(trial: Trial, place: Path, kind: str, given_layout: str | os.P
             losses=sections.Losses(lost=known(_beside_frames(trial))),
         )
     )
-    layout = layout_of(place, given_layout)
+    layout = layout_of(path, given_layout)
     return _with_layout(contents, layout, given=given_layout is not None)
 
 
@@ -489,7 +489,7 @@ def sensors(recording: Recording) -> list[Recording]:
 
 def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordings") -> list[Recording]:
     """Return each sensor of recordings as one of its own; refuse what is no recording."""
-    every = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
-    if not len(every):
+    entries = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
+    if not len(entries):
         raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
-    return [recording for entry in every for recording in sensors(instance(name, entry, Recording))]
+    return [recording for entry in entries for recording in sensors(instance(name, entry, Recording))]

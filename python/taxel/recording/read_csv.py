@@ -29,8 +29,8 @@ from taxel.formats.checks import table as limited
 from taxel.formats.layout import advice
 from taxel.frames import Frames
 from taxel.recording.contents import Source, source_from
-from taxel.recording.sections import Origin
 from taxel.recording.read_npz import around
+from taxel.recording.sections import Origin
 
 #: Columns of events: those that a table must have, and those that may follow.
 EVENTS = ("t_us", "x", "y", "p")
@@ -228,12 +228,12 @@ def _numbers(path: Path, names: list[str], first: int, body: bytes, dtype: type[
     try:
         table = np.loadtxt(io.BytesIO(body), dtype=dtype, delimiter=",", comments=None, ndmin=2)
     except (ValueError, OverflowError) as error:
-        place = re.search(r"at row (\d+)(?:, column (\d+))?", str(error))
+        match = re.search(r"at row (\d+)(?:, column (\d+))?", str(error))
         # NumPy counts rows from 0 in one of its messages, and from 1 in the other.
-        row = 0 if place is None else int(place[1]) - ("changed" in str(error))
-        where = "" if place is None else f", line {first + _line_number(body, row)}"
-        if place is not None and place[2] is not None and int(place[2]) <= len(names):
-            where += f", column {names[int(place[2]) - 1]}"
+        row = 0 if match is None else int(match[1]) - ("changed" in str(error))
+        where = "" if match is None else f", line {first + _line_number(body, row)}"
+        if match is not None and match[2] is not None and int(match[2]) <= len(names):
+            where += f", column {names[int(match[2]) - 1]}"
         reason = re.sub(r" at row .*|; use `usecols`.*", "", first_line(error))
         raise FormatError(f"{path}{where}: {reason}; must be {len(names)} numbers a line") from None
     if table.shape[1] != len(names):

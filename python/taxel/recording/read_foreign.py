@@ -240,11 +240,11 @@ def _us(times: NDArray[np.float64], name: str, how: Table, path: Path, first: in
 
 def cells(line: str, separator: str) -> list[str]:
     """Return the cells of a line, without blanks and quotes around them; by " " any number of blanks stands between."""
-    parts = line.split() if separator == " " else line.split(separator)
+    texts = line.split() if separator == " " else line.split(separator)
     if '"' in line and separator != " ":
         with suppress(csv.Error):
-            parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    return [_unquote(part.strip()) for part in parts]
+            texts = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    return [_unquote(text.strip()) for text in texts]
 
 
 def _unquote(cell: str) -> str:
@@ -331,8 +331,8 @@ def _column(path: Path, key: str, column: str | int, names: Sequence[str], named
             if named
             else "no names, so give its number from 1"
         )
-        of = " of times" if key == "time_column" else ""
-        raise FormatError(f"{path.name}: no column {shown(name)}{of}; there are {known_names}")
+        kind = " of times" if key == "time_column" else ""
+        raise FormatError(f"{path.name}: no column {shown(name)}{kind}; there are {known_names}")
     return names.index(name)
 
 
@@ -347,12 +347,14 @@ def _data(path: Path, how: Data) -> _Read:
         stored_names: list[str] = [""]
         wanted = stored_names
     else:
-        every = shapes_of(path)
-        stored_names = list(every)
+        stored_shapes = shapes_of(path)
+        stored_names = list(stored_shapes)
         if how.array is None and len(stored_names) != 1:
-            raise FormatError(f"{path}: holds {list_arrays(every)}; say which in the layout: [data] array")
+            raise FormatError(f"{path}: holds {list_arrays(stored_shapes)}; say which in the layout: [data] array")
         # A path within a .h5 may begin at its root.
-        named = [name if name in every else name.strip("/") for name in (how.array, how.time) if name is not None]
+        named = [
+            name if name in stored_shapes else name.strip("/") for name in (how.array, how.time) if name is not None
+        ]
         wanted = [stored_names[0], *named] if how.array is None else named
         missing = next((name for name in wanted if name not in stored_names), None)
         if missing is not None:
@@ -360,9 +362,9 @@ def _data(path: Path, how: Data) -> _Read:
                 raise FormatError(f"{path}, {missing}: {why}")
             size = as_size(missing)
             hint = f"; a size is said by {size}" if size else ""
-            raise FormatError(f"{path}: holds no array {missing}; there are {list_arrays(every)}{hint}")
-        if len(wanted) > 1 and every[wanted[1]] != every[wanted[0]][:1]:
-            count, frames = math.prod(every[wanted[1]]), math.prod(every[wanted[0]][:1])
+            raise FormatError(f"{path}: holds no array {missing}; there are {list_arrays(stored_shapes)}{hint}")
+        if len(wanted) > 1 and stored_shapes[wanted[1]] != stored_shapes[wanted[0]][:1]:
+            count, frames = math.prod(stored_shapes[wanted[1]]), math.prod(stored_shapes[wanted[0]][:1])
             raise FormatError(f"{path}, {wanted[1]}: {counted(count, 'time')} for {counted(frames, 'frame')}")
         arrays = arrays_of(path, wanted, frames=wanted[0])
     values, unread = arrays[wanted[0]], ", ".join(name for name in stored_names if name not in wanted)
@@ -375,8 +377,8 @@ def _data(path: Path, how: Data) -> _Read:
         )
     large = _too_large(values)
     if large is not None:
-        frame, *place = large
-        at = f"row {place[0]}, column {place[1]}" if len(place) == 2 else f"taxel {place[0]}"
+        frame, *indices = large
+        at = f"row {indices[0]}, column {indices[1]}" if len(indices) == 2 else f"taxel {indices[0]}"
         raise FormatError(
             f"{path}, {wanted[0] or 'the array'}, frame {frame}, {at}: {values[large]}; must fit 32 "
             "bits, or be NaN where it is missing"
@@ -393,8 +395,8 @@ def _data(path: Path, how: Data) -> _Read:
         else np.empty(len(times), np.int64)
     )
     for begin in range(0, len(times), _TIMES_AT_ONCE):
-        part = slice(begin, begin + _TIMES_AT_ONCE)
-        t[part] = whole_us(path.name, times[part].astype(np.float64) * UNITS_US[how.time_unit] / 1e6, begin)
+        block = slice(begin, begin + _TIMES_AT_ONCE)
+        t[block] = whole_us(path.name, times[block].astype(np.float64) * UNITS_US[how.time_unit] / 1e6, begin)
     return _Read(values, t, lost=lost)
 
 

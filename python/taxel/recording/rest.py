@@ -200,10 +200,10 @@ def flickering(frames: Frames) -> NDArray[np.bool_]:
 
 def _extremes(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return each taxel's least and greatest finite value, NaN for one without any."""
-    least, most = (of.reduce(values, axis=0, initial=np.nan) for of in (np.fmin, np.fmax))
+    least, most = (reduction.reduce(values, axis=0, initial=np.nan) for reduction in (np.fmin, np.fmax))
     if np.isinf(least).any() or np.isinf(most).any():
         values = np.where(np.isfinite(values), values, np.nan)
-        least, most = (of.reduce(values, axis=0, initial=np.nan) for of in (np.fmin, np.fmax))
+        least, most = (reduction.reduce(values, axis=0, initial=np.nan) for reduction in (np.fmin, np.fmax))
     return least, most
 
 

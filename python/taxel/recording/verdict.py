@@ -72,28 +72,28 @@ class Verdict(str):
     @classmethod
     def _from(cls, held: Mapping[str, Any]) -> Self:
         """Return the verdict that the compiled part states."""
-        made = str.__new__(cls, held["text"])
-        made._held = held
-        return made
+        verdict = str.__new__(cls, held["text"])
+        verdict._held = held
+        return verdict
 
     @classmethod
-    def _together(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
+    def _together(cls, named: Iterable[tuple[str, Verdict]]) -> Self:
         """Return the verdict on several recordings or sources, each with its name."""
-        return cls._of({"together": [(name, part._held) for name, part in parts]})
+        return cls._of({"together": [(name, verdict._held) for name, verdict in named]})
 
     @classmethod
-    def _of_sources(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
+    def _of_sources(cls, named: Iterable[tuple[str, Verdict]]) -> Self:
         """Return the verdict on the sources of one file, each with its name; damage of the file counts once."""
-        return cls._of({"sources": [(name, part._held) for name, part in parts]})
+        return cls._of({"sources": [(name, verdict._held) for name, verdict in named]})
 
     @classmethod
-    def _of_stretches(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
-        """Return the verdict on stretches of one recording, each with its name; what the whole lost counts once."""
-        return cls._of({"stretches": [(name, part._held) for name, part in parts]})
+    def _of_stretches(cls, named: Iterable[tuple[str, Verdict]]) -> Self:
+        """Return the verdict on slices of one recording, each with its name; what the whole lost counts once."""
+        return cls._of({"stretches": [(name, verdict._held) for name, verdict in named]})
 
-    def _as_stretch_of(self, whole: str) -> Self:
+    def _as_stretch_of(self, name: str) -> Self:
         """Return the same verdict as that of a stretch of the recording of this name."""
-        return self._from({**self._held, "stretch_of": whole})
+        return self._from({**self._held, "stretch_of": name})
 
     def _later(self, shift: int) -> Self:
         """Return the verdict on the recording whose times are later by so many us."""

@@ -71,7 +71,7 @@ def refuse_without_layout(path: Path) -> None:
 def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
     """Return the layout of the array of a name."""
     count, *shape = shapes[name]
-    time = next((name for name, of in shapes.items() if of == (count,) and unit_of(name) is not None), None)
+    time = next((name for name, shape_of in shapes.items() if shape_of == (count,) and unit_of(name) is not None), None)
     times = [] if time is None else [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time])]
     data = [f"array = {_quote(name)}"] * bool(name) + times
     return [*_size(shape), *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]

@@ -30,8 +30,8 @@ from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.contents import Contents, source_from
-from taxel.recording.sections import Origin
 from taxel.recording.pressure import series
+from taxel.recording.sections import Origin
 from taxel.report.page import render
 from taxel.report.svg import INK, STYLE, picture
 from taxel.spikes import SpikeTrains, to_ms, to_us
