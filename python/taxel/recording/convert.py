@@ -26,7 +26,7 @@ from taxel.recording.kinds import ENDINGS
 from taxel.recording.opening import open_one
 from taxel.recording.recording import Recording
 from taxel.recording.sections import Wire
-from taxel.recording.stored import storable
+from taxel.recording.stored import needs_new_bytes, storable
 from taxel.recording.write_csv import write_csv
 from taxel.recording.write_h5 import write_h5
 from taxel.recording.write_mcap import write_mcap

@@ -70,8 +70,8 @@ def json_of(source: Source) -> str:
     described = json.dumps({name: value for name, value in document.items() if value or isinstance(value, float)})
     if (size := memory_of_json(described)) > limits.ABOUT:
         raise ProblemError(
-            f"{source.origin.name}: its description (sensor, notes, registers, detections) takes {size} bytes of memory; a "
-            f".npz and a .h5 hold at most {limits.ABOUT}"
+            f"{source.origin.name}: its description (sensor, notes, registers, detections) takes {size} bytes of "
+            f"memory; a .npz and a .h5 hold at most {limits.ABOUT}"
         )
     return described
 

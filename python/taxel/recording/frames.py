@@ -168,8 +168,8 @@ def calibrate(source: Source, rate_hz: float | None = None, rest: Tare | None = 
     calibration = source.sensor.calibration()
     if calibration is None:
         raise ProblemError(
-            f"{source.origin.path}: no calibration lies beside it; taxel calibrate makes one, and without one nothing is N "
-            "or kPa"
+            f"{source.origin.path}: no calibration lies beside it; taxel calibrate makes one, and without one nothing "
+            "is N or kPa"
         )
     drawn = as_frames(source, rate_hz)
     calibrated = replace(

@@ -1,6 +1,6 @@
 """The sections of a recording: what a function does with a field follows from the type of the section it stands in.
 
-Each function (`between`, `merge`, `convert` ...) has a rule for every type in `Section`, which the type checker demands.
+Each function (`between`, `merge`, `convert` ...) has a rule for every type in `Section`: the type checker demands it.
 """
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ def _fitting(path: Path, source: Source) -> Calibration:
     unit = source.table.unit if isinstance(source, FrameSource) else "ticks"
     if not calibration.array.fits(source.sensor.array) or calibration.of != unit:
         raise ProblemError(
-            f"{path}: turns {calibration.of} of {calibration.array!r} into {calibration.unit}; {source.origin.name} holds "
-            f"{unit} of {source.sensor.array!r}, another array"
+            f"{path}: turns {calibration.of} of {calibration.array!r} into {calibration.unit}; {source.origin.name} "
+            f"holds {unit} of {source.sensor.array!r}, another array"
         )
     return calibration
