@@ -177,7 +177,7 @@ def test_pressure_over_time_is_that_of_whole_frames(tmp_path: Path) -> None:
             found, whole = series(part), above_rest(part)
             assert found is not None
             assert whole is not None
-            dense = Series.of(*whole)
+            dense = Series.from_frames(*whole)
             for name in ("t", "area", "peak", "total", "centre"):
                 np.testing.assert_array_equal(getattr(found, name), getattr(dense, name), err_msg=f"{k} {name}")
             assert (found.unit, found.above) == (dense.unit, dense.above)

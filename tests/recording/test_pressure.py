@@ -154,7 +154,7 @@ def test_the_largest_are_those_of_frames_at_all_events(monkeypatch: pytest.Monke
     recording = Recording(Contents.single(source_from(events)))
     found = pressure.series(recording)
     assert found is not None and found.largest is not None  # noqa: PT018
-    drawn = pressure._Drawn.of(recording)
+    drawn = pressure._Drawn.from_recording(recording)
     rest = pressure._rest_of(recording, drawn, None)
     every = pressure._series_of(pressure.replace(drawn, t=np.unique(t)), rest, ARRAY)
     for name in ("area", "peak", "total"):
@@ -189,7 +189,7 @@ def test_silence_is_read_at_few_times_and_shows_the_same(monkeypatch: pytest.Mon
         times = np.union1d(drawn.t, np.arange(drawn.t[0], drawn.t[-1], 50_000))
         return times, np.ones(len(times), np.int64)
 
-    drawn = pressure._Drawn.of(recording)
+    drawn = pressure._Drawn.from_recording(recording)
     times, stand_for = drawn.sampled
     assert np.isin(times, every(drawn)[0]).all()
     assert stand_for.min() > 0
@@ -216,7 +216,7 @@ def test_what_info_takes_does_not_grow_with_a_time_that_is_wrong(tmp_path: Path,
     t = np.sort(np.append(np.arange(3000) * 1000, wrong_us))
     x, y, p, ticks = (np.random.default_rng(2).integers(0, most, len(t)) for most in (8, 8, 2, 90))
     events = taxel.Events(t, x, y, p.astype(bool), array=taxel.Array(8, 8), intensity=ticks)
-    drawn = pressure._Drawn.of(Recording(Contents.single(source_from(events))))
+    drawn = pressure._Drawn.from_recording(Recording(Contents.single(source_from(events))))
     assert len(drawn.sampled[0]) < 20_000
     taxel.convert(events, tmp_path / "wrong.npz")
     begin = perf_counter()

@@ -131,7 +131,7 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
     ['contact area (mm2)', 'peak (kPa)', 'sum (kPa)', 'centre (mm)']
     """
     nowhere = np.full(instance("frames", frames, Frames).array.rows * frames.array.columns, np.nan)
-    of = Series.of(frames, above, Rest("none", nowhere))
+    of = Series.from_frames(frames, above, Rest("none", nowhere))
     if figure is None:
         figure = plt.figure(figsize=(11, 6), layout="constrained")
     curves = [(f"peak ({of.unit})", of.peak), (f"sum ({of.unit})", of.total)]

@@ -151,11 +151,11 @@ def _interval(source: Source, start: float, stop: float) -> tuple[int, int]:
     bounds = (int(t.min()), int(t.max()) + 1) if len(t) else (0, 1)
     if source.timing.interval is not None:
         bounds = source.timing.interval()
-    first, last = max(bounds[0], _whole(start)), min(bounds[1], _whole(stop))
+    first, last = max(bounds[0], _whole_us(start)), min(bounds[1], _whole_us(stop))
     return first, max(first, last)
 
 
-def _whole(value: float) -> int:
+def _whole_us(value: float) -> int:
     """Return a bound in whole us; an infinite one becomes the largest time."""
     return int(np.ceil(np.clip(value, -(2.0**62), 2.0**62)))
 

@@ -89,7 +89,7 @@ class Series:
     largest: Series | None = None
 
     @classmethod
-    def of(cls, frames: Frames, above: float, rest: Rest) -> Series:
+    def from_frames(cls, frames: Frames, above: float, rest: Rest) -> Series:
         """Return the series of frames above rest."""
         array = frames.array
         block = max(1, _BLOCK // max(1, array.rows * array.columns))
@@ -133,15 +133,15 @@ def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     if not recording.has_events or recording.calibration is not None:
         result = above_rest(recording, tare)
         if result is None or recording.has_events:
-            return None if result is None else Series.of(*result)
+            return None if result is None else Series.from_frames(*result)
         frames, above, rest = result
         # As on the page, a taxel that jumps alone for single frames is no load.
         values = np.where(flickering(recording.frames()), np.float32(0), frames.values)
-        return Series.of(Frames(values, frames.t, unit=frames.unit, array=frames.array), above, rest)
+        return Series.from_frames(Frames(values, frames.t, unit=frames.unit, array=frames.array), above, rest)
     events = recording.events
     if events.present is None or events.intensity is None or not events.present.any():
         return None
-    drawn = _Drawn.of(recording)
+    drawn = _Drawn.from_recording(recording)
     rest = _rest_of(recording, drawn, tare)
     drawn_series = _series_of(drawn, rest, events.array)
     moments = _moments(events, drawn, rest, drawn_series)
@@ -277,7 +277,7 @@ class _Drawn:
     zeroed: tuple[tuple[int, int, float], ...]
 
     @classmethod
-    def of(cls, recording: Recording) -> _Drawn:
+    def from_recording(cls, recording: Recording) -> _Drawn:
         events = recording.events
         assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller checked
         present = np.flatnonzero(events.present)
@@ -377,8 +377,8 @@ class _Drawn:
         for t, over in _above(replace(rest, values=everywhere), read(), self.box[1]):
             shown, (_, values) = kept.popleft()
             for k, since, zero in self.zeroed:
-                place, later = self.places[k], t >= since
-                over[later, place] = np.maximum(np.nan_to_num(values[later, place] - np.float32(zero)), 0)
+                column, later = self.places[k], t >= since
+                over[later, column] = np.maximum(np.nan_to_num(values[later, column] - np.float32(zero)), 0)
             yield first, over[shown][:, self.places]
             first += int(np.count_nonzero(shown))
 
@@ -445,7 +445,7 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
             rest,
         )
     if recording.has_events:
-        drawn = _Drawn.of(recording)
+        drawn = _Drawn.from_recording(recording)
         shown = drawn.frames(replace(rest, values=rest.values.reshape(-1)[drawn.taxels]), frames.array)
     elif rest.source in ("unit", "none"):
         return frames, floor, rest
@@ -471,7 +471,7 @@ def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
     float32, shape (n, rows, columns), ticks
     """
     recording = Recording(Contents.single(source_from(events)))
-    drawn = _Drawn.of(recording)
+    drawn = _Drawn.from_recording(recording)
     # The rest is found from the first event on.
     from_first = np.union1d(t, min(t[0], events.t.min())) if len(t) else t
     drawn = replace(drawn, t=from_first.astype(np.int64))
@@ -484,7 +484,7 @@ def quiet_rest(recording: Recording) -> Rest | None:
     Its values are those of the taxels with events.
     """
     present = recording.events.present
-    return None if present is None or not present.any() else _Drawn.of(recording).found()
+    return None if present is None or not present.any() else _Drawn.from_recording(recording).found()
 
 
 def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:
@@ -499,7 +499,7 @@ def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Re
     events = recording.events
     if events.present is None or not events.present.any():
         return None
-    drawn = _Drawn.of(recording)
+    drawn = _Drawn.from_recording(recording)
     rest, values, preload = _rest_of(recording, drawn, tare), np.full(events.array.shape, np.nan), None
     values.reshape(-1)[drawn.taxels] = rest.values
     if rest.preload is not None:

@@ -211,9 +211,9 @@ def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: A
         if array is None and n * rows * columns > max(1 << 24, 16 * n * len(names)):
             raise FormatError(sparse)
         for k in range(0, len(table), at_once):
-            part = table[k : k + at_once]
-            frames = np.zeros((len(part), rows, columns), np.float32)
-            frames[:, y, x] = part[:, 1:]
+            block = table[k : k + at_once]
+            frames = np.zeros((len(block), rows, columns), np.float32)
+            frames[:, y, x] = block[:, 1:]
             read.add(t=t[k : k + at_once], values=frames)
     try:
         return Frames(read.column("values"), read.column("t"), array=sensor)

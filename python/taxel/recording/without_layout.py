@@ -47,10 +47,10 @@ def refuse_without_layout(path: Path) -> None:
     """
     if path.suffix.lower() not in ARRAYS:
         lines = text.beginning(path)
-        found = _TextTable.of(lines, texts=False)
+        found = _TextTable.find(lines, texts=False)
         if found is None:
             _refuse_decimal_commas(path, lines)
-            found = _TextTable.of(lines, texts=True)
+            found = _TextTable.find(lines, texts=True)
         if found is None:
             return
         holds, lines = _of_table(found)
@@ -90,7 +90,7 @@ class _TextTable:
     numeric: Sequence[bool]
 
     @classmethod
-    def of(cls, lines: Sequence[str], *, texts: bool) -> _TextTable | None:
+    def find(cls, lines: Sequence[str], *, texts: bool) -> _TextTable | None:
         """Find the parts; None of a text that does not end in lines of numbers, with `texts` beside texts."""
         there = [(k, line) for k, line in enumerate(lines) if line.strip()]
         # The separator that makes most columns of numbers.
