@@ -15,9 +15,9 @@ import taxel
 from taxel import Array, Frames, Places
 from taxel.live import Panel
 from taxel.live import _shown_files as shown_files
+from taxel.recording.analysis.pressure import above_rest, force_n
+from taxel.recording.analysis.rest import ticks_by_unit
 from taxel.recording.contents import Contents, source_from
-from taxel.recording.pressure import above_rest, force_n
-from taxel.recording.rest import ticks_by_unit
 from taxel.recording.text_options import TextOptions
 
 UNKNOWN = 65_535

@@ -21,7 +21,7 @@ from taxel.recording.once import known
 from taxel.recording.raw import Samples
 from taxel.recording.recording import with_notes
 from taxel.recording.sections import Columns, Timing
-from taxel.recording.stored import storable
+from taxel.recording.writers.stored import storable
 
 from .parts import flat, holds, unsaid
 from .test_chains import ARRAY, KINDS, write

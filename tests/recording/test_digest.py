@@ -19,9 +19,9 @@ import taxel
 from taxel._core import FormatError
 from taxel.recording.contents import Contents
 from taxel.recording.once import known
-from taxel.recording.read_npz import source_of_columns
+from taxel.recording.readers.npz import source_of_columns
 from taxel.recording.verdict import Verdict
-from taxel.recording.write_npz import columns_of
+from taxel.recording.writers.npz import columns_of
 
 from .making import record, some_events, some_frames
 

@@ -180,7 +180,7 @@ def test_a_csv_is_the_same_however_much_of_it_is_read_at_once(
     lines = path.read_bytes().split(b"\n")
     wrong = [*lines[:20], b"", lines[20].rpartition(b",")[0] + b",abc", *lines[21:]]
     for size in (1, 37, 400, 1 << 22):
-        monkeypatch.setattr(taxel.recording.read_csv, "_AT_ONCE", size)
+        monkeypatch.setattr(taxel.recording.readers.csv, "_AT_ONCE", size)
         path.write_bytes(b"\r\n".join(lines))
         read = taxel.open(path).frames() if are_frames else taxel.open(path).events
         assert read == table

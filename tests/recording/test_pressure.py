@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel.recording import pressure
+from taxel.recording.analysis import pressure
+from taxel.recording.analysis.pressure import series
 from taxel.recording.contents import Contents, source_from
-from taxel.recording.pressure import series
 from taxel.recording.recording import Recording
 
 from .test_commands import run
@@ -139,7 +139,7 @@ def test_what_is_largest_between_two_frames_of_events_is_said(tmp_path: Path) ->
 
 @pytest.mark.parametrize("chunk", [64, 1 << 16])
 def test_the_largest_are_those_of_frames_at_all_events(monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
-    from taxel.recording import pressure
+    from taxel.recording.analysis import pressure
     from taxel.recording.contents import Contents, source_from
     from taxel.recording.recording import Recording
 

@@ -16,8 +16,8 @@ from taxel._base.times import beginning_us, begun
 from taxel.frames import Frames
 from taxel.plot.nouns import axes
 from taxel.recording import Health, Recording, health
-from taxel.recording.pressure import Series, above_rest
-from taxel.recording.rest import Rest
+from taxel.recording.analysis.pressure import Series, above_rest
+from taxel.recording.analysis.rest import Rest
 
 F = TypeVar("F", bound=FigureBase)
 

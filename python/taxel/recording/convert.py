@@ -26,11 +26,11 @@ from taxel.recording.kinds import ENDINGS
 from taxel.recording.opening import open_one
 from taxel.recording.recording import Recording
 from taxel.recording.sections import Wire
-from taxel.recording.stored import needs_new_bytes, storable
-from taxel.recording.write_csv import write_csv
-from taxel.recording.write_h5 import write_h5
-from taxel.recording.write_mcap import write_mcap
-from taxel.recording.write_npz import write_npz
+from taxel.recording.writers.csv import write_csv
+from taxel.recording.writers.h5 import write_h5
+from taxel.recording.writers.mcap import write_mcap
+from taxel.recording.writers.npz import write_npz
+from taxel.recording.writers.stored import needs_new_bytes, storable
 
 __all__ = ["KINDS", "convert"]
 

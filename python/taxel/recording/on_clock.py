@@ -20,7 +20,7 @@ from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Contents, Source, alone, apply_rule
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import Once
-from taxel.recording.read_mcap import ascending
+from taxel.recording.readers.mcap import ascending
 from taxel.recording.verdict import Verdict
 
 #: The name of the host's clock, us since 1970.

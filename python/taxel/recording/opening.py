@@ -30,13 +30,13 @@ from taxel.recording.contents import Board, Contents, FrameSource, Source, Strea
 from taxel.recording.kinds import ENDINGS, LABELS
 from taxel.recording.layout import apply_layout, check_size, on_array
 from taxel.recording.once import known
-from taxel.recording.read_csv import read_csv
-from taxel.recording.read_foreign import read_foreign
-from taxel.recording.read_h5 import read_h5
-from taxel.recording.read_lsa import read_lsa
-from taxel.recording.read_mcap import read_mcap
-from taxel.recording.read_npz import read_npz
-from taxel.recording.read_ros import Topics, read_ros
+from taxel.recording.readers.csv import read_csv
+from taxel.recording.readers.foreign import read_foreign
+from taxel.recording.readers.h5 import read_h5
+from taxel.recording.readers.lsa import read_lsa
+from taxel.recording.readers.mcap import read_mcap
+from taxel.recording.readers.npz import read_npz
+from taxel.recording.readers.ros import Topics, read_ros
 from taxel.recording.recognition import (
     ForeignFile,
     FormatFile,
@@ -140,7 +140,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     first used.
 
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
-    is described in `taxel.recording.write_h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`)
+    is described in `taxel.recording.writers.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`)
     become notes of a file of frames that it names.
 
     Examples

@@ -17,10 +17,10 @@ from taxel._core import FormatError
 from taxel.formats.layout import Layout, advice
 from taxel.formats.ros import is_bag
 from taxel.recording.kinds import ENDINGS, LABELS
-from taxel.recording.read_csv import check_head, names_in
-from taxel.recording.read_foreign import ARRAYS
-from taxel.recording.read_h5 import is_h5_of_taxel
-from taxel.recording.without_layout import refuse_without_layout
+from taxel.recording.readers.csv import check_head, names_in
+from taxel.recording.readers.foreign import ARRAYS
+from taxel.recording.readers.h5 import is_h5_of_taxel
+from taxel.recording.readers.without_layout import refuse_without_layout
 
 #: The endings of tables of text, also compressed by gzip.
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")

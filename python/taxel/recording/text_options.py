@@ -16,7 +16,7 @@ from taxel.formats.layout import Layout
 from taxel.recording.contents import Contents
 from taxel.recording.layout import on_array
 from taxel.recording.opening import SharedOptions, join_feet, open_all, sensors
-from taxel.recording.read_foreign import is_lone_array
+from taxel.recording.readers.foreign import is_lone_array
 from taxel.recording.recognition import ForeignFile, recognise
 from taxel.recording.recording import Recording
 

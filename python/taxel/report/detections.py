@@ -29,8 +29,8 @@ from taxel.encode import Composite, Encoder
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
+from taxel.recording.analysis.pressure import series
 from taxel.recording.contents import Contents, source_from
-from taxel.recording.pressure import series
 from taxel.recording.sections import Origin
 from taxel.report.page import render
 from taxel.report.svg import INK, STYLE, picture

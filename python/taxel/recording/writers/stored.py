@@ -36,8 +36,8 @@ from taxel.recording.contents import (
 from taxel.recording.kinds import ENDINGS, verdict_of
 from taxel.recording.once import known
 from taxel.recording.sidecars import calibration_beside
-from taxel.recording.write_csv import array_in_csv
-from taxel.recording.write_mcap import cut_raw, encode_events
+from taxel.recording.writers.csv import array_in_csv
+from taxel.recording.writers.mcap import cut_raw, encode_events
 from taxel.wire import decode as wire_decode
 
 #: The unit of the stamps of wire version 1, us.

@@ -17,11 +17,7 @@ from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Contents, source_from
-from taxel.recording.frames import FRAMES_HZ, period_us
-from taxel.recording.once import UNKNOWN
-from taxel.recording.recording import Recording
-from taxel.recording.rest import (
+from taxel.recording.analysis.rest import (
     FrameBlock,
     Rest,
     find_rest,
@@ -31,6 +27,10 @@ from taxel.recording.rest import (
     of_frames,
     ticks_by_unit,
 )
+from taxel.recording.contents import Contents, source_from
+from taxel.recording.frames import FRAMES_HZ, period_us
+from taxel.recording.once import UNKNOWN
+from taxel.recording.recording import Recording
 from taxel.tare import Tare
 
 #: The most frames of a long recording, as a plot resolves no more points.
@@ -127,7 +127,7 @@ def force_n(frames: Frames) -> NDArray[np.float64] | None:
 def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     """Return area, peak, sum and centre of a recording's frames above rest (`above_rest`); None without intensities.
 
-    Taxels of frames that flicker (`taxel.recording.rest.flickering`) count as 0. For events only taxels with events
+    Taxels of frames that flicker (`taxel.recording.analysis.rest.flickering`) count as 0. For events only taxels with events
     are computed, a block of frames at a time: for a large sensor with few events no whole frame is in memory.
     """
     if not recording.has_events or recording.calibration is not None:

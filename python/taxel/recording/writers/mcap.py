@@ -16,13 +16,13 @@ from taxel._core import RecordingWriter
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.recording.analysis.pressure import above_rest
+from taxel.recording.analysis.rest import Rest, ticks_by_unit
 from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import known
-from taxel.recording.pressure import above_rest
 from taxel.recording.raw import Datagrams
 from taxel.recording.recording import Recording
-from taxel.recording.rest import Rest, ticks_by_unit
 
 __all__ = ["RecordingWriter", "cut_raw", "encode_events", "write_mcap"]
 
@@ -35,7 +35,7 @@ _RESTS = {"unit": "0", "quiet": "quiet stretch"}
 
 
 def write_mcap(path: Path, contents: Contents, compression: str, counts: Mapping[str, dict[str, Any]]) -> None:
-    """Write a .mcap of contents as it can hold them (`taxel.recording.stored.storable`).
+    """Write a .mcap of contents as it can hold them (`taxel.recording.writers.stored.storable`).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Reads events or frames as named columns: a .npz, and what a .h5 holds (`taxel.recording.write_npz`)."""
+"""Reads events or frames as named columns: a .npz, and what a .h5 holds (`taxel.recording.readers.columns`)."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from taxel.frames import Frames
 from taxel.recording.contents import Source
 from taxel.recording.description import about_of, described_source
 from taxel.recording.layout import check_size
+from taxel.recording.readers.columns import COLUMNS, DIGEST, EVENTS, PIECE_BYTES, TEXTS, digest_of
 from taxel.recording.sections import Origin
-from taxel.recording.write_npz import COLUMNS, DIGEST, EVENTS, PIECE_BYTES, TEXTS, digest_of
 
 #: Columns of events, one entry each.
 _OF_EVENTS = (*EVENTS, "intensity", "present", "repaired")

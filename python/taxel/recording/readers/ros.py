@@ -19,7 +19,7 @@ from taxel.frames import Frames
 from taxel.labels import source_of
 from taxel.recording.contents import Contents, Source, alone, source_from
 from taxel.recording.once import known
-from taxel.recording.read_mcap import ascending
+from taxel.recording.readers.mcap import ascending
 from taxel.recording.sections import Losses, Origin
 
 

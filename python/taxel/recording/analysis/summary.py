@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from taxel.clock import doubt
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.health import health
-from taxel.recording.pressure import Series
+from taxel.recording.analysis.health import health
+from taxel.recording.analysis.pressure import Series
 from taxel.recording.recording import Recording
 
 #: The interval over which the highest rate is measured, us.
@@ -33,7 +33,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     ----------
     recording : Recording
     pressed : Series, optional
-        Its pressure over time (`taxel.recording.pressure.series`), if it has intensities.
+        Its pressure over time (`taxel.recording.analysis.pressure.series`), if it has intensities.
     """
     array = recording.array
     table: Events | Frames = recording.events if recording.has_events else recording.frames()

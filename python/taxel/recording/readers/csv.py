@@ -29,7 +29,7 @@ from taxel.formats.checks import table as limited
 from taxel.formats.layout import advice
 from taxel.frames import Frames
 from taxel.recording.contents import Source, source_from
-from taxel.recording.read_npz import around
+from taxel.recording.readers.npz import around
 from taxel.recording.sections import Origin
 
 #: Columns of events: those that a table must have, and those that may follow.

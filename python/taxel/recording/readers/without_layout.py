@@ -17,7 +17,7 @@ from taxel._base.number_text import float_of
 from taxel._core import FormatError
 from taxel.formats import text
 from taxel.formats.layout import ISO, UNITS_US, advice
-from taxel.recording.read_foreign import (
+from taxel.recording.readers.foreign import (
     ARRAYS,
     MISSING,
     are_units,

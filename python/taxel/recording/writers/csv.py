@@ -1,4 +1,4 @@
-"""Writes tables of text: a .csv of events or of frames, as `taxel.recording.read_csv` reads them."""
+"""Writes tables of text: a .csv of events or of frames, as `taxel.recording.readers.csv` reads them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.read_csv import EVENTS, MORE, sensor_of
-from taxel.recording.read_npz import around
+from taxel.recording.readers.csv import EVENTS, MORE, sensor_of
+from taxel.recording.readers.npz import around
 
 #: Number of frames that are written at once.
 _FRAMES = 4096
