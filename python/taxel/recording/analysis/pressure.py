@@ -127,8 +127,8 @@ def force_n(frames: Frames) -> NDArray[np.float64] | None:
 def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     """Return area, peak, sum and centre of a recording's frames above rest (`above_rest`); None without intensities.
 
-    Taxels of frames that flicker (`taxel.recording.analysis.rest.flickering`) count as 0. For events only taxels with events
-    are computed, a block of frames at a time: for a large sensor with few events no whole frame is in memory.
+    Taxels of frames that flicker (`flickering`) count as 0. For events only taxels with events are computed, a block of
+    frames at a time: for a large sensor with few events no whole frame is in memory.
     """
     if not recording.has_events or recording.calibration is not None:
         result = above_rest(recording, tare)
