@@ -215,7 +215,9 @@ def _open(path: Path, options: OpenOptions) -> list[Recording]:
     with options.within():
         if is_folder(path):
             return _open_folder(path, options)
-        return [_named_beside(path, Path(recording.name), recording) for recording in _open_file(path, options)]
+        opened = _open_file(path, options)
+        names = [recording.name if recording.kind in formats.FORMATS else path.name for recording in opened]
+        return [_named_beside(path, Path(name), recording) for name, recording in zip(names, opened, strict=True)]
 
 
 def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
