@@ -25,7 +25,7 @@ from taxel.formats import Trial
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording import sections
+from taxel.recording import recognition, sections
 from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, several, source_from
 from taxel.recording.kinds import ENDINGS, LABELS
 from taxel.recording.layout import apply_layout, check_size, on_array
@@ -37,23 +37,6 @@ from taxel.recording.readers.lsa import read_lsa
 from taxel.recording.readers.mcap import read_mcap
 from taxel.recording.readers.npz import read_npz
 from taxel.recording.readers.ros import Topics, read_ros
-from taxel.recording.recognition import (
-    ForeignFile,
-    FormatFile,
-    RosBag,
-    TaxelFile,
-    bags_of,
-    described_tables,
-    files_in,
-    formats_of,
-    is_folder,
-    is_label_table,
-    layout_of,
-    natural_order,
-    recognise_recording,
-    recorded_by_taxel,
-    refuse_undescribed,
-)
 from taxel.recording.recording import Recording, add_notes
 from taxel.recording.sidecars import labels_of, with_sidecars
 
@@ -153,7 +136,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     Recording(step.npz: 2 events, 0 to 200 us, 8 x 8 taxels)
     """
     file = Path(arguments.checked_path("path", path))
-    if is_folder(file):
+    if recognition.is_folder(file):
         raise ProblemError(f"{file}: a folder; taxel.open_all opens its recordings")
     recordings = _open(file, options)
     if len(recordings) != 1:
@@ -213,35 +196,33 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
 def _open(path: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, or all trials of a file."""
     with options.within():
-        if is_folder(path):
+        if recognition.is_folder(path):
             return _open_folder(path, options)
-        opened = _open_file(path, options)
-        names = [recording.name if recording.kind in formats.FORMATS else path.name for recording in opened]
-        return [_named_beside(path, Path(name), recording) for name, recording in zip(names, opened, strict=True)]
+        return [_named_beside(path, recording) for recording in _open_file(path, options)]
 
 
 def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
     """Open a file, or a ROS bag: of a file of another format all trials."""
     text("pairing", options.pairing, ("direct", "taxel"))
     flag("differences", options.differences)
-    layout = layout_of(path, options.layout)
+    layout = recognition.layout_of(path, options.layout)
     try:
-        match recognise_recording(path, layout):
-            case FormatFile(name):
+        match recognition.recognise_recording(path, layout):
+            case recognition.FormatFile(name):
                 trials = _counting_memory(formats.trials(path, name))
                 return [_recording_of(trial, path, name, options.layout) for trial in trials]
-            case RosBag():
+            case recognition.RosBag():
                 topics = options.topics.but({} if layout is None else layout.ros)
                 grid = layout.grid() if options.array is None and layout is not None else options.array
                 contents = read_ros(path, topics, grid)
-            case ForeignFile():
+            case recognition.ForeignFile():
                 assert layout is not None  # one without is refused
                 if options.topics.are_given:
                     raise ProblemError(f"{path}: no ROS bag; topic, field, types and ros are of one")
                 contents = Contents.single(read_foreign(path, layout))
                 if options.array is not None:
                     contents = Contents.single(_on_given(contents.main, instance("array", options.array, Array)))
-            case TaxelFile(kind):
+            case recognition.TaxelFile(kind):
                 if options.topics.are_given:
                     raise ProblemError(f"{path}: a .{kind}; topic, field, types and ros are of a ROS bag")
                 array = None if options.array is None else instance("array", options.array, Array)
@@ -285,19 +266,21 @@ def _read(path: Path, kind: str, array: Array | None, pairing: str, differences:
 
 def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
-    files = files_in(folder)
-    recorded = recorded_by_taxel(files, options.layout)
+    files = recognition.files_in(folder)
+    recorded = recognition.recorded_by_taxel(files, options.layout)
     if options.topic or not recorded:
-        bags = bags_of(files)
+        bags = recognition.bags_of(files)
         recorded = [file for file in files if file in recorded or file in bags]
-    names = [] if recorded else [*formats_of(folder)]
+    names = [] if recorded else [*recognition.formats_of(folder)]
     if len(names) == 1:
-        trials = sorted(_counting_memory(formats.trials(folder, names[0])), key=lambda t: natural_order(Path(t.name)))
+        trials = sorted(
+            _counting_memory(formats.trials(folder, names[0])), key=lambda t: recognition.natural_order(Path(t.name))
+        )
         pairs = [(Path(trial.name), _recording_of(trial, folder, names[0], options.layout)) for trial in trials]
         return _add_labels(folder / LABELS, pairs)
     if recorded:
         _warn_of_tables(folder, recorded, files, options)
-    found = recorded or ([] if names else described_tables(files, options.layout))
+    found = recorded or ([] if names else recognition.described_tables(files, options.layout))
     if not found:
         _refuse_folder(folder, files, names)
     opened = [(file, _count_memory(recording)) for file in found for recording in _open_file(file, options)]
@@ -308,12 +291,12 @@ def _refuse_folder(folder: Path, files: Sequence[Path], names: Sequence[str]) ->
     """Refuse a folder without a recording, or with files of several formats, by what there is in it."""
     for file in files if not names else ():
         if file.is_file():
-            refuse_undescribed(file)
+            recognition.refuse_undescribed(file)
     problem = "no recording" if not names else f"several formats ({', '.join(names)}): name one file"
     deeper = sorted(
         inner.name
         for inner in folder.iterdir()
-        if inner.is_dir() and os.access(inner, os.R_OK | os.X_OK) and recorded_by_taxel(inner.iterdir())
+        if inner.is_dir() and os.access(inner, os.R_OK | os.X_OK) and recognition.recorded_by_taxel(inner.iterdir())
     )
     hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
     known_kinds = (
@@ -351,7 +334,9 @@ def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path
     """Warn of tables and arrays with a layout that are left out beside recordings, but for those converted to one."""
     stems = {file.stem for file in recorded}
     left = [
-        file.name for file in described_tables(files, options.layout) if file not in recorded and file.stem not in stems
+        file.name
+        for file in recognition.described_tables(files, options.layout)
+        if file not in recorded and file.stem not in stems
     ]
     if left:
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
@@ -380,14 +365,14 @@ def _add_labels(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Record
     return [_with_labels(labels, name, recording) for name, recording in pairs]
 
 
-def _named_beside(path: Path, name: Path, recording: Recording) -> Recording:
+def _named_beside(path: Path, recording: Recording) -> Recording:
     """Add the reference events of the folder to the notes of frames that it names; the page opens them one by one."""
     table, contents = path.parent / LABELS, recording._contents
     if any(source.has_events for source in contents.sources.values()):
         return recording
-    if not (table.is_file() and is_label_table(table)):
+    if not (table.is_file() and recognition.is_label_table(table)):
         return recording
-    labels = Labels(table)
+    labels, name = Labels(table), Path(recording.name if recording.kind in formats.FORMATS else path.name)
     return recording if labels.named(name) in (None, "") else _with_labels(labels, name, recording)
 
 
@@ -439,7 +424,7 @@ def _recording_of(trial: Trial, path: Path, kind: str, given_layout: str | os.Pa
             losses=sections.Losses(lost=known(_beside_frames(trial))),
         )
     )
-    layout = layout_of(path, given_layout)
+    layout = recognition.layout_of(path, given_layout)
     return _with_layout(contents, layout, given=given_layout is not None)
 
 

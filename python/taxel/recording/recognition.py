@@ -97,7 +97,7 @@ def recognise(path: Path, layout: GivenLayout = None) -> TaxelFile | FormatFile 
     ------
     OSError : the path is not there, or cannot be read
     """
-    ending, has_layout = path.suffix.lower(), layout is not None or Layout.beside(path) is not None
+    ending, has_layout = path.suffix.lower(), _has_layout(path, layout)
     if is_bag(path):
         return RosBag()
     if why := _companion(path, has_layout=has_layout):
@@ -190,11 +190,9 @@ def recordings_in(folder: Path, layout: GivenLayout = None) -> list[Path]:
     """
     files = files_in(folder)
     bags = bags_of(files)
-    found = recorded_by_taxel(files, layout)
-    found = found or sorted(
-        {file for of_format in formats_of(folder).values() for file in of_format}, key=natural_order
-    )
-    return [*(found or ([] if bags else described_tables(files, layout))), *bags]
+    of_formats = sorted({file for found in formats_of(folder).values() for file in found}, key=natural_order)
+    found = recorded_by_taxel(files, layout) or of_formats or ([] if bags else described_tables(files, layout))
+    return [*found, *bags]
 
 
 def files_in(folder: Path) -> list[Path]:
@@ -224,13 +222,8 @@ def bags_of(files: Iterable[Path]) -> list[Path]:
 
 def described_tables(files: Iterable[Path], layout: GivenLayout) -> list[Path]:
     """Return the tables and arrays of other programs of which a layout says how to read them."""
-    return [
-        file
-        for file in files
-        if not file.name.endswith(".notes.csv")
-        and _is_of_another_program(file, layout)
-        and (layout is not None or Layout.beside(file) is not None)
-    ]
+    tables = (file for file in files if not file.name.endswith(".notes.csv") and _has_layout(file, layout))
+    return [file for file in tables if _is_of_another_program(file, layout)]
 
 
 def formats_of(path: Path) -> dict[str, list[Path]]:
@@ -244,6 +237,10 @@ def layout_of(path: Path, layout: GivenLayout) -> Layout | None:
         return layout
     file = Layout.beside(path) if layout is None else Path(checked_path("layout", layout))
     return None if file is None else Layout.read(file)
+
+
+def _has_layout(path: Path, layout: GivenLayout) -> bool:
+    return layout is not None or Layout.beside(path) is not None
 
 
 def is_label_table(path: Path) -> bool:
