@@ -1,4 +1,4 @@
-"""What a function does with a field follows from the type of its part: it is carried, changed, or said to be lost."""
+"""What a function does with a field follows from the type of its section: it is carried, changed, or said to be lost."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from taxel.recording.recording import with_notes
 from taxel.recording.sections import Columns, Timing
 from taxel.recording.writers.stored import storable
 
-from .parts import flat, holds, unsaid
+from .sections import flat, holds, unsaid
 from .test_chains import ARRAY, KINDS, write
 
 

@@ -13,7 +13,7 @@ import taxel
 from taxel.formats import FORMATS
 
 from .making import some_frames
-from .parts import unsaid
+from .sections import unsaid
 from .test_chains import KINDS, write
 
 #: Fields of the table itself and of how it is stored: they have tests of their own.
