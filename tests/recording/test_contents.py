@@ -1,4 +1,4 @@
-"""What a function does with a field follows from the type of its section: it is carried, changed, or said to be lost."""
+"""What a function does with a field follows from the type of its section: it is kept, changed, or said to be lost."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def full(folder: Path, kind: type[Source]) -> Contents:
 
 
 def marked(of: Contents) -> Contents:
-    """Return contents that are a part by time on another clock."""
+    """Return contents that are a slice on another clock."""
     timing = Timing(of.main.timing.clock, "other", known((0, 300_000)))
     return Contents(replace(of.main, timing=timing), of.sources)
 
@@ -139,14 +139,14 @@ def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
 
 @dataclass(frozen=True, eq=False)
 class Coloured(Board):
-    """A board with a part that no function has a rule for."""
+    """A board with a section that no function has a rule for."""
 
     colour: str = field(default="red", kw_only=True)
 
 
 @pytest.mark.parametrize("function", ["between", "region", "on_clock", *KINDS])
-def test_a_part_without_a_rule_is_refused_by_each_function(tmp_path: Path, function: str) -> None:
+def test_a_section_without_a_rule_is_refused_by_each_function(tmp_path: Path, function: str) -> None:
     of = full(tmp_path, Board)
     one = Coloured(**sections_of(of.main if function in ("between", "on_clock") else marked(of).main))
-    with pytest.raises((AssertionError, AttributeError), match=r"'red'|'str' object has no attribute 'lines'"):
+    with pytest.raises((AssertionError, AttributeError), match=r"'red'|'str' object has no attribute 'losses'"):
         FUNCTIONS[function][0](Contents(one, {"board": one, "other": of.sources["other"]}), tmp_path)
