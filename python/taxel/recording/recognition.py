@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 from taxel import _core, formats
 from taxel._base import limits
@@ -46,7 +47,7 @@ _STRANGERS = {
 
 
 #: A layout, the path of one, or None for the layout file beside a recording, if there is one.
-GivenLayout = str | os.PathLike[str] | Layout | None
+GivenLayout: TypeAlias = str | os.PathLike[str] | Layout | None
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from taxel._base.limits import ABOUT, UNIT
 
-EVENTS = ("t", "x", "y", "p")
+EVENTS: tuple[str, ...] = ("t", "x", "y", "p")
 COLUMNS = (*EVENTS, "intensity", "present", "repaired", "markers", "values", "unit", "held", "about")
 #: The columns that are a single text, and how many characters they may have; NumPy's have 4 bytes.
 TEXTS = {"about": ABOUT // 6, "unit": UNIT}
