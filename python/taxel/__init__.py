@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from taxel.detect import Readout
     from taxel.recording import BoardChange, Datagrams, Recording, Verdict, Zeroing, open_all
     from taxel.recording import open_one as open  # noqa: A004  taxel.open is a recording's
+    from taxel.recording.analysis.health import Health, health
     from taxel.recording.convert import convert
     from taxel.recording.cut import cut
-    from taxel.recording.health import Health, health
     from taxel.recording.merge import merge
     from taxel.tasks.train import train
 

@@ -15,7 +15,7 @@ from taxel import _core
 from taxel.labels import TURN_US
 from taxel.live._requests.labels import LabelRequests
 from taxel.live._shown_files import Opening
-from taxel.recording.opening import is_recording
+from taxel.recording.recognition import is_recording
 
 ARRAY = {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}
 BEGAN_NS = 1_700_000_000_000_000_000

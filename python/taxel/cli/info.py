@@ -30,8 +30,8 @@ from taxel.spikes import SpikeTrains, to_ms
 if TYPE_CHECKING:
     from taxel.frames import Frames
     from taxel.recording import Recording
-    from taxel.recording.pressure import Series
-    from taxel.recording.rest import Rest
+    from taxel.recording.analysis.pressure import Series
+    from taxel.recording.analysis.rest import Rest
 
 app = App()
 
@@ -67,8 +67,8 @@ def info(
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
     """
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
-    from taxel.recording.pressure import above_rest  # noqa: PLC0415
-    from taxel.recording.without_layout import are_spike_trains  # noqa: PLC0415
+    from taxel.recording.analysis.pressure import above_rest  # noqa: PLC0415
+    from taxel.recording.recognition import are_spike_trains  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")

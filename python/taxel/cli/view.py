@@ -21,7 +21,7 @@ from taxel.cli.console import Console
 from taxel.formats.ros import is_bag, topics
 from taxel.live import Panel
 from taxel.recording import Recording
-from taxel.recording.opening import recordings_in
+from taxel.recording.recognition import is_folder, recordings_in
 from taxel.recording.sidecars import calibrate_by
 
 app = App()
@@ -73,7 +73,7 @@ def view(
 
 def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> Callable[[Path], list[Recording]] | None:
     """Return how files are opened where options say it, else None; what they do not fit is refused now."""
-    every = recordings_in(recording, files.layout) if recording.is_dir() and not is_bag(recording) else [recording]
+    every = recordings_in(recording, files.layout) if is_folder(recording) else [recording]
     if not every:
         return None
     first = every[0]

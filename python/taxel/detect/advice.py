@@ -23,7 +23,7 @@ from taxel.encode import ContactArea, Encoder, Moments
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.rest import of_frames
+from taxel.recording.analysis.rest import of_frames
 from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 

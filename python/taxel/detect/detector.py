@@ -17,7 +17,7 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import unit_of
-from taxel.recording.rest import FORCE_UNITS
+from taxel.recording.analysis.rest import FORCE_UNITS
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 

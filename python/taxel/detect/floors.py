@@ -9,7 +9,7 @@ import numpy as np
 from taxel.detect.examples import Example
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.rest import SHARE, TIMES_NOISE
+from taxel.recording.analysis.rest import SHARE, TIMES_NOISE
 
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01

@@ -20,10 +20,10 @@ from taxel.array import Array
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside
 from taxel.recording import Recording
+from taxel.recording.analysis.health import health
+from taxel.recording.analysis.rest import flickering, loaded_from, of_frames, ticks_by_unit
 from taxel.recording.convert import convert
-from taxel.recording.health import health
-from taxel.recording.opening import is_recording
-from taxel.recording.rest import flickering, loaded_from, of_frames, ticks_by_unit
+from taxel.recording.recognition import is_recording
 from taxel.recording.text_options import TextOptions
 
 #: Of a text table of more bytes than this the beginning is shown first, of so many bytes.

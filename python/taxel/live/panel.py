@@ -14,7 +14,6 @@ from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.detect import load
 from taxel.device import Cable
-from taxel.formats.ros import is_bag
 from taxel.frames import Frames
 from taxel.live._requests import Requests
 from taxel.live._requests.board import BoardRequests
@@ -22,7 +21,7 @@ from taxel.live._shown_files import Opening
 from taxel.live.live import Live
 from taxel.recording import Recording
 from taxel.recording.frames import period_us
-from taxel.recording.opening import check_recording, recordings_in
+from taxel.recording.recognition import check_recording, is_folder, recordings_in
 from taxel.recording.text_options import TextOptions
 from taxel.tare import Tare
 
@@ -90,7 +89,7 @@ class Panel:
                 raise refused("folder", ": is the recording's own")
             folder, opened = _folder_and_name(place, how.layout)
             opens = how.open_joined if opens is None and how.given() else opens
-            shown = None if place.is_dir() and not is_bag(place) else folder / opened
+            shown = None if is_folder(place) else folder / opened
         if how.rate_hz is not None:
             period_us("rate_hz", how.rate_hz)
         opening = Opening() if opens is None else Opening(callback("opens", opens), shown, how)
@@ -269,7 +268,7 @@ def _folder_and_name(place: Path, layout: str | os.PathLike[str] | None) -> tupl
 
     The server indexes it when a client opens it; what is no recording is refused now.
     """
-    if place.is_dir() and not is_bag(place):
+    if is_folder(place):
         files = recordings_in(place, layout)
         if not files:
             raise ProblemError(f"{place}: holds no recording; name a file, or one of its folders")

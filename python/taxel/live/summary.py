@@ -8,7 +8,7 @@ from typing import Any
 
 from taxel import _core
 from taxel.recording import open_one
-from taxel.recording.read_mcap import DOUBTS, STEPS
+from taxel.recording.readers.mcap import DOUBTS, STEPS
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
 

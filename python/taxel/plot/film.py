@@ -22,7 +22,7 @@ from taxel._base.files import write_whole
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.recording.pressure import above_rest_at
+from taxel.recording.analysis.pressure import above_rest_at
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 

@@ -16,8 +16,8 @@ from taxel._base.times import beginning_us, begun
 from taxel.frames import Frames
 from taxel.plot.nouns import axes
 from taxel.recording import Health, Recording, health
-from taxel.recording.pressure import Series, above_rest
-from taxel.recording.rest import Rest
+from taxel.recording.analysis.pressure import Series, above_rest
+from taxel.recording.analysis.rest import Rest
 
 F = TypeVar("F", bound=FigureBase)
 
@@ -131,7 +131,7 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
     ['contact area (mm2)', 'peak (kPa)', 'sum (kPa)', 'centre (mm)']
     """
     nowhere = np.full(instance("frames", frames, Frames).array.rows * frames.array.columns, np.nan)
-    of = Series.of(frames, above, Rest("none", nowhere))
+    of = Series.from_frames(frames, above, Rest("none", nowhere))
     if figure is None:
         figure = plt.figure(figsize=(11, 6), layout="constrained")
     curves = [(f"peak ({of.unit})", of.peak), (f"sum ({of.unit})", of.total)]

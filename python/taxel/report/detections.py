@@ -29,9 +29,9 @@ from taxel.encode import Composite, Encoder
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
+from taxel.recording.analysis.pressure import series
 from taxel.recording.contents import Contents, source_from
-from taxel.recording.parts import Origin
-from taxel.recording.pressure import series
+from taxel.recording.sections import Origin
 from taxel.report.page import render
 from taxel.report.svg import INK, STYLE, picture
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -196,7 +196,7 @@ def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
         len(shown), 1, figsize=(9.0, 0.6 + 1.4 * len(shown)), layout="constrained", squeeze=False
     )
     for axis, (outcome, frames) in zip(axes[:, 0], shown, strict=True):
-        of = series(Recording(Contents.of(source_from(frames, Origin(Path(outcome.name))))), outcome.example.tare)
+        of = series(Recording(Contents.single(source_from(frames, Origin(Path(outcome.name))))), outcome.example.tare)
         assert of is not None  # frames have values
         total, unit = (of.total, of.unit) if of.force is None else (of.force, "N")
         begins = np.arange(0, len(total), 1 + len(total) // _STRETCHES)

@@ -21,7 +21,7 @@ from taxel.calibration import Calibration, Load
 from taxel.formats import text
 from taxel.frames import Frames
 from taxel.recording import Recording
-from taxel.recording.pressure import readings
+from taxel.recording.analysis.pressure import readings
 from taxel.tasks.rest import GivenTare, check_tare, given_tare
 
 

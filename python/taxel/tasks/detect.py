@@ -24,8 +24,8 @@ from taxel.encode import ContactArea, Moments
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
+from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.opening import sensors_of
-from taxel.recording.rest import FORCE_UNITS, of_frames
 from taxel.spikes import SpikeTrains
 from taxel.tasks.labels import GivenLabels, references
 from taxel.tasks.rest import GivenTare, TakenRest, check_tare, rest

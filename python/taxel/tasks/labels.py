@@ -188,8 +188,8 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
         return dict(events)
     first, last = span_us(recording)
     if recording.has_events:
-        held, stretch = recording.events, recording.stretch
-        seen = [last, *(t for t, _ in held.markers), *(() if stretch is None else stretch[1:])]
+        held, interval = recording.events, recording.interval
+        seen = [last, *(t for t, _ in held.markers), *(() if interval is None else interval[1:])]
         # A heartbeat or a frame without events is a sign of life, too.
         end = max(seen if recording.clock is None else [*seen, *recording.clock.board_us[-1:].tolist()])
         near_us, late_us = _NEAR_US, _LATE_US

@@ -29,8 +29,8 @@ from taxel.detect.scoring import score_together
 from taxel.detect.training import Trained, fit_aligned
 from taxel.recorded import recorded
 from taxel.recording import Recording
+from taxel.recording.analysis.rest import BY_UNIT
 from taxel.recording.opening import sensors_of
-from taxel.recording.rest import BY_UNIT
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 from taxel.tasks.labels import GivenLabels, labelled_trials, references

@@ -11,9 +11,9 @@ from taxel import _core
 from taxel.array import Array
 from taxel.live._requests.reasons import reasons
 from taxel.live._shown_files import Opening, ReadFrames, ShownFiles
+from taxel.recording.analysis.health import TaxelStatistics, Touches, judge
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
-from taxel.recording.health import TaxelStatistics, Touches, judge
 
 #: Taxels as (column, row).
 _Taxels = list[tuple[int, int]]
