@@ -22,10 +22,10 @@ from taxel._base import progress
 from taxel.cli import _recordings
 from taxel.detect import Example, PlainRule, Recipe, choose, judge, load, recipes, run, score, training
 from taxel.detect.advice import advise
+from taxel.detect.fitting import fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.followed import follow
 from taxel.detect.plain_score import PlainScore
-from taxel.detect.training import fit_aligned
 from taxel.encode import ContactArea, LevelCrossing, LocalLoad
 
 LABELS = ("contact", "lift")

@@ -85,9 +85,9 @@ def _fitting(place: Path, of: Source) -> Calibration:
     """Return a calibration; refuse one of another array or of readings in another unit."""
     calibration = Calibration.load(place)
     read = of.table.unit if isinstance(of, FrameSource) else "ticks"
-    if not calibration.array.fits(of.sensor.array) or calibration.of != read:
+    if not calibration.array.fits(of.sensor.array) or calibration.reading_unit != read:
         raise ProblemError(
-            f"{place}: turns {calibration.of} of {calibration.array!r} into {calibration.unit}; {of.origin.name} holds "
-            f"{read} of {of.sensor.array!r}, another array"
+            f"{place}: turns {calibration.reading_unit} of {calibration.array!r} into {calibration.unit}; "
+            f"{of.origin.name} holds {read} of {of.sensor.array!r}, another array"
         )
     return calibration
