@@ -105,8 +105,8 @@ def __getattr__(name: str) -> Any:
     if name in _ROOMS:
         return import_module(f"taxel.{name}")
     if name in _ELSEWHERE:
-        place, inside = _ELSEWHERE[name]
-        value = getattr(import_module(place), inside)
+        module, inside = _ELSEWHERE[name]
+        value = getattr(import_module(module), inside)
         globals()[name] = value
         return value
     raise AttributeError(f"module 'taxel' has no attribute {name!r}")

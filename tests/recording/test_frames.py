@@ -279,7 +279,7 @@ def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
     said = {name: [note.text for note in one.notes] for name, one in back.sources.items()}
     assert said == {"left": ["heel", "turn"], "right": ["turn", "toe"]}
     labels = taxel.Labels(tmp_path / "walk.notes.csv")
-    assert sorted(labels.of(back.sources["right"])) == ["toe", "turn"]
+    assert sorted(labels.times(back.sources["right"])) == ["toe", "turn"]
 
 
 def test_labels_of_a_source_that_is_not_there_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

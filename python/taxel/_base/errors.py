@@ -21,8 +21,8 @@ _REMEDIES = {
     "pitch": "give {} with the pitch in mm, or pitch_mm in a layout file",
     "unfelt": (
         "either the tare holds a touch, as it ends before the first label, which may be late (give {}), or readings fall "
-        "with pressure (falls = true in a layout file), or another source felt it (a column source in the labels); taxel "
-        "info shows what was touched"
+        "with pressure (falls = true in a layout file), or another source felt it (a column source in the labels); "
+        "taxel info shows what was touched"
     ),
 }
 

@@ -73,10 +73,10 @@ def view(
 
 def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> Callable[[Path], list[Recording]] | None:
     """Return how files are opened where options say it, else None; what they do not fit is refused now."""
-    every = recordings_in(recording, files.layout) if is_folder(recording) else [recording]
-    if not every:
+    recordings = recordings_in(recording, files.layout) if is_folder(recording) else [recording]
+    if not recordings:
         return None
-    first = every[0]
+    first = recordings[0]
     bag = is_bag(first)
     if bag and not files.opener._names_topic(first):
         raise ProblemError(*list_topics(first, topics(first, files.types, files.ros), as_json=False))

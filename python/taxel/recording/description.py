@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import limits
-from taxel._base.arguments import finite, flag, number, text, whole
+from taxel._base.arguments import finite, flag, integer, number, text
 from taxel._base.documents import memory_of_json, of_json
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
@@ -143,7 +143,7 @@ def array_of(geometry: Mapping[str, Any]) -> Array:
 
 def notes_of(records: Any) -> tuple[Note, ...]:
     """Return notes from records of text, t_us and at_ns."""
-    return tuple(Note(text("text", n["text"]), _time("t_us", n["t_us"]), whole("at_ns", n["at_ns"])) for n in records)
+    return tuple(Note(text("text", n["text"]), _time("t_us", n["t_us"]), integer("at_ns", n["at_ns"])) for n in records)
 
 
 def detections_of(records: Any) -> Detections:
@@ -158,9 +158,9 @@ def zeroings_of(records: Any) -> tuple[Zeroing, ...]:
     """Return zeroed taxels, in order of time, from records of t, x, y, rest and before."""
     zeroings = (
         Zeroing(
-            whole("t", record["t"], -limits.TIME_US, limits.TIME_US),
-            whole("x", record["x"], 0, 65_535),
-            whole("y", record["y"], 0, 65_535),
+            integer("t", record["t"], -limits.TIME_US, limits.TIME_US),
+            integer("x", record["x"], 0, 65_535),
+            integer("y", record["y"], 0, 65_535),
             number("rest", record["rest"]),
             None if record["before"] is None else number("before", record["before"]),
         )
@@ -174,9 +174,9 @@ def board_changes_of(records: Any) -> tuple[BoardChange, ...]:
     return tuple(
         BoardChange(
             _time("t_us", record["t_us"]),
-            whole("at_ns", at),
+            integer("at_ns", at),
             text("change", record["change"]),
-            None if record.get("version") is None else whole("version", record["version"], 0, 255),
+            None if record.get("version") is None else integer("version", record["version"], 0, 255),
             flag("asked", record.get("asked", False)),
         )
         for at, record in records
@@ -184,13 +184,13 @@ def board_changes_of(records: Any) -> tuple[BoardChange, ...]:
 
 
 def _time(name: str, value: Any) -> int | None:
-    return None if value is None else whole(name, value, -limits.TIME_US, limits.TIME_US)
+    return None if value is None else integer(name, value, -limits.TIME_US, limits.TIME_US)
 
 
 def _registers(values: Any, driven: Array) -> Any:
     """Return a set of registers, or a list of times and sets, checked against the array that they drive."""
     if isinstance(values, list):
-        return tuple((whole("at_ns", at), Registers._of(registers, driven)) for at, registers in values)
+        return tuple((integer("at_ns", at), Registers._of(registers, driven)) for at, registers in values)
     return Registers._of(values, driven)
 
 
@@ -199,7 +199,7 @@ def counts_of(counts: Any, depth: int = 0) -> dict[str, Any]:
     if not isinstance(counts, dict):
         raise ProblemError("no object")
     return {
-        name: n if n is None else counts_of(n, 1) if isinstance(n, dict) and depth == 0 else whole(name, n, 0)
+        name: n if n is None else counts_of(n, 1) if isinstance(n, dict) and depth == 0 else integer(name, n, 0)
         for name, n in ((_OLD_KEYS.get(name, str(name)), n) for name, n in counts.items())
     }
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from taxel import formats
 from taxel._base import arguments, limits
-from taxel._base.arguments import flag, instance, text, whole
+from taxel._base.arguments import flag, instance, integer, text
 from taxel._base.errors import helped, refused
 from taxel._base.limits import opening
 from taxel._base.messages import warn
@@ -67,7 +67,7 @@ class OpenOptions(SharedOptions):
 
     def within(self) -> AbstractContextManager[None]:
         """Return a context in which no more is read than may be."""
-        return opening(None if self.limit is None else whole("limit", self.limit, 1, unit="bytes"))
+        return opening(None if self.limit is None else integer("limit", self.limit, 1, unit="bytes"))
 
     @property
     def topics(self) -> Topics:
@@ -391,7 +391,7 @@ def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
 def _notes(labels: Labels, name: Path, source: Source) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
     clock = source.timing.usable()
-    times = labels._of(name, lambda: clock, source.origin.label)
+    times = labels._times(name, lambda: clock, source.origin.label)
     names, replaced, labelled = labels_of(source.origin), set[int | None](), set[object]()
     if beside(source.origin.path).is_file():
         set_here = Labels(beside(source.origin.path))

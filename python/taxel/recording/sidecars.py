@@ -85,9 +85,9 @@ def _fitting(path: Path, source: Source) -> Calibration:
     """Return a calibration; refuse one of another array or of readings in another unit."""
     calibration = Calibration.load(path)
     unit = source.table.unit if isinstance(source, FrameSource) else "ticks"
-    if not calibration.array.fits(source.sensor.array) or calibration.of != unit:
+    if not calibration.array.fits(source.sensor.array) or calibration.reading_unit != unit:
         raise ProblemError(
-            f"{path}: turns {calibration.of} of {calibration.array!r} into {calibration.unit}; {source.origin.name} "
-            f"holds {unit} of {source.sensor.array!r}, another array"
+            f"{path}: turns {calibration.reading_unit} of {calibration.array!r} into {calibration.unit}; "
+            f"{source.origin.name} holds {unit} of {source.sensor.array!r}, another array"
         )
     return calibration
