@@ -10,7 +10,7 @@ import numpy as np
 
 from taxel.calibration import Calibration
 from taxel.clock import Clock
-from taxel.recording.contents import Source, sections_of
+from taxel.recording.contents import RecordedSource, sections_of
 from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.raw import Datagrams, Samples
 
@@ -47,7 +47,7 @@ WORDS: dict[str, tuple[str, ...]] = {
 OF_BYTES = {"wire.differences", "wire.version_2", "wire.origin_us", "wire.unmarked"}
 
 
-def flat(source: Source) -> dict[str, Any]:
+def flat(source: RecordedSource) -> dict[str, Any]:
     """Return the values of all fields by section and name, each read."""
     values = {}
     for name, section in sections_of(source).items():
@@ -81,7 +81,9 @@ def equal(a: Any, b: Any) -> bool:
     return bool(a == b)
 
 
-def unsaid(before: Source, after: Source, said: list[str] | tuple[str, ...], but: set[str]) -> list[str]:
+def unsaid(
+    before: RecordedSource, after: RecordedSource, said: list[str] | tuple[str, ...], but: set[str]
+) -> list[str]:
     """Return the fields that are neither as before nor said to be lost, nor among those that are checked elsewhere."""
     there, missing = flat(after), []
     for name, value in flat(before).items():

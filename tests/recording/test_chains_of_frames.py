@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 import taxel
 from taxel import Array, Frames, Note, _core
-from taxel.recording.contents import Contents, FrameSource, Source, alone, source_from
+from taxel.recording.contents import Contents, FrameSource, RecordedSource, alone, source_from
 from taxel.recording.once import known
 from taxel.recording.sections import Losses, Marks, Origin, Sensor
 
@@ -119,7 +119,7 @@ def some_feet(*names: str) -> dict[str, Model]:
     return models
 
 
-def source_of(name: str, model: Model) -> Source:
+def source_of(name: str, model: Model) -> RecordedSource:
     label, t, known_us = zip(*model.found, strict=True)
     marks = Marks(
         notes=known(tuple(Note(text, at) for text, at in model.notes)),

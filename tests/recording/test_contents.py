@@ -12,7 +12,7 @@ import pytest
 import taxel
 from taxel import Note
 from taxel.recording.between import between
-from taxel.recording.contents import Board, Contents, Drawn, FrameSource, Source, Stream, sections_of
+from taxel.recording.contents import BoardSource, Contents, Drawn, FrameSource, RecordedSource, Stream, sections_of
 from taxel.recording.cut import region
 from taxel.recording.frames import as_frames, calibrate
 from taxel.recording.merge import merge_contents
@@ -27,11 +27,11 @@ from .sections import flat, holds, unsaid
 from .test_chains import ARRAY, KINDS, write
 
 
-def full(folder: Path, kind: type[Source]) -> Contents:
+def full(folder: Path, kind: type[RecordedSource]) -> Contents:
     """Return contents of a type of source with something in every field, beside another source."""
     (folder / "calibration.json").write_text(taxel.Calibration.law(ARRAY, date="2026-11-21").to_json())
     one = taxel.open(write(folder / "full.mcap"))._contents.main
-    assert isinstance(one, Board)
+    assert isinstance(one, BoardSource)
     losses = replace(
         one.losses,
         remarks=("by another's times",),
@@ -52,8 +52,8 @@ def full(folder: Path, kind: type[Source]) -> Contents:
     drawn = as_frames(one, 100)
     readings, five = replace(drawn.frame_table, untimed=True, turned=255.0), np.arange(5)
     samples = Samples({}, five, five.astype(np.uint64), five, five[:, None] * 1.0)
-    every: dict[type[Source], Source] = {
-        Board: one,
+    every: dict[type[RecordedSource], RecordedSource] = {
+        BoardSource: one,
         Drawn: Drawn(frame_table=readings, wire=wire, **header),
         FrameSource: FrameSource(frame_table=readings, **header),
         Stream: Stream(
@@ -116,10 +116,10 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
 }
 
 
-@pytest.mark.parametrize("kind", [Board, FrameSource, Drawn, Stream])
+@pytest.mark.parametrize("kind", [BoardSource, FrameSource, Drawn, Stream])
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
-    tmp_path: Path, function: str, kind: type[Source]
+    tmp_path: Path, function: str, kind: type[RecordedSource]
 ) -> None:
     of = full(tmp_path, kind)
     for name, value in flat(marked(of).main).items():
@@ -127,7 +127,7 @@ def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
     if function not in ("between", "on_clock"):
         of = marked(of)
     work, anew = FUNCTIONS[function]
-    if function == ".lsa" and kind is not Board:
+    if function == ".lsa" and kind is not BoardSource:
         return
     after = work(of, tmp_path)
     said = after.main.losses.lost()
@@ -138,7 +138,7 @@ def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
 
 
 @dataclass(frozen=True, eq=False)
-class Coloured(Board):
+class Coloured(BoardSource):
     """A board with a section that no function has a rule for."""
 
     colour: str = field(default="red", kw_only=True)
@@ -146,7 +146,7 @@ class Coloured(Board):
 
 @pytest.mark.parametrize("function", ["between", "region", "on_clock", *KINDS])
 def test_a_section_without_a_rule_is_refused_by_each_function(tmp_path: Path, function: str) -> None:
-    of = full(tmp_path, Board)
+    of = full(tmp_path, BoardSource)
     one = Coloured(**sections_of(of.main if function in ("between", "on_clock") else marked(of).main))
     with pytest.raises((AssertionError, AttributeError), match=r"'red'|'str' object has no attribute 'losses'"):
         FUNCTIONS[function][0](Contents(one, {"board": one, "other": of.sources["other"]}), tmp_path)

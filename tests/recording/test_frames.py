@@ -23,7 +23,7 @@ from taxel import Array, Frames, Note, ProblemError, SpikeTrains
 from taxel.detect import Example, Part, Recipe, judge
 from taxel.detect.folds import _split
 from taxel.encode import LevelCrossing
-from taxel.recording.contents import Contents, Source, alone, source_from
+from taxel.recording.contents import Contents, RecordedSource, alone, source_from
 from taxel.recording.once import known
 from taxel.recording.opening import join_feet
 from taxel.recording.sections import Losses, Marks, Origin
@@ -255,7 +255,7 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
     array, quiet = Array(6, 6), np.random.default_rng(4).integers(0, 3, (400, 6, 6)).astype(np.float32)
     pressed = quiet.copy()
     pressed[30:80, 1:4, 1:4] += 300
-    sources: dict[str, Source] = {}
+    sources: dict[str, RecordedSource] = {}
     for foot, values in (("left", quiet), ("right", pressed)):
         frames = Frames(values, np.arange(400) * 10_000, array=array)
         sources[foot] = source_from(frames, Origin(tmp_path / "a.asc", f"a {foot}", "pedar", foot))
@@ -269,7 +269,7 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
 def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
     array = Array(1, 2)
     frames = Frames(np.ones((5, 1, 2)), np.arange(5) * 10_000, unit="N", array=array)
-    sources: dict[str, Source] = {}
+    sources: dict[str, RecordedSource] = {}
     for foot in ("left", "right"):
         sources[foot] = source_from(frames, Origin(tmp_path / "walk.asc", f"walk {foot}", "pedar", foot))
     [both] = join_feet([taxel.Recording(Contents.single(one)) for one in sources.values()])

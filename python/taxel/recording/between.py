@@ -18,7 +18,7 @@ from taxel._base.files import open_file
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.recording import sections
-from taxel.recording.contents import Board, Contents, S, Source, apply_rule, share_clock
+from taxel.recording.contents import BoardSource, Contents, RecordedSource, S, apply_rule, share_clock
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.verdict import Verdict
@@ -40,7 +40,7 @@ def between(contents: Contents, start: float, stop: float) -> Contents:
     return Contents(main, Slices(slices, contents.main.origin, are_apart))
 
 
-def _slice(source: S, sources: Mapping[str, Source], start: float, stop: float) -> S:
+def _slice(source: S, sources: Mapping[str, RecordedSource], start: float, stop: float) -> S:
     """Return the slice of a source over an interval."""
     marks = source.marks
 
@@ -52,8 +52,8 @@ def _slice(source: S, sources: Mapping[str, Source], start: float, stop: float) 
                 return sections.EventTable(Once(lambda: section.events().between(start, stop)))
             case sections.FrameTable():
                 return replace(section, frames=Once(lambda: section.frames().between(start, stop)))
-            case sections.Columns():
-                return sections.Columns(
+            case sections.SampleColumns():
+                return sections.SampleColumns(
                     section.columns, section.samples.to(lambda samples: samples and samples.between(start, stop))
                 )
             case sections.Settings():
@@ -81,7 +81,7 @@ def _slice(source: S, sources: Mapping[str, Source], start: float, stop: float) 
     return apply_rule(source, rule, untimed)
 
 
-def _verdict(source: Source, sources: Mapping[str, Source]) -> Verdict | None:
+def _verdict(source: RecordedSource, sources: Mapping[str, RecordedSource]) -> Verdict | None:
     """Return the verdict of a source as that of a slice, which names the whole.
 
     The name follows from the file's ends, or else from what there is, so that slices that were cut at different times,
@@ -110,13 +110,13 @@ def _ends(path: Path) -> bytes:
         return b"%d " % size + file.read(_END) + last
 
 
-class Slices(Mapping[str, Source]):
+class Slices(Mapping[str, RecordedSource]):
     """Hold the slices of all sources of a file; refuse access to those whose clock is not that of the interval."""
 
-    def __init__(self, slices: Mapping[str, Source], origin: sections.Origin, apart: Once[bool]) -> None:
+    def __init__(self, slices: Mapping[str, RecordedSource], origin: sections.Origin, apart: Once[bool]) -> None:
         self._slices, self._origin, self._apart = slices, origin, apart
 
-    def __getitem__(self, name: str) -> Source:
+    def __getitem__(self, name: str) -> RecordedSource:
         source = self._slices[name]
         if self._apart():
             raise ProblemError(
@@ -131,7 +131,7 @@ class Slices(Mapping[str, Source]):
     def __len__(self) -> int:
         return len(self._slices)
 
-    def but(self, label: str, source: Source) -> Slices:
+    def but(self, label: str, source: RecordedSource) -> Slices:
         """Return the same with another slice of one source."""
         return Slices({**self._slices, label: source}, self._origin, self._apart)
 
@@ -140,12 +140,12 @@ class Slices(Mapping[str, Source]):
         return vars(self) | {"_slices": dict.fromkeys(self._slices) if self._apart() else self._slices}
 
 
-def inside(sources: Mapping[str, Source]) -> Mapping[str, Source]:
+def inside(sources: Mapping[str, RecordedSource]) -> Mapping[str, RecordedSource]:
     """Return all sources, also those of slices by another clock."""
     return sources._slices if isinstance(sources, Slices) else sources
 
 
-def _interval(source: Source, start: float, stop: float) -> tuple[int, int]:
+def _interval(source: RecordedSource, start: float, stop: float) -> tuple[int, int]:
     """Return the first time and the end of a slice, limited to those of the whole."""
     t = source.table.t
     bounds = (int(t.min()), int(t.max()) + 1) if len(t) else (0, 1)
@@ -160,9 +160,9 @@ def _whole_us(value: float) -> int:
     return int(np.ceil(np.clip(value, -(2.0**62), 2.0**62)))
 
 
-def _held_at(source: Source, start: float) -> NDArray[np.uint16] | None:
+def _held_at(source: RecordedSource, start: float) -> NDArray[np.uint16] | None:
     """Return the values that the taxels held at a time, as far as they are known."""
-    held, events = source.settings.held(), source.table if isinstance(source, Board) else None
+    held, events = source.settings.held(), source.table if isinstance(source, BoardSource) else None
     if events is None or events.intensity is None or events.present is None:
         return held
     earlier = events.between(-np.inf, start)

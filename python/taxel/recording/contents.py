@@ -15,13 +15,13 @@ from taxel.recording.once import Once, known
 from taxel.recording.verdict import Verdict
 
 __all__ = [
-    "Board",
+    "BoardSource",
     "Contents",
     "Drawn",
     "FrameSource",
+    "RecordedSource",
     "S",
     "Several",
-    "Source",
     "Stream",
     "alone",
     "apply_rule",
@@ -34,12 +34,12 @@ __all__ = [
     "with_losses",
 ]  # fmt: skip
 
-P = TypeVar("P", sections.Wire, sections.Columns)
-S = TypeVar("S", bound="Source")
+P = TypeVar("P", sections.Wire, sections.SampleColumns)
+S = TypeVar("S", bound="RecordedSource")
 
 
 @dataclass(frozen=True, eq=False)
-class Source(ABC):
+class RecordedSource(ABC):
     """Hold what all sources have: the header of a board, of frames, and of a stream of numbers."""
 
     origin: sections.Origin
@@ -52,7 +52,7 @@ class Source(ABC):
     @property
     def has_events(self) -> bool:
         """Whether it holds events (else frames)."""
-        return isinstance(self, Board)
+        return isinstance(self, BoardSource)
 
     @property
     @abstractmethod
@@ -75,7 +75,7 @@ class Source(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Board(Source):
+class BoardSource(RecordedSource):
     """Hold what a board sent."""
 
     event_table: sections.EventTable
@@ -88,7 +88,7 @@ class Board(Source):
 
 
 @dataclass(frozen=True, eq=False)
-class FrameSource(Source):
+class FrameSource(RecordedSource):
     """Hold frames."""
 
     frame_table: sections.FrameTable
@@ -110,15 +110,15 @@ class Drawn(FrameSource):
 class Stream(FrameSource):
     """Hold a stream of numbers, whose lines are frames of one row."""
 
-    stream: sections.Columns
+    stream: sections.SampleColumns
 
 
 @dataclass(frozen=True, eq=False)
-class Several(Source):
+class Several(RecordedSource):
     """Hold what a file of several sensors says as a whole; all that is of a single one refuses to be read."""
 
     refuse: Callable[[], NoReturn] = field(metadata={"is_section": False})
-    first: Source = field(metadata={"is_section": False})
+    first: RecordedSource = field(metadata={"is_section": False})
     are_frames: bool = field(metadata={"is_section": False})
 
     @property
@@ -137,13 +137,13 @@ class Several(Source):
         self.refuse()
 
 
-def refuse_several(source: Source) -> None:
+def refuse_several(source: RecordedSource) -> None:
     """Refuse a file of several sensors as a whole, by an error that lists its sources."""
     if isinstance(source, Several):
         source.refuse()
 
 
-def sections_of(source: Source) -> dict[str, sections.Section]:
+def sections_of(source: RecordedSource) -> dict[str, sections.Section]:
     """Return the sections of a source by the names of its fields."""
     return {
         field.name: getattr(source, field.name) for field in fields(source) if field.metadata.get("is_section", True)
@@ -188,7 +188,7 @@ def source_from(
     turned: float | None = None,
     columns: Sequence[str] = (),
     **header: Any,
-) -> Board | FrameSource:
+) -> BoardSource | FrameSource:
     """Return a source of a table.
 
     Parameters
@@ -198,17 +198,17 @@ def source_from(
     untimed, turned : bool, float
         As of `FrameTable`.
     columns : sequence of str
-        Columns of a stream of numbers, as those of `Columns`.
+        Columns of a stream of numbers, as those of `SampleColumns`.
     **header
         Its other sections; default: a sensor of the table's array alone.
     """
     origin = sections.Origin() if origin is None else origin
     sensor = header.pop("sensor", None) or sections.Sensor(table.array)
     if isinstance(table, Events):
-        return Board(origin, sensor, sections.EventTable(known(table)), **header)
+        return BoardSource(origin, sensor, sections.EventTable(known(table)), **header)
     frame_table = sections.FrameTable(known(table), untimed, turned)
     if columns:
-        return Stream(origin, sensor, frame_table, sections.Columns(tuple(columns)), **header)
+        return Stream(origin, sensor, frame_table, sections.SampleColumns(tuple(columns)), **header)
     return FrameSource(origin, sensor, frame_table, **header)
 
 
@@ -224,11 +224,11 @@ class Contents:
         All sources of the file by their names.
     """
 
-    main: Source
-    sources: Mapping[str, Source]
+    main: RecordedSource
+    sources: Mapping[str, RecordedSource]
 
     @classmethod
-    def single(cls, source: Source) -> Contents:
+    def single(cls, source: RecordedSource) -> Contents:
         """Return a recording of one source."""
         return cls(source, {source.origin.label: source})
 
@@ -242,7 +242,7 @@ class Contents:
         return isinstance(self.main, Several)
 
 
-def alone(sources: Mapping[str, Source]) -> Contents:
+def alone(sources: Mapping[str, RecordedSource]) -> Contents:
     """Return the contents of a file: those of its only source or its only sensor; else those of `several`.
 
     The verdict is that of all sources.
@@ -256,7 +256,7 @@ def alone(sources: Mapping[str, Source]) -> Contents:
     return Contents(replace(boards[0], losses=losses), sources)
 
 
-def several(sources: Mapping[str, Source]) -> Several:
+def several(sources: Mapping[str, RecordedSource]) -> Several:
     """Return the contents of a file of several sensors as a whole; sections of a single one raise an error."""
     first = next(iter(sources.values()))
     path, names = first.origin.path, ", ".join(sources)
@@ -289,7 +289,7 @@ def several(sources: Mapping[str, Source]) -> Several:
     )
 
 
-def _verdict(sources: Mapping[str, Source]) -> Verdict | None:
+def _verdict(sources: Mapping[str, RecordedSource]) -> Verdict | None:
     """Return what several sources lost, as far as they say it."""
     verdicts = [(name, source.losses.verdict()) for name, source in sources.items()]
     known_verdicts = [(name, verdict) for name, verdict in verdicts if verdict is not None]
@@ -303,7 +303,7 @@ def name_remarks(remarks: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[str, .
     return tuple(dict.fromkeys(f"{name}: {line}" for name, lines in remarks for line in lines))
 
 
-def share_clock(sources: Mapping[str, Source]) -> bool:
+def share_clock(sources: Mapping[str, RecordedSource]) -> bool:
     """Return whether sources share one clock: frames without arrival times, as those of two feet."""
     return all(
         not source.has_events

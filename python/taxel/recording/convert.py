@@ -20,7 +20,7 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Board, Contents, Source, Stream, alone, share_clock, source_from
+from taxel.recording.contents import BoardSource, Contents, RecordedSource, Stream, alone, share_clock, source_from
 from taxel.recording.frames import as_frames, period_us
 from taxel.recording.kinds import ENDINGS
 from taxel.recording.opening import open_one
@@ -122,7 +122,7 @@ def convert(
     return lost
 
 
-def _write_lsa(path: Path, source: Source, overwrite: bool) -> None:
+def _write_lsa(path: Path, source: RecordedSource, overwrite: bool) -> None:
     """Write a `.lsa` and its `.lss` whole; until then an older pair stays as it is."""
     marker = path.with_suffix(".lss")
     if not overwrite and os.path.lexists(marker):
@@ -149,16 +149,16 @@ def _contents(source: object) -> Contents:
     return Contents.single(source_from(source))
 
 
-def _counts(source: Source, written: Source) -> dict[str, Any]:
+def _counts(source: RecordedSource, written: RecordedSource) -> dict[str, Any]:
     """Return the counts of a recording under the names of the live format."""
     samples = source.stream.samples() if isinstance(source, Stream) else None
     if samples is not None:
         return {"received": len(samples)}
-    received = len(written.wire.datagrams() or ()) if isinstance(written, Board) else len(written.table)
+    received = len(written.wire.datagrams() or ()) if isinstance(written, BoardSource) else len(written.table)
     if source.origin.kind == "events":
         # Nothing is missing of what was made here.
         return {"received": received, "missing": 0}
-    if not isinstance(written, Board):
+    if not isinstance(written, BoardSource):
         return {"received": received}
     counts = source.losses.counts()
     known = {name: counts.get(name) or 0 for name in ("dropped_by_kernel", "dropped_by_queue", "received")}
@@ -167,9 +167,9 @@ def _counts(source: Source, written: Source) -> dict[str, Any]:
     return {**known, "decoder": damage}
 
 
-def _read_otherwise(path: Path, source: Source) -> list[str]:
+def _read_otherwise(path: Path, source: RecordedSource) -> list[str]:
     """Return a line if copied datagrams decode to other events than the recording's."""
-    if not isinstance(source, Board) or needs_new_bytes(source):
+    if not isinstance(source, BoardSource) or needs_new_bytes(source):
         return []
     events = source.table
     again = Events._from_parts(

@@ -139,8 +139,8 @@ def region(contents: Contents, columns: slice, rows: slice) -> Contents:
                 return sections.EventTable(Once(lambda: events(section.events())))
             case sections.FrameTable():
                 return replace(section, frames=Once(lambda: section.frames().region(columns, rows)))
-            case sections.Columns():
-                return sections.Columns(section.columns[left:right])
+            case sections.SampleColumns():
+                return sections.SampleColumns(section.columns[left:right])
             case sections.Wire():
                 return None
             case _:
@@ -148,7 +148,7 @@ def region(contents: Contents, columns: slice, rows: slice) -> Contents:
 
     return Contents.single(
         apply_rule(
-            contents.main, rule, lambda: [*contents.main.section(sections.Columns).received(), *contents.others()]
+            contents.main, rule, lambda: [*contents.main.section(sections.SampleColumns).received(), *contents.others()]
         )
     )
 

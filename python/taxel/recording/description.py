@@ -23,14 +23,14 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import sections
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import FrameSource, Source, source_from
+from taxel.recording.contents import FrameSource, RecordedSource, source_from
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import known
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 
-def json_of(source: Source) -> str:
+def json_of(source: RecordedSource) -> str:
     """Return all fields that are not columns of the table, as the JSON in files.
 
     Raises
@@ -105,7 +105,7 @@ def about_of(location: str, document: str) -> dict[str, Any]:
 
 def described_source(
     table: Events | Frames, held: NDArray[np.uint16] | None, origin: sections.Origin, about: Mapping[str, Any]
-) -> Source:
+) -> RecordedSource:
     """Return a source of a table and of what `about_of` read; its sensor is that of the table."""
     get = about.get
     none = Detections([], [], [])

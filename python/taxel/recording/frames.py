@@ -20,7 +20,7 @@ from taxel.recording.contents import (
     Contents,
     Drawn,
     FrameSource,
-    Source,
+    RecordedSource,
     Stream,
     refuse_several,
     several,
@@ -64,7 +64,7 @@ def times_at(number: NDArray[np.int64], rate_hz: float) -> NDArray[np.int64]:
     return t
 
 
-def as_frames(source: Source, rate_hz: float | None = None, *, name: str = "rate_hz") -> FrameSource:
+def as_frames(source: RecordedSource, rate_hz: float | None = None, *, name: str = "rate_hz") -> FrameSource:
     """Return the same recording as frames.
 
     Parameters
@@ -102,7 +102,7 @@ def as_frames(source: Source, rate_hz: float | None = None, *, name: str = "rate
     return Drawn(source.origin, source.sensor, sections.FrameTable(frames), source.section(sections.Wire), **header)
 
 
-def _draw(source: Source, period: int | None) -> Frames:
+def _draw(source: RecordedSource, period: int | None) -> Frames:
     events, held, interval = source.table, source.settings.held(), source.timing.interval
     assert isinstance(events, Events)  # the caller checked
     # A value of 65 535 stands for an unknown one.
@@ -134,7 +134,7 @@ def at_rate(contents: Contents, rate_hz: float) -> Contents:
     return Contents(several(sources) if contents.is_several else _at_rate(contents.main, rate_hz), sources)
 
 
-def _at_rate(source: Source, rate_hz: float) -> Source:
+def _at_rate(source: RecordedSource, rate_hz: float) -> RecordedSource:
     if not isinstance(source, FrameSource) or not source.untimed:
         return source
 
@@ -150,7 +150,7 @@ def _at_rate(source: Source, rate_hz: float) -> Source:
     return replace(source, frame_table=frame_table, marks=replace(source.marks, notes=source.marks.notes.to(notes)))
 
 
-def calibrate(source: Source, rate_hz: float | None = None, rest: Tare | None = None) -> FrameSource:
+def calibrate(source: RecordedSource, rate_hz: float | None = None, rest: Tare | None = None) -> FrameSource:
     """Return the same recording as frames in N or kPa, by its calibration.
 
     Parameters
@@ -181,5 +181,5 @@ def calibrate(source: Source, rate_hz: float | None = None, rest: Tare | None = 
     if not isinstance(calibrated, Stream):
         return calibrated
     return with_losses(
-        replace(calibrated, stream=sections.Columns(calibrated.stream.columns)), calibrated.stream.received
+        replace(calibrated, stream=sections.SampleColumns(calibrated.stream.columns)), calibrated.stream.received
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from taxel.recording.contents import Source
+from taxel.recording.contents import RecordedSource
 from taxel.recording.verdict import Verdict
 
 #: taxel's own kinds of files by their endings.
@@ -27,7 +27,7 @@ def kind_of_file(kind: str) -> str:
 _OTHERS = {"arrays": "file of arrays", "table": "table", "ros": "ROS bag"}
 
 
-def verdict_of(source: Source) -> Verdict:
+def verdict_of(source: RecordedSource) -> Verdict:
     """Return what was lost of a recording, or that its file does not say it."""
     verdict = source.losses.verdict()
     return Verdict._of({"silent": kind_of_file(source.origin.kind)}) if verdict is None else verdict

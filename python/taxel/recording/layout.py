@@ -19,7 +19,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.layout import Layout, load_packaged
 from taxel.frames import Frames
-from taxel.recording.contents import Board, Contents, FrameSource, S, Source, Stream, alone
+from taxel.recording.contents import BoardSource, Contents, FrameSource, RecordedSource, S, Stream, alone
 from taxel.recording.frames import times_at
 from taxel.recording.once import known
 from taxel.recording.sections import EventTable, FrameTable
@@ -54,7 +54,7 @@ def on_array(source: S, array: Array) -> S:
         return Frames(table.values.reshape(-1, *array.shape), table.t, unit=table.unit, array=array)
 
     same = replace(source, sensor=replace(source.sensor, array=array))
-    if isinstance(same, Board):
+    if isinstance(same, BoardSource):
         return replace(same, event_table=EventTable(same.event_table.events.to(events)))
     if isinstance(same, FrameSource):
         return replace(same, frame_table=replace(same.frame_table, frames=same.frame_table.frames.to(frames)))
@@ -84,7 +84,7 @@ def apply_layout(contents: Contents, layout: Layout, *, given: bool) -> Contents
     )
 
 
-def _apply_layout(source: Source, layout: Layout, *, given: bool) -> Source:
+def _apply_layout(source: RecordedSource, layout: Layout, *, given: bool) -> RecordedSource:
     """Return a source with what its layout says of it."""
     kind, name, sensor = source.origin.kind, source.origin.name, source.sensor
     strict = given or kind not in _STATING
@@ -115,7 +115,7 @@ def _apply_layout(source: Source, layout: Layout, *, given: bool) -> Source:
     return replace(same, frame_table=FrameTable(known(frames), untimed, was if full is None else full))
 
 
-def _array(source: Source, layout: Layout) -> Array:
+def _array(source: RecordedSource, layout: Layout) -> Array:
     """Return the sensor of a recording as its layout says, which may not contradict the file."""
     stated, kind = source.sensor.array, source.origin.kind
     array = layout.array(stated.rows * stated.columns, stated, source.sensor.side)

@@ -22,7 +22,15 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import sections
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, name_remarks, with_losses
+from taxel.recording.contents import (
+    BoardSource,
+    Contents,
+    FrameSource,
+    RecordedSource,
+    Stream,
+    name_remarks,
+    with_losses,
+)
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import UNKNOWN, anything, known
 from taxel.recording.recording import Recording
@@ -99,7 +107,7 @@ def merge_contents(recordings: Sequence[Contents], gap: float | None = None, *, 
     for recording, source in zip(recordings, sources, strict=True):
         lost += [
             *source.section(sections.Wire).losses(),
-            *source.section(sections.Columns).received(),
+            *source.section(sections.SampleColumns).received(),
             *recording.others(),
         ]
     merged = merging.source()
@@ -111,7 +119,7 @@ def merge_contents(recordings: Sequence[Contents], gap: float | None = None, *, 
 class _Merging:
     """Merges sources, a type of section after the other; `lost` lists what they do not agree in."""
 
-    sources: Sequence[Source]
+    sources: Sequence[RecordedSource]
     tables: Sequence[Events | Frames]
     shifts: list[int]
     lefts: list[int]
@@ -119,7 +127,7 @@ class _Merging:
     beside: bool
     lost: list[str] = field(default_factory=list)
 
-    def source(self) -> Source:
+    def source(self) -> RecordedSource:
         """Return the sources as one."""
         names = ", ".join(source.origin.name for source in self.sources)
         header: dict[str, Any] = {
@@ -132,13 +140,13 @@ class _Merging:
         }
         if self.sources[0].has_events:
             tables = [table for table in self.tables if isinstance(table, Events)]
-            return Board(
+            return BoardSource(
                 event_table=sections.EventTable(known(_events(tables, self.shifts, self.array, self.lefts))), **header
             )
         columns = self.columns()
         if columns is None:
             return FrameSource(frame_table=self.frame_table(), **header)
-        return Stream(frame_table=self.frame_table(), stream=sections.Columns(columns), **header)
+        return Stream(frame_table=self.frame_table(), stream=sections.SampleColumns(columns), **header)
 
     def agreed(self, values: Iterable[T], empty: T, line: str, key: Callable[[T], object] = lambda value: value) -> T:
         """Return the common value if all recordings agree, else the empty value; then a line says so."""
@@ -313,7 +321,7 @@ def _same_clock(a: Clock | None, b: Clock | None) -> bool:
     return np.array_equal(a.board_us, b.board_us) and np.array_equal(a.arrived_ns, b.arrived_ns)
 
 
-def _of_files(sources: Sequence[Source], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
+def _of_files(sources: Sequence[RecordedSource], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
     """Return name and verdict of each file or merged recording of which there are parts.
 
     Stretches of one recording, in memory or in files of their own, have the losses of the whole, which count once;
@@ -339,7 +347,7 @@ def _of_files(sources: Sequence[Source], shifts: Sequence[int]) -> list[tuple[st
     return of_files
 
 
-def _end(source: Source) -> int:
+def _end(source: RecordedSource) -> int:
     """Return the first time after everything in a recording."""
     if source.timing.interval is not None:
         return source.timing.interval()[1]
@@ -347,7 +355,7 @@ def _end(source: Source) -> int:
     return max([int(t.max()) if len(t) else 0, *(z.t for z in source.marks.zeroings())]) + 1
 
 
-def _begin(source: Source) -> int:
+def _begin(source: RecordedSource) -> int:
     if source.timing.interval is not None:
         return source.timing.interval()[0]
     t = source.table.t
@@ -369,7 +377,7 @@ def _shifts(tables: Sequence[Events | Frames], gap: float | None) -> list[int]:
     return shifts
 
 
-def _common(sources: Sequence[Source], tables: Sequence[Events | Frames]) -> Array:
+def _common(sources: Sequence[RecordedSource], tables: Sequence[Events | Frames]) -> Array:
     array = tables[0].array
     for source, table in zip(sources, tables, strict=True):
         if not array.fits(table.array):

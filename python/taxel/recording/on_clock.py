@@ -17,7 +17,7 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import sections
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Contents, Source, alone, apply_rule
+from taxel.recording.contents import Contents, RecordedSource, alone, apply_rule
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import Once
 from taxel.recording.readers.mcap import ascending
@@ -63,7 +63,7 @@ def on_clock(contents: Contents, name: str) -> Contents:
     return Contents(replace(named, losses=replace(named.losses, verdict=Once(verdict))), moved)
 
 
-def _clock(source: Source) -> Clock:
+def _clock(source: RecordedSource) -> Clock:
     clock = source.timing.usable()
     if clock is None:
         raise ProblemError(
@@ -82,7 +82,7 @@ def _times(clock: Clock, to: Clock | None) -> Times:
     return times
 
 
-def _move(source: Source, name: str, times: Times | None) -> Source:
+def _move(source: RecordedSource, name: str, times: Times | None) -> RecordedSource:
     """Return a source with its times converted to another clock; None leaves them unchanged."""
     if times is None:
         return replace(source, timing=replace(source.timing, clock_of=name))
@@ -136,9 +136,9 @@ def _move(source: Source, name: str, times: Times | None) -> Source:
                 return sections.EventTable(section.events.to(events))
             case sections.FrameTable():
                 return replace(section, frames=section.frames.to(frames))
-            case sections.Columns():
-                return sections.Columns(section.columns)
+            case sections.SampleColumns():
+                return sections.SampleColumns(section.columns)
             case _:
                 assert_never(section)
 
-    return apply_rule(source, rule, source.section(sections.Columns).received)
+    return apply_rule(source, rule, source.section(sections.SampleColumns).received)

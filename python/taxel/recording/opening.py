@@ -26,7 +26,7 @@ from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording import recognition, sections
-from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, several, source_from
+from taxel.recording.contents import BoardSource, Contents, FrameSource, RecordedSource, Stream, several, source_from
 from taxel.recording.kinds import ENDINGS, LABELS
 from taxel.recording.layout import apply_layout, check_size, on_array
 from taxel.recording.once import known
@@ -241,7 +241,7 @@ def _with_layout(contents: Contents, layout: Layout | None, *, given: bool) -> R
     return Recording(with_sidecars(contents if layout is None else apply_layout(contents, layout, given=given)))
 
 
-def _on_given(source: Source, array: Array) -> Source:
+def _on_given(source: RecordedSource, array: Array) -> RecordedSource:
     """Return frames of another program on the given sensor: as many rows and columns, or a row of as many channels.
 
     Raises
@@ -317,7 +317,7 @@ def _count_memory(recording: Recording) -> Recording:
     """Count the arrays of a recording as far as they are read already."""
     for source in recording._contents.sources.values():
         for table in (
-            source.event_table.events if isinstance(source, Board) else None,
+            source.event_table.events if isinstance(source, BoardSource) else None,
             source.frame_table.frames if isinstance(source, FrameSource) else None,
         ):
             limits.keep(0 if table is None or not table.is_read else _size(table()))
@@ -388,7 +388,7 @@ def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     return Recording(Contents(several(sources), sources))
 
 
-def _notes(labels: Labels, name: Path, source: Source) -> list[Note]:
+def _notes(labels: Labels, name: Path, source: RecordedSource) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
     clock = source.timing.usable()
     times = labels._times(name, lambda: clock, source.origin.label)

@@ -28,7 +28,16 @@ from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 __all__ = [
-    "Columns", "EventTable", "FrameTable", "Losses", "Marks", "Origin", "Section", "Sensor", "Settings", "Timing",
+    "EventTable",
+    "FrameTable",
+    "Losses",
+    "Marks",
+    "Origin",
+    "SampleColumns",
+    "Section",
+    "Sensor",
+    "Settings",
+    "Timing",
     "Wire",
 ]  # fmt: skip
 
@@ -264,7 +273,7 @@ class Wire:
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class SampleColumns:
     """Hold the lines of a stream of numbers.
 
     Parameters
@@ -288,4 +297,4 @@ class Columns:
 
 
 #: A function has a rule for each of these types: `match` them, and end with `assert_never`.
-Section = Origin | Sensor | Settings | Marks | Timing | Losses | EventTable | FrameTable | Wire | Columns
+Section = Origin | Sensor | Settings | Marks | Timing | Losses | EventTable | FrameTable | Wire | SampleColumns

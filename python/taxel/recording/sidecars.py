@@ -8,7 +8,7 @@ from pathlib import Path
 from taxel._core import ProblemError
 from taxel.calibration import Calibration
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording.contents import Contents, FrameSource, Source, Stream, alone, share_clock
+from taxel.recording.contents import Contents, FrameSource, RecordedSource, Stream, alone, share_clock
 from taxel.recording.frames import calibrate
 from taxel.recording.once import Once, known
 from taxel.recording.recording import Recording
@@ -22,14 +22,14 @@ def with_sidecars(contents: Contents) -> Contents:
     return alone({name: _with_sidecars(source, labelled=name in labelled) for name, source in contents.sources.items()})
 
 
-def _with_sidecars(source: Source, *, labelled: bool) -> Source:
+def _with_sidecars(source: RecordedSource, *, labelled: bool) -> RecordedSource:
     path, marks = source.origin.path, source.marks
     if labelled and path.exists() and beside(path).is_file():
         marks = replace(marks, notes=Once(lambda: _notes(source)))
     return replace(source, sensor=replace(source.sensor, calibration=calibration_beside(path, source)), marks=marks)
 
 
-def _notes(source: Source) -> tuple[Note, ...]:
+def _notes(source: RecordedSource) -> tuple[Note, ...]:
     """Return the notes of a recording, and the labels that people set on it: of its trial and source, and those of all.
 
     Notes can be used as labels: one that a label replaces is left out, and a label that says the same at the same time
@@ -48,7 +48,7 @@ def labels_of(origin: Origin) -> tuple[Path, str, str]:
     return origin.path, origin.label, trial_of(origin.name, origin.label)
 
 
-def calibration_beside(path: Path, source: Source) -> Once[Calibration | None]:
+def calibration_beside(path: Path, source: RecordedSource) -> Once[Calibration | None]:
     """Return the calibration beside a file (`Calibration.beside`); None if there is none.
 
     Reading it raises a FormatError if it cannot be read, and a ProblemError if it is of another array than the
@@ -71,7 +71,7 @@ def calibrate_by(recording: Recording, path: Path) -> Recording:
     ProblemError : it is of another array than the recording, or of readings in another unit
     """
 
-    def with_calibration(source: Source) -> Source:
+    def with_calibration(source: RecordedSource) -> RecordedSource:
         if isinstance(source, Stream):
             return source
         calibration: Once[Calibration | None] = known(_fitting(path, source))
@@ -81,7 +81,7 @@ def calibrate_by(recording: Recording, path: Path) -> Recording:
     return Recording(alone({name: with_calibration(source) for name, source in sources.items()}))
 
 
-def _fitting(path: Path, source: Source) -> Calibration:
+def _fitting(path: Path, source: RecordedSource) -> Calibration:
     """Return a calibration; refuse one of another array or of readings in another unit."""
     calibration = Calibration.load(path)
     unit = source.table.unit if isinstance(source, FrameSource) else "ticks"

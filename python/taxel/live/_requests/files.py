@@ -57,7 +57,7 @@ class FileRequests:
         activity, repeated, *known = (
             np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, *(values or ()))
         )
-        result = judge(sensor, TaxelStatistics(activity, repeated, Touches.of(*touches), *known))
+        result = judge(sensor, TaxelStatistics(activity, repeated, Touches.from_counts(*touches), *known))
         taxels = result.named()
         return taxels["dead"], taxels["stuck"], taxels["noisy"], int(np.count_nonzero(result.untested))
 

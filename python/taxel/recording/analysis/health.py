@@ -154,7 +154,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
             values = table.values - least
             ticks = Frames(frozen(np.multiply(values, scale, out=values)), table.t, array=table.array)
     counts = _core.touches_of_frames(ticks._parts(), 0.0 if table.unit in FORCE_UNITS else np.nan)
-    result = judge(table.array, TaxelStatistics(activity, moved, Touches.of(*counts)), loud=False)
+    result = judge(table.array, TaxelStatistics(activity, moved, Touches.from_counts(*counts)), loud=False)
     if not len(table):
         return result
     # In frames a taxel that never changes is dead or stuck, depending on its value.
@@ -181,7 +181,7 @@ class Touches(NamedTuple):
     """Those in which hardly any taxel around it did."""
 
     @classmethod
-    def of(cls, taxels: NDArray[np.uint32], counts: NDArray[np.uint32]) -> Touches:
+    def from_counts(cls, taxels: NDArray[np.uint32], counts: NDArray[np.uint32]) -> Touches:
         """Return what the core gives: the taxels, and rows of five counts one after the other."""
         return cls(taxels, *counts.reshape(-1, 5).T)
 
@@ -247,7 +247,7 @@ def _statistics_of_events(events: Events) -> TaxelStatistics:
     sent = np.ones(len(events), bool) if events.repaired is None else ~events.repaired
     index = events.array.index(events.x, events.y).astype(np.int64)
     activity, moved = _ways(index[sent], np.where(events.p[sent], 1, -1), events.array)
-    touches = Touches.of(*_core.touches_of_events(events.sorted()._parts()))
+    touches = Touches.from_counts(*_core.touches_of_events(events.sorted()._parts()))
     if events.intensity is None or events.present is None:
         return TaxelStatistics(activity, moved, touches)
     shape, size = events.array.shape, events.array.rows * events.array.columns

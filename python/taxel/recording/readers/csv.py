@@ -28,7 +28,7 @@ from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.formats.layout import advice
 from taxel.frames import Frames
-from taxel.recording.contents import Source, source_from
+from taxel.recording.contents import RecordedSource, source_from
 from taxel.recording.readers.npz import around
 from taxel.recording.sections import Origin
 
@@ -52,7 +52,7 @@ _AT_ONCE = 1 << 22
 _Block = tuple[int, bytes]
 
 
-def read_csv(path: Path, array: Array | None) -> Source:
+def read_csv(path: Path, array: Array | None) -> RecordedSource:
     """Read a .csv of events or of frames.
 
     Raises

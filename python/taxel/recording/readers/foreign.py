@@ -31,7 +31,7 @@ from taxel.formats.checks import ascending, whole_us
 from taxel.formats.checks import table as limited
 from taxel.formats.layout import ISO, UNITS_US, Data, Layout, Table, as_size
 from taxel.frames import Frames
-from taxel.recording.contents import Source, source_from
+from taxel.recording.contents import RecordedSource, source_from
 from taxel.recording.once import known
 from taxel.recording.sections import Losses, Origin
 
@@ -61,7 +61,7 @@ def is_lone_array(path: Path) -> bool:
     return len(shapes) == 1 and all(len(shape) in (2, 3) for shape in shapes.values())
 
 
-def read_foreign(path: Path, layout: Layout) -> Source:
+def read_foreign(path: Path, layout: Layout) -> RecordedSource:
     """Read a file whose layout says how.
 
     Parameters

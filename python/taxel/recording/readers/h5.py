@@ -11,7 +11,7 @@ from taxel._base.files import open_file
 from taxel._base.h5_file import H5File
 from taxel._core import FormatError
 from taxel.array import Array
-from taxel.recording.contents import Source
+from taxel.recording.contents import RecordedSource
 from taxel.recording.readers.columns import TEXTS
 from taxel.recording.readers.npz import DTYPES, chosen, source_of_columns
 
@@ -46,7 +46,7 @@ def _holds(file: BinaryIO, word: bytes) -> bool:
     return False
 
 
-def read_h5(path: Path, array: Array | None) -> Source:
+def read_h5(path: Path, array: Array | None) -> RecordedSource:
     """Read a .h5 that taxel wrote.
 
     Raises

@@ -8,13 +8,13 @@ from taxel import _core
 from taxel._base import limits
 from taxel.array import Array
 from taxel.events import Events
-from taxel.recording.contents import Board
+from taxel.recording.contents import BoardSource
 from taxel.recording.once import known
 from taxel.recording.sections import EventTable, Losses, Origin, Sensor, Wire
 from taxel.recording.verdict import Verdict
 
 
-def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Board:
+def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> BoardSource:
     """Return the contents of a .lsa.
 
     Parameters
@@ -42,4 +42,4 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Board
     )
     events = known(Events._from_parts(read.events, array))
     wire = Wire(payload=read.payload, differences=differences)
-    return Board(Origin(path, path.name, "lsa"), Sensor(array), EventTable(events), wire, losses=losses)
+    return BoardSource(Origin(path, path.name, "lsa"), Sensor(array), EventTable(events), wire, losses=losses)

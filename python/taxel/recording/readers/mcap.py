@@ -19,7 +19,7 @@ from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording import sections
-from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, alone
+from taxel.recording.contents import BoardSource, Contents, FrameSource, RecordedSource, Stream, alone
 from taxel.recording.description import (
     array_of,
     board_changes_of,
@@ -50,7 +50,7 @@ def read_mcap(path: Path, pairing: str) -> Contents:
     """
     limit = limits.given()
     reader = _core.RecordingReader(path, limits.memory(limit), limit is not None)
-    sources: dict[str, Source] = {}
+    sources: dict[str, RecordedSource] = {}
     for name in reader.sources():
         channel = _Source(path, reader.of_source(name), limit)
         if channel.header.get("frames") is not None:
@@ -97,14 +97,14 @@ class _Source:
         """Return the reader of this source, which reads as much as the memory that is available now allows."""
         return self._reader.within(limits.memory(self._limit))
 
-    def board(self, pairing: str) -> Board:
+    def board(self, pairing: str) -> BoardSource:
         """Return the contents of a board."""
         decoded = Once(lambda: self.reader().decode(pairing))
 
         def arrived() -> bool:
             return self.remarks().datagrams > 0
 
-        return Board(
+        return BoardSource(
             self.origin,
             self.sensor,
             sections.EventTable(Once(lambda: Events._from_parts(decoded().events, self.array))),
@@ -157,7 +157,7 @@ class _Source:
         header: dict[str, Any] = {"settings": self.settings(), "marks": self.marks(), "losses": self.losses(counts)}
         if not about.get("columns"):
             return FrameSource(self.origin, self.sensor, frame_table, **header)
-        return Stream(self.origin, self.sensor, frame_table, sections.Columns(tuple(about["columns"])), **header)
+        return Stream(self.origin, self.sensor, frame_table, sections.SampleColumns(tuple(about["columns"])), **header)
 
     def stream(self) -> Stream:
         """Return the contents of a stream of numbers, whose lines are frames of one row."""
@@ -183,7 +183,7 @@ class _Source:
             self.origin,
             self.sensor,
             sections.FrameTable(Once(frames)),
-            sections.Columns(names, Once(samples, lambda: self.remarks().samples > 0)),
+            sections.SampleColumns(names, Once(samples, lambda: self.remarks().samples > 0)),
             timing=sections.Timing(Once(lambda: Clock(read().t, read().arrived_ns))),
             losses=self.losses(lambda: self.counts_of_stream(read()), lambda: read().found),
             marks=self.marks(),

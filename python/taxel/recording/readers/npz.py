@@ -21,7 +21,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.frames import Frames
-from taxel.recording.contents import Source
+from taxel.recording.contents import RecordedSource
 from taxel.recording.description import about_of, described_source
 from taxel.recording.layout import check_size
 from taxel.recording.readers.columns import COLUMNS, DIGEST, EVENTS, PIECE_BYTES, TEXTS, digest_of
@@ -73,7 +73,7 @@ def _wrong_shape(name: str, shapes: Mapping[str, tuple[int, ...]]) -> str | None
     return None if is_right else "one value an event, as many as t has"
 
 
-def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: Array | None) -> Source:
+def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: Array | None) -> RecordedSource:
     """Return what a file of columns holds; the arrays are not copied.
 
     Parameters
@@ -133,7 +133,7 @@ def _held(held: NDArray[Any], array: Array) -> NDArray[np.uint16]:
     return held
 
 
-def read_npz(path: Path, array: Array | None) -> Source:
+def read_npz(path: Path, array: Array | None) -> RecordedSource:
     """Read a .npz that taxel wrote, or one with the columns ``t x y p`` or ``values t``.
 
     Raises

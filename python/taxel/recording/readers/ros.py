@@ -17,7 +17,7 @@ from taxel.array import Array
 from taxel.formats.ros import Chosen, Read, read
 from taxel.frames import Frames
 from taxel.labels import source_of
-from taxel.recording.contents import Contents, Source, alone, source_from
+from taxel.recording.contents import Contents, RecordedSource, alone, source_from
 from taxel.recording.once import known
 from taxel.recording.readers.mcap import ascending
 from taxel.recording.sections import Losses, Origin
@@ -98,7 +98,7 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
         )
         raise helped(error, "topic", "give")
     reads = read(path, topics.chosen(array), topics.folder, topics.ros)
-    sources: dict[str, Source] = {}
+    sources: dict[str, RecordedSource] = {}
     for name, topic in zip(_names(path, reads), reads, strict=True):
         left_out = tuple(_lines_of_losses(topic))
         for line in left_out:

@@ -19,7 +19,7 @@ from typing import BinaryIO
 import numpy as np
 
 from taxel._base import h5_writing
-from taxel.recording.contents import Source
+from taxel.recording.contents import RecordedSource
 from taxel.recording.readers.columns import TEXTS
 from taxel.recording.readers.h5 import MARK, VERSION
 from taxel.recording.writers.npz import columns_of
@@ -28,7 +28,7 @@ from taxel.recording.writers.npz import columns_of
 _PIECE_BYTES = 1 << 20
 
 
-def write_h5(path: Path, source: Source, *, overwrite: bool) -> None:
+def write_h5(path: Path, source: RecordedSource, *, overwrite: bool) -> None:
     """Write a .h5, column after column in pieces.
 
     Raises

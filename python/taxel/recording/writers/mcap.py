@@ -18,7 +18,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.analysis.pressure import above_rest
 from taxel.recording.analysis.rest import Rest, ticks_by_unit
-from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream
+from taxel.recording.contents import BoardSource, Contents, FrameSource, RecordedSource, Stream
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import known
 from taxel.recording.raw import Datagrams
@@ -59,7 +59,7 @@ def write_mcap(path: Path, contents: Contents, compression: str, counts: Mapping
         _add_small(writer, main, _by_host(main))
         writer.finish(json.dumps(counts[main.origin.label]))
         return
-    if not isinstance(main, Board):
+    if not isinstance(main, BoardSource):
         frame_sources = {name: source for name, source in contents.sources.items() if isinstance(source, FrameSource)}
         _write_frames(path, frame_sources, compression, counts)
         return
@@ -92,7 +92,7 @@ def write_mcap(path: Path, contents: Contents, compression: str, counts: Mapping
     writer.finish(json.dumps(counts[main.origin.label]))
 
 
-def _header(source: Source) -> dict[str, Any]:
+def _header(source: RecordedSource) -> dict[str, Any]:
     """Return what a header states of a sensor."""
     registers, array = source.settings.registers(), source.sensor.array
     driven = array if registers is None else registers.array
@@ -107,7 +107,7 @@ def _header(source: Source) -> dict[str, Any]:
     }
 
 
-def _provenance(source: Source) -> dict[str, Any]:
+def _provenance(source: RecordedSource) -> dict[str, Any]:
     """Return what a header states of the recording that a file was made of."""
     # The verdict stands here and not with the final counts, so that a file that was cut still states it.
     converted = None if source.losses.verdict() is None else verdict_of(source)._held
@@ -243,13 +243,13 @@ def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64]
         )
 
 
-def _by_host(source: Source) -> Callable[[int], int]:
+def _by_host(source: RecordedSource) -> Callable[[int], int]:
     """Return the function of a source's times, us, to those in the file, ns: by its clock where that is known."""
     clock = source.timing.usable()
     return lambda t: max(0, t * 1000 if clock is None else int(clock.host_ns(t)))
 
 
-def _add_remarks(writer: Any, events: Events, source: Source) -> None:
+def _add_remarks(writer: Any, events: Events, source: RecordedSource) -> None:
     at_ns = _by_host(source)
     detections = source.marks.detections()
     noted = [note.t for note in source.marks.notes() if note.t is not None]
@@ -263,7 +263,7 @@ def _add_remarks(writer: Any, events: Events, source: Source) -> None:
     _add_small(writer, source, at_ns)
 
 
-def _add_small(writer: Any, source: Source, at_ns: Callable[[int], int]) -> None:
+def _add_small(writer: Any, source: RecordedSource, at_ns: Callable[[int], int]) -> None:
     """Write notes, zeroed taxels, registers and detections."""
     for note in source.marks.notes():
         writer.note(note.at_ns, note.t, note.text)

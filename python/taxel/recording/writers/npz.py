@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from taxel._base.limits import MARKERS, UNIT
 from taxel._core import ProblemError
 from taxel.frames import Frames
-from taxel.recording.contents import Source
+from taxel.recording.contents import RecordedSource
 from taxel.recording.description import json_of
 from taxel.recording.readers.columns import DIGEST, digest_of
 
 
-def columns_of(source: Source) -> dict[str, NDArray[Any]]:
+def columns_of(source: RecordedSource) -> dict[str, NDArray[Any]]:
     """Return a recording as columns by name, with their checksum.
 
     Raises
@@ -47,6 +47,6 @@ def columns_of(source: Source) -> dict[str, NDArray[Any]]:
     return {**columns, DIGEST: digest_of(columns)}
 
 
-def write_npz(file: BinaryIO, source: Source) -> None:
+def write_npz(file: BinaryIO, source: RecordedSource) -> None:
     """Write a .npz."""
     np.savez_compressed(file, **cast(dict[str, Any], columns_of(source)))

@@ -19,11 +19,11 @@ from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.recording import sections
 from taxel.recording.contents import (
-    Board,
+    BoardSource,
     Contents,
     Drawn,
     FrameSource,
-    Source,
+    RecordedSource,
     Stream,
     apply_rule,
     refuse_several,
@@ -47,7 +47,7 @@ STAMP_US = 100
 _MOST = 1_000_000
 
 #: What a file can hold, and a line for each kind of information that it cannot.
-_Kept = tuple[Source, list[str]]
+_Kept = tuple[RecordedSource, list[str]]
 
 
 def storable(contents: Contents, path: Path) -> Contents:
@@ -69,11 +69,11 @@ def storable(contents: Contents, path: Path) -> Contents:
     return Contents.single(with_losses(source, contents.others))
 
 
-def _rename(source: Source, name: str, label: str) -> Source:
+def _rename(source: RecordedSource, name: str, label: str) -> RecordedSource:
     return replace(source, origin=replace(source.origin, name=name, label=label))
 
 
-def _storable(source: Source, ending: str, path: Path) -> Source:
+def _storable(source: RecordedSource, ending: str, path: Path) -> RecordedSource:
     """Return what a file can hold of a source."""
     stored, lines = {".mcap": _mcap, ".lsa": _lsa, ".csv": _csv, ".npz": _table, ".h5": _table}[ending](source, path)
     beside = calibration_beside(path, source)
@@ -90,7 +90,7 @@ def _storable(source: Source, ending: str, path: Path) -> Source:
     )
 
 
-def needs_new_bytes(source: Source) -> bool:
+def needs_new_bytes(source: RecordedSource) -> bool:
     """Return whether a file's bytes must be made of the events, as no datagrams contain exactly these events."""
     has_bytes = bool(source.section(sections.Wire).losses())
     return source.timing.interval is not None or source.timing.clock_of is not None or not has_bytes
@@ -102,14 +102,14 @@ def _sensor(array: Array) -> str:
     return f'the sensor ({array.rows} x {array.columns} taxels{some}, {array._apart()}, "{array.name}")'
 
 
-def _arrivals(source: Source) -> list[str]:
+def _arrivals(source: RecordedSource) -> list[str]:
     """Return what is lost without arrival times, which datagrams have too."""
     return ["arrival times"] * (source.timing.clock.holds() and not source.section(sections.Wire).datagrams.holds())
 
 
-def _table(source: Source, _: Path) -> _Kept:
+def _table(source: RecordedSource, _: Path) -> _Kept:
     """Return what a .npz or a .h5 holds: all but the raw datagrams."""
-    wire, stream = source.section(sections.Wire), source.section(sections.Columns)
+    wire, stream = source.section(sections.Wire), source.section(sections.SampleColumns)
 
     def rule(section: sections.Section) -> sections.Section | None:
         match section:
@@ -126,8 +126,8 @@ def _table(source: Source, _: Path) -> _Kept:
                 return section
             case sections.Wire():
                 return sections.Wire()
-            case sections.Columns():
-                return sections.Columns(section.columns)
+            case sections.SampleColumns():
+                return sections.SampleColumns(section.columns)
             case sections.Timing():
                 return None
             case _:
@@ -136,7 +136,7 @@ def _table(source: Source, _: Path) -> _Kept:
     return apply_rule(source, rule), [*_arrivals(source), *wire.losses(with_times=True), *stream.received()]
 
 
-def _bare(source: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
+def _bare(source: RecordedSource, table: Events | Frames, wire: Iterable[str]) -> _Kept:
     """Return a table alone, and what is lost of each of the other parts; of the bytes it is given."""
     kept_sections = (section for section in sections_of(source).values() if not isinstance(section, sections.Wire))
     return source_from(table, losses=sections.Losses(lost=source.losses.lost)), [
@@ -146,7 +146,7 @@ def _bare(source: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
     ]
 
 
-def _csv(source: Source, path: Path) -> _Kept:
+def _csv(source: RecordedSource, path: Path) -> _Kept:
     """Return what a .csv holds: events without markers, or frames without their unit."""
     beside, is_turned = Layout.beside(path), isinstance(source, FrameSource) and source.frame_table.turned is not None
     if is_turned and beside is not None and Layout.read(beside).turned is not None:
@@ -171,7 +171,7 @@ def _csv(source: Source, path: Path) -> _Kept:
     return stored, [*lines, *lost]
 
 
-def _lsa(source: Source, path: Path) -> _Kept:
+def _lsa(source: RecordedSource, path: Path) -> _Kept:
     """Return what a .lsa holds: the board's bytes as received, or made of the events."""
     board = _board(source, path)
     events, wire, stated = board.table, board.wire, source.sensor.array
@@ -194,11 +194,11 @@ def _lsa(source: Source, path: Path) -> _Kept:
     elif (again.t != events.t // STAMP_US * STAMP_US).any():
         lost.append("whole turns of 6.5536 s in times")
     stored, lines = _bare(source, events, of_wire)
-    assert isinstance(stored, Board)  # of events
+    assert isinstance(stored, BoardSource)  # of events
     return replace(stored, wire=sections.Wire(payload=payload)), [*lines, *lost]
 
 
-def _mcap(source: Source, path: Path) -> _Kept:
+def _mcap(source: RecordedSource, path: Path) -> _Kept:
     """Return what a .mcap holds: all; events without datagrams of exactly these events get new datagrams."""
     is_file, lines = source.origin.kind != "events", source.losses.damage()
     # Of what recordings were merged stands in `source`.
@@ -206,7 +206,7 @@ def _mcap(source: Source, path: Path) -> _Kept:
     samples = source.stream.samples() if isinstance(source, Stream) else None
     events = None if isinstance(source, FrameSource) else known(_board(source, path).table)
     clock = source.timing.usable()
-    wire = _wire(source, clock, lines) if isinstance(source, Board) else sections.Wire()
+    wire = _wire(source, clock, lines) if isinstance(source, BoardSource) else sections.Wire()
     if samples is not None:
         bad = source.losses.counts().get("lines_that_could_not_be_read", 0)
         lines += [f"{bad} lines that could not be read"] * bool(bad)
@@ -226,7 +226,11 @@ def _mcap(source: Source, path: Path) -> _Kept:
                     section, source=section.source or section.name or ("events" if source.has_events else "frames")
                 )
             case (
-                sections.Sensor() | sections.Settings() | sections.Marks() | sections.FrameTable() | sections.Columns()
+                sections.Sensor()
+                | sections.Settings()
+                | sections.Marks()
+                | sections.FrameTable()
+                | sections.SampleColumns()
             ):
                 return section
             case sections.EventTable():
@@ -249,7 +253,7 @@ def _mcap(source: Source, path: Path) -> _Kept:
     return apply_rule(source, rule), lines
 
 
-def _wire(board: Board, clock: Clock | None, lost: list[str]) -> sections.Wire:
+def _wire(board: BoardSource, clock: Clock | None, lost: list[str]) -> sections.Wire:
     """Return the datagrams of a new .mcap: those received, or new ones made of the events."""
     wire = board.wire
     if not needs_new_bytes(board):
@@ -265,8 +269,8 @@ def _wire(board: Board, clock: Clock | None, lost: list[str]) -> sections.Wire:
     )
 
 
-def _board(source: Source, path: Path) -> Board:
-    if not isinstance(source, Board):
+def _board(source: RecordedSource, path: Path) -> BoardSource:
+    if not isinstance(source, BoardSource):
         raise ProblemError(
             f"{path}: a {path.suffix.lower()} holds events and no frames; write those to .mcap, .npz, .csv or .h5"
         )
