@@ -139,7 +139,10 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         (f"{folder}/web/clients.js", False),
         (f"{folder}/web/index.html", True),
         *3 * [(f"{folder}/web/main.js", True)],
-        *[(f"{folder}/src/{name}.rs", True) for name in ("assets", "protocol/request", "requests", "protocol/messages")],
+        *[
+            (f"{folder}/src/{name}.rs", True)
+            for name in ("assets", "protocol/request", "requests", "protocol/messages")
+        ],
         ("tests/panel/test_page_clients.py", False),
     ]
     assert [(p.path, bool(p.after)) for p in of(OPTION)] == [
