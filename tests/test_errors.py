@@ -13,7 +13,7 @@ import pytest
 
 import taxel
 from taxel import _core
-from taxel._base.arguments import finite, whole
+from taxel._base.arguments import finite, integer
 from taxel._base.errors import helped, refused
 from taxel._base.parameters import described
 from taxel.cli import main
@@ -115,5 +115,5 @@ def test_limits_have_one_voice(command: str, option: Any, capsys: pytest.Capture
         line = line_of(capsys, *command.split(), f"{name}={value}")
         limits = {key: end for key, end in (("least", option.min), ("most", option.max)) if end is not None}
         with pytest.raises(taxel.ProblemError) as caught:
-            (whole if option.type_descriptor.annotation is int else finite)(name, value, **limits)
+            (integer if option.type_descriptor.annotation is int else finite)(name, value, **limits)
         assert line == str(caught.value)

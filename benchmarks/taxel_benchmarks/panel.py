@@ -207,7 +207,7 @@ def seeking(version: int, count: int, seeks: int, scratch: Path) -> dict[str, An
 def insoles(seconds: float) -> taxel.Recording:
     """Return a walk on two insoles of 99 sensors at 100 Hz: steps of a second, in kPa with fractions."""
     from taxel.recording.contents import Source, alone, source_from  # noqa: PLC0415  a recording in memory
-    from taxel.recording.parts import Origin  # noqa: PLC0415
+    from taxel.recording.sections import Origin  # noqa: PLC0415
 
     random, n = np.random.default_rng(7), round(100 * seconds)
     y, x = np.divmod(np.arange(99), 9)

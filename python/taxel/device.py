@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Self, TypeVar
 
 from taxel import _core
-from taxel._base.arguments import flag, instance, number, shown, text, whole
+from taxel._base.arguments import flag, instance, integer, number, shown, text
 from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel._core import DeviceError
@@ -161,7 +161,7 @@ class Cable:
         self.timeout = number("timeout", timeout)
         if not 0 < self.timeout <= 3600:
             raise refused("timeout", f" is {shown(timeout)}: must be from 0 to 3600")
-        if whole("baud", baud) not in _SPEEDS:
+        if integer("baud", baud) not in _SPEEDS:
             raise refused("baud", f" is {baud}: must be one of {', '.join(map(str, _SPEEDS))}")
         self.faults: dict[str, int] = {}
         self.resets = 0
@@ -338,7 +338,7 @@ class Cable:
         DeviceError : the board does not answer
         ProblemError : no such register
         """
-        return self.command(Command(6, whole("register", register, 0, 7)))
+        return self.command(Command(6, integer("register", register, 0, 7)))
 
     @contextlib.contextmanager
     def floor(self, ticks: int) -> Iterator[None]:
@@ -358,7 +358,7 @@ class Cable:
         ProblemError : a noise floor out of this range
         """
         before = self.read(_FLOOR_REGISTER)
-        floor = whole("ticks", ticks, 0, 255) << 8
+        floor = integer("ticks", ticks, 0, 255) << 8
         self.command(Command(_FLOOR_REGISTER, before & ~_FLOOR_MASK | floor))
         try:
             yield

@@ -96,7 +96,7 @@ SOUND: dict[str, Sound] = {
         taxel.Labels("here_labels.csv").named,
         {"recording": "walk.mcap", "trial": "walk 1", "source": "left"},
     ),
-    "taxel.Labels.of": lambda: (taxel.Labels("here_labels.csv").of, {"recording": taxel.open("here_events.npz")}),
+    "taxel.Labels.times": lambda: (taxel.Labels("here_labels.csv").times, {"recording": taxel.open("here_events.npz")}),
     "taxel.Verdict.from_dict": plain(
         taxel.Verdict.from_dict, held={"status": "lost", "text": "LOST: 2 datagrams", "lost": {"lost_on_the_way": 2}}
     ),

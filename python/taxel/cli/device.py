@@ -109,7 +109,7 @@ def apply(
 @app.command(short_help="Make a board mark the start or stop of a recording.")
 def record(
     place: PlaceArgument,
-    what: Annotated[str, typer.Argument(help="The mark: start or stop.")],
+    mark: Annotated[str, typer.Argument(metavar="WHAT", help="The mark: start or stop.")],
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
 ) -> None:
@@ -117,10 +117,10 @@ def record(
 
     Example: taxel device record /dev/ttyUSB0 start
     """
-    if what not in ("start", "stop"):
-        raise ProblemError(f"{what}: must be start or stop")
+    if mark not in ("start", "stop"):
+        raise ProblemError(f"{mark}: must be start or stop")
     with Device(place, baud=baud) as device:
-        _print(device, device.record(what == "start"), as_json)
+        _print(device, device.record(mark == "start"), as_json)
 
 
 @app.command(short_help="Print the faults that a board reports, as they come.")

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from taxel._base.arguments import checked_path, flag, instance, number, text, whole
+from taxel._base.arguments import checked_path, flag, instance, integer, number, text
 from taxel._base.options import option
 from taxel.array import Array
 from taxel.simulate.acts import Act, Contact
@@ -96,13 +96,13 @@ class EmulateOptions:
         registers = preset(self.preset) if registers is None else registers
         registers = instance("registers", registers, Registers)
         if self.wire is not None:
-            registers = registers.replace(wire_version=whole("wire", self.wire, 1, 2))
+            registers = registers.replace(wire_version=integer("wire", self.wire, 1, 2))
         return replace(self, array=array, registers=registers)
 
     def for_rust(self) -> dict[str, Any]:
         """Return the completed options as Rust reads them."""
         registers = instance("registers", self.registers, Registers)
-        baud, overwrite = whole("baud", self.baud, 300, 4_000_000), flag("overwrite", self.overwrite)
+        baud, overwrite = integer("baud", self.baud, 300, 4_000_000), flag("overwrite", self.overwrite)
         return {
             "registers": registers._held,
             "tare_ms": None if isinstance(self.touch, Replay | Pipe) else number("tare_ms", self.tare_ms),
@@ -119,5 +119,5 @@ class EmulateOptions:
             "faults": None if self.faults is None else instance("faults", self.faults, Faults)._parts(),
             "reset_every_s": None if self.reset_every_s is None else number("reset_every_s", self.reset_every_s),
             "drift_ppm": number("drift_ppm", self.drift_ppm),
-            "source_port": whole("source_port", self.source_port, 0, 65_535),
+            "source_port": integer("source_port", self.source_port, 0, 65_535),
         }

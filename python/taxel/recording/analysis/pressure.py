@@ -17,11 +17,7 @@ from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Contents, source_from
-from taxel.recording.frames import FRAMES_HZ, period_us
-from taxel.recording.once import UNKNOWN
-from taxel.recording.recording import Recording
-from taxel.recording.rest import (
+from taxel.recording.analysis.rest import (
     FrameBlock,
     Rest,
     find_rest,
@@ -31,6 +27,10 @@ from taxel.recording.rest import (
     of_frames,
     ticks_by_unit,
 )
+from taxel.recording.contents import Contents, source_from
+from taxel.recording.frames import FRAMES_HZ, period_us
+from taxel.recording.once import UNKNOWN
+from taxel.recording.recording import Recording
 from taxel.tare import Tare
 
 #: The most frames of a long recording, as a plot resolves no more points.
@@ -89,20 +89,20 @@ class Series:
     largest: Series | None = None
 
     @classmethod
-    def of(cls, frames: Frames, above: float, rest: Rest) -> Series:
+    def from_frames(cls, frames: Frames, above: float, rest: Rest) -> Series:
         """Return the series of frames above rest."""
         array = frames.array
         block = max(1, _BLOCK // max(1, array.rows * array.columns))
         # A block at a time, because the centre's weights have 64 bits.
         blocks = [frames[k : k + block] for k in range(0, len(frames), block)] or [frames]
 
-        def over(of: Callable[[Frames], NDArray[np.float64]]) -> NDArray[np.float64]:
-            return np.concatenate([of(block) for block in blocks])
+        def over(measure: Callable[[Frames], NDArray[np.float64]]) -> NDArray[np.float64]:
+            return np.concatenate([measure(block) for block in blocks])
 
         def loaded_sum(block: Frames) -> NDArray[np.float64]:
             # Where no noise is cut off, values below 0 cancel that above; a sum of forces is that of all taxels.
-            cut = above > 0 and rest.source != "unit"
-            values = np.where(block._loaded(above), block.values, 0.0) if cut else block.values
+            is_cut_off = above > 0 and rest.source != "unit"
+            values = np.where(block._loaded(above), block.values, 0.0) if is_cut_off else block.values
             return np.asarray(values.sum(axis=(1, 2), dtype=np.float64))
 
         in_mm2 = array.area_mm2 is not None
@@ -127,27 +127,31 @@ def force_n(frames: Frames) -> NDArray[np.float64] | None:
 def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     """Return area, peak, sum and centre of a recording's frames above rest (`above_rest`); None without intensities.
 
-    Taxels of frames that flicker (`taxel.recording.rest.flickering`) count as 0. For events only taxels with events
-    are computed, a block of frames at a time: for a large sensor with few events no whole frame is in memory.
+    Taxels of frames that flicker (`flickering`) count as 0. For events only taxels with events are computed, a block of
+    frames at a time: for a large sensor with few events no whole frame is in memory.
     """
     if not recording.has_events or recording.calibration is not None:
         result = above_rest(recording, tare)
         if result is None or recording.has_events:
-            return None if result is None else Series.of(*result)
+            return None if result is None else Series.from_frames(*result)
         frames, above, rest = result
         # As on the page, a taxel that jumps alone for single frames is no load.
         values = np.where(flickering(recording.frames()), np.float32(0), frames.values)
-        return Series.of(Frames(values, frames.t, unit=frames.unit, array=frames.array), above, rest)
+        return Series.from_frames(Frames(values, frames.t, unit=frames.unit, array=frames.array), above, rest)
     events = recording.events
     if events.present is None or events.intensity is None or not events.present.any():
         return None
-    drawn = _Drawn.of(recording)
+    drawn = _Drawn.from_recording(recording)
     rest = _rest_of(recording, drawn, tare)
-    of = _series_of(drawn, rest, events.array)
-    moments = _moments(events, drawn, rest, of)
+    drawn_series = _series_of(drawn, rest, events.array)
+    moments = _moments(events, drawn, rest, drawn_series)
     # They are frames more, at which the rest is tracked as at the others.
     at_all = replace(drawn, t=np.union1d(drawn.t, moments))
-    return replace(of, largest=_series_of(at_all, rest, events.array)) if len(at_all.t) > len(drawn.t) else of
+    return (
+        replace(drawn_series, largest=_series_of(at_all, rest, events.array))
+        if len(at_all.t) > len(drawn.t)
+        else drawn_series
+    )
 
 
 def _series_of(drawn: _Drawn, rest: Rest, array: Array) -> Series:
@@ -157,21 +161,32 @@ def _series_of(drawn: _Drawn, rest: Rest, array: Array) -> Series:
     places = None if array.is_channels else [axis.reshape(-1)[drawn.taxels] for axis in array.positions()]
     for first, over in drawn.above(rest):
         loaded = over > np.float64(floor)
-        part = slice(first, first + len(over))
-        area[part] = np.where(loaded, areas, 0.0).sum(axis=1)
+        rows = slice(first, first + len(over))
+        area[rows] = np.where(loaded, areas, 0.0).sum(axis=1)
         weights = np.where(loaded, over, 0.0).astype(np.float64)
-        peak[part], total[part] = over.max(axis=1), weights.sum(axis=1)
+        peak[rows], total[rows] = over.max(axis=1), weights.sum(axis=1)
         if places is None:
             continue
-        all_of_them = total[part, None]
+        all_of_them = total[rows, None]
         moments = np.stack([weights @ axis for axis in places], axis=1)
-        np.divide(moments, all_of_them, out=centre[part], where=all_of_them > 0)
-    of = (area, centre) if places is not None else (None, None)
+        np.divide(moments, all_of_them, out=centre[rows], where=all_of_them > 0)
+    not_of_channels = (area, centre) if places is not None else (None, None)
     unit = "taxels" if array.area_mm2 is None else "mm2"
-    return Series(drawn.t, "ticks", floor, of[0], peak, total, of[1], unit, array.centre_unit or "", rest)
+    return Series(
+        drawn.t,
+        "ticks",
+        floor,
+        not_of_channels[0],
+        peak,
+        total,
+        not_of_channels[1],
+        unit,
+        array.centre_unit or "",
+        rest,
+    )
 
 
-def _moments(events: Events, drawn: _Drawn, rest: Rest, of: Series) -> NDArray[np.int64]:
+def _moments(events: Events, drawn: _Drawn, rest: Rest, drawn_series: Series) -> NDArray[np.int64]:
     """Return the times of events at which area, peak and sum may be largest, us.
 
     Each event changes them by what its taxel changes, above a rest that stands still from one frame to the next:
@@ -188,30 +203,30 @@ def _moments(events: Events, drawn: _Drawn, rest: Rest, of: Series) -> NDArray[n
         base[k] = zero
     held = np.where(drawn.since <= drawn.t[0], drawn.held.at(drawn.t[:1]).reshape(-1), np.nan)
     base = np.where(np.isnan(base), held, base)
-    load = np.where(held - base > of.above, held - base, 0.0)
-    sums = {"total": float(load.sum())} | ({} if of.area is None else {"area": float(areas @ (load > 0))})
+    load = np.where(held - base > drawn_series.above, held - base, 0.0)
+    sums = {"total": float(load.sum())} | ({} if drawn_series.area is None else {"area": float(areas @ (load > 0))})
     offs, seen = dict.fromkeys(sums, 0.0), -1
     found: dict[str, list[tuple[float, int]]] = {name: [] for name in ("peak", *sums)}
     later = int(np.searchsorted(events.t, drawn.t[0], side="right"))
     for first in range(later, len(events), _EVENTS):
-        part = slice(first, first + _EVENTS)
-        is_present = events.present[part]
-        t, values = events.t[part][is_present], events.intensity[part][is_present].astype(np.float64)
+        rows = slice(first, first + _EVENTS)
+        is_present = events.present[rows]
+        t, values = events.t[rows][is_present], events.intensity[rows][is_present].astype(np.float64)
         if not len(t):
             continue
-        of_taxel = column[events.array.index(events.x[part][is_present], events.y[part][is_present])]
+        of_taxel = column[events.array.index(events.x[rows][is_present], events.y[rows][is_present])]
         order = np.argsort(of_taxel, kind="stable")
         taxel, value = of_taxel[order], values[order]
         begins = np.flatnonzero(np.diff(taxel, prepend=-1))
         # A taxel whose rest is not known is above its first value.
         base[taxel[begins]] = np.where(np.isnan(base[taxel[begins]]), value[begins], base[taxel[begins]])
         above = value - base[taxel]
-        now = np.where(above > of.above, above, 0.0)
+        now = np.where(above > drawn_series.above, above, 0.0)
         earlier = np.concatenate([[0.0], now[:-1]])
         earlier[begins] = load[taxel[begins]]
         load[taxel[begins]] = now[np.append(begins[1:], len(now)) - 1]
         steps = {"peak": above, "total": now - earlier}
-        if of.area is not None:
+        if drawn_series.area is not None:
             steps["area"] = areas[taxel] * ((now > 0) - 1.0 * (earlier > 0))
         # Only what is there once all of a moment's events are read.
         last = np.append(np.diff(t) > 0, True)
@@ -223,7 +238,7 @@ def _moments(events: Events, drawn: _Drawn, rest: Rest, of: Series) -> NDArray[n
             if name in sums:
                 curve = sums[name] + np.cumsum(curve)
                 at_frame = np.append(sums[name], curve[:-1])[starts]
-                off = getattr(of, name)[frame[starts]] - at_frame
+                off = getattr(drawn_series, name)[frame[starts]] - at_frame
                 if frame[0] == seen:
                     off[0] = offs[name]
                 sums[name], offs[name] = curve[-1], off[-1]
@@ -262,7 +277,7 @@ class _Drawn:
     zeroed: tuple[tuple[int, int, float], ...]
 
     @classmethod
-    def of(cls, recording: Recording) -> _Drawn:
+    def from_recording(cls, recording: Recording) -> _Drawn:
         events = recording.events
         assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller checked
         present = np.flatnonzero(events.present)
@@ -281,8 +296,8 @@ class _Drawn:
             places, rows, columns = np.arange(len(taxels)), 1, len(taxels)
         else:
             places = (y - y.min()) * columns + x - x.min()
-        of = {int(taxel): k for k, taxel in enumerate(taxels)}
-        zeroings = [(of.get(z.y * events.array.columns + z.x), z.t, z.rest) for z in recording.zeroings]
+        column_of = {int(taxel): k for k, taxel in enumerate(taxels)}
+        zeroings = [(column_of.get(z.y * events.array.columns + z.x), z.t, z.rest) for z in recording.zeroings]
         zeroed = tuple((k, t, rest) for k, t, rest in zeroings if k is not None)
         steps = events.t // _TRACKED_US
         changed = events.t[np.diff(steps, prepend=steps[0] - 1) != 0]
@@ -310,10 +325,10 @@ class _Drawn:
         while since[-1] < count:
             since.append(since[-1] + since[-1] // _IN_SILENCE)
         many = np.searchsorted(since, until - steps)
-        place = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many, many)
-        grid = np.repeat(steps, many) + np.array(since)[place]
+        number = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many, many)
+        grid = np.repeat(steps, many) + np.array(since)[number]
         # Stretches begin and end where they would with all times: in silence, around frames, and where events begin.
-        later = place >= _IN_SILENCE
+        later = number >= _IN_SILENCE
         grid[later] -= grid[later] % _STRETCH
         around = np.unique((self.t - first) // (_STRETCH * _TRACKED_US))[:, None] * _STRETCH + [0, _STRETCH]
         ends = until[until - steps > _IN_SILENCE, None] // _STRETCH * _STRETCH + np.arange(_STRETCH)
@@ -362,8 +377,8 @@ class _Drawn:
         for t, over in _above(replace(rest, values=everywhere), read(), self.box[1]):
             shown, (_, values) = kept.popleft()
             for k, since, zero in self.zeroed:
-                place, later = self.places[k], t >= since
-                over[later, place] = np.maximum(np.nan_to_num(values[later, place] - np.float32(zero)), 0)
+                column, later = self.places[k], t >= since
+                over[later, column] = np.maximum(np.nan_to_num(values[later, column] - np.float32(zero)), 0)
             yield first, over[shown][:, self.places]
             first += int(np.count_nonzero(shown))
 
@@ -393,8 +408,8 @@ def _rate_hz(recording: Recording) -> float:
 def _times(recording: Recording) -> NDArray[np.int64]:
     """Return the times of the frames of `Recording.frames`."""
     t = recording.events.t
-    stretch = recording._contents.main.timing.stretch
-    first, stop = (int(t.min()), int(t.max()) + 1) if stretch is None else stretch()
+    interval = recording._contents.main.timing.interval
+    first, stop = (int(t.min()), int(t.max()) + 1) if interval is None else interval()
     return np.arange(first, stop, period_us("rate_hz", _rate_hz(recording)), dtype=np.int64)
 
 
@@ -423,10 +438,14 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
         return None
     frames, rest, floor = read
     if recording.calibration is not None:
-        of, values = recording.calibration, rest.values.reshape(frames.array.shape)
-        return Frames(of._values(frames.values, values), frames.t, unit=of.unit, array=frames.array), 0.0, rest
+        calibration, values = recording.calibration, rest.values.reshape(frames.array.shape)
+        return (
+            Frames(calibration._values(frames.values, values), frames.t, unit=calibration.unit, array=frames.array),
+            0.0,
+            rest,
+        )
     if recording.has_events:
-        drawn = _Drawn.of(recording)
+        drawn = _Drawn.from_recording(recording)
         shown = drawn.frames(replace(rest, values=rest.values.reshape(-1)[drawn.taxels]), frames.array)
     elif rest.source in ("unit", "none"):
         return frames, floor, rest
@@ -451,8 +470,8 @@ def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
     -------
     float32, shape (n, rows, columns), ticks
     """
-    recording = Recording(Contents.of(source_from(events)))
-    drawn = _Drawn.of(recording)
+    recording = Recording(Contents.single(source_from(events)))
+    drawn = _Drawn.from_recording(recording)
     # The rest is found from the first event on.
     from_first = np.union1d(t, min(t[0], events.t.min())) if len(t) else t
     drawn = replace(drawn, t=from_first.astype(np.int64))
@@ -465,7 +484,7 @@ def quiet_rest(recording: Recording) -> Rest | None:
     Its values are those of the taxels with events.
     """
     present = recording.events.present
-    return None if present is None or not present.any() else _Drawn.of(recording).found()
+    return None if present is None or not present.any() else _Drawn.from_recording(recording).found()
 
 
 def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:
@@ -480,7 +499,7 @@ def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Re
     events = recording.events
     if events.present is None or not events.present.any():
         return None
-    drawn = _Drawn.of(recording)
+    drawn = _Drawn.from_recording(recording)
     rest, values, preload = _rest_of(recording, drawn, tare), np.full(events.array.shape, np.nan), None
     values.reshape(-1)[drawn.taxels] = rest.values
     if rest.preload is not None:

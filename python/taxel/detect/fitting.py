@@ -46,7 +46,7 @@ _NOT_OF_ROWS = (
 _FEWER = 3
 #: ... and that share of the labels: of many labels some were never felt.
 _FEWER_SHARE = 0.05
-#: Of fewer labels no two folds can be made.
+#: Two folds need this many labels.
 TWO_FOLDS = 4
 #: With so many of the quantities that follow the labels best a point is tried.
 _FOLLOWED = 2
@@ -128,8 +128,8 @@ def fit_aligned(examples: Sequence[Example], recipe: Recipe, progress: Progress 
     recipe = in_frames(instance("recipe", recipe, Recipe), sound, clocks)
     possibly = possible(recipe, sound)
     unit = unit_of(sound)
-    made = learn(Encoded(sound, possibly, report), possibly, array_of(sound), report)
-    return made._replace(recipe=recipe._at(made.recipe.neurons), readout=made.readout._with(unit=unit))
+    trained = learn(EncodedExamples(sound, possibly, report), possibly, array_of(sound), report)
+    return trained._replace(recipe=recipe._at(trained.recipe.neurons), readout=trained.readout._with(unit=unit))
 
 
 def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
@@ -140,7 +140,7 @@ def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
     return recipe._without_choices(LocalLoad.name) if any(example.tare is None for example in examples) else recipe
 
 
-class Encoded:
+class EncodedExamples:
     """The (checked) examples as spike trains of a recipe's encoder; what only points to choose from need when they do.
 
     Parameters
@@ -171,13 +171,13 @@ class Encoded:
             self._others[key] = self._encode(narrowed)
         return narrowed, self._others[key]
 
-    def part(self, of: Callable[[Sequence[Example]], list[Example]]) -> Encoded:
+    def part(self, part_of: Callable[[Sequence[Example]], list[Example]]) -> EncodedExamples:
         """Return a part of all examples, which shares their trains."""
-        mine = copy(self)
-        mine.patterns = of(self.patterns)
-        mine._others = {}
-        mine._encode = lambda plan: of(self.receiving(plan)[1])
-        return mine
+        part = copy(self)
+        part.patterns = part_of(self.patterns)
+        part._others = {}
+        part._encode = lambda plan: part_of(self.receiving(plan)[1])
+        return part
 
 
 def encode_examples(examples: Sequence[Example], recipe: Recipe, report: Progress) -> list[Example]:
@@ -209,7 +209,7 @@ def readout_of(
     return Readout(encoder, learners, array=array, delay_ms=delays_ms, run_threshold=threshold, inputs=inputs)
 
 
-def learn(examples: Encoded, recipe: Recipe, array: Array | None, report: Progress) -> Trained:
+def learn(examples: EncodedExamples, recipe: Recipe, array: Array | None, report: Progress) -> Trained:
     """Fit the learner of each of a recipe's labels on encoded examples; see `fit`."""
     learners, delays, alignments, ranges = {}, {}, {}, {}
     points = dict(recipe.neurons)
@@ -218,11 +218,11 @@ def learn(examples: Encoded, recipe: Recipe, array: Array | None, report: Progre
         delays[label], ranges[label] = fitting.delay_ms, fitting.seen(learners[label])
         if fitting.alignment is not None:
             alignments[label] = fitting.alignment
-    made = replace(recipe, neurons=points) if recipe.neurons else recipe
-    return Trained(made, learners, readout_of(learners, delays, made, array)._with(seen=ranges), alignments)
+    plan = replace(recipe, neurons=points) if recipe.neurons else recipe
+    return Trained(plan, learners, readout_of(learners, delays, plan, array)._with(seen=ranges), alignments)
 
 
-class _Fit(NamedTuple):
+class _FittedPoint(NamedTuple):
     """One point of a label's neuron, fitted."""
 
     wrong: int
@@ -233,7 +233,7 @@ class _Fit(NamedTuple):
     caught: list[str]
 
 
-def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, report: Progress) -> _Fit:
+def _best(examples: EncodedExamples, recipe: Recipe, label: str, array: Array | None, report: Progress) -> _FittedPoint:
     """Return the first of the points to choose from, or a later one that leaves fewer events missed or false.
 
     They are tried in turn. A later one counts if it leaves as many fewer as its `fewer` says, else `_FEWER`, and
@@ -245,13 +245,13 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
     points = recipe._choices_of(label)
     known: Known = {}
 
-    def fitted(point: Mapping[str, Any], place: int) -> _Fit:
+    def fitted(point: Mapping[str, Any], rank: int) -> _FittedPoint:
         plan, patterns = examples.receiving(replace(recipe, neurons={label: point}))
         with collected() as caught:
-            fitting = Fitting(patterns, plan, label, array, report, place, known)
+            fitting = Fitting(patterns, plan, label, array, report, rank, known)
             learner = fitting.fit(plan)
         wrong = fitting.wrong(learner, plan.run_threshold) if len(points) > 1 else 0
-        return _Fit(wrong, fitting, learner, point, caught)
+        return _FittedPoint(wrong, fitting, learner, point, caught)
 
     count = sum(len(pattern.labels.get(label, ())) for pattern in examples.patterns)
     best, refused = None, None
@@ -269,9 +269,9 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
             continue
         others = []
         followed = recipe._received({**recipe.learner, **point})._quantities()
-        for place in range(_FOLLOWED if followed else 1):
+        for rank in range(_FOLLOWED if followed else 1):
             with contextlib.suppress(ProblemError):
-                others.append(fitted(point, place))
+                others.append(fitted(point, rank))
         second = min(others, key=lambda fit: fit.wrong, default=None)
         if second is not None and second.wrong <= wrong - fewer:
             best = second
@@ -313,7 +313,7 @@ class Fitting:
         label: str,
         array: Array | None,
         report: Progress,
-        place: int = 0,
+        rank: int = 0,
         known: Known | None = None,
     ) -> None:
         self._label, self._needs = label, rows_of(recipe, label)
@@ -340,15 +340,17 @@ class Fitting:
             inputs = recipe.inputs_of(label)
             if inputs not in known:
                 known[inputs] = follow(sources, label, label_times, received.latency_ms, list(quantities))
-            every = known[inputs]
-            if len(every) <= place and place:
-                raise ProblemError(f"{label}: {counted(len(every), 'quantity', 'quantities')} follow it")
-            followed = every[place] if every else None
+            followers = known[inputs]
+            if len(followers) <= rank and rank:
+                raise ProblemError(f"{label}: {counted(len(followers), 'quantity', 'quantities')} follow it")
+            followed = followers[rank] if followers else None
             self.alignment = align_by(label, label_times, followed and (followed.train, followed.score))
         elif recipe.align:
             self.alignment = align(sources, label, label_times, received.latency_ms, ages)
         self._names = [name_of(k, example) for k, example in enumerate(examples)]
-        self._sources = sources if followed is None else [only(of, quantities[followed.train]) for of in sources]
+        self._sources = (
+            sources if followed is None else [only(trains_of, quantities[followed.train]) for trains_of in sources]
+        )
         felt = label_times if self.alignment is None else [self.alignment.felt(k) for k in range(len(label_times))]
         for name, times in zip(self._names, felt, strict=True):
             self._check_apart(name, times, neuron.refractory)
@@ -359,10 +361,10 @@ class Fitting:
         self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
         self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
         self._shift_ms = received.latency_ms + self.delay_ms
-        whole = self._until_targets(self._sources)
-        trains = whole if self._graded or self.alignment is None else self._until_targets(distinct(self._sources))
+        lasting = self._until_targets(self._sources)
+        trains = lasting if self._graded or self.alignment is None else self._until_targets(distinct(self._sources))
         self._check_felt(trains)
-        silent = self._silent(followed, sources, whole, ages, neuron)
+        silent = self._silent(followed, sources, lasting, ages, neuron)
         self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
         report(self._what, 0, 0)
         try:
@@ -416,9 +418,11 @@ class Fitting:
 
     def _unpaired(self) -> list[NDArray[np.float64]]:
         """Return the labels of each example that were not aligned, ms."""
-        of = self.alignment
-        assert of is not None
-        return [to_ms(of.given[of.unpaired & (of.example == k)]) for k in range(len(self._label_times))]
+        alignment = self.alignment
+        assert alignment is not None
+        return [
+            to_ms(alignment.given[alignment.unpaired & (alignment.example == k)]) for k in range(len(self._label_times))
+        ]
 
     def wrong(self, cone: ConeR, run_threshold: float) -> int:
         """Return how many labels, as given, a fitted learner misses on these examples, and how many it invents."""
@@ -485,11 +489,11 @@ def _inputs(k: int, example: Example, recipe: Recipe, label: str, array: Array |
     assert isinstance(trains, SpikeTrains)
     if not names or not isinstance(encoder, Composite):
         return trains
-    places = encoder.places(names, array or Array(1, 1))
-    if len(places) != len(trains):
-        made = f"{counted(len(trains), 'train')}, the encoders make {len(places)}"
-        raise ProblemError(f"{name_of(k, example)}: {made}: must be equally many")
-    return trains.select(places)
+    received = encoder.places(names, array or Array(1, 1))
+    if len(received) != len(trains):
+        trains_text = f"{counted(len(trains), 'train')}, the encoders make {len(received)}"
+        raise ProblemError(f"{name_of(k, example)}: {trains_text}: must be equally many")
+    return trains.select(received)
 
 
 def _remarks(
@@ -504,8 +508,8 @@ def _remarks(
     missed, count = cone.unreachable_, sum(map(len, targets))
     if missed:
         at = [(targets[p][k] - shift_ms - begins_ms[p], f" of {names[p]}" * (len(targets) > 1)) for p, k in missed]
-        places = [f"{ms:.10g} ms{name}" for ms, name in at]
-        listed = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
+        times_and_names = [f"{ms:.10g} ms{name}" for ms, name in at]
+        listed = ", ".join(times_and_names[:3]) + f" and {len(times_and_names) - 3} more" * (len(times_and_names) > 3)
         why = f"cannot be learnt, as too few input spikes come before them ({listed})"
         if count < TWO_FOLDS:
             there = f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from"

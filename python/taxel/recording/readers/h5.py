@@ -1,4 +1,4 @@
-"""Reads events or frames of a .h5 that taxel wrote (`taxel.recording.write_h5`)."""
+"""Reads events or frames of a .h5 that taxel wrote (`taxel.recording.writers.h5`)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from taxel._base.h5_file import H5File
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.recording.contents import Source
-from taxel.recording.read_npz import DTYPES, chosen, source_of_columns
-from taxel.recording.write_h5 import MARK, VERSION
-from taxel.recording.write_npz import TEXTS
+from taxel.recording.readers.columns import TEXTS
+from taxel.recording.readers.npz import DTYPES, chosen, source_of_columns
 
+#: Name of the attribute that has the version of the layout.
+MARK = "taxel"
+#: Version of the layout.
+VERSION = 1
 #: Bytes of a file that are searched at once.
 _PIECE_BYTES = 1 << 20
 

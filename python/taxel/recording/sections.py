@@ -1,6 +1,6 @@
-"""The parts of a recording: what a function does with a field follows from the type of the part that it stands in.
+"""The sections of a recording: what a function does with a field follows from the type of the section it stands in.
 
-Each function (`between`, `merge`, `convert` ...) has a rule for every type in `Part`, which the type checker demands.
+Each function (`between`, `merge`, `convert` ...) has a rule for every type in `Section`: the type checker demands it.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 __all__ = [
-    "Columns", "EventTable", "FrameTable", "Losses", "Marks", "Origin", "Part", "Sensor", "Settings", "Timing",
+    "Columns", "EventTable", "FrameTable", "Losses", "Marks", "Origin", "Section", "Sensor", "Settings", "Timing",
     "Wire",
 ]  # fmt: skip
 
-#: Defaults of fields of parts.
+#: Defaults of fields of sections.
 _NONE: Once[Any] = known(None)
 _EMPTY: Once[Any] = known(())
 
@@ -57,8 +57,8 @@ class Origin:
     label: str = "board"
     source: str = ""
 
-    def lines(self) -> list[str]:
-        """Return what is lost without it."""
+    def losses(self) -> list[str]:
+        """Return what a file without this section does not hold, one line each."""
         return [f"where it came from ({self.source})"] * bool(self.source)
 
 
@@ -81,8 +81,8 @@ class Sensor:
     heel: str = ""
     calibration: Once[Calibration | None] = _NONE
 
-    def lines(self) -> list[str]:
-        """Return what is lost without it, but for the array."""
+    def losses(self) -> list[str]:
+        """Return what a file without this section does not hold, but for the array."""
         lines = [f"the side ({self.side})"] * bool(self.side)
         return lines + [f"where the heel lies ({self.heel})"] * bool(self.heel)
 
@@ -104,8 +104,8 @@ class Settings:
     registers: Once[Registers | None] = _NONE
     register_changes: Once[tuple[tuple[int, Registers], ...]] = _EMPTY
 
-    def lines(self) -> list[str]:
-        """Return what is lost without it."""
+    def losses(self) -> list[str]:
+        """Return what a file without this section does not hold, one line each."""
         held, changes = self.held(), self.register_changes()
         lines = [] if held is None else [f"what {counted(int(np.sum(held != UNKNOWN)), 'taxel')} held at the beginning"]
         lines = lines * self.held.holds() + ["the board's registers"] * (self.registers() is not None)
@@ -121,8 +121,8 @@ class Marks:
     detections: Once[Detections] = field(default_factory=lambda: known(Detections([], [], [])))
     zeroings: Once[tuple[Zeroing, ...]] = _EMPTY
 
-    def lines(self) -> list[str]:
-        """Return what is lost without it."""
+    def losses(self) -> list[str]:
+        """Return what a file without this section does not hold, one line each."""
         changes, notes, detections = len(self.board_changes()), len(self.notes()), len(self.detections())
         lines = [f"{counted(changes, 'change')} of the board"] * bool(changes)
         lines += [counted(notes, "note")] * bool(notes) + [counted(detections, "detection")] * bool(detections)
@@ -139,21 +139,21 @@ class Timing:
         Arrival times against the source's time.
     clock_of : str
         The name of the clock of all times, if it is not the source's own.
-    stretch : (int, int), us
-        The first time and the end of a part by time. One that is written to a file becomes a recording of its own.
+    interval : (int, int), us
+        The first time and the end of a slice. A slice that is written to a file becomes a recording of its own.
     """
 
     clock: Once[Clock | None] = _NONE
     clock_of: str | None = None
-    stretch: Once[tuple[int, int]] | None = None
+    interval: Once[tuple[int, int]] | None = None
 
     def usable(self) -> Clock | None:
         """Return the clock, if any datagram holds a time."""
         clock = self.clock()
         return clock if clock is not None and len(clock.board_us) else None
 
-    def lines(self) -> list[str]:
-        """Return what is lost without it, but for arrival times."""
+    def losses(self) -> list[str]:
+        """Return what a file without this section does not hold, but for arrival times."""
         return [f"by whose clock times are ({self.clock_of})"] * (self.clock_of is not None)
 
 
@@ -183,8 +183,8 @@ class Losses:
     rebuilt: Once[Mapping[str, int]] = field(default_factory=lambda: known(dict[str, int]()))
     lost: Once[tuple[str, ...]] = _EMPTY
 
-    def lines(self) -> list[str]:
-        """Return what is lost without it."""
+    def losses(self) -> list[str]:
+        """Return what a file without this section does not hold, one line each."""
         counts = self.counts.holds()
         lines = ["what was received and lost, by cause"] * counts
         # With counts, this is what they say.
@@ -192,7 +192,7 @@ class Losses:
         return lines + [f"the remark: {line}" for line in self.remarks] + self.damage()
 
     def damage(self) -> list[str]:
-        """Return what is lost without a file's own damage."""
+        """Return what a file that does not state its damage lacks."""
         return ["that its end is missing"] * self.truncated + ["what reading had to put up with"] * self.rebuilt.holds()
 
 
@@ -202,7 +202,7 @@ class EventTable:
 
     events: Once[Events]
 
-    def lines(self) -> list[str]:
+    def losses(self) -> list[str]:
         """Return nothing: a table is never left out."""
         return []
 
@@ -224,8 +224,8 @@ class FrameTable:
     untimed: bool = False
     turned: float | None = None
 
-    def lines(self) -> list[str]:
-        """Return what is lost without it, but for the frames."""
+    def losses(self) -> list[str]:
+        """Return what a file without this section does not hold, but for the frames."""
         lines = ["that its frames have no times"] * self.untimed
         return lines + ([] if self.turned is None else [f"that its readings were turned (falls = {self.turned:g})"])
 
@@ -237,7 +237,7 @@ class Wire:
     Parameters
     ----------
     datagrams : Datagrams
-        As received; those of the whole file, even if the recording is a part by time.
+        As received; those of the whole file, even if the recording is a slice.
     payload : uint8, shape (bytes,)
         The bytes of a file that does not record where datagrams begin.
     version_2 : bool
@@ -257,8 +257,8 @@ class Wire:
     origin_us: int = 0
     unmarked: tuple[int, ...] = ()
 
-    def lines(self, *, with_times: bool = False) -> list[str]:
-        """Return what is lost without it; the rest says how they are encoded."""
+    def losses(self, *, with_times: bool = False) -> list[str]:
+        """Return what a file without this section does not hold; the other fields say how bytes are encoded."""
         lines = ["raw datagrams" + " with their arrival times" * with_times] * self.datagrams.holds()
         return lines + ["raw bytes (words that are no events)"] * (self.payload is not None and self.payload.size > 0)
 
@@ -278,14 +278,14 @@ class Columns:
     columns: tuple[str, ...] = ()
     samples: Once[Samples | None] = _NONE
 
-    def lines(self) -> list[str]:
-        """Return what is lost without it."""
+    def losses(self) -> list[str]:
+        """Return what a file without this section does not hold, one line each."""
         return self.received() + [f"the names of the columns ({', '.join(self.columns)})"] * bool(self.columns)
 
     def received(self) -> list[str]:
-        """Return what is lost without the lines as received."""
+        """Return what a file without the lines as received does not hold."""
         return ["the lines of the stream as they came"] * self.samples.holds()
 
 
 #: A function has a rule for each of these types: `match` them, and end with `assert_never`.
-Part = Origin | Sensor | Settings | Marks | Timing | Losses | EventTable | FrameTable | Wire | Columns
+Section = Origin | Sensor | Settings | Marks | Timing | Losses | EventTable | FrameTable | Wire | Columns

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from taxel._base.arguments import finite, flag, mapping, whole
+from taxel._base.arguments import finite, flag, integer, mapping
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._base.times import beginning_us
@@ -69,7 +69,7 @@ class TrainOptions:
         check_tare(self.tare)
         flag("search", self.search)
         finite("window_ms", self.window_ms, "ms", least=0.0)
-        if self.folds is not None and whole("folds", self.folds, 0) == 1:
+        if self.folds is not None and integer("folds", self.folds, 0) == 1:
             raise refused("folds", " is 1: must be 2 or more, or 0 for none")
         self._plan()
 
@@ -234,14 +234,14 @@ class Training:
         if plain is None or plain.together is None:
             return
         for label in plain.better(self.scored.together):
-            rule, neuron = (of[label].rank[0] for of in (plain.together, self.scored.together))
+            rule, neuron = (scores[label].rank[0] for scores in (plain.together, self.scored.together))
             yield f"{label}: the plain rule is better: {rule} missed and false, the neuron {neuron}; {_RULE_FILE}"
         for label in plain.sooner(self.scored.together):
-            ours, theirs = (of[label] for of in (plain.together, self.scored.together))
+            rule_score, score = (scores[label] for scores in (plain.together, self.scored.together))
             yield (
-                f"{label}: the plain rule is as good and knows sooner: {ours.rank[0]} missed and false, as the neuron, "
-                f"known {ours.delay.median:+.3g} ms after the label (median), the neuron {theirs.delay.median:+.3g} "
-                f"ms; {_RULE_FILE}"
+                f"{label}: the plain rule is as good and knows sooner: {rule_score.rank[0]} missed and false, as the "
+                f"neuron, known {rule_score.delay.median:+.3g} ms after the label (median), the neuron "
+                f"{score.delay.median:+.3g} ms; {_RULE_FILE}"
             )
         if plain.lacks:
             yield plain.lacks
@@ -259,9 +259,9 @@ class Training:
             score = self.scored.together[label]
             if score.rank[0] < score.events:
                 continue
-            which = "labels that it was trained on" if self.why else "held-out labels"
+            labels = "labels that it was trained on" if self.why else "held-out labels"
             yield (
-                f"{label}: do not rely on this readout: {score.found} of {score.events} {which} found, {score.false} "
+                f"{label}: do not rely on this readout: {score.found} of {score.events} {labels} found, {score.false} "
                 "false, no better than to detect nothing"
                 + (f"; what may help is {self.advice[label].helps}" if label in self.advice else "")
             )
@@ -277,14 +277,15 @@ class Training:
                 f"{alignment.largest_ms:+.3g} ms"
             )
             unpaired = ((self.recordings[k], t) for k, t in alignment.to_dict()["unpaired"])
-            places = [
-                f"{of.title} at {(t - beginning_us(recorded(of, hold=False).t)) / 1e6:.3f} s" for of, t in unpaired
+            events = [
+                f"{recording.title} at {(t - beginning_us(recorded(recording, hold=False).t)) / 1e6:.3f} s"
+                for recording, t in unpaired
             ]
-            if places:
-                more = f" and {len(places) - _NAMED} more" if len(places) > _NAMED else ""
-                of = counted(len(places), "label")
-                named = ", ".join(places[:_NAMED]) + more
-                yield f"{label}: nothing was felt within 50 ms of {of}, not learnt: {named}"
+            if events:
+                more = f" and {len(events) - _NAMED} more" if len(events) > _NAMED else ""
+                labels = counted(len(events), "label")
+                named = ", ".join(events[:_NAMED]) + more
+                yield f"{label}: nothing was felt within 50 ms of {labels}, not learnt: {named}"
 
 
 def _line(label: str, by: str, score: Score) -> str:

@@ -18,7 +18,7 @@ from taxel.array import Array
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, alone
 from taxel.recording.description import (
     array_of,
@@ -77,14 +77,14 @@ class _Source:
         self.before = _read_entry(path, "counts", counts_of, self.header.get("counts")) or {}
         self.remarks = Once(lambda: self.reader().remarks())
         label = self.header.get("name", "board")
-        self.origin = parts.Origin(path, path.name, "mcap", label, self.header["source"])
-        self.sensor = parts.Sensor(self.array, self.header.get("side", ""), self.header.get("heel", ""))
+        self.origin = sections.Origin(path, path.name, "mcap", label, self.header["source"])
+        self.sensor = sections.Sensor(self.array, self.header.get("side", ""), self.header.get("heel", ""))
 
     def losses(
         self, counts: Callable[[], dict[str, Any]], found: Callable[[], dict[str, Any]] | None = None
-    ) -> parts.Losses:
+    ) -> sections.Losses:
         """Return what was lost; arguments are those of `counts` and `verdict`."""
-        return parts.Losses(
+        return sections.Losses(
             counts=self.counts(counts),
             verdict=Once(lambda: self.verdict(found)),
             remarks=tuple(self.header.get("remarks", ())),
@@ -107,27 +107,27 @@ class _Source:
         return Board(
             self.origin,
             self.sensor,
-            parts.EventTable(Once(lambda: Events._from_parts(decoded().events, self.array))),
-            parts.Wire(
+            sections.EventTable(Once(lambda: Events._from_parts(decoded().events, self.array))),
+            sections.Wire(
                 datagrams=Once(lambda: Datagrams(**self.reader().datagrams()), arrived),
                 version_2=Once(lambda: bool(decoded().version_2["intact"])),
                 differences=bool(self.header["difference"]),
                 origin_us=int(self.header["origin_us"]),
                 unmarked=tuple(self.header.get("repaired", ())),
             ),
-            timing=parts.Timing(Once(lambda: _clock(decoded()), arrived)),
+            timing=sections.Timing(Once(lambda: _clock(decoded()), arrived)),
             losses=self.losses(lambda: self.counts_of_board(decoded()), lambda: decoded().found),
             settings=self.settings(),
             marks=self.marks(),
         )
 
-    def settings(self) -> parts.Settings:
+    def settings(self) -> sections.Settings:
         """Return the board's state of a board, or of the frames that were made of one."""
-        return parts.Settings(Once(self.held), Once(self.registers), Once(self.register_changes))
+        return sections.Settings(Once(self.held), Once(self.registers), Once(self.register_changes))
 
-    def marks(self) -> parts.Marks:
+    def marks(self) -> sections.Marks:
         """Return what happened at a time."""
-        return parts.Marks(
+        return sections.Marks(
             board_changes=Once(lambda: board_changes_of(self.remarks().board)),
             notes=Once(lambda: notes_of(self.remarks().notes)),
             detections=Once(lambda: detections_of(self.remarks().detections)),
@@ -153,11 +153,11 @@ class _Source:
             return {**damage, "received": self.counted().get("received"), **self.rebuilt()}
 
         turned = _read_entry(path, "turned", turned_of, about.get("turned"))
-        frame_table = parts.FrameTable(Once(frames), not about.get("clock", True), turned)
+        frame_table = sections.FrameTable(Once(frames), not about.get("clock", True), turned)
         header: dict[str, Any] = {"settings": self.settings(), "marks": self.marks(), "losses": self.losses(counts)}
         if not about.get("columns"):
             return FrameSource(self.origin, self.sensor, frame_table, **header)
-        return Stream(self.origin, self.sensor, frame_table, parts.Columns(tuple(about["columns"])), **header)
+        return Stream(self.origin, self.sensor, frame_table, sections.Columns(tuple(about["columns"])), **header)
 
     def stream(self) -> Stream:
         """Return the contents of a stream of numbers, whose lines are frames of one row."""
@@ -182,9 +182,9 @@ class _Source:
         return Stream(
             self.origin,
             self.sensor,
-            parts.FrameTable(Once(frames)),
-            parts.Columns(names, Once(samples, lambda: self.remarks().samples > 0)),
-            timing=parts.Timing(Once(lambda: Clock(read().t, read().arrived_ns))),
+            sections.FrameTable(Once(frames)),
+            sections.Columns(names, Once(samples, lambda: self.remarks().samples > 0)),
+            timing=sections.Timing(Once(lambda: Clock(read().t, read().arrived_ns))),
             losses=self.losses(lambda: self.counts_of_stream(read()), lambda: read().found),
             marks=self.marks(),
         )

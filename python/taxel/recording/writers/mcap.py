@@ -16,13 +16,13 @@ from taxel._core import RecordingWriter
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.recording.analysis.pressure import above_rest
+from taxel.recording.analysis.rest import Rest, ticks_by_unit
 from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import known
-from taxel.recording.pressure import above_rest
 from taxel.recording.raw import Datagrams
 from taxel.recording.recording import Recording
-from taxel.recording.rest import Rest, ticks_by_unit
 
 __all__ = ["RecordingWriter", "cut_raw", "encode_events", "write_mcap"]
 
@@ -34,12 +34,12 @@ _EVERY_US = 100_000
 _RESTS = {"unit": "0", "quiet": "quiet stretch"}
 
 
-def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping[str, dict[str, Any]]) -> None:
-    """Write a .mcap of contents as it can hold them (`taxel.recording.stored.storable`).
+def write_mcap(path: Path, contents: Contents, compression: str, counts: Mapping[str, dict[str, Any]]) -> None:
+    """Write a .mcap of contents as it can hold them (`taxel.recording.writers.stored.storable`).
 
     Parameters
     ----------
-    part : Path
+    path : Path
     contents : Contents
         Of a board with datagrams, of a stream with lines, or of frames.
     compression : {"none", "lz4", "zstd"}
@@ -50,73 +50,73 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
     ------
     OSError : the disk is full ...
     """
-    whole = contents.main
-    samples = whole.stream.samples() if isinstance(whole, Stream) else None
+    main = contents.main
+    samples = main.stream.samples() if isinstance(main, Stream) else None
     if samples is not None:
-        header = {**samples.about, "sources": [], **_provenance(whole)}
-        writer = RecordingWriter(part, json.dumps(header), compression, True)
+        header = {**samples.about, "sources": [], **_provenance(main)}
+        writer = RecordingWriter(path, json.dumps(header), compression, True)
         writer.samples(samples.arrived_ns, samples.number, np.ascontiguousarray(samples.values).reshape(-1))
-        _add_small(writer, whole, _by_host(whole))
-        writer.finish(json.dumps(counts[whole.origin.label]))
+        _add_small(writer, main, _by_host(main))
+        writer.finish(json.dumps(counts[main.origin.label]))
         return
-    if not isinstance(whole, Board):
-        every = {name: source for name, source in contents.sources.items() if isinstance(source, FrameSource)}
-        _write_frames(part, every, compression, counts)
+    if not isinstance(main, Board):
+        frame_sources = {name: source for name, source in contents.sources.items() if isinstance(source, FrameSource)}
+        _write_frames(path, frame_sources, compression, counts)
         return
-    wire, events = whole.wire, whole.table
+    wire, events = main.wire, main.table
     datagrams = wire.datagrams()
     assert datagrams is not None  # `storable` sets them
     # Host times before 1970 are not possible, so all board times are shifted together.
     earliest = int(datagrams.arrived_ns[0]) if len(datagrams) else 0
     arrived = datagrams.arrived_ns - min(0, earliest)
     header = {
-        **_header(whole),
+        **_header(main),
         "repaired": wire.unmarked,
         "difference": wire.differences,
         "origin_us": wire.origin_us,
         "started_ns": int(arrived[0]) if len(arrived) else 0,
     }
-    writer = RecordingWriter(part, json.dumps(header), compression, True)
+    writer = RecordingWriter(path, json.dumps(header), compression, True)
     # Written before all datagrams, as the recorder does, because a player reads it there.
-    if (held := whole.settings.held()) is not None:
+    if (held := main.settings.held()) is not None:
         writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(held).reshape(-1))
     done = 0
     # Commands of the host are written between the datagrams before and after them, an order that the decoder needs.
-    for change in whole.marks.board_changes():
+    for change in main.marks.board_changes():
         upto = int(np.searchsorted(datagrams.arrived_ns, change.at_ns, side="left"))
         _add_datagrams(writer, datagrams, arrived, done, max(done, upto))
         writer.board_change(max(0, change.at_ns), json.dumps(change._described()))
         done = max(done, upto)
     _add_datagrams(writer, datagrams, arrived, done, len(arrived))
-    _add_remarks(writer, events, whole)
-    writer.finish(json.dumps(counts[whole.origin.label]))
+    _add_remarks(writer, events, main)
+    writer.finish(json.dumps(counts[main.origin.label]))
 
 
-def _header(of: Source) -> dict[str, Any]:
+def _header(source: Source) -> dict[str, Any]:
     """Return what a header states of a sensor."""
-    registers, array = of.settings.registers(), of.sensor.array
+    registers, array = source.settings.registers(), source.sensor.array
     driven = array if registers is None else registers.array
     return {
         "array": array._geometry(),
         "registers": None if registers is None else registers._held,
         **({} if driven == array else {"driven": driven._geometry()}),
-        **_provenance(of),
-        "source": of.origin.source,
-        "side": of.sensor.side,
-        "heel": of.sensor.heel,
+        **_provenance(source),
+        "source": source.origin.source,
+        "side": source.sensor.side,
+        "heel": source.sensor.heel,
     }
 
 
-def _provenance(of: Source) -> dict[str, Any]:
+def _provenance(source: Source) -> dict[str, Any]:
     """Return what a header states of the recording that a file was made of."""
     # The verdict stands here and not with the final counts, so that a file that was cut still states it.
-    converted = None if of.losses.verdict() is None else verdict_of(of)._held
-    counts = dict(of.losses.counts())
-    return {"lost": of.losses.lost(), "remarks": of.losses.remarks, "converted": converted, "counts": counts}
+    converted = None if source.losses.verdict() is None else verdict_of(source)._held
+    counts = dict(source.losses.counts())
+    return {"lost": source.losses.lost(), "remarks": source.losses.remarks, "converted": converted, "counts": counts}
 
 
 def _write_frames(
-    part: Path, sources: Mapping[str, FrameSource], compression: str, counts: Mapping[str, dict[str, Any]]
+    path: Path, sources: Mapping[str, FrameSource], compression: str, counts: Mapping[str, dict[str, Any]]
 ) -> None:
     """Write sources of frames, all by one clock; times in the file are those of the board, from 0 on."""
     tables = {name: source.table for name, source in sources.items()}
@@ -135,7 +135,7 @@ def _write_frames(
         for name, source in sources.items()
     ]
     header = {**headers[0], "sources": headers[1:], "started_ns": 0}
-    writer = RecordingWriter(part, json.dumps(header), compression, True)
+    writer = RecordingWriter(path, json.dumps(header), compression, True)
     tracks = {name: writer.track(name) for name in sources}
 
     def at_ns(t: int) -> int:
@@ -148,10 +148,10 @@ def _write_frames(
             tracks[name].held(0, None, np.ascontiguousarray(held).reshape(-1))
         for change in source.marks.board_changes():
             tracks[name].board_change(max(0, change.at_ns), json.dumps(change._described()))
-    for name, first, block, whole in _blocks(tables):
+    for name, first, block, fits in _blocks(tables):
         t = np.ascontiguousarray(block.t)
         values = np.ascontiguousarray(block.values).reshape(-1)
-        tracks[name].frames(first, (t - origin_us) * 1000, t, values, whole)
+        tracks[name].frames(first, (t - origin_us) * 1000, t, values, fits)
         few, about = shown[name]
         stop = int(np.searchsorted(few.t, t[-1], side="right"))
         for k in range(drawn[name], stop):
@@ -165,25 +165,25 @@ def _write_frames(
     writer.finish(json.dumps(counts[next(iter(sources))]))
 
 
-def _low_rate(of: FrameSource) -> tuple[Frames, tuple[float, str, str]]:
+def _low_rate(source: FrameSource) -> tuple[Frames, tuple[float, str, str]]:
     """Return frames above rest, ten a second, and what white is at least, the rest that was subtracted, the unit.
 
     There are none where frames have no times.
     """
-    frames = of.table
+    frames = source.table
     _, first = np.unique(frames.t // _EVERY_US, return_index=True)
-    first = first[: 0 if of.untimed else None]
+    first = first[: 0 if source.untimed else None]
     few = Frames(frames.values[first], frames.t[first], unit=frames.unit, array=frames.array)
     if not len(few):
         return few, (1.0, "none", few.unit)
-    recording = Recording(Contents.of(replace(of, frame_table=replace(of.frame_table, frames=known(few)))))
+    recording = Recording(Contents.single(replace(source, frame_table=replace(source.frame_table, frames=known(few)))))
     above, _, rest = cast("tuple[Frames, float, Rest]", above_rest(recording))
     return above, (1.0 / ticks_by_unit(few), _RESTS.get(rest.source, rest.source), above.unit)
 
 
 def _blocks(tables: Mapping[str, Frames]) -> Iterator[tuple[str, int, Frames, bool]]:
     """Yield name, number of the first frame, frames, and whether 16 bits hold them, of all sources by time."""
-    whole = {name: _core.whole_frames(np.ascontiguousarray(table.values).reshape(-1)) for name, table in tables.items()}
+    fits = {name: _core.whole_frames(np.ascontiguousarray(table.values).reshape(-1)) for name, table in tables.items()}
     done = dict.fromkeys(tables, 0)
     blocks = {name: max(1, _BLOCK // max(1, table.array.rows * table.array.columns)) for name, table in tables.items()}
     while left := {name: table for name, table in tables.items() if done[name] < len(table)}:
@@ -193,7 +193,7 @@ def _blocks(tables: Mapping[str, Frames]) -> Iterator[tuple[str, int, Frames, bo
         for name, frames in left.items():
             stop = min(int(np.searchsorted(frames.t, end, side="right")), done[name] + blocks[name])
             if stop > done[name]:
-                yield name, done[name], frames[done[name] : stop], whole[name]
+                yield name, done[name], frames[done[name] : stop], fits[name]
                 done[name] = stop
 
 
@@ -224,12 +224,16 @@ def encode_events(
     ProblemError : an array of more than 65 536 positions, or times more than 8.9 years apart
     """
     begins = None if held is None else np.ascontiguousarray(held).reshape(-1)
-    made = _core.encode_datagrams(events._parts(), begins, clock is not None)
-    at = made.times * 1000 if clock is None or not len(made.times) else np.asarray(clock.host_ns(made.times), np.int64)
+    encoded = _core.encode_datagrams(events._parts(), begins, clock is not None)
+    at = (
+        encoded.times * 1000
+        if clock is None or not len(encoded.times)
+        else np.asarray(clock.host_ns(encoded.times), np.int64)
+    )
     # Arrival times never decrease.
     arrived = np.maximum.accumulate(at) if len(at) else at
-    datagrams = Datagrams(arrived, np.arange(len(arrived), dtype=np.uint64), made.offsets, made.payload)
-    return made.origin_us, datagrams, made.unmarked
+    datagrams = Datagrams(arrived, np.arange(len(arrived), dtype=np.uint64), encoded.offsets, encoded.payload)
+    return encoded.origin_us, datagrams, encoded.unmarked
 
 
 def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64], first: int, last: int) -> None:
@@ -239,16 +243,16 @@ def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64]
         )
 
 
-def _by_host(of: Source) -> Callable[[int], int]:
+def _by_host(source: Source) -> Callable[[int], int]:
     """Return the function of a source's times, us, to those in the file, ns: by its clock where that is known."""
-    clock = of.timing.usable()
+    clock = source.timing.usable()
     return lambda t: max(0, t * 1000 if clock is None else int(clock.host_ns(t)))
 
 
-def _add_remarks(writer: Any, events: Events, of: Source) -> None:
-    at_ns = _by_host(of)
-    detections = of.marks.detections()
-    noted = [note.t for note in of.marks.notes() if note.t is not None]
+def _add_remarks(writer: Any, events: Events, source: Source) -> None:
+    at_ns = _by_host(source)
+    detections = source.marks.detections()
+    noted = [note.t for note in source.marks.notes() if note.t is not None]
     around = np.concatenate(
         [detections.t, detections.known, np.array([*(t for t, _ in events.markers), *noted], np.int64)]
     )
@@ -256,18 +260,18 @@ def _add_remarks(writer: Any, events: Events, of: Source) -> None:
         writer.marker(at_ns(t), t, start)
     for t, ticks in _core.RecordingPreviews(events._parts(), around):
         writer.preview(at_ns(t), t, events.array.columns, ticks)
-    _add_small(writer, of, at_ns)
+    _add_small(writer, source, at_ns)
 
 
-def _add_small(writer: Any, of: Source, at_ns: Callable[[int], int]) -> None:
+def _add_small(writer: Any, source: Source, at_ns: Callable[[int], int]) -> None:
     """Write notes, zeroed taxels, registers and detections."""
-    for note in of.marks.notes():
+    for note in source.marks.notes():
         writer.note(note.at_ns, note.t, note.text)
-    for zeroing in of.marks.zeroings():
+    for zeroing in source.marks.zeroings():
         writer.zeroing(at_ns(zeroing.t), zeroing.t, zeroing.x, zeroing.y, zeroing.rest, zeroing.before)
-    for at, values in of.settings.register_changes():
+    for at, values in source.settings.register_changes():
         writer.registers(at, values._json())
-    for d in of.marks.detections():
+    for d in source.marks.detections():
         writer.detection(at_ns(d.known), d.label, d.t, d.known, d.slope, d.repaired)
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.archive import read_array, read_arrays, shapes, stored_names
+from taxel._base.archive import read_array, read_arrays, shapes
 from taxel._base.arguments import short, shown
 from taxel._base.columns import Growing, frozen_whole
 from taxel._base.h5_file import H5File
@@ -32,13 +32,10 @@ from taxel.formats.checks import table as limited
 from taxel.formats.layout import ISO, UNITS_US, Data, Layout, Table, as_size
 from taxel.frames import Frames
 from taxel.recording.contents import Source, source_from
-from taxel.recording.kinds import is_label_table, is_table_of_taxel
 from taxel.recording.once import known
-from taxel.recording.parts import Losses, Origin
-from taxel.recording.read_h5 import is_h5_of_taxel
+from taxel.recording.sections import Losses, Origin
 
-#: The endings of tables of text, also compressed by gzip, and of files of arrays.
-_TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+#: The endings of files of arrays.
 ARRAYS = (".npy", ".npz", ".h5", ".hdf5")
 
 #: A cell that says a unit, as N, [kPa] or (m/s^2).
@@ -58,31 +55,9 @@ _TIMES = re.compile(
 )
 
 
-def is_of_another_program(path: Path, layout: Layout | None = None) -> bool:
-    """Return whether a file is a table or holds arrays that taxel did not write; false for a file that is not there.
-
-    Arrays that a layout names are those of another program, also where they have names that taxel gives.
-    """
-    ending = Path(path.name.removesuffix(".gz")).suffix.lower()
-    if not path.is_file() or ending not in (*_TABLES, *ARRAYS):
-        return False
-    if ending == ".npz":
-        names = set(stored_names(path))
-        # Other programs name their times t too.
-        says = layout is not None and layout.data is not None and layout.data.array in names
-        return "about" not in names and (says or not ("t" in names and names & {"x", "y", "p", "values"}))
-    if ending == ".h5":
-        return not is_h5_of_taxel(path)
-    if ending == ".csv":
-        return not (is_table_of_taxel(path) or is_label_table(path))
-    return True
-
-
 def is_lone_array(path: Path) -> bool:
-    """Return whether a file that taxel did not write holds one array only, of the shape of frames."""
-    if path.suffix.lower() not in ARRAYS or not is_of_another_program(path):
-        return False
-    shapes = shapes_of(path)
+    """Return whether a file of another program holds one array only, of the shape of frames."""
+    shapes = shapes_of(path) if path.suffix.lower() in ARRAYS else {}
     return len(shapes) == 1 and all(len(shape) in (2, 3) for shape in shapes.values())
 
 
@@ -265,11 +240,11 @@ def _us(times: NDArray[np.float64], name: str, how: Table, path: Path, first: in
 
 def cells(line: str, separator: str) -> list[str]:
     """Return the cells of a line, without blanks and quotes around them; by " " any number of blanks stands between."""
-    parts = line.split() if separator == " " else line.split(separator)
+    texts = line.split() if separator == " " else line.split(separator)
     if '"' in line and separator != " ":
         with suppress(csv.Error):
-            parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    return [_unquote(part.strip()) for part in parts]
+            texts = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    return [_unquote(text.strip()) for text in texts]
 
 
 def _unquote(cell: str) -> str:
@@ -356,8 +331,8 @@ def _column(path: Path, key: str, column: str | int, names: Sequence[str], named
             if named
             else "no names, so give its number from 1"
         )
-        of = " of times" if key == "time_column" else ""
-        raise FormatError(f"{path.name}: no column {shown(name)}{of}; there are {known_names}")
+        kind = " of times" if key == "time_column" else ""
+        raise FormatError(f"{path.name}: no column {shown(name)}{kind}; there are {known_names}")
     return names.index(name)
 
 
@@ -372,12 +347,14 @@ def _data(path: Path, how: Data) -> _Read:
         stored_names: list[str] = [""]
         wanted = stored_names
     else:
-        every = shapes_of(path)
-        stored_names = list(every)
+        stored_shapes = shapes_of(path)
+        stored_names = list(stored_shapes)
         if how.array is None and len(stored_names) != 1:
-            raise FormatError(f"{path}: holds {list_arrays(every)}; say which in the layout: [data] array")
+            raise FormatError(f"{path}: holds {list_arrays(stored_shapes)}; say which in the layout: [data] array")
         # A path within a .h5 may begin at its root.
-        named = [name if name in every else name.strip("/") for name in (how.array, how.time) if name is not None]
+        named = [
+            name if name in stored_shapes else name.strip("/") for name in (how.array, how.time) if name is not None
+        ]
         wanted = [stored_names[0], *named] if how.array is None else named
         missing = next((name for name in wanted if name not in stored_names), None)
         if missing is not None:
@@ -385,9 +362,9 @@ def _data(path: Path, how: Data) -> _Read:
                 raise FormatError(f"{path}, {missing}: {why}")
             size = as_size(missing)
             hint = f"; a size is said by {size}" if size else ""
-            raise FormatError(f"{path}: holds no array {missing}; there are {list_arrays(every)}{hint}")
-        if len(wanted) > 1 and every[wanted[1]] != every[wanted[0]][:1]:
-            count, frames = math.prod(every[wanted[1]]), math.prod(every[wanted[0]][:1])
+            raise FormatError(f"{path}: holds no array {missing}; there are {list_arrays(stored_shapes)}{hint}")
+        if len(wanted) > 1 and stored_shapes[wanted[1]] != stored_shapes[wanted[0]][:1]:
+            count, frames = math.prod(stored_shapes[wanted[1]]), math.prod(stored_shapes[wanted[0]][:1])
             raise FormatError(f"{path}, {wanted[1]}: {counted(count, 'time')} for {counted(frames, 'frame')}")
         arrays = arrays_of(path, wanted, frames=wanted[0])
     values, unread = arrays[wanted[0]], ", ".join(name for name in stored_names if name not in wanted)
@@ -400,8 +377,8 @@ def _data(path: Path, how: Data) -> _Read:
         )
     large = _too_large(values)
     if large is not None:
-        frame, *place = large
-        at = f"row {place[0]}, column {place[1]}" if len(place) == 2 else f"taxel {place[0]}"
+        frame, *indices = large
+        at = f"row {indices[0]}, column {indices[1]}" if len(indices) == 2 else f"taxel {indices[0]}"
         raise FormatError(
             f"{path}, {wanted[0] or 'the array'}, frame {frame}, {at}: {values[large]}; must fit 32 "
             "bits, or be NaN where it is missing"
@@ -418,8 +395,8 @@ def _data(path: Path, how: Data) -> _Read:
         else np.empty(len(times), np.int64)
     )
     for begin in range(0, len(times), _TIMES_AT_ONCE):
-        part = slice(begin, begin + _TIMES_AT_ONCE)
-        t[part] = whole_us(path.name, times[part].astype(np.float64) * UNITS_US[how.time_unit] / 1e6, begin)
+        block = slice(begin, begin + _TIMES_AT_ONCE)
+        t[block] = whole_us(path.name, times[block].astype(np.float64) * UNITS_US[how.time_unit] / 1e6, begin)
     return _Read(values, t, lost=lost)
 
 

@@ -1,4 +1,4 @@
-"""Reads events or frames as named columns: a .npz, and what a .h5 holds (`taxel.recording.write_npz`)."""
+"""Reads events or frames as named columns: a .npz, and what a .h5 holds (`taxel.recording.readers.columns`)."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from taxel.frames import Frames
 from taxel.recording.contents import Source
 from taxel.recording.description import about_of, described_source
 from taxel.recording.layout import check_size
-from taxel.recording.parts import Origin
-from taxel.recording.write_npz import COLUMNS, DIGEST, EVENTS, PIECE_BYTES, TEXTS, digest_of
+from taxel.recording.readers.columns import COLUMNS, DIGEST, EVENTS, PIECE_BYTES, TEXTS, digest_of
+from taxel.recording.sections import Origin
 
 #: Columns of events, one entry each.
 _OF_EVENTS = (*EVENTS, "intensity", "present", "repaired")
@@ -95,8 +95,8 @@ def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], a
     if values is not None and values.dtype.kind == "f" and values.flags.writeable:
         # Of the NaNs of a damaged file some may be signalling ones, of which each computation would warn.
         for k in range(0, len(values) if values.ndim else 0, step := max(1, PIECE_BYTES // max(1, values[:1].nbytes))):
-            part = values[k : k + step]
-            np.copyto(part, np.nan, where=np.isnan(part))
+            block = values[k : k + step]
+            np.copyto(block, np.nan, where=np.isnan(block))
     columns = {name: frozen_whole(values) for name, values in columns.items()}
     about = about_of(f"{path}, array about", str(columns.get("about", "{}")))
     described = about.get("array")

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.pressure import readings
+from taxel.recording.analysis.pressure import readings
+from taxel.recording.analysis.rest import Rest, of_quiet
 from taxel.recording.recording import Recording
-from taxel.recording.rest import Rest, of_quiet
 from taxel.tare import Tare
 
 #: A tare lasts so long at least, us, and so many frames.

@@ -19,8 +19,8 @@ from taxel.frames import Frames
 from taxel.labels import source_of
 from taxel.recording.contents import Contents, Source, alone, source_from
 from taxel.recording.once import known
-from taxel.recording.parts import Losses, Origin
-from taxel.recording.read_mcap import ascending
+from taxel.recording.readers.mcap import ascending
+from taxel.recording.sections import Losses, Origin
 
 
 @dataclass(frozen=True)
@@ -127,15 +127,15 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
 def _names(path: Path, reads: Sequence[Read]) -> list[str]:
     """Return the names of sources: their topics (/palm/left: palm_left), with the field where one is opened twice."""
     topics = [read.topic.strip("/") for read in reads]
-    whole = [f"{t}.{read.field}" if topics.count(t) > 1 else t for t, read in zip(topics, reads, strict=True)]
-    names = [source_of(name) for name in whole]
+    full_names = [f"{t}.{read.field}" if topics.count(t) > 1 else t for t, read in zip(topics, reads, strict=True)]
+    names = [source_of(name) for name in full_names]
     for k, name in enumerate(names):
         if name in names[:k]:
-            also = whole[names.index(name)]
+            also = full_names[names.index(name)]
             raise ProblemError(
                 f"{path}: {also} is chosen twice"
-                if also == whole[k]
-                else f"{path}: {also} and {whole[k]} would both be the source {name}; open one at a time"
+                if also == full_names[k]
+                else f"{path}: {also} and {full_names[k]} would both be the source {name}; open one at a time"
             )
     return names
 
@@ -143,9 +143,9 @@ def _names(path: Path, reads: Sequence[Read]) -> list[str]:
 def _lines_of_losses(topic: Read) -> Iterator[str]:
     """Yield what was left out, and how many of the stamps were wrong."""
     if topic.left_out:
-        whole = counted(topic.left_out + len(topic.t), "message")
+        total = counted(topic.left_out + len(topic.t), "message")
         rows, columns = topic.array.shape
-        yield f"{topic.left_out} of {whole} left out, as they do not hold {rows} x {columns} values"
+        yield f"{topic.left_out} of {total} left out, as they do not hold {rows} x {columns} values"
     if topic.by_the_bag:
         yield (
             f"{topic.by_the_bag} of {counted(len(topic.t), 'message')} at the bag's time, as stamps are 0, do not "

@@ -19,7 +19,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded
 from taxel.recorded import recorded as held_by
-from taxel.recording.rest import FORCE_UNITS, flickering, ticks_by_unit
+from taxel.recording.analysis.rest import FORCE_UNITS, flickering, ticks_by_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,28 +137,30 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     Health(9 taxels: 1 dead, 0 stuck, 0 noisy)
     """
     # A missing value is no reading that could show what a taxel does.
-    held = held_by(recorded, hold=False)
-    if isinstance(held, Events):
-        return judge(held.array, _statistics_of_events(held))
-    if not isinstance(held, Frames):
+    table = held_by(recorded, hold=False)
+    if isinstance(table, Events):
+        return judge(table.array, _statistics_of_events(table))
+    if not isinstance(table, Frames):
         raise refused("recorded", f" is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
-    activity, moved = (of.astype(np.int64).reshape(held.array.shape) for of in _core.changes_of_frames(held._parts()))
+    activity, moved = (
+        grid.astype(np.int64).reshape(table.array.shape) for grid in _core.changes_of_frames(table._parts())
+    )
     # The values of frames count from the least one.
-    scale, least = ticks_by_unit(held), np.fmin.reduce(held.values, axis=None, initial=np.inf)
-    ticks = held
+    scale, least = ticks_by_unit(table), np.fmin.reduce(table.values, axis=None, initial=np.inf)
+    ticks = table
     if np.isfinite(least):
         # Values at both ends of single precision are infinitely far apart.
         with np.errstate(over="ignore"):
-            values = held.values - least
-            ticks = Frames(frozen(np.multiply(values, scale, out=values)), held.t, array=held.array)
-    counts = _core.touches_of_frames(ticks._parts(), 0.0 if held.unit in FORCE_UNITS else np.nan)
-    result = judge(held.array, TaxelStatistics(activity, moved, Touches.of(*counts)), loud=False)
-    if not len(held):
+            values = table.values - least
+            ticks = Frames(frozen(np.multiply(values, scale, out=values)), table.t, array=table.array)
+    counts = _core.touches_of_frames(ticks._parts(), 0.0 if table.unit in FORCE_UNITS else np.nan)
+    result = judge(table.array, TaxelStatistics(activity, moved, Touches.of(*counts)), loud=False)
+    if not len(table):
         return result
     # In frames a taxel that never changes is dead or stuck, depending on its value.
-    loaded = held.values[0] > least
-    noisy = result.noisy | flickering(held)
-    dead, stuck = (of & ~noisy for of in (result.dead & ~loaded, result.stuck | result.dead & loaded))
+    loaded = table.values[0] > least
+    noisy = result.noisy | flickering(table)
+    dead, stuck = (grid & ~noisy for grid in (result.dead & ~loaded, result.stuck | result.dead & loaded))
     return replace(result, dead=dead, stuck=stuck, noisy=noisy, untested=result.untested & ~noisy)
 
 
@@ -203,16 +205,16 @@ class TaxelStatistics(NamedTuple):
 def judge(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> Health:
     """Return the health of taxels with these statistics, by the rules of `health`; `loud`: that of noise too."""
     exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
-    activity, of = statistics.activity, statistics.touches
+    activity, touches = statistics.activity, statistics.touches
     silent = exists & (activity == 0)
 
     def where(selected: NDArray[np.bool_]) -> NDArray[np.bool_]:
         grid = np.zeros(array.shape, bool)
-        grid.reshape(-1)[of.taxels[selected]] = True
+        grid.reshape(-1)[touches.taxels[selected]] = True
         return grid
 
-    enough = where(of.touches >= TOUCHED_FROM) & (_neighbours(exists) >= NEIGHBOURS_FROM)
-    dead = exists & enough & where(of.missed == of.touches)
+    enough = where(touches.touches >= TOUCHED_FROM) & (_neighbours(exists) >= NEIGHBOURS_FROM)
+    dead = exists & enough & where(touches.missed == touches.touches)
     if loud:
         # A median reaches a bound only if a neighbour reaches it, so all other taxels are skipped.
         among = _reaches(activity, exists, (_neighbours(exists & (activity >= LOUD_FROM)) > 0) & exists, LOUD_FROM)
@@ -230,12 +232,12 @@ def judge(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> He
     if statistics.values is not None:
         still = exists & (activity >= STUCK_FROM) & (statistics.values == 1)
         stuck |= _reaches(statistics.values, exists & (activity > 0), still, 1, above=True)
-    noisy = exists & where((of.by_itself >= NOISY_FROM) & (of.by_itself >= NOISY_SHARE * of.changed))
+    noisy = exists & where((touches.by_itself >= NOISY_FROM) & (touches.by_itself >= NOISY_SHARE * touches.changed))
     noisy &= ~stuck & (statistics.moved <= NOISY_ON * activity)
     # A channel has no neighbours that would show what it should do.
     noisy &= min(array.shape) > 1
     dead &= ~stuck
-    works = enough | where(of.pressed > 0) | (activity >= WORKS_FROM)
+    works = enough | where(touches.pressed > 0) | (activity >= WORKS_FROM)
     untested = exists & ~dead & ~stuck & ~noisy & ~works
     return Health(array, activity, dead, stuck, noisy, untested)
 
@@ -256,7 +258,7 @@ def _statistics_of_events(events: Events) -> TaxelStatistics:
     np.minimum.at(least, index[events.present], ticks)
     np.maximum.at(greatest, index[events.present], ticks)
     least[greatest < 0] = -1
-    grids = (of.reshape(shape) for of in (values, least, greatest))
+    grids = (grid.reshape(shape) for grid in (values, least, greatest))
     return TaxelStatistics(activity, moved, touches, *grids)
 
 
@@ -266,7 +268,7 @@ def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[ND
     taxel, way = index[order], way[order]
     again = taxel[1:][(taxel[1:] == taxel[:-1]) & (way[1:] == way[:-1])]
     size = array.rows * array.columns
-    counts = (np.bincount(of, minlength=size).reshape(array.shape) for of in (taxel, again))
+    counts = (np.bincount(taxels, minlength=size).reshape(array.shape) for taxels in (taxel, again))
     activity, moved = counts
     return activity, moved
 

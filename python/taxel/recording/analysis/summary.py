@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from taxel.clock import doubt
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.health import health
-from taxel.recording.pressure import Series
+from taxel.recording.analysis.health import health
+from taxel.recording.analysis.pressure import Series
 from taxel.recording.recording import Recording
 
 #: The interval over which the highest rate is measured, us.
@@ -33,7 +33,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     ----------
     recording : Recording
     pressed : Series, optional
-        Its pressure over time (`taxel.recording.pressure.series`), if it has intensities.
+        Its pressure over time (`taxel.recording.analysis.pressure.series`), if it has intensities.
     """
     array = recording.array
     table: Events | Frames = recording.events if recording.has_events else recording.frames()
@@ -107,13 +107,18 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
     if not len(pressed.t):
         return None
     facts: dict[str, Any] = {"unit": pressed.unit, "above": pressed.above}
-    of = pressed if pressed.largest is None else pressed.largest
-    curves: dict[str, Any] = {f"area_{of.area_unit}": of.area, "peak": of.peak, "sum": of.total, "force_n": of.force}
+    largest = pressed if pressed.largest is None else pressed.largest
+    curves: dict[str, Any] = {
+        f"area_{largest.area_unit}": largest.area,
+        "peak": largest.peak,
+        "sum": largest.total,
+        "force_n": largest.force,
+    }
     for name, values in curves.items():
         if values is not None:
             # A frame of missing values alone has no peak.
             k = int(np.where(np.isnan(values), -np.inf, values).argmax())
-            facts[name] = {"most": float(values[k]), "t_us": int(of.t[k])}
+            facts[name] = {"most": float(values[k]), "t_us": int(largest.t[k])}
     if pressed.centre is None:
         return facts
     centre = pressed.centre[~np.isnan(pressed.centre).any(axis=1)]
@@ -133,7 +138,7 @@ def _full_scale(frames: Frames) -> dict[str, Any] | None:
     values = frames.values
     if not values.size:
         return None
-    least, top = (float(of.reduce(values, axis=None)) for of in (np.fmin, np.fmax))
+    least, top = (float(reduction.reduce(values, axis=None)) for reduction in (np.fmin, np.fmax))
     if not np.isfinite(top - least) or (top - least < _LEVELS and not np.any(values % 1)):
         return None
     below, tail = top, list[int]()
@@ -162,8 +167,8 @@ def _peak(events: Events) -> tuple[float | None, bool]:
     """Return the highest rate in 10 ms of board time, events/s, and whether most of it is before the start marker."""
     if not len(events):
         return None, False
-    of = events.t // _PEAK_US
-    intervals, counts = np.unique(of, return_counts=True)
-    busiest = events.t[of == intervals[counts.argmax()]]
+    interval_of = events.t // _PEAK_US
+    intervals, counts = np.unique(interval_of, return_counts=True)
+    busiest = events.t[interval_of == intervals[counts.argmax()]]
     start_us = min((t for t, start in events.markers if start), default=int(busiest.min()))
     return len(busiest) / (_PEAK_US / 1e6), bool(np.median(busiest) < start_us)

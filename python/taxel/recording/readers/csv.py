@@ -29,8 +29,8 @@ from taxel.formats.checks import table as limited
 from taxel.formats.layout import advice
 from taxel.frames import Frames
 from taxel.recording.contents import Source, source_from
-from taxel.recording.parts import Origin
-from taxel.recording.read_npz import around
+from taxel.recording.readers.npz import around
+from taxel.recording.sections import Origin
 
 #: Columns of events: those that a table must have, and those that may follow.
 EVENTS = ("t_us", "x", "y", "p")
@@ -77,7 +77,7 @@ def _head(path: Path, file: BinaryIO) -> list[str]:
     head = file.readline(_HEAD + 1)
     if len(head) > _HEAD:
         raise FormatError(f"{path}, line 1: more than {_HEAD} bytes; at most that are read")
-    return _names(path, head.removeprefix(b"\xef\xbb\xbf").rstrip(b"\r\n"))
+    return _names(path, head)
 
 
 def _table(path: Path, array: Array | None) -> Events | Frames:
@@ -93,16 +93,9 @@ def _names(path: Path, head: bytes) -> list[str]:
     columns = head.count(b",") + 1
     if columns > COLUMNS:
         raise FormatError(f"{path}, line 1: {columns} columns; at most {COLUMNS} are read")
-    try:
-        text = head.decode()
-    except UnicodeDecodeError:
-        # As in other tables of text.
-        text = head.decode("latin-1")
-    names = [name.strip() for name in text.split(",")]
+    names = names_in(head)
     if names[0] != "t_us" or len(names) < 2:
-        if {"label", "t_us"} <= set(names):
-            raise FormatError(f"{path}, line 1: a table of labels (docs/command-line.md), no recording")
-        begin = repr(head[:40].decode("utf-8", "replace"))
+        begin = repr(_text_of(head)[:40].decode("utf-8", "replace"))
         raise FormatError(
             f"{path}, line 1: {begin}: must be t_us,x,y,p[,intensity][,repaired], or t_us and a column a taxel; "
             + advice(path, "describes a table of another program")
@@ -117,6 +110,21 @@ def _names(path: Path, head: bytes) -> list[str]:
     if repeated is not None:
         raise FormatError(f"{path}, line 1: column {shown(repeated)} stands there twice")
     return names
+
+
+def names_in(head: bytes) -> list[str]:
+    """Return the cells of a first line, without blanks around them."""
+    try:
+        text = _text_of(head).decode()
+    except UnicodeDecodeError:
+        # As in other tables of text.
+        text = _text_of(head).decode("latin-1")
+    return [name.strip() for name in text.split(",")]
+
+
+def _text_of(head: bytes) -> bytes:
+    """Return a first line without the mark of UTF-8 and without its end."""
+    return head.removeprefix(b"\xef\xbb\xbf").rstrip(b"\r\n")
 
 
 def _blocks(path: Path, file: BinaryIO) -> Iterator[_Block]:
@@ -203,9 +211,9 @@ def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: A
         if array is None and n * rows * columns > max(1 << 24, 16 * n * len(names)):
             raise FormatError(sparse)
         for k in range(0, len(table), at_once):
-            part = table[k : k + at_once]
-            frames = np.zeros((len(part), rows, columns), np.float32)
-            frames[:, y, x] = part[:, 1:]
+            block = table[k : k + at_once]
+            frames = np.zeros((len(block), rows, columns), np.float32)
+            frames[:, y, x] = block[:, 1:]
             read.add(t=t[k : k + at_once], values=frames)
     try:
         return Frames(read.column("values"), read.column("t"), array=sensor)
@@ -220,12 +228,12 @@ def _numbers(path: Path, names: list[str], first: int, body: bytes, dtype: type[
     try:
         table = np.loadtxt(io.BytesIO(body), dtype=dtype, delimiter=",", comments=None, ndmin=2)
     except (ValueError, OverflowError) as error:
-        place = re.search(r"at row (\d+)(?:, column (\d+))?", str(error))
+        match = re.search(r"at row (\d+)(?:, column (\d+))?", str(error))
         # NumPy counts rows from 0 in one of its messages, and from 1 in the other.
-        row = 0 if place is None else int(place[1]) - ("changed" in str(error))
-        where = "" if place is None else f", line {first + _line_number(body, row)}"
-        if place is not None and place[2] is not None and int(place[2]) <= len(names):
-            where += f", column {names[int(place[2]) - 1]}"
+        row = 0 if match is None else int(match[1]) - ("changed" in str(error))
+        where = "" if match is None else f", line {first + _line_number(body, row)}"
+        if match is not None and match[2] is not None and int(match[2]) <= len(names):
+            where += f", column {names[int(match[2]) - 1]}"
         reason = re.sub(r" at row .*|; use `usecols`.*", "", first_line(error))
         raise FormatError(f"{path}{where}: {reason}; must be {len(names)} numbers a line") from None
     if table.shape[1] != len(names):

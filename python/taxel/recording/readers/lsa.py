@@ -10,7 +10,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.recording.contents import Board
 from taxel.recording.once import known
-from taxel.recording.parts import EventTable, Losses, Origin, Sensor, Wire
+from taxel.recording.sections import EventTable, Losses, Origin, Sensor, Wire
 from taxel.recording.verdict import Verdict
 
 

@@ -1,4 +1,4 @@
-"""The fields of a source, part by part, and the words that say that one is lost."""
+"""The fields of a source, section by section, and the words that say that one is lost."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from taxel.calibration import Calibration
 from taxel.clock import Clock
-from taxel.recording.contents import Source, parts_of
+from taxel.recording.contents import Source, sections_of
 from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.raw import Datagrams, Samples
 
@@ -47,12 +47,12 @@ WORDS: dict[str, tuple[str, ...]] = {
 OF_BYTES = {"wire.differences", "wire.version_2", "wire.origin_us", "wire.unmarked"}
 
 
-def flat(of: Source) -> dict[str, Any]:
-    """Return the values of all fields by part and name, each read."""
+def flat(source: Source) -> dict[str, Any]:
+    """Return the values of all fields by section and name, each read."""
     values = {}
-    for name, part in parts_of(of).items():
-        for one in fields(part):
-            value = getattr(part, one.name)
+    for name, section in sections_of(source).items():
+        for one in fields(section):
+            value = getattr(section, one.name)
             values[f"{name}.{one.name}"] = value() if isinstance(value, Once) else value
     return values
 

@@ -11,22 +11,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.archive import stored_names
 from taxel._base.limits import TIME_US
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._core import FormatError
 from taxel.formats import text
 from taxel.formats.layout import ISO, UNITS_US, advice
-from taxel.recording.kinds import kind_of
-from taxel.recording.read_foreign import (
+from taxel.recording.readers.foreign import (
     ARRAYS,
     MISSING,
     are_units,
     arrays_of,
     cells,
     ends_in_separator,
-    is_of_another_program,
     list_arrays,
     seconds_of,
     shapes_of,
@@ -40,29 +37,20 @@ _NO_RATE = "# rate_hz = 100  # frames a second: the file does not say it, and wi
 
 
 def refuse_without_layout(path: Path) -> None:
-    """Refuse a table or arrays that taxel did not write and no layout describes, with the layout that reads them.
+    """Refuse a table or arrays of another program with the layout that reads them; a text without a table is none.
 
-    Its lines hold what the file says; what it does not say is a comment.
+    The lines of the layout hold what the file says; what it does not say is a comment.
 
     Raises
     ------
-    FormatError : it is such a file, or a damaged one
+    FormatError : it holds a table or arrays, or is damaged
     """
-    if are_spike_trains(path):
-        raise FormatError(
-            f"{path}: spike trains, as taxel encode writes them, no recording; taxel info describes them, and "
-            "taxel.SpikeTrains.load reads them"
-        )
-    if not is_of_another_program(path) or (path.suffix.lower() == ".npz" and not stored_names(path)):
-        return
-    if path.suffix.lower() in (".csv", ".h5", ".hdf5"):
-        kind_of(path)  # refuses what is not of the kind that its name says
     if path.suffix.lower() not in ARRAYS:
         lines = text.beginning(path)
-        found = _TextTable.of(lines, texts=False)
+        found = _TextTable.find(lines, texts=False)
         if found is None:
             _refuse_decimal_commas(path, lines)
-            found = _TextTable.of(lines, texts=True)
+            found = _TextTable.find(lines, texts=True)
         if found is None:
             return
         holds, lines = _of_table(found)
@@ -80,16 +68,10 @@ def refuse_without_layout(path: Path) -> None:
     raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
 
 
-def are_spike_trains(path: Path) -> bool:
-    """Return whether a file holds the arrays that `SpikeTrains.save` writes."""
-    is_npz = path.suffix.lower() == ".npz" and path.is_file()
-    return is_npz and {"times", "offsets", "start", "stop"} <= set(stored_names(path))
-
-
 def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
     """Return the layout of the array of a name."""
     count, *shape = shapes[name]
-    time = next((name for name, of in shapes.items() if of == (count,) and unit_of(name) is not None), None)
+    time = next((name for name, shape_of in shapes.items() if shape_of == (count,) and unit_of(name) is not None), None)
     times = [] if time is None else [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time])]
     data = [f"array = {_quote(name)}"] * bool(name) + times
     return [*_size(shape), *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
@@ -108,7 +90,7 @@ class _TextTable:
     numeric: Sequence[bool]
 
     @classmethod
-    def of(cls, lines: Sequence[str], *, texts: bool) -> _TextTable | None:
+    def find(cls, lines: Sequence[str], *, texts: bool) -> _TextTable | None:
         """Find the parts; None of a text that does not end in lines of numbers, with `texts` beside texts."""
         there = [(k, line) for k, line in enumerate(lines) if line.strip()]
         # The separator that makes most columns of numbers.

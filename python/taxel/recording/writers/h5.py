@@ -5,7 +5,7 @@ The root has the attribute ``taxel`` (1, the layout's version). Events are the d
 ``markers`` (int64, two columns: us, whether a start); frames are ``values`` (float32, frames x rows x columns)
 with ``t`` and ``unit`` (text). ``held`` (uint16, rows x columns, 65 535 for unknown) is the values of the taxels at the
 beginning. ``about`` is JSON: the sensor, the source, registers, notes, detections and lost information. ``digest``
-(uint8) is the checksum over all data sets, of which `taxel.recording.write_npz` states the order.
+(uint8) is the checksum over all data sets, of which `taxel.recording.readers.columns` states the order.
 """
 
 from __future__ import annotations
@@ -20,12 +20,10 @@ import numpy as np
 
 from taxel._base import h5_writing
 from taxel.recording.contents import Source
-from taxel.recording.write_npz import TEXTS, columns_of
+from taxel.recording.readers.columns import TEXTS
+from taxel.recording.readers.h5 import MARK, VERSION
+from taxel.recording.writers.npz import columns_of
 
-#: Name of the attribute that has the version of the layout.
-MARK = "taxel"
-#: Version of the layout.
-VERSION = 1
 #: Size of the chunks of a data set, which are compressed one by one.
 _PIECE_BYTES = 1 << 20
 

@@ -1,4 +1,4 @@
-"""Writes tables of text: a .csv of events or of frames, as `taxel.recording.read_csv` reads them."""
+"""Writes tables of text: a .csv of events or of frames, as `taxel.recording.readers.csv` reads them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.read_csv import EVENTS, MORE, sensor_of
-from taxel.recording.read_npz import around
+from taxel.recording.readers.csv import EVENTS, MORE, sensor_of
+from taxel.recording.readers.npz import around
 
 #: Number of frames that are written at once.
 _FRAMES = 4096
@@ -34,10 +34,10 @@ def write_csv(file: BinaryIO, table: Events | Frames) -> None:
         for k in range(0, len(table), _FRAMES):
             values = table.values[k : k + _FRAMES, y, x]
             # Each value is written once; as bits, because 0 equals -0.
-            bits, which = np.unique(values.view(np.uint32), return_inverse=True)
+            bits, positions = np.unique(values.view(np.uint32), return_inverse=True)
             # str of a float32 is the shortest text that reads back as the same value.
             texts = np.array([str(value).removesuffix(".0") for value in bits.view(np.float32)], object)
-            rows = texts[which.reshape(values.shape)].tolist()
+            rows = texts[positions.reshape(values.shape)].tolist()
             times = table.t[k : k + _FRAMES].tolist()
             file.writelines(f"{t},{','.join(row)}\n".encode() for t, row in zip(times, rows, strict=True))
         return

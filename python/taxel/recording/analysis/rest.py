@@ -137,8 +137,8 @@ def by_unit(frames: Frames) -> Tare | None:
     middle, above = np.nanquantile(np.where(np.isnan(still).all(axis=0), 0.0, still), (0.5, 0.75), axis=0)
     noise = 1.4826 * np.asarray(above - middle, np.float64)
     nothing = Frames(np.zeros((2, *frames.array.shape)), [0, 1], unit=frames.unit, array=frames.array)
-    made = json.loads(Tare.take(nothing, note=BY_UNIT).to_json())
-    return Tare.from_json(json.dumps(made | {"noise": noise.reshape(-1).tolist()}))
+    document = json.loads(Tare.take(nothing, note=BY_UNIT).to_json())
+    return Tare.from_json(json.dumps(document | {"noise": noise.reshape(-1).tolist()}))
 
 
 def loaded_from(frames: Frames, rest: Rest) -> float:
@@ -200,10 +200,10 @@ def flickering(frames: Frames) -> NDArray[np.bool_]:
 
 def _extremes(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return each taxel's least and greatest finite value, NaN for one without any."""
-    least, most = (of.reduce(values, axis=0, initial=np.nan) for of in (np.fmin, np.fmax))
+    least, most = (reduction.reduce(values, axis=0, initial=np.nan) for reduction in (np.fmin, np.fmax))
     if np.isinf(least).any() or np.isinf(most).any():
         values = np.where(np.isfinite(values), values, np.nan)
-        least, most = (of.reduce(values, axis=0, initial=np.nan) for of in (np.fmin, np.fmax))
+        least, most = (reduction.reduce(values, axis=0, initial=np.nan) for reduction in (np.fmin, np.fmax))
     return least, most
 
 
@@ -310,8 +310,8 @@ def _fall(frames: Frames, quiet_us: tuple[int, int], scale: float) -> bool:
     down, up = rest - lowest, values.max(axis=0) - rest
     back = np.array([values[k:, taxel].max() for taxel, k in enumerate(values.argmin(axis=0))])
     down[back < rest - down / _FALLS] = 0
-    which = _THIRD if down.size >= _SMALL else 1
-    deepest, most = (np.partition(of, -which)[-which] for of in (down, up))
+    rank = _THIRD if down.size >= _SMALL else 1
+    deepest, most = (np.partition(moves, -rank)[-rank] for moves in (down, up))
     return bool(deepest > max(_FALLS * most, 2 * LOADED_TICKS / scale))
 
 
