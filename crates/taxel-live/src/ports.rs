@@ -9,7 +9,7 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Port {
-    /// Path of the device, as "/dev/ttyUSB0".
+    /// Name of the port, as "COM3" or "/dev/ttyACM0".
     pub place: String,
     /// "usb", "pci", "bluetooth" or "other".
     pub kind: &'static str,
@@ -28,10 +28,9 @@ pub struct Port {
 ///
 /// # Errors
 ///
-/// `File` if the system cannot list its ports.
+/// `Socket` if the system cannot list its ports.
 pub fn ports() -> Result<Vec<Port>> {
-    let found = serialport::available_ports()
-        .map_err(|error| Error::file(std::path::Path::new("/sys/class/tty"))(error.into()))?;
+    let found = serialport::available_ports().map_err(|error| Error::socket("serial ports")(error.into()))?;
     let mut ports: Vec<Port> = found.into_iter().map(|port| described(port.port_name, port.port_type)).collect();
     ports.sort_by(|a, b| (a.kind != "usb", &a.place).cmp(&(b.kind != "usb", &b.place)));
     Ok(ports)
