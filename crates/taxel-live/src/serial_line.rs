@@ -19,6 +19,9 @@ pub const BAUD: u32 = 115_200;
 /// Baud rates that are accepted, bits/s; a port may refuse some of them.
 pub const BAUDS: RangeInclusive<u32> = 300..=4_000_000;
 
+/// How long a server may take to answer where its user waits for nothing else.
+pub const CONNECT: Duration = Duration::from_secs(1);
+
 /// The least time limit of a port: Windows takes 0 for no limit.
 const AT_ONCE: Duration = if cfg!(windows) { Duration::from_millis(1) } else { Duration::ZERO };
 
@@ -187,7 +190,7 @@ fn write_in_part<Port>(_: &Port) -> io::Result<()> {
 fn connect(host: &str, port: u16, within: Duration) -> io::Result<SerialLine> {
     let mut failed = None;
     for address in (host, port).to_socket_addrs()? {
-        match TcpStream::connect_timeout(&address, within) {
+        match TcpStream::connect_timeout(&address, within.max(Duration::from_millis(1))) {
             Ok(stream) => return stream.set_nodelay(true).map(|()| SerialLine(Stream::Tcp(stream))),
             Err(error) => failed = Some(error),
         }

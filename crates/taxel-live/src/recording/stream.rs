@@ -8,6 +8,7 @@ use taxel_core::problem;
 
 use super::damage::{DamageCounts, IN_NO_LINE, MISSING, STRANGE, UNFINISHED_LINES};
 use super::limits;
+use crate::text_lines::LeftOut;
 use clock::StreamClock;
 
 /// The columns of a source's lines.
