@@ -648,6 +648,9 @@ class _Port(TypedDict):
     usb: tuple[int, int] | None
 
 def serial_ports() -> list[_Port]: ...
+
+BAUDS: Final = (300, 4_000_000)
+
 @final
 class BoardLine:
     def __new__(cls, place: str, baud: int, timeout: float) -> BoardLine: ...
@@ -659,8 +662,6 @@ class BoardLine:
     def close(self) -> None: ...
     def faults(self) -> dict[str, int]: ...
     def resets(self) -> int: ...
-
-BAUDS: Final = (300, 4_000_000)
 
 def send(
     host: str,
