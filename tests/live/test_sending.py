@@ -170,7 +170,7 @@ def test_a_reader_that_comes_late_hears_what_is_said_from_then_on(tmp_path: Path
 @pytest.mark.parametrize(
     ("to", "kind", "said"),
     [
-        ("nowhere", taxel.ProblemError, "must be udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD"),
+        ("nowhere", taxel.ProblemError, "must be udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD"),
         ("udp:9000", taxel.ProblemError, "must be a host and a port"),
         ("serial:/dev/null@fast", taxel.ProblemError, "'fast'".replace("'", '"')),
         ("pipe:/dev/null", taxel.ProblemError, "/dev/null: is no named pipe; mkfifo makes one"),

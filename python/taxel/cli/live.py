@@ -61,7 +61,7 @@ class _Typed:
     control: Annotated[
         str | None,
         typer.Option(
-            help="The board's serial line (/dev/ttyUSB0, host:port), for the panel's registers and for a noise floor "
+            help="The board's serial line (COM3, /dev/ttyACM0, host:port), for the panel's registers and for a noise floor "
             "of 0 while a tare is taken."
         ),
     ] = None
