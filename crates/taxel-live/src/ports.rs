@@ -51,3 +51,23 @@ fn described(place: String, kind: SerialPortType) -> Port {
         SerialPortType::Unknown => port("other"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use serialport::UsbPortInfo;
+
+    use super::*;
+
+    #[test]
+    fn a_usb_port_has_its_product_in_every_system() {
+        for place in ["COM3", "/dev/ttyACM0"] {
+            let [product, maker, serial] = ["Uno", "Arduino", "75"].map(|text| Some(text.to_owned()));
+            let (manufacturer, serial_number) = (maker.clone(), serial.clone());
+            let usb = UsbPortInfo { vid: 0x2341, pid: 0x43, serial_number, manufacturer, product: product.clone() };
+            let port = described(place.to_owned(), SerialPortType::UsbPort(usb));
+            let (place, usb) = (place.to_owned(), Some((0x2341, 0x43)));
+            assert_eq!(port, Port { place, kind: "usb", product, maker, serial, usb });
+        }
+        assert_eq!(described("COM1".to_owned(), SerialPortType::Unknown).kind, "other");
+    }
+}
