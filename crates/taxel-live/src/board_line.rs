@@ -59,9 +59,9 @@ impl BoardLine {
     /// has hung up.
     pub fn command(&mut self, command: Command, stop: Stop<'_>) -> Result<u32> {
         let Command { register, value } = command;
-        let answered = if register == 6 { value } else { register.into() };
+        let answered = if register == 6 { value } else { u32::from(register) };
         let answer = self.ask(command, self.timeout, stop, |line| match *line {
-            StatusLine::Register { register, value } if answered == register.into() => Some(Ok(value)),
+            StatusLine::Register { register, value } if answered == u32::from(register) => Some(Ok(value)),
             StatusLine::Refusal { register: refused, .. } if refused == register => Some(Err(line.to_string())),
             _ => None,
         })?;
