@@ -106,8 +106,8 @@ class Cable:
     Parameters
     ----------
     place : str
-        A serial port ("COM3", "/dev/ttyACM0"; `ports` lists them), or host:port of a serial server or an emulated board.
-        Only one program can open a port at a time.
+        A serial port ("COM3", "/dev/ttyACM0"; `ports` lists them), which one program can open at a time, or host:port
+        of a serial server or an emulated board.
     baud : int, bits/s, from 300 to 4000000
         Baud rate of a serial port; 8 data bits, no parity, 1 stop bit (reading: the manual gives no settings).
     timeout : float, s, above 0

@@ -153,7 +153,7 @@ def test_of_a_pipe_that_closes_at_once_nothing_arrived(tmp_path: Path) -> None:
 
 @contextlib.contextmanager
 def plugged(kind: str, link: Path) -> Iterator[tuple[str, Callable[[], Callable[[bytes], bool]]]]:
-    """Yield the place of a serial line, and a function that plugs it in anew and returns a function that sends on it."""
+    """Yield the place of a serial line, and a function that plugs it in anew and returns one that sends on it."""
     with contextlib.ExitStack() as plug, socket.create_server((LOOPBACK, 0)) as server:
 
         def plug_port() -> Callable[[bytes], bool]:

@@ -51,9 +51,7 @@ impl SerialPlace {
         }
         match address::host_and_port(text) {
             Some((host, port)) => Ok(Self::Tcp(host.to_owned(), port)),
-            None => {
-                Err(problem!("place"; " is {text:?}: must be a serial port (COM3, /dev/ttyACM0) or HOST:PORT"))
-            }
+            None => Err(problem!("place"; " is {text:?}: must be a serial port (COM3, /dev/ttyACM0) or HOST:PORT")),
         }
     }
 
@@ -119,9 +117,9 @@ impl SerialLine {
     /// Those of the system: the line has hung up.
     pub fn read(&mut self, bytes: &mut [u8], within: Duration) -> io::Result<usize> {
         let read = match &mut self.0 {
-            Stream::Port(port) => port.set_timeout(within.max(AT_ONCE)).map_err(io::Error::from).and_then(|()| {
-                port.read(bytes)
-            }),
+            Stream::Port(port) => {
+                port.set_timeout(within.max(AT_ONCE)).map_err(io::Error::from).and_then(|()| port.read(bytes))
+            }
             Stream::Tcp(stream) => stream.set_nonblocking(within.is_zero()).and_then(|()| {
                 // A limit of 0 is refused.
                 stream.set_read_timeout(Some(within.max(Duration::from_millis(1))))?;

@@ -112,7 +112,10 @@ fn a_board_takes_commands_and_answers() {
             assert_eq!(line.command(Command { register: 4, value: 140 }, never).unwrap(), 140);
             assert_eq!(line.command(Command { register: 6, value: 4 }, never).unwrap(), 140);
             let refused = line.command(Command { register: 2, value: 301 }, never).unwrap_err().to_string();
-            assert!(refused.ends_with(": the board refuses REG2 = 0x0000012D (REG2 rule 1 of its registers)"), "{refused}");
+            assert!(
+                refused.ends_with(": the board refuses REG2 = 0x0000012D (REG2 rule 1 of its registers)"),
+                "{refused}"
+            );
             let greeting = Greeting { wire_version: 1, rows: 64, columns: 64, channels: 16 };
             assert_eq!((line.greeting(never).unwrap(), line.resets()), (greeting, 0));
             let answers = ["ok REG4=0x0000008C", "ok REG4=0x0000008C", "bad REG2 rule 1", "taxel-board v1 64x64 16ch"];
@@ -130,7 +133,8 @@ fn a_board_takes_commands_and_answers() {
 
 #[test]
 fn wherever_the_lines_are_cut_they_mean_the_same() {
-    let text = b"taxel-board v1 64x64 16ch\r\nfault queue 3\n\nok REG4=0x0000008C\nfault comparator 12\n\xc3\nfault queue 5\n";
+    let text =
+        b"taxel-board v1 64x64 16ch\r\nfault queue 3\n\nok REG4=0x0000008C\nfault comparator 12\n\xc3\nfault queue 5\n";
     for seed in 0..5 {
         on_each_line(LONG, |mut line, mut end| {
             let (mut random, mut rest) = (StdRng::seed_from_u64(seed), &text[..]);
@@ -142,7 +146,10 @@ fn wherever_the_lines_are_cut_they_mean_the_same() {
             }
             let mut lines = vec![];
             until_lines(&mut line, &mut lines, 6);
-            assert_eq!(lines[..4], ["taxel-board v1 64x64 16ch", "fault queue 3", "ok REG4=0x0000008C", "fault comparator 12"]);
+            assert_eq!(
+                lines[..4],
+                ["taxel-board v1 64x64 16ch", "fault queue 3", "ok REG4=0x0000008C", "fault comparator 12"]
+            );
             assert_eq!(line.faults().clone(), [("comparator".to_owned(), 12), ("queue".to_owned(), 5)].into());
             assert_eq!(line.resets(), 1);
         });
@@ -188,7 +195,8 @@ fn bytes_of_another_baud_rate_and_a_line_without_an_end_are_no_answer() {
             let error = line.greeting(Stop::never()).unwrap_err().to_string();
             over.store(true, Ordering::Relaxed);
             let is_port = error.starts_with('/');
-            let why = if is_port { "bytes came that are no text: is its baud rate 115200?" } else { "is this the board's" };
+            let why =
+                if is_port { "bytes came that are no text: is its baud rate 115200?" } else { "is this the board's" };
             assert!(error.contains(why), "{error}");
         });
     });
@@ -227,7 +235,10 @@ fn a_line_that_hangs_up_while_it_is_read_is_an_error_that_says_so() {
                 end.hang_up();
             });
             let error = line.greeting(Stop::never()).unwrap_err();
-            assert!(matches!(&error, Error::Socket { source, .. } if source.kind() == ErrorKind::NotConnected), "{error}");
+            assert!(
+                matches!(&error, Error::Socket { source, .. } if source.kind() == ErrorKind::NotConnected),
+                "{error}"
+            );
             assert!(error.to_string().contains(": the line has hung up"), "{error}");
         });
         let error = line.command(Command { register: 4, value: 1 }, Stop::never()).unwrap_err().to_string();

@@ -140,7 +140,9 @@ mod tests {
             assert_eq!(StatusLine::parse(&format!("{line} ")), None);
             assert_eq!(StatusLine::parse(&format!(" {line}")), None);
         }
-        for line in ["", "ok", "ok REG8=0x00000000", "ok REG4=0xA0", "status frames=2 events=500", "fault  3", "bad REG1"] {
+        for line in
+            ["", "ok", "ok REG8=0x00000000", "ok REG4=0xA0", "status frames=2 events=500", "fault  3", "bad REG1"]
+        {
             assert_eq!(StatusLine::parse(line), None, "{line}");
         }
     }
