@@ -95,7 +95,7 @@ def test_a_line_without_a_board_is_said() -> None:
         ({"place": "ttyUSB0"}, 'place is "ttyUSB0"'),
         ({"place": 3}, "place is 3"),
         ({"place": "host:99999"}, 'place is "host:99999"'),
-        ({"place": "/dev/null", "baud": 5}, "baud is 5: must be from 300 to 4000000"),
+        ({"place": "/dev/null", "baud": 5}, "baud is 5: must be a whole number from 300 to 4000000"),
         ({"place": "/dev/null", "timeout": 0}, "timeout is 0"),
     ],
 )
