@@ -55,16 +55,22 @@ pub fn live(error: LiveError) -> PyErr {
 }
 
 fn os_error(source: std::io::Error, place: String) -> PyErr {
-    match source.raw_os_error() {
+    use std::io::ErrorKind::{AlreadyExists, NotFound, PermissionDenied, ResourceBusy};
+    // An error that the system's code did not make has none: the codes of Python's classes by kind, the same in every system.
+    let code = source.raw_os_error().or(match source.kind() {
+        NotFound => Some(2),
+        PermissionDenied => Some(13),
+        ResourceBusy => Some(16),
+        AlreadyExists => Some(17),
+        _ => None,
+    });
+    let message = source.to_string();
+    match code {
         Some(code) => {
-            let message = source.to_string();
             let text = message.split(" (os error").next().unwrap_or(&message).to_owned();
             PyOSError::new_err((code, text, place))
         }
-        None if source.kind() == std::io::ErrorKind::AlreadyExists => {
-            pyo3::exceptions::PyFileExistsError::new_err(format!("{place}: {source}"))
-        }
-        None => PyOSError::new_err(format!("{place}: {source}")),
+        None => PyOSError::new_err(format!("{place}: {message}")),
     }
 }
 

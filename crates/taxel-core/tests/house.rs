@@ -32,10 +32,11 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-live",
         &[
-            &["error", "latency", "locked"],
+            &["error", "latency", "locked", "text_lines"],
             &["clock", "host_clock", "regular_file"],
             &["address", "bridged", "ports"],
-            &["recording"],
+            &["serial_line"],
+            &["board_line", "recording"],
             &["capture"],
             &["emulate", "pipeline"],
         ],
@@ -67,6 +68,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
                 "calibration",
                 "circuit",
                 "detect",
+                "device",
                 "encode",
                 "held",
                 "learn",

@@ -61,8 +61,8 @@ class _LiveArguments:
     control: Annotated[
         str | None,
         typer.Option(
-            help="The board's serial line (/dev/ttyUSB0, host:port), for the panel's registers and for a noise floor "
-            "of 0 while a tare is taken."
+            help="The board's serial line (COM3, /dev/ttyACM0, host:port), for the panel's registers and for a noise "
+            "floor of 0 while a tare is taken."
         ),
     ] = None
     save_tare: Annotated[Path | None, typer.Option(help="Save the fresh tare in a new file (JSON).")] = None

@@ -38,7 +38,7 @@ class Panel:
         A live board; or a recording to show first, any file or folder that `taxel.open` reads: of a folder its first
         recording. Others of the folder can be opened too.
     control : str, optional
-        The board's serial line ("/dev/ttyUSB0", host:port), with which the page reads and sets registers.
+        The board's serial line ("COM3", "/dev/ttyACM0", host:port), with which the page reads and sets registers.
     folder : path, optional
         The folder of recordings, also of new ones. Default: that of the recording, or the current one.
     port : int, 0 to 65535

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from taxel._base.arguments import checked_path, flag, instance, integer, number, text
 from taxel._base.options import option
+from taxel._core import BAUDS
 from taxel.array import Array
 from taxel.simulate.acts import Act, Contact
 from taxel.simulate.board import Version2, fitting, reading
@@ -75,7 +76,7 @@ class EmulateOptions:
     line: str | os.PathLike[str] | None = option(
         None, "Accept commands on a serial line of this name (a link to a pseudo-terminal)."
     )
-    baud: int = option(115_200, "Baud rate of --line. Default: 115200.", least=300, most=4_000_000)
+    baud: int = option(115_200, "Baud rate of --line. Default: 115200.", least=BAUDS[0], most=BAUDS[1])
     sync: str | os.PathLike[str] | None = option(
         None, "Write the sync line as text to a new file or a pipe: board us, 1 or 0, host ns."
     )
@@ -102,7 +103,7 @@ class EmulateOptions:
     def for_rust(self) -> dict[str, Any]:
         """Return the completed options as Rust reads them."""
         registers = instance("registers", self.registers, Registers)
-        baud, overwrite = integer("baud", self.baud, 300, 4_000_000), flag("overwrite", self.overwrite)
+        baud, overwrite = integer("baud", self.baud, *BAUDS), flag("overwrite", self.overwrite)
         return {
             "registers": registers._held,
             "tare_ms": None if isinstance(self.touch, Replay | Pipe) else number("tare_ms", self.tare_ms),

@@ -17,9 +17,10 @@ use super::options::LiveOptions;
 use super::record_stage::COUNTS_EVERY;
 use super::running_recording::{Host, RecordingPart};
 use super::shared::PipelineShared;
-use super::source::{FurtherSource, LineInput, LineReader, SourceKind, TextLine};
+use super::source::{FurtherSource, LineInput, LineReader, SourceKind};
 use crate::locked::lock;
-use crate::recording::{self, DamageCounts, LeftOut, SourceWriter, StreamColumns, StreamFaults, fields, now_ns};
+use crate::recording::{self, DamageCounts, SourceWriter, StreamColumns, StreamFaults, fields, now_ns};
+use crate::text_lines::{LeftOut, TextLine};
 use crate::{Error, Result};
 
 /// A running stream of numbers.
@@ -189,7 +190,7 @@ impl NumberStream {
                 }
             };
             let at_ns = reader.came_ns;
-            while let Some(line) = reader.line(ended) {
+            while let Some(line) = reader.lines.next(ended) {
                 let has_no_beginning = std::mem::take(&mut first) && self.stream.parse(&line.text).is_none();
                 if has_no_beginning && reader.is_serial() {
                     self.count_left_out(LeftOut { unfinished: line.bytes, ..LeftOut::default() })?;
@@ -197,12 +198,13 @@ impl NumberStream {
                     self.line(at_ns, &line)?;
                 }
             }
-            self.count_left_out(reader.take_left_out(ended))?;
             if ended {
-                return Ok(());
+                break;
             }
+            self.count_left_out(reader.lines.take_left_out())?;
         }
-        self.count_left_out(reader.take_left_out(true))
+        reader.lines.discard();
+        self.count_left_out(reader.lines.take_left_out())
     }
 }
 

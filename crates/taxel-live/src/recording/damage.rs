@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use taxel_core::wire::{self, SenderDecoder, StepBack};
 
+use crate::text_lines::LeftOut;
+
 /// What decoding a file found.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
@@ -44,15 +46,6 @@ impl DamageCounts {
         let count = |cause: &str| self.damage.get(cause).copied().unwrap_or(0);
         LeftOut { in_no_line: count(IN_NO_LINE), unfinished: count(UNFINISHED_LINES) }
     }
-}
-
-/// Number of bytes that arrived from a source of lines and that are in no line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct LeftOut {
-    /// Those that cannot be part of a line of numbers.
-    pub in_no_line: u64,
-    /// Those of lines whose end did not arrive, or whose beginning did not.
-    pub unfinished: u64,
 }
 
 /// What a decoder of version 1 could not use, by cause.

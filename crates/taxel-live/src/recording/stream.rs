@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use taxel_core::problem;
 
-use super::damage::{DamageCounts, IN_NO_LINE, LeftOut, MISSING, STRANGE, UNFINISHED_LINES};
+use super::damage::{DamageCounts, IN_NO_LINE, MISSING, STRANGE, UNFINISHED_LINES};
 use super::limits;
+use crate::text_lines::LeftOut;
 use clock::StreamClock;
 
 /// The columns of a source's lines.

@@ -126,7 +126,7 @@ pub(crate) enum Request {
     DeltaIntensity { on: bool },
     /// Requests `places`: where a board can be.
     Places {},
-    /// The board's serial line: a device, or host:port; `null` disconnects it.
+    /// The board's serial line: a port of this machine, or host:port; `null` disconnects it.
     Control { place: Option<Text<255>> },
 }
 
