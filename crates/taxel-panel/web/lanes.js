@@ -31,7 +31,7 @@ import { rounded, integer } from "./words.js";
  * @property {string} name of its elements: `NAME-block` with a heading, and `NAME-lane`
  * @property {string} label what it is, for those who hear the page
  * @property {number} least height that it needs with its heading, CSS pixels
- * @property {string} [kind] class of its element in style.css
+ * @property {string} [kind] class of its block and of its element in style.css
  * @property {`show${string}`} setting that shows it
  * @property {string} [box] text of the setting's box; without one it shares the box of another lane
  * @property {(shown: Shown) => boolean} [fits] whether it has anything to show of this source; without it: of all
@@ -206,7 +206,7 @@ export class Lanes {
     const observer = new ResizeObserver(() => this.fit());
     this.all = LANES.map((lane) => {
       const [heading, element] = [make("h2"), make("div", { id: `${lane.name}-lane`, class: `lane ${lane.kind ?? ""}`, role: "img", "aria-label": lane.label })];
-      const block = make("section", { id: `${lane.name}-block` }, heading, element);
+      const block = make("section", { id: `${lane.name}-block`, class: lane.kind ?? "" }, heading, element);
       part("axis", HTMLElement).before(block);
       observer.observe(element);
       return { lane, block, heading, element, painter: lane.painter?.(element), plot: /** @type {uPlot | null} */ (null) };
