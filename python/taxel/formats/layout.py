@@ -119,7 +119,7 @@ class Layout:
 
     Parameters
     ----------
-    place : Path
+    path : Path
         The file, for errors.
     rows, columns : int, 1 or more, optional
         Both or neither.
@@ -148,7 +148,7 @@ class Layout:
     ProblemError : a value of another kind, or values that contradict each other
     """
 
-    place: Path
+    path: Path
     rows: int | None = None
     columns: int | None = None
     pitch_mm: float | tuple[float, float] | None = None
@@ -194,7 +194,7 @@ class Layout:
         """
         document = read_toml(path)
         try:
-            return cls(place=path, **_values(document))
+            return cls(path=path, **_values(document))
         except (ProblemError, TypeError) as error:
             raise FormatError(f"{path}: {first_line(error)}") from None
 
@@ -278,7 +278,7 @@ def _name(path: Path) -> str:
 
 def _values(document: dict[str, Any]) -> dict[str, Any]:
     """Return the values of a file by the names of the fields of `Layout`."""
-    _known("", document, [field.name for field in fields(Layout) if field.name != "place"])
+    _known("", document, [field.name for field in fields(Layout) if field.name != "path"])
     values: dict[str, Any] = {}
     for name, value in document.items():
         if name in _TABLES:

@@ -92,22 +92,20 @@ def _apply_layout(source: RecordedSource, layout: Layout, *, given: bool) -> Rec
         array = _array(source, layout)
     except ProblemError as error:
         if strict:
-            raise FormatError(f"{layout.place}: {name}: {first_line(error)}") from None
+            raise FormatError(f"{layout.path}: {name}: {first_line(error)}") from None
         array = sensor.array
     if strict and sensor.heel and layout.heel not in ("", sensor.heel):
-        raise FormatError(f"{layout.place}: says heel {layout.heel}; {name} says {sensor.heel}")
+        raise FormatError(f"{layout.path}: says heel {layout.heel}; {name} says {sensor.heel}")
     same = source if array == sensor.array else on_array(source, array)
     same = replace(same, sensor=replace(same.sensor, side=sensor.side or layout.side, heel=sensor.heel or layout.heel))
     if not isinstance(same, FrameSource):
         if strict and (layout.turned is not None or layout.unit or layout.rate_hz):
-            raise FormatError(f"{layout.place}: {name} holds events; falls, unit and rate_hz are of frames")
+            raise FormatError(f"{layout.path}: {name} holds events; falls, unit and rate_hz are of frames")
         return same
     was = same.frame_table.turned
     if strict and was is not None and layout.falls is not None and layout.turned != was:
         falls = "false" if layout.turned is None else f"{layout.turned:g}"
-        raise FormatError(
-            f"{layout.place}: says falls = {falls}; the readings of {name} were turned by falls = {was:g}"
-        )
+        raise FormatError(f"{layout.path}: says falls = {falls}; the readings of {name} were turned by falls = {was:g}")
     full = layout.turned if was is None else None
     # Read at once, so that a layout that contradicts the file is refused where the file is opened.
     frames = _read(same.table, layout, full, name, is_alone=kind in _ALONE, strict=strict)
@@ -163,15 +161,15 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_al
         if unit in _UNSAID:
             unit = layout.unit
         elif strict and unit != layout.unit:
-            raise FormatError(f"{layout.place}: says unit {layout.unit}; {name} is in {unit}")
+            raise FormatError(f"{layout.path}: says unit {layout.unit}; {name} is in {unit}")
     if layout.rate_hz is not None:
         if _are_numbers(t):
             try:
                 t = _times_at(layout.rate_hz, _writable(t) if is_alone else np.empty_like(t))
             except ProblemError as error:
-                raise FormatError(f"{layout.place}: {name}: {error}") from None
+                raise FormatError(f"{layout.path}: {name}: {error}") from None
         elif strict and len(t) > 1 and abs(layout.rate_hz * (step := _median_step(t)) / 1e6 - 1) > _SLACK:
-            raise FormatError(f"{layout.place}: says {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz")
+            raise FormatError(f"{layout.path}: says {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz")
     if full is not None:
         values = _writable(values)
         step = max(1, _PIECE // max(1, values[:1].size))
@@ -181,7 +179,7 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_al
                 risen = np.float32(full) - block
             if (large := np.isinf(risen)).any():
                 raise FormatError(
-                    f"{layout.place}: falls is {layout.falls}; {name} reads {shown(block[large][0].item())}, and the "
+                    f"{layout.path}: falls is {layout.falls}; {name} reads {shown(block[large][0].item())}, and the "
                     "difference does not fit 32 bits"
                 )
             block[...] = risen

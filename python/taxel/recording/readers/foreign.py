@@ -88,7 +88,7 @@ def read_foreign(path: Path, layout: Layout) -> RecordedSource:
         taxels = math.prod(values.shape[1:])
         if layout.rows is not None and layout.columns is not None and taxels != layout.rows * layout.columns:
             size = counted(taxels, "column") if is_table else f"frames of {' x '.join(map(str, values.shape[1:]))}"
-            raise FormatError(f"{path}: {size}; {layout.place} says {layout.rows} x {layout.columns} taxels")
+            raise FormatError(f"{path}: {size}; {layout.path} says {layout.rows} x {layout.columns} taxels")
         grid = Array(values.shape[1], values.shape[2], name=path.stem) if values.ndim == 3 else None
         array = layout.array(
             taxels, grid or Array(1, taxels, name=path.stem, names=read.names if any(read.names or ()) else None)
@@ -96,7 +96,7 @@ def read_foreign(path: Path, layout: Layout) -> RecordedSource:
         shaped = values.astype(np.float32, copy=False).reshape(-1, *array.shape)
         frames = Frames(frozen_whole(shaped), frozen_whole(t), array=array)
     except ProblemError as error:
-        raise FormatError(f"{layout.place}: {path.name}: {first_line(error)}") from None
+        raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None
     limited(path, frames)
     origin = Origin(path, path.name, "table" if is_table else "arrays")
     return source_from(frames, origin, untimed=read.t is None, losses=Losses(lost=known(read.lost)))
