@@ -53,7 +53,7 @@ impl<V> From<Vec<V>> for Held<V> {
 }
 
 impl Held {
-    /// Whether no taxel had an event so far.
+    /// The values of an array of so many taxels, none of which has had an event.
     #[must_use]
     pub fn unknown(taxels: usize) -> Self {
         Self::all(taxels, UNKNOWN)
