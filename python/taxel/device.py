@@ -194,7 +194,7 @@ class Cable:
         ------
         DeviceError : the board does not answer
         """
-        return Greeting(*self._line.greeting())
+        return Greeting(**self._line.greeting())
 
     def listen(self) -> dict[str, int]:
         """Read the lines that have arrived, and return the number of faults so far by name ("queue": 3).
@@ -242,7 +242,7 @@ class Cable:
         DeviceError : no board answers within that time
         ProblemError : no number
         """
-        return Greeting(*self._line.reopen(number("within", within)))
+        return Greeting(**self._line.reopen(number("within", within)))
 
     def read(self, register: int) -> int:
         """Return the value of a register (a write of REG6 with its number).

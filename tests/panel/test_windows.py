@@ -198,4 +198,4 @@ def test_the_spikes_of_a_readout_are_made_with_the_tare_that_it_measured(tmp_pat
             pass
         assert page.ask("encode", encoder=by_name)["type"] == "done"
         # Other parameters are not the readout's, and have no tare.
-        assert "without a tare" in page.ask("encode", encoder={**by_name, "first": 3})["reason"]
+        assert "without a tare" in page.ask("encode", encoder={**by_name, "noise_floor": 20.0})["reason"]

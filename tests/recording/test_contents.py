@@ -20,7 +20,7 @@ from taxel.recording.on_clock import on_clock
 from taxel.recording.once import known
 from taxel.recording.raw import Samples
 from taxel.recording.recording import with_notes
-from taxel.recording.sections import Columns, Timing
+from taxel.recording.sections import SampleColumns, Timing
 from taxel.recording.writers.stored import storable
 
 from .sections import flat, holds, unsaid
@@ -58,7 +58,7 @@ def full(folder: Path, kind: type[RecordedSource]) -> Contents:
         FrameSource: FrameSource(frame_table=readings, **header),
         Stream: Stream(
             frame_table=readings,
-            stream=Columns(tuple(f"c{k}" for k in range(10)), known(samples)),
+            stream=SampleColumns(tuple(f"c{k}" for k in range(10)), known(samples)),
             **header,
         ),
     }

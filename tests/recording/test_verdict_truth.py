@@ -29,7 +29,7 @@ from taxel.recording.contents import alone, source_from
 from taxel.recording.once import known
 from taxel.recording.sections import Losses, Origin
 from taxel.recording.verdict import STATUSES
-from taxel.simulate import BoardSource, Version2
+from taxel.simulate import Board, Version2
 from taxel.wire import Registers
 
 from .making import HEADER, record, some_events
@@ -46,7 +46,7 @@ def at_least(verdict: Verdict, status: str) -> bool:
 @cache
 def sent_by_a_board(frames: int = 1500) -> list[bytes]:
     """The datagrams of version 2 of a board of which some taxels change in each frame, by sequence number."""
-    board = BoardSource(Registers(wire_version=2), version_2=Version2(states_us=0))
+    board = Board(Registers(wire_version=2), version_2=Version2(states_us=0))
     draw, held = np.random.default_rng(3), np.full(4096, 20, np.uint16)
     sent = []
     for _ in range(frames):
@@ -503,7 +503,7 @@ def test_datagrams_of_version_1_that_come_again_are_damage_as_their_events_are_t
 
 @pytest.mark.parametrize("reordered", [False, True])
 def test_what_version_2_lost_right_after_a_reset_is_counted(reordered: bool, tmp_path: Path) -> None:
-    board = BoardSource(Registers(wire_version=2), version_2=Version2(states_us=0))
+    board = Board(Registers(wire_version=2), version_2=Version2(states_us=0))
     held, parts = np.full(4096, 20, np.uint16), []
     for _ in range(2):
         part: list[bytes] = []
@@ -839,7 +839,7 @@ def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
 
 
 def test_intact_datagrams_of_another_board_are_no_damaged_ones(tmp_path: Path) -> None:
-    boards = [BoardSource(Registers(wire_version=2), version_2=Version2(board=n)) for n in (5, 6)]
+    boards = [Board(Registers(wire_version=2), version_2=Version2(board=n)) for n in (5, 6)]
     sent = [[one for k in range(3) for one in board.frame(np.full(4096, 40 + 9 * k, np.uint16))] for board in boards]
     writer = _core.RecordingWriter(tmp_path / "a.mcap", json.dumps(HEADER), "none", False)
     other = sent[1][:7]
@@ -856,7 +856,7 @@ def test_intact_datagrams_of_another_board_are_no_damaged_ones(tmp_path: Path) -
 def test_a_second_board_with_the_numbers_of_the_first_is_told(seed: int, tmp_path: Path) -> None:
     """Two emulated boards have one session: what came under a number that another datagram has is left out."""
     draw = np.random.default_rng(seed)
-    boards = [BoardSource(Registers(wire_version=2), version_2=Version2(states_us=0)) for _ in range(2)]
+    boards = [Board(Registers(wire_version=2), version_2=Version2(states_us=0)) for _ in range(2)]
     sent: list[tuple[int, bytes]] = []
     for k, board in enumerate(boards):
         held = np.full(4096, 20, np.uint16)

@@ -22,9 +22,6 @@ pub fn serial_ports(py: Python<'_>) -> PyResult<Plain<Vec<ports::Port>>> {
 #[pyclass(frozen)]
 pub struct BoardLine(Exclusive<board_line::BoardLine>);
 
-/// Version of the wire, rows, columns and channels.
-type GreetingOut = (u8, u16, u16, u8);
-
 #[pymethods]
 impl BoardLine {
     /// The board may take `timeout` s to answer.
@@ -42,8 +39,8 @@ impl BoardLine {
     }
 
     /// Requests the greeting of the board.
-    fn greeting(&self, py: Python<'_>) -> PyResult<GreetingOut> {
-        self.0.enter(py, |line, stop| line.greeting(stop)).map(greeting_out)
+    fn greeting(&self, py: Python<'_>) -> PyResult<Plain<Greeting>> {
+        self.0.enter(py, |line, stop| line.greeting(stop)).map(Plain)
     }
 
     /// Reads the lines that have arrived.
@@ -57,8 +54,8 @@ impl BoardLine {
     }
 
     /// Opens the line again until the board answers, for at most `within` s.
-    fn reopen(&self, py: Python<'_>, within: f64) -> PyResult<GreetingOut> {
-        self.0.enter(py, |line, stop| line.reopen(seconds(within), stop)).map(greeting_out)
+    fn reopen(&self, py: Python<'_>, within: f64) -> PyResult<Plain<Greeting>> {
+        self.0.enter(py, |line, stop| line.reopen(seconds(within), stop)).map(Plain)
     }
 
     /// Closes the line.
@@ -80,9 +77,4 @@ impl BoardLine {
 /// A time of 0 or more; infinity is the longest one.
 fn seconds(seconds: f64) -> Duration {
     Duration::try_from_secs_f64(seconds.max(0.0)).unwrap_or(Duration::MAX)
-}
-
-fn greeting_out(greeting: Greeting) -> GreetingOut {
-    let Greeting { wire_version, rows, columns, channels } = greeting;
-    (wire_version, rows, columns, channels)
 }

@@ -13,8 +13,8 @@ use crate::protocol::messages::Message;
 use crate::readout_encoders::ViewEncoder;
 use crate::time_columns::{SPAN, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
-use taxel_live::pipeline::TaxelChange;
 use taxel_live::Result;
+use taxel_live::pipeline::TaxelChange;
 
 /// Maximum number of spikes in a message.
 const MOST: usize = 4096;
