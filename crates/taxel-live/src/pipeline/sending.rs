@@ -126,8 +126,8 @@ impl Sending {
         let counts = Sent { to: to.to_string(), ..Sent::default() };
         let state = SendingState { device, waiting: VecDeque::new(), gone: 0, counts, closed: false };
         let line = Arc::new(SendingLine { to: to.clone(), state: Mutex::new(state), came: Condvar::new() });
-        let theirs = Arc::clone(&line);
-        let thread = std::thread::Builder::new().name("taxel-send".to_owned()).spawn(move || theirs.send_what_waits());
+        let sender = Arc::clone(&line);
+        let thread = std::thread::Builder::new().name("taxel-send".to_owned()).spawn(move || sender.send_what_waits());
         Ok(Self { line, thread: Some(thread.map_err(Error::socket("thread"))?) })
     }
 

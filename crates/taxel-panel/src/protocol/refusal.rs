@@ -53,3 +53,22 @@ pub(crate) fn words(error: &taxel_live::Error) -> String {
 }
 
 pub(crate) type Answer<T = ()> = Result<T, Refusal>;
+
+#[cfg(test)]
+mod tests {
+    use taxel_core::{Error, Hint, problem};
+
+    use super::words;
+
+    #[test]
+    fn a_remedy_names_its_argument_once_also_in_a_part() {
+        for hint in [Hint::Give, Hint::Larger, Hint::LayOut, Hint::Pitch] {
+            let error: Error = problem!("it needs a grid").with_hint("array", hint).in_part("encoder fa1");
+            let text = words(&error.into());
+            assert!(text.starts_with("encoder fa1: it needs a grid; "), "{text}");
+            assert_eq!(text.matches("array").count(), 1, "{text}");
+        }
+        let wrong = problem!("tau"; " is 0: must be above 0").in_part("encoder fa1");
+        assert_eq!(words(&wrong.into()), "encoder fa1: tau is 0: must be above 0");
+    }
+}
