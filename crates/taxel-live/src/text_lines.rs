@@ -34,7 +34,7 @@ pub struct LeftOut {
 }
 
 impl TextLines {
-    /// Lines of at most `longest` bytes. Of a longer line the beginning is returned, and the rest is left out.
+    /// Lines of at most `longest` bytes. A longer line is returned up to there, and its rest is left out.
     #[must_use]
     pub fn new(longest: usize) -> Self {
         Self { longest, bytes: vec![], searched: 0, cut: false, left_out: LeftOut::default() }

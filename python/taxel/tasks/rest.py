@@ -202,7 +202,7 @@ def _warn_of_touch(tare: GivenTare, recording: Recording, source: Events | Frame
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
     """Return the tare of the time before a recording's first label, or before the board's start marker.
 
-    Of frames in a unit of force or pressure it is 0, as everywhere (`taxel.recording.analysis.rest`).
+    The tare of frames in a unit of force or pressure is 0, as everywhere (`taxel.recording.analysis.rest`).
     A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 frames come before
     it, the tare is that of a quiet stretch, if there is one. Where something lay on the array before it and was taken
     away, the tare is of the longest time without it, before the label if there is one; a warning says so.

@@ -135,13 +135,8 @@ impl Player {
             if !later.is_empty() {
                 break;
             }
-            self.pending.clear();
-            self.applied = 0;
-            match self.reader.read(&mut self.pending)? {
-                ReadOutcome::Changes => {}
-                ReadOutcome::Held(held, events) => self.state.set_held(&held, events),
-                ReadOutcome::Rest(rest) => self.state.set_rest(rest),
-                ReadOutcome::End => break,
+            if !self.read()? {
+                break;
             }
         }
         self.state.advance(t);
@@ -150,6 +145,19 @@ impl Player {
         }
         self.t = self.t.max(t);
         Ok(())
+    }
+
+    /// Reads the next changes, or what the index says of values and rest; returns false at the end.
+    fn read(&mut self) -> Result<bool> {
+        self.pending.clear();
+        self.applied = 0;
+        match self.reader.read(&mut self.pending)? {
+            ReadOutcome::Changes => {}
+            ReadOutcome::Held(held, events) => self.state.set_held(&held, events),
+            ReadOutcome::Rest(rest) => self.state.set_rest(rest),
+            ReadOutcome::End => return Ok(false),
+        }
+        Ok(true)
     }
 
     /// The next time stamp that has events, us.
@@ -162,13 +170,8 @@ impl Player {
             if let Some(change) = self.pending.get(self.applied) {
                 return Ok(Some(change.t.max(self.t)));
             }
-            self.pending.clear();
-            self.applied = 0;
-            match self.reader.read(&mut self.pending)? {
-                ReadOutcome::Changes => {}
-                ReadOutcome::Held(held, events) => self.state.set_held(&held, events),
-                ReadOutcome::Rest(rest) => self.state.set_rest(rest),
-                ReadOutcome::End => return Ok(None),
+            if !self.read()? {
+                return Ok(None);
             }
         }
     }

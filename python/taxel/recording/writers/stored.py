@@ -201,7 +201,7 @@ def _lsa(source: RecordedSource, path: Path) -> _Kept:
 def _mcap(source: RecordedSource, path: Path) -> _Kept:
     """Return what a .mcap holds: all; events without datagrams of exactly these events get new datagrams."""
     is_file, lines = source.origin.kind != "events", source.losses.damage()
-    # Of what recordings were merged stands in `source`.
+    # `source` names the recordings that were merged.
     converted = [f"converted from {source.origin.name}"] if is_file and source.origin.kind != "merged" else []
     samples = source.stream.samples() if isinstance(source, Stream) else None
     events = None if isinstance(source, FrameSource) else known(_board(source, path).table)

@@ -17,7 +17,7 @@ pub(super) struct ValuesByLine {
     /// Upper bound of the entries of `since`.
     pub(super) newest: i64,
     /// Value of a taxel without any event so far: 0 if the session was received from its start.
-    pub(super) unheard: Option<u16>,
+    pub(super) initial: Option<u16>,
 }
 
 /// Time of a value that is known from elsewhere: earlier than anything received.
@@ -34,14 +34,14 @@ impl ValuesByLine {
             values: vec![0; taxels],
             since: vec![NEVER; taxels],
             newest: NEVER,
-            unheard: None,
+            initial: None,
         }
     }
 
     /// The same array, with all values unknown.
     pub(super) fn blank(&self) -> Self {
         let taxels = self.values.len();
-        Self { values: vec![0; taxels], since: vec![NEVER; taxels], newest: NEVER, unheard: None, ..*self }
+        Self { values: vec![0; taxels], since: vec![NEVER; taxels], newest: NEVER, initial: None, ..*self }
     }
 
     /// Sets the taxels' values, by index, none if a value is unknown.
@@ -73,11 +73,11 @@ impl ValuesByLine {
         self.newest = self.newest.max(t);
     }
 
-    /// Discards all values; `unheard` becomes the field of that name.
-    pub(super) fn forget(&mut self, unheard: Option<u16>) {
+    /// Discards all values; a taxel without any event from now on has the value `initial`.
+    pub(super) fn forget(&mut self, initial: Option<u16>) {
         self.since.fill(NEVER);
         self.newest = NEVER;
-        self.unheard = unheard;
+        self.initial = initial;
     }
 
     /// The values by taxel index.

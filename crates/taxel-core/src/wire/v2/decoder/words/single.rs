@@ -52,7 +52,7 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
             match body.meaning {
                 Meaning::Changes => {}
                 Meaning::Differences => {
-                    let from = held.get(index).or(held.unheard);
+                    let from = held.get(index).or(held.initial);
                     known = from.is_some();
                     counts.unknown_value += u64::from(!known);
                     ticks =
