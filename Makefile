@@ -114,7 +114,7 @@ slow: released $(VENV)/.for-test dist bridge
 
 # Either build of the extension does.
 lint: $(VENV)/.for-test $(VENV)/.for-lint
-	@$(MAKE) --question $(VENV)/.released 2>/dev/null || $(MAKE) --no-print-directory build
+	@$(MAKE) --no-print-directory $(if $(wildcard $(VENV)/.released),released,build)
 	cargo fmt --all --check
 	cargo fmt --manifest-path bridge/zenoh/Cargo.toml --check
 	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs rules/src/rules/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo

@@ -16,7 +16,7 @@ from taxel import Note
 from taxel.recording import Recording
 from taxel.recording.contents import Contents, source_from
 from taxel.recording.once import known
-from taxel.recording.parts import Losses, Marks, Origin
+from taxel.recording.sections import Losses, Marks, Origin
 
 #: What a terminal would obey, in a name: clear the screen, set its title; C1, DEL, directions, separators.
 SEQUENCE = "\x1b[2J\x1b]0;owned\x07\x9b31m\x7f\x08\u202e\u2066\u200e\u200f\u061c\u2028\u2029"
@@ -58,7 +58,7 @@ def recording(source: str = NAME) -> Recording:
     marks = Marks(notes=known((Note(NAME, 300_000, 0), Note(CELL, 600_000, 0))), detections=known(found))
     losses = Losses(remarks=(NAME,), lost=known((NAME,)))
     origin = Origin(Path("a.bag"), "a.bag", "ros", source=source)
-    return Recording(Contents.of(source_from(frames(), origin, marks=marks, losses=losses)))
+    return Recording(Contents.single(source_from(frames(), origin, marks=marks, losses=losses)))
 
 
 def labels(place: Path) -> Path:

@@ -115,9 +115,10 @@ def tare(path: Path) -> list[Any]:
 
 def calibration(path: Path) -> list[Any]:
     held = Calibration.load(path)
-    values = held.apply(taxel.Frames(np.full((1, *held.array.shape), 60.0), [0], unit=held.of, array=held.array)).values
-    return [held.array._geometry(), held.unit, held.of, held.gain, held.rest, held.floor, held.date, held.residual,
-            held.loads, held.note, held.described(), values.round(4)]  # fmt: skip
+    frames = taxel.Frames(np.full((1, *held.array.shape), 60.0), [0], unit=held.reading_unit, array=held.array)
+    values = held.apply(frames).values
+    return [held.array._geometry(), held.unit, held.reading_unit, held.gain, held.rest, held.floor, held.date,
+            held.residual, held.loads, held.note, held.described(), values.round(4)]  # fmt: skip
 
 
 def recipe(path: Path) -> list[Any]:

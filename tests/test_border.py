@@ -15,7 +15,7 @@ JSON = {
 }  # fmt: skip
 #: What returns another text: names and places, and lines for people.
 TEXTS = {
-    "clock_doubt", "error_line", "instructions", "numbered_path", "ConeXCertificate.text", "ConeXFit.reason",
+    "clock_doubt", "instructions", "numbered_path", "ConeXCertificate.text", "ConeXFit.reason",
     "Error.argument", "Error.hint", "Live.place",
     "Panel.token", "Panel.url", "Tally.label", "WireBoard.command", "WireBoard.faults",
     "WireBoard.greeting",

@@ -1,9 +1,13 @@
-"""The Python code of the documentation runs, each page in its own folder; tutorials show its output and pictures."""
+"""The Python code of the documentation runs, each page in its own folder; tutorials show its output and pictures.
+
+The files of this repository that a page names exist, and so do the targets of `make`.
+"""
 
 from __future__ import annotations
 
 import doctest
 import importlib.util
+import re
 from pathlib import Path
 
 import pytest
@@ -31,3 +35,23 @@ def test_every_python_piece_of_a_page_runs_in_order_and_does_what_the_page_says(
             assert len(done.pictures) == len(done.figures), where
         assert all((DOCS / picture).exists() for picture in done.pictures), where
     assert count == page.read_text().count("```python")
+
+
+ROOT = DOCS.parent
+PROSE = sorted(page for kind in ("*.md", "docs/*.md", "docs/reference/*.md", "*/README.md") for page in ROOT.glob(kind))
+TARGETS = set(re.findall(r"^([a-z][\w-]*)(?: [\w -]+)?:", (ROOT / "Makefile").read_text(), re.MULTILINE))
+FOLDERS = "benchmarks|bridge|crates|docs|fuzz|python|rtl|rules|studies|tests|tools|viewers"
+_PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})/[\w./-]+")
+#: What `make` builds, and a folder of another project.
+ELSEWHERE = ("rtl/build/", "tests/testdata")
+
+
+@pytest.mark.parametrize("page", PROSE, ids=lambda page: str(page.relative_to(ROOT)))
+def test_the_paths_and_make_targets_of_a_page_exist(page: Path) -> None:
+    prose = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    for code in re.findall(r"`([^`]+)`", prose):
+        for path in _PATH.findall(code):
+            known = "NAME" in path or path.startswith(ELSEWHERE)
+            assert known or (ROOT / path).exists() or (page.parent / path).exists(), f"{page.name}: no file {path}"
+        for target in re.findall(r"\bmake ([a-z][\w-]*)", code):
+            assert target in TARGETS, f"{page.name}: no target {target} in the Makefile"

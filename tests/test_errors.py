@@ -13,7 +13,7 @@ import pytest
 
 import taxel
 from taxel import _core
-from taxel._base.arguments import finite, whole
+from taxel._base.arguments import finite, integer
 from taxel._base.errors import helped, refused
 from taxel._base.parameters import described
 from taxel.cli import main
@@ -47,11 +47,11 @@ def test_an_error_shows_its_argument_once(kind: type[taxel.Error]) -> None:
 
 def test_an_unknown_remedy_is_refused_with_those_that_there_are() -> None:
     with pytest.raises(taxel.ProblemError) as caught:
-        _core.error_line("text", "tare", "pray")
+        helped(taxel.ProblemError("text"), "tare", "pray")
     assert str(caught.value).startswith("hint is ")
     for hint in ("give", "larger", "lay_out", "pitch", "unfelt"):
         assert hint in str(caught.value)
-        assert _core.error_line("text", "THERE", hint).count("THERE") == 1
+        assert str(helped(taxel.ProblemError("text"), "THERE", hint)).count("THERE") == 1
 
 
 def test_the_compiled_part_s_errors_have_them_too() -> None:
@@ -115,5 +115,5 @@ def test_limits_have_one_voice(command: str, option: Any, capsys: pytest.Capture
         line = line_of(capsys, *command.split(), f"{name}={value}")
         limits = {key: end for key, end in (("least", option.min), ("most", option.max)) if end is not None}
         with pytest.raises(taxel.ProblemError) as caught:
-            (whole if option.type_descriptor.annotation is int else finite)(name, value, **limits)
+            (integer if option.type_descriptor.annotation is int else finite)(name, value, **limits)
         assert line == str(caught.value)

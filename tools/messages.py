@@ -1,6 +1,6 @@
 """Make the types and the tables of the panel's messages, and the options of `Live`, from the structs in Rust (`make messages`).
 
-Usage: python tools/messages.py [--check]. The built extension gives their schemas (crates/taxel-panel/src/messages.rs and
+Usage: python tools/messages.py [--check]. The built extension gives their schemas (crates/taxel-panel/src/protocol/messages.rs and
 request.rs, crates/taxel-live/src/pipeline/options.rs). With --check no file is written, and the status is 1 where one differs (`make lint`).
 """
 

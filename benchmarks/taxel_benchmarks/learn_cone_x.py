@@ -164,7 +164,7 @@ def by_daqp_on_demand(n, p):
     """Solve it with DAQP, with rows on demand, from the active rows of the last solution."""
     import daqp  # noqa: PLC0415  a peer need not be there
 
-    # Of DAQP's states of a row: active, active at its lower limit, and an equality.
+    # DAQP's states of a row: active, active at its lower limit, and an equality.
     active, lower, equal = 1, 3, 5
     held = [equalities(n, p), np.full(p, THETA_0), np.empty(0)]
 

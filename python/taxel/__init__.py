@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from taxel.detect import Readout
     from taxel.recording import BoardChange, Datagrams, Recording, Verdict, Zeroing, open_all
     from taxel.recording import open_one as open  # noqa: A004  taxel.open is a recording's
+    from taxel.recording.analysis.health import Health, health
     from taxel.recording.convert import convert
     from taxel.recording.cut import cut
-    from taxel.recording.health import Health, health
     from taxel.recording.merge import merge
     from taxel.tasks.train import train
 
@@ -105,8 +105,8 @@ def __getattr__(name: str) -> Any:
     if name in _ROOMS:
         return import_module(f"taxel.{name}")
     if name in _ELSEWHERE:
-        place, inside = _ELSEWHERE[name]
-        value = getattr(import_module(place), inside)
+        module, inside = _ELSEWHERE[name]
+        value = getattr(import_module(module), inside)
         globals()[name] = value
         return value
     raise AttributeError(f"module 'taxel' has no attribute {name!r}")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import instance, number, numbers, several, shown, text, whole
+from taxel._base.arguments import instance, integer, number, numbers, several, shown, text
 from taxel._base.columns import frozen
 from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped, warn
@@ -152,7 +152,7 @@ class Array:
 
     def __post_init__(self) -> None:
         for field in ("rows", "columns"):
-            object.__setattr__(self, field, whole(field, getattr(self, field), 1, 65_535))
+            object.__setattr__(self, field, integer(field, getattr(self, field), 1, 65_535))
         object.__setattr__(self, "pitch_mm", None if self.pitch_mm is None else _pitch(self.pitch_mm))
         text("name", self.name)
         if self.exists is not None:
@@ -250,9 +250,9 @@ class Array:
         array([3, 8])
         """
         column, row = numbers("x", x, np.int64), numbers("y", y, np.int64)
-        for name, place, end in (("x", column, self.columns), ("y", row, self.rows)):
-            if place.size and not (place.min() >= 0 and place.max() < end):
-                raise refused(name, f" reaches from {place.min()} to {place.max()}: must be from 0 to {end - 1}")
+        for name, indices, end in (("x", column, self.columns), ("y", row, self.rows)):
+            if indices.size and not (indices.min() >= 0 and indices.max() < end):
+                raise refused(name, f" reaches from {indices.min()} to {indices.max()}: must be from 0 to {end - 1}")
         try:
             return np.asarray(row * self.columns + column)
         except ValueError:
@@ -370,12 +370,12 @@ class Array:
         y, x = np.indices(self.shape, dtype=np.float64)
         return x * across, y * down
 
-    def fits(self, other: Array) -> bool:
+    def fits(self, array: Array) -> bool:
         """Return whether what was measured or trained on one sensor can be used on another.
 
         Parameters
         ----------
-        other : Array
+        array : Array
 
         Returns
         -------
@@ -391,22 +391,22 @@ class Array:
         >>> Array(8, 8, pitch_mm=2.67).fits(Array(8, 8)), Array(8, 8).fits(Array(8, 9))
         (True, False)
         """
-        instance("other", other, Array)
-        return self.shape == other.shape and np.array_equal(self._there(), other._there())
+        instance("array", array, Array)
+        return self.shape == array.shape and np.array_equal(self._there(), array._there())
 
-    def _warn_apart(self, other: Array, what: str, stacklevel: int = 2) -> bool:
+    def _warn_apart(self, array: Array, subject: str, stacklevel: int = 2) -> bool:
         """Warn, and return true, if another sensor's known pitch or places differ, for which nothing is refused."""
-        known = self._is_measured and other._is_measured
-        if not known or (self.pitch_mm, self.places) == (other.pitch_mm, other.places):
+        known = self._is_measured and array._is_measured
+        if not known or (self.pitch_mm, self.places) == (array.pitch_mm, array.places):
             return False
-        ours, theirs = self._apart(), other._apart()
-        if ours != theirs:
-            differ = f"{other.name} has its taxels {theirs}, {self.name} {ours}"
-        elif other.name == self.name:
+        spacing, spacing_of_array = self._apart(), array._apart()
+        if spacing != spacing_of_array:
+            differ = f"{array.name} has its taxels {spacing_of_array}, {self.name} {spacing}"
+        elif array.name == self.name:
             differ = f"two sensors named {self.name} have their taxels at different places"
         else:
-            differ = f"{other.name} has its taxels at other places than {self.name}"
-        warn(f"{what}: {differ}", stacklevel=stacklevel + 1)
+            differ = f"{array.name} has its taxels at other places than {self.name}"
+        warn(f"{subject}: {differ}", stacklevel=stacklevel + 1)
         return True
 
     def _part(self, x: slice, y: slice) -> Array:
@@ -428,11 +428,11 @@ class Array:
         """Return which taxels exist, shape (rows, columns)."""
         return np.ones(self.shape, bool) if self.exists is None else self.exists
 
-    def _pitch(self, what: str) -> tuple[float, float]:
-        """Return the distances between rows and between columns, mm, for `what` that needs them."""
+    def _pitch(self, purpose: str) -> tuple[float, float]:
+        """Return the distances between rows and between columns, mm, for `purpose` that needs them."""
         pitch = self.pitch_mm
         if pitch is None:
-            raise ProblemError(f"{what} needs mm, and the pitch of {self.name} is not known: give its pitch_mm")
+            raise ProblemError(f"{purpose} needs mm, and the pitch of {self.name} is not known: give its pitch_mm")
         return pitch if isinstance(pitch, tuple) else (pitch, pitch)
 
     def _apart(self) -> str:
@@ -447,18 +447,21 @@ class Array:
         """Return the fields as the compiled part reads them."""
         exists = None if self.exists is None else [bool(e) for e in self.exists.ravel()]
         pitch = None if self.pitch_mm is None else self._pitch("")
-        of = self.places
-        lists = None if of is None else (of.x.ravel().tolist(), of.y.ravel().tolist())
-        areas = None if of is None or of.area is None else of.area.ravel().tolist()
-        places = None if of is None or lists is None else (*lists, areas, of.unit == "mm")
+        positions = self.places
+        lists = None if positions is None else (positions.x.ravel().tolist(), positions.y.ravel().tolist())
+        areas = None if positions is None or positions.area is None else positions.area.ravel().tolist()
+        places = None if positions is None or lists is None else (*lists, areas, positions.unit == "mm")
         names = None if self.names is None else list(self.names)
         return self.rows, self.columns, pitch, self.name, exists, places, names
 
     @classmethod
     def _from_parts(cls, parts: _core._Array) -> Array:
-        rows, columns, pitch_mm, name, exists, of, names = parts
+        rows, columns, pitch_mm, name, exists, positions, names = parts
         grid = None if exists is None else np.array(exists).reshape(rows, columns)
-        places = None if of is None else Places(of[0], of[1], of[2], "mm" if of[3] else None)  # type: ignore[arg-type]
+        places = None
+        if positions is not None:
+            x, y, area, in_mm = positions
+            places = Places(x, y, area, "mm" if in_mm else None)  # type: ignore[arg-type]
         return cls(rows, columns, pitch_mm, grid, name, places, names)
 
     def _geometry(self) -> dict[str, Any]:
@@ -499,18 +502,17 @@ def _places_beside(
     Arrays that stand apart from left to right keep their places, as those of two feet in one system of coordinates;
     others are set half a width apart.
     """
-    every = [array.places for array in arrays]
-    places = [of_one for of_one in every if of_one is not None]
-    if len(places) < len(arrays) or len({of_one.unit for of_one in places}) > 1:
+    places = [array.places for array in arrays if array.places is not None]
+    if len(places) < len(arrays) or len({sensor.unit for sensor in places}) > 1:
         return None
-    across = [of_one.x[array._there()] for array, of_one in zip(arrays, places, strict=True)]
+    across = [sensor.x[array._there()] for array, sensor in zip(arrays, places, strict=True)]
     apart = all(a.max() < b.min() for a, b in pairwise(across))
     x, y, area, right = np.zeros(shape), np.zeros(shape), np.ones(shape), 0.0
-    for at, of_one, own in zip(ats, places, across, strict=True):
-        x[at], y[at] = of_one.x if apart else of_one.x - own.min() + right, of_one.y
-        right += 1.5 * (own.max() - own.min())
-        area[at] = 1.0 if of_one.area is None else of_one.area
-    known = all(of_one.area is not None for of_one in places)
+    for at, sensor, width in zip(ats, places, across, strict=True):
+        x[at], y[at] = sensor.x if apart else sensor.x - width.min() + right, sensor.y
+        right += 1.5 * (width.max() - width.min())
+        area[at] = 1.0 if sensor.area is None else sensor.area
+    known = all(sensor.area is not None for sensor in places)
     return Places(x, y, area if known else None, places[0].unit)
 
 

@@ -64,10 +64,10 @@ class Clock:
         """The midpoints of the intervals, us, and the host's time there, ns, extended by a second on either side."""
         lines = self._lines
         middles = [middle for middle, _ in lines]
-        places = [middles[0] - 1_000_000, *middles, middles[-1] + 1_000_000]
-        of = [lines[0], *lines, lines[-1]]
-        host = [_at(line, place) for (_, line), place in zip(of, places, strict=True)]
-        return np.array(places, np.int64), np.array(host, np.int64)
+        board = [middles[0] - 1_000_000, *middles, middles[-1] + 1_000_000]
+        lines_there = [lines[0], *lines, lines[-1]]
+        host = [_at(line, t) for (_, line), t in zip(lines_there, board, strict=True)]
+        return np.array(board, np.int64), np.array(host, np.int64)
 
     @cached_property
     def _arrived(self) -> NDArray[np.int64]:
@@ -80,8 +80,8 @@ class Clock:
         lines = self._lines
         if len(lines) == 1:
             return lines[0][1]["drift_ppm"]
-        own, host = self._knots
-        return float((host[-2] - host[1]) / ((own[-2] - own[1]) * 1000) - 1) * 1e6
+        board, host = self._knots
+        return float((host[-2] - host[1]) / ((board[-2] - board[1]) * 1000) - 1) * 1e6
 
     def host_ns(self, board_us: int | NDArray[np.int64]) -> Any:
         """Return the host's time (ns since 1970) at times of the source (us).
@@ -104,10 +104,10 @@ class Clock:
         array([1000000000500000])
         """
         t = _whole("board_us", board_us, "us")
-        own, host = self._knots
-        k = np.clip(np.searchsorted(own, t, side="right") - 1, 0, len(own) - 2)
-        since = t - own[k]
-        slope = (host[k + 1] - host[k]) / (own[k + 1] - own[k]) - 1000.0
+        board, host = self._knots
+        k = np.clip(np.searchsorted(board, t, side="right") - 1, 0, len(board) - 2)
+        since = t - board[k]
+        slope = (host[k + 1] - host[k]) / (board[k + 1] - board[k]) - 1000.0
         if self._is_one_line:
             slope = np.full(np.shape(k), self._lines[0][1]["drift_ppm"] * 1e-3)
         return host[k] + since * 1000 + np.rint(since * slope).astype(np.int64)
@@ -137,8 +137,8 @@ class Clock:
         array([500])
         """
         target = _whole("host_ns", host_ns, "ns")
-        own, host = self._knots
-        t = own[0] + (target - host[0]) // 1000
+        board, host = self._knots
+        t = board[0] + (target - host[0]) // 1000
         for _ in range(4):
             # Each iteration multiplies the error by the drift, 1e-4 or less.
             t = t + np.rint((target - self.host_ns(t)) / 1000.0).astype(np.int64)
@@ -150,13 +150,13 @@ class Clock:
         Late by the delays of these two, but right to that where no line fits, as of a sender that is too busy for its
         own clock.
         """
-        own, arrived = self.board_us, self._arrived
-        k = int(np.searchsorted(arrived, host_ns))
-        if 0 < k < len(own):
-            before, after = int(arrived[k - 1]), int(arrived[k])
-            return int(own[k - 1]) + (int(own[k] - own[k - 1]) * (host_ns - before)) // max(after - before, 1)
-        edge = 0 if k == 0 else len(own) - 1
-        return int(own[edge]) + (host_ns - int(arrived[edge])) // 1000
+        board, host = self.board_us, self._arrived
+        k = int(np.searchsorted(host, host_ns))
+        if 0 < k < len(board):
+            before, after = int(host[k - 1]), int(host[k])
+            return int(board[k - 1]) + (int(board[k] - board[k - 1]) * (host_ns - before)) // max(after - before, 1)
+        edge = 0 if k == 0 else len(board) - 1
+        return int(board[edge]) + (host_ns - int(host[edge])) // 1000
 
     @property
     def delay_us(self) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import bare, checked_path, column, fields, instance, nth, several, shown, window
-from taxel._base.columns import Columns, frozen, frozen_column, frozen_copy
+from taxel._base.columns import FrozenColumns, frozen, frozen_column, frozen_copy
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
 from taxel._base.files import write_whole
@@ -76,7 +76,7 @@ class Detection(NamedTuple):
         return None if self.reported is None else self.reported - self.known
 
 
-class Detections(Columns):
+class Detections(FrozenColumns):
     """Hold the detections of a readout: label, time of the event, earliest time of detection, and slope.
 
     All times are us of the board's clock.
@@ -196,16 +196,16 @@ class Detections(Columns):
         if isinstance(chosen, int | np.integer) and not isinstance(chosen, bool):
             n = nth("detection", chosen, len(self))
             return next(iter(self[n : n + 1]))
-        places: Any = self.label == chosen if isinstance(chosen, str) else chosen
+        rows: Any = self.label == chosen if isinstance(chosen, str) else chosen
         try:
-            places = np.arange(len(self))[places]
+            rows = np.arange(len(self))[rows]
         except (IndexError, TypeError, ValueError) as error:
             raise ProblemError(f"detections: choose by a label, a slice, a mask or numbers: {error}") from None
-        if places.ndim != 1:
-            raise ProblemError(f"detections: {shown(chosen)} has {places.ndim} dimensions, must have one")
-        reported = None if self.reported is None else self.reported[places]
-        label, t, known, slope = self.label[places], self.t[places], self.known[places], self.slope[places]
-        return Detections._of(label, t, known, slope, reported, self.repaired[places])
+        if rows.ndim != 1:
+            raise ProblemError(f"detections: {shown(chosen)} has {rows.ndim} dimensions, must have one")
+        reported = None if self.reported is None else self.reported[rows]
+        label, t, known, slope = self.label[rows], self.t[rows], self.known[rows], self.slope[rows]
+        return Detections._of(label, t, known, slope, reported, self.repaired[rows])
 
     def between(self, start: float, stop: float) -> Detections:
         """Return the detections of ``start <= t < stop`` (us).
@@ -289,7 +289,7 @@ class Detections(Columns):
         >>> Detections.from_list([Detection("contact", 1000, 1344)])
         Detections(1: contact 1; 1000 to 1000 us)
         """
-        entries = [instance("detections", one, Detection) for one in several("detections", detections)]
+        entries = [instance("detections", detection, Detection) for detection in several("detections", detections)]
         columns: list[tuple[Any, ...]] = list(zip(*entries, strict=True)) or [()] * len(Detection._fields)
         label, t, known, slope, reported, _, repaired = columns
         return cls._of(label, t, known, slope, None if None in reported else reported, repaired)
@@ -368,12 +368,12 @@ class Detections(Columns):
         >>> Detections.from_csv(place)
         Detections(1: a 1; 10 to 10 us)
         """
-        place = Path(checked_path("path", path))
-        table = HeaderTable.read(place, text_of(place))
+        file = Path(checked_path("path", path))
+        table = HeaderTable.read(file, text_of(file))
         header = tuple(_RENAMED.get(name, name) for name in table.header)
         more: dict[str, list[int]] = {name: [] for name in (_REPORTED, _REPAIRED) if name in header}
         if header != (*_CSV, *more):
-            raise FormatError(f"{place}, line 1: {','.join(table.header) or 'nothing'}; must be {','.join(_CSV)}")
+            raise FormatError(f"{file}, line 1: {','.join(table.header) or 'nothing'}; must be {','.join(_CSV)}")
         rows: list[tuple[str, int, int, float]] = []
         for line, row in table.rows:
             try:
@@ -381,7 +381,7 @@ class Detections(Columns):
                 for name, value in zip(more, row[4:], strict=True):
                     more[name].append(int_of(value))
             except ValueError as error:
-                raise FormatError(f"{place}, line {line}: {error}") from None
+                raise FormatError(f"{file}, line {line}: {error}") from None
         label, t, known, slope = zip(*rows, strict=True) if rows else ((), (), (), ())
         repaired = [value != 0 for value in more[_REPAIRED]] if _REPAIRED in more else None
         return cls._of(label, t, known, slope, more.get(_REPORTED), repaired)
@@ -461,9 +461,9 @@ class Detections(Columns):
 def _slopes(slope: ArrayLike) -> NDArray[np.float64]:
     """Return a caller's slopes, each finite; None becomes NaN."""
     if isinstance(slope, list | tuple):
-        none = np.array([one is None for one in slope], bool)
+        none = np.array([value is None for value in slope], bool)
         values = np.full(len(slope), np.nan)
-        values[~none] = column("slope", [one for one in slope if one is not None], np.float64)
+        values[~none] = column("slope", [value for value in slope if value is not None], np.float64)
     else:
         values, none = column("slope", slope, np.float64), np.zeros(np.shape(slope), bool)
     wrong = np.flatnonzero(~np.isfinite(values) & ~none)

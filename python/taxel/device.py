@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import re
-import select
-import socket
-import termios
-import time
-import tty
-from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Self, TypeVar
 
 from taxel import _core
-from taxel._base.arguments import flag, instance, number, shown, text, whole
+from taxel._base.arguments import flag, instance, integer, number, shown, text
 from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel._core import DeviceError
@@ -27,23 +19,11 @@ __all__ = ["Cable", "Device", "Greeting", "Port", "ports"]
 
 T = TypeVar("T")
 
-#: Interval between attempts to reopen a line, s.
-_AGAIN_S = 0.05
 #: Start and stop of a recording: REG7[16] (Table 5.5).
 _RECORD = 1 << 16
-#: Lines that are stored for `Cable.take_lines`.
-_RECENT = 256
 
 #: The noise floor: REG5[15:8] (Table 5.5).
 _FLOOR_REGISTER, _FLOOR_MASK = 5, 0xFF00
-
-#: The line that a board sends at its reset, and on request.
-_GREETING = re.compile(r"taxel-board v(\d) (\d+)x(\d+) (\d+)ch")
-
-#: The constant of each baud rate.
-_SPEEDS: dict[int, int] = {
-    baud: getattr(termios, f"B{baud}") for baud in (9600, 57_600, 115_200, 230_400, 460_800, 921_600)
-}
 
 
 @dataclass(frozen=True)
@@ -53,7 +33,7 @@ class Port:
     Parameters
     ----------
     place : str
-        As "/dev/ttyUSB0", for `Cable` and `Device`.
+        As "COM3" or "/dev/ttyACM0", for `Cable` and `Device`.
     kind : {"usb", "pci", "bluetooth", "other"}
     product, maker, serial : str or None
         The description of a USB device.
@@ -62,8 +42,8 @@ class Port:
 
     Examples
     --------
-    >>> Port("/dev/ttyUSB0", "usb", product="FT232R").place
-    '/dev/ttyUSB0'
+    >>> Port("COM3", "usb", product="FT232R").place
+    'COM3'
     """
 
     place: str
@@ -126,23 +106,17 @@ class Cable:
     Parameters
     ----------
     place : str
-        A serial device ("/dev/ttyUSB0"), or host:port of a serial server or an emulated board.
-    baud : int, bits/s, from 9600 to 460800
-        Baud rate of a serial device; 8 data bits, no parity, 1 stop bit (reading: the manual gives no settings).
+        A serial port ("COM3", "/dev/ttyACM0"; `ports` lists them), which one program can open at a time, or host:port
+        of a serial server or an emulated board.
+    baud : int, bits/s, from 300 to 4000000
+        Baud rate of a serial port; 8 data bits, no parity, 1 stop bit (reading: the manual gives no settings).
     timeout : float, s, above 0
         How long the board may take to answer.
 
-    Attributes
-    ----------
-    faults : dict
-        Number of faults by name, counted from the lines that were received.
-    resets : int
-        Number of received greetings that were not requested: the board sends one at a reset and on connecting.
-
     Raises
     ------
-    OSError : the device or the server cannot be opened
-    DeviceError : the device is not a serial device
+    OSError : the port or the server cannot be opened, or another program has opened the port
+    DeviceError : the place is no serial port
     ProblemError : an invalid place, baud rate or timeout
 
     Notes
@@ -151,9 +125,9 @@ class Cable:
 
     Examples
     --------
-    >>> Cable("ttyUSB0")
+    >>> Cable("ttyACM0")
     Traceback (most recent call last):
-    taxel.ProblemError: place is 'ttyUSB0': must be a serial device (/dev/ttyUSB0) or host:port
+    taxel.ProblemError: place is "ttyACM0": must be a serial port (COM3, /dev/ttyACM0) or HOST:PORT
     """
 
     def __init__(self, place: str, *, baud: int = 115_200, timeout: float = 1.0) -> None:
@@ -161,37 +135,17 @@ class Cable:
         self.timeout = number("timeout", timeout)
         if not 0 < self.timeout <= 3600:
             raise refused("timeout", f" is {shown(timeout)}: must be from 0 to 3600")
-        if whole("baud", baud) not in _SPEEDS:
-            raise refused("baud", f" is {baud}: must be one of {', '.join(map(str, _SPEEDS))}")
-        self.faults: dict[str, int] = {}
-        self.resets = 0
-        self._recent: deque[str] = deque(maxlen=_RECENT)
-        self.baud, self._file = baud, -1
-        self._open()
+        self._line = _core.BoardLine(self.place, integer("baud", baud, *_core.BAUDS), self.timeout)
 
-    def _open(self) -> None:
-        self._waiting, place, baud = b"", self.place, self.baud
-        server = re.fullmatch(r"\[?(.+?)\]?:([0-9]{1,5})", place)
-        if place.startswith("/"):
-            self._file = os.open(place, os.O_RDWR | os.O_NOCTTY)
-            try:
-                tty.setraw(self._file)
-                settings = termios.tcgetattr(self._file)
-                settings[4] = settings[5] = _SPEEDS[baud]
-                termios.tcsetattr(self._file, termios.TCSANOW, settings)
-                # Lines that arrived before the request are not its answer.
-                termios.tcflush(self._file, termios.TCIFLUSH)
-            except termios.error as error:
-                self.close()
-                raise DeviceError(f"{place}: no serial device ({error.args[-1]})") from None
-        elif server and int(server[2]) <= 65_535:
-            try:
-                self._file = socket.create_connection((server[1], int(server[2])), self.timeout).detach()
-            except OSError as error:
-                raise OSError(error.errno, error.strerror or str(error), f"TCP {place}") from None
-        else:
-            raise refused("place", f" is {shown(place)}: must be a serial device (/dev/ttyUSB0) or host:port")
-        os.set_blocking(self._file, False)
+    @property
+    def faults(self) -> dict[str, int]:
+        """Number of faults by name, as far as lines were read."""
+        return self._line.faults()
+
+    @property
+    def resets(self) -> int:
+        """Number of received greetings that were not requested: the board sends one at a reset and on connecting."""
+        return self._line.resets()
 
     def command(self, command: Command) -> int:
         """Write a register and return the value that the board reports; other lines of the board are skipped.
@@ -208,6 +162,7 @@ class Cable:
         Raises
         ------
         DeviceError : the board refuses the command (the error names the rule), or does not answer
+        OSError : the cable was pulled
         ProblemError : no command
 
         Examples
@@ -226,16 +181,7 @@ class Cable:
         (140, 140)
         """
         instance("command", command, Command)
-        # A write of REG6 requests the register whose number it holds.
-        register = command.value if command.register == 6 else command.register
-        for line in self._answers(command):
-            answer = re.fullmatch(r"ok REG(\d)=0x([0-9A-F]{8})", line)
-            if answer and int(answer[1]) == register:
-                return int(answer[2], 16)
-            if line.startswith(f"bad REG{command.register} "):
-                write = f"REG{command.register} = 0x{command.value:08X}"
-                raise DeviceError(f"{self.place}: the board refuses {write} ({line[4:]} of its registers)")
-        raise self._silence()
+        return self._line.command(command.register, command.value)
 
     def greeting(self) -> Greeting:
         """Request the greeting of the board (a write of 8 to REG6), as its line at reset may not have been received.
@@ -248,13 +194,7 @@ class Cable:
         ------
         DeviceError : the board does not answer
         """
-        for line in self._answers(Command(6, 8)):
-            greeting = _GREETING.fullmatch(line)
-            if greeting:
-                # This greeting was requested, so it does not indicate a reset.
-                self.resets -= 1
-                return Greeting(*(int(part) for part in greeting.groups()))
-        raise self._silence()
+        return Greeting(**self._line.greeting())
 
     def listen(self) -> dict[str, int]:
         """Read the lines that have arrived, and return the number of faults so far by name ("queue": 3).
@@ -265,11 +205,11 @@ class Cable:
 
         Raises
         ------
-        OSError, DeviceError : the cable was pulled
+        OSError : the cable was pulled
+        DeviceError : the line is closed
         """
-        for _ in self._lines(0.0):
-            pass
-        return dict(self.faults)
+        self._line.listen()
+        return self.faults
 
     def take_lines(self) -> list[str]:
         """Return the lines of the board since the last call, answers to commands included; at most the last 256.
@@ -280,12 +220,10 @@ class Cable:
 
         Raises
         ------
-        DeviceError : the board has disconnected
+        OSError : the cable was pulled
+        DeviceError : the line is closed
         """
-        self.listen()
-        lines = list(self._recent)
-        self._recent.clear()
-        return lines
+        return self._line.take_lines()
 
     def reopen(self, within: float = 2.0) -> Greeting:
         """Reopen the line until the board answers with its greeting; the fault counts begin again at 0.
@@ -304,22 +242,7 @@ class Cable:
         DeviceError : no board answers within that time
         ProblemError : no number
         """
-        until, why = time.monotonic() + number("within", within), ""
-        patience, self.timeout = self.timeout, min(self.timeout, 0.25)
-        try:
-            while True:
-                try:
-                    self.close()
-                    self._open()
-                    self.faults.clear()
-                    return self.greeting()
-                except (OSError, DeviceError) as error:
-                    why = str(error)
-                if time.monotonic() >= until:
-                    raise DeviceError(f"{self.place}: no board there after {within:g} s ({why})")
-                time.sleep(_AGAIN_S)
-        finally:
-            self.timeout = patience
+        return Greeting(**self._line.reopen(number("within", within)))
 
     def read(self, register: int) -> int:
         """Return the value of a register (a write of REG6 with its number).
@@ -338,7 +261,7 @@ class Cable:
         DeviceError : the board does not answer
         ProblemError : no such register
         """
-        return self.command(Command(6, whole("register", register, 0, 7)))
+        return self.command(Command(6, integer("register", register, 0, 7)))
 
     @contextlib.contextmanager
     def floor(self, ticks: int) -> Iterator[None]:
@@ -358,7 +281,7 @@ class Cable:
         ProblemError : a noise floor out of this range
         """
         before = self.read(_FLOOR_REGISTER)
-        floor = whole("ticks", ticks, 0, 255) << 8
+        floor = integer("ticks", ticks, 0, 255) << 8
         self.command(Command(_FLOOR_REGISTER, before & ~_FLOOR_MASK | floor))
         try:
             yield
@@ -367,9 +290,7 @@ class Cable:
 
     def close(self) -> None:
         """Close the line."""
-        if self._file >= 0:
-            os.close(self._file)
-            self._file = -1
+        self._line.close()
 
     def __enter__(self) -> Cable:
         return self
@@ -379,43 +300,6 @@ class Cable:
 
     def __repr__(self) -> str:
         return escaped(f"Cable({self.place})")
-
-    def _answers(self, command: Command) -> Iterator[str]:
-        """Send a command; yield the lines that the board sends after it."""
-        self._require()
-        os.write(self._file, command.to_bytes())
-        return self._lines(self.timeout)
-
-    def _require(self) -> None:
-        if self._file < 0:
-            raise DeviceError(f"{self.place}: the line is closed")
-
-    def _silence(self) -> DeviceError:
-        return DeviceError(f"{self.place}: no answer within {self.timeout:g} s: is this the board's serial line?")
-
-    def _lines(self, seconds: float) -> Iterator[str]:
-        """Yield the lines of the board until none has arrived for `seconds`; count faults among them."""
-        self._require()
-        until = time.monotonic() + seconds
-        while True:
-            line, end, rest = self._waiting.partition(b"\n")
-            if end:
-                self._waiting = rest
-                received = line.decode("ascii", "replace").strip()
-                self._recent.append(received)
-                self.resets += _GREETING.fullmatch(received) is not None
-                fault = re.fullmatch(r"fault (\w+) (\d+)", received)
-                if fault:
-                    self.faults[fault[1]] = int(fault[2])
-                else:
-                    yield received
-                continue
-            if not select.select([self._file], [], [], max(0.0, until - time.monotonic()))[0]:
-                return
-            more = os.read(self._file, 4096)
-            if not more:
-                raise DeviceError(f"{self.place}: the board has hung up")
-            self._waiting += more
 
 
 class Device:
@@ -427,11 +311,11 @@ class Device:
     Parameters
     ----------
     place : str
-        A serial device (`ports` finds them), or host:port.
+        A serial port (`ports` lists them), or host:port.
     array : Array, optional
         The sensor. Default: one of the size that the board reports.
-    baud : int, bits/s, from 9600 to 460800
-        Baud rate of a serial device.
+    baud : int, bits/s, from 300 to 4000000
+        Baud rate of a serial port.
     timeout : float, s, above 0
         How long the board may take to answer.
     patience : float, s
@@ -447,7 +331,7 @@ class Device:
     --------
     >>> Device("nowhere")
     Traceback (most recent call last):
-    taxel.ProblemError: place is 'nowhere': must be a serial device (/dev/ttyUSB0) or host:port
+    taxel.ProblemError: place is "nowhere": must be a serial port (COM3, /dev/ttyACM0) or HOST:PORT
     """
 
     def __init__(
@@ -598,9 +482,6 @@ class Device:
             return work()
         except OSError:
             pass
-        except DeviceError as error:
-            if "hung up" not in str(error):
-                raise
         greeting = self.cable.reopen(self.patience)
         self.reconnects += 1
         if replace(greeting, wire_version=self.greeting.wire_version) != self.greeting:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import column, fields, instance, nth, rows, shown, window
-from taxel._base.columns import Columns, frozen, frozen_column
+from taxel._base.columns import FrozenColumns, frozen, frozen_column
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
 from taxel._base.messages import counted
@@ -47,7 +47,7 @@ class Event(NamedTuple):
     repaired: bool = False
 
 
-class Events(Columns):
+class Events(FrozenColumns):
     """Hold changes at taxels, in the order of their arrival.
 
     Parameters
@@ -208,21 +208,21 @@ class Events(Columns):
         if isinstance(chosen, int | np.integer) and not isinstance(chosen, bool):
             n = nth("event", chosen, len(self))
             return next(iter(self[n : n + 1]))
-        places = chosen if isinstance(chosen, slice) else rows("events", chosen, len(self))
+        indices = chosen if isinstance(chosen, slice) else rows("events", chosen, len(self))
         try:
-            t = self.t[places]
+            t = self.t[indices]
         except (TypeError, ValueError) as error:
             raise refused("events", f"[{shown(chosen)}]: {error}") from None
-        held: list[Any] = [self.intensity, self.present, self.repaired]
-        ticks, present, repaired = (None if column is None else column[places] for column in held)
-        x, y, p, markers = self.x[places], self.y[places], self.p[places], self._markers_of(places)
+        columns: list[Any] = [self.intensity, self.present, self.repaired]
+        ticks, present, repaired = (None if column is None else column[indices] for column in columns)
+        x, y, p, markers = self.x[indices], self.y[indices], self.p[indices], self._markers_of(indices)
         return self._unchecked(t, x, y, p, self.array, ticks, present, repaired, markers)
 
-    def _markers_of(self, places: slice | NDArray[Any]) -> tuple[tuple[int, bool], ...]:
+    def _markers_of(self, indices: slice | NDArray[Any]) -> tuple[tuple[int, bool], ...]:
         """Return the markers of the time of chosen events."""
         if not self.markers or not len(self):
             return self.markers
-        chosen = np.arange(len(self))[places]
+        chosen = np.arange(len(self))[indices]
         if not len(chosen):
             return ()
         first, last = int(chosen.min()), int(chosen.max())

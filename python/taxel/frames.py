@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import finite, instance, shown, text, whole, window
-from taxel._base.columns import Columns, frozen, frozen_column, frozen_numbers
+from taxel._base.arguments import finite, instance, integer, shown, text, window
+from taxel._base.columns import FrozenColumns, frozen, frozen_column, frozen_numbers
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped
@@ -27,7 +27,7 @@ __all__ = ["Frames"]
 MOST_VALUES = 2**30
 
 
-class Frames(Columns):
+class Frames(FrozenColumns):
     """Hold frames of the whole array over time.
 
     Parameters
@@ -119,11 +119,11 @@ class Frames(Columns):
         instance("events", events, Events)
         if events.intensity is None or events.present is None:
             raise ProblemError("events without intensities: frames need the held values")
-        period, array = whole("period_us", period_us, 1, unit="us"), events.array
+        period, array = integer("period_us", period_us, 1, unit="us"), events.array
         first = int(events.t.min()) if len(events) else 0
-        first = first if start is None else whole("start", start, unit="us")
+        first = first if start is None else integer("start", start, unit="us")
         end = int(events.t.max()) + 1 if len(events) else first
-        end = end if stop is None else whole("stop", stop, unit="us")
+        end = end if stop is None else integer("stop", stop, unit="us")
         count = max(0, -((first - end) // period))
         if count * array.rows * array.columns > MOST_VALUES:
             raise ProblemError(
@@ -390,5 +390,5 @@ class Frames(Columns):
 def _refuse_infinite(name: str, values: NDArray[np.float32]) -> None:
     """Refuse readings that are infinite; NaN is a missing one."""
     if np.isinf(values).any():
-        place = ", ".join(map(str, np.argwhere(np.isinf(values))[0].tolist()))
-        raise refused(name, f"[{place}] is infinite: must be finite, or NaN where it is missing")
+        position = ", ".join(map(str, np.argwhere(np.isinf(values))[0].tolist()))
+        raise refused(name, f"[{position}] is infinite: must be finite, or NaN where it is missing")

@@ -118,9 +118,9 @@ class Labels:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        place = Path(checked_path("path", path))
-        rows, _ = rows_of(place, text_of(place))
-        self.path, self.rows = place, tuple(row for row in rows if row.text)
+        file = Path(checked_path("path", path))
+        rows, _ = rows_of(file, text_of(file))
+        self.path, self.rows = file, tuple(row for row in rows if row.text)
         self.removed = tuple(row for row in rows if not row.text)
 
     @property
@@ -145,13 +145,13 @@ class Labels:
         """
         text("trial", trial)
         text("source", source)
-        place = Path(checked_path("recording", recording))
+        file = Path(checked_path("recording", recording))
         names = {row.recording for row in (*self.rows, *self.removed)}
-        possible = (trial, "", str(recording), place.name, place.stem)
+        possible = (trial, "", str(recording), file.name, file.stem)
         of_source = [f"{name} {source}" for name in possible if name] if source else []
         return next((name for name in (*of_source, *possible) if name in names), None)
 
-    def of(self, recording: Recorded) -> dict[str, NDArray[np.int64]]:
+    def times(self, recording: Recorded) -> dict[str, NDArray[np.int64]]:
         """Return the events of a `taxel.Recording` by label, us on its own clock; empty if the table does not name it.
 
         A recording that began in mid-stream counts from its first stamp, which lies a whole number of wraps of the
@@ -174,9 +174,9 @@ class Labels:
             raise refused("recording", f" is {shown(recording)}: must be a taxel.Recording")
         source = getattr(recording, "label", "")
         trial = trial_of(getattr(recording, "name", ""), source)
-        return self._of(recording.path, lambda: recording.clock, source, trial)
+        return self._times(recording.path, lambda: recording.clock, source, trial)
 
-    def _of(
+    def _times(
         self, path: Path, clock_of: Callable[[], Clock | None], source: str, trial: str = ""
     ) -> dict[str, NDArray[np.int64]]:
         """Return the events of a source of the recording at this path; its clock is read only if it is needed."""
@@ -190,10 +190,12 @@ class Labels:
 
     def _rows(self, path: Path, source: str, trial: str, among: Sequence[Note] | None = None) -> list[Note]:
         """Return the labels of a source of a recording, or of its trial: those of all of the file, and its own."""
-        every = self.rows if among is None else among
-        whole = trial in ("", path.name, path.stem)
-        names = {self.named(path), self.named(path, "" if whole else trial, source), None if whole else trial} - {None}
-        return [row for row in every if row.recording in names and row.source in ("", source)]
+        rows = self.rows if among is None else among
+        is_file = trial in ("", path.name, path.stem)
+        names = {self.named(path), self.named(path, "" if is_file else trial, source), None if is_file else trial} - {
+            None
+        }
+        return [row for row in rows if row.recording in names and row.source in ("", source)]
 
     def _replaced(self, path: Path, source: str, trial: str) -> set[int | None]:
         """Return the times of the notes of a source of a recording that its labels replace."""
@@ -247,16 +249,16 @@ def beside(recording: str | os.PathLike[str]) -> Path:
     >>> beside("walk.mcap").name
     'walk.notes.csv'
     """
-    place = Path(checked_path("recording", recording))
-    return beside_file(place, f"{named(place).stem}.notes.csv")
+    file = Path(checked_path("recording", recording))
+    return beside_file(file, f"{named(file).stem}.notes.csv")
 
 
-def rows_of(place: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...], tuple[str, ...]]:
+def rows_of(location: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...], tuple[str, ...]]:
     """Return the rows of a table of labels, those without a label too, and the names of its columns in their order.
 
     Parameters
     ----------
-    place : str or Path
+    location : str or Path
         The name of the table in errors.
     lines : iterable of str
         With their ends.
@@ -271,12 +273,12 @@ def rows_of(place: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...], 
     >>> rows[0].t, columns
     (400, ('t_us', 'label', 'comment'))
     """
-    table = HeaderTable.read(place, lines)
+    table = HeaderTable.read(location, lines)
     if not table.header:
         # An editor empties a table before it writes it.
         return (), ()
     table.has(_WANTED)
-    rows = tuple(_row(f"{place}, line {line}", cells) for line, cells in table)
+    rows = tuple(_row(f"{location}, line {line}", cells) for line, cells in table)
     return rows, table.header
 
 
@@ -320,7 +322,7 @@ def text_with(rows: Iterable[Note], columns: Iterable[str] = (), end: str = "\n"
     return text.getvalue()
 
 
-def _row(place: str, cells: Mapping[str, str]) -> Note:
+def _row(location: str, cells: Mapping[str, str]) -> Note:
     values = {name: cell.strip() for name, cell in cells.items()}
     times: dict[str, int] = {}
     for name in ("t_us", "host_ns", "replaces_us"):
@@ -330,12 +332,12 @@ def _row(place: str, cells: Mapping[str, str]) -> Note:
         try:
             times[name] = int_of(written)
         except ValueError:
-            raise FormatError(f"{place}: {name} is {shown(written)}; must be whole {name[-2:]}") from None
+            raise FormatError(f"{location}: {name} is {shown(written)}; must be whole {name[-2:]}") from None
     replaces = times.get("replaces_us")
     if not (values["label"] or replaces is not None) or any(abs(times.get(name, 0)) > 2**52 for name in _TIMES):
-        raise FormatError(f"{place}: must name a label, and a time within 2^52 us")
+        raise FormatError(f"{location}: must name a label, and a time within 2^52 us")
     if not 0 <= times.get("host_ns", 0) < 2**63:
-        raise FormatError(f"{place}: host_ns must be ns since 1970")
+        raise FormatError(f"{location}: host_ns must be ns since 1970")
     source = values.get("source", "")
     named = values.get("recording", ""), source_of(source) if source.startswith("/") else source
     others = tuple((name, cell) for name, cell in cells.items() if name not in (*_WANTED, *_KNOWN))

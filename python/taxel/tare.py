@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import instance, shown, whole
+from taxel._base.arguments import instance, integer, shown
 from taxel._base.arguments import text as checked_text
 from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped
@@ -93,13 +93,13 @@ class Tare(Saved):
         """
         note = checked_text("note", note)
         window = (
-            None if start_us is None else whole("start_us", start_us, unit="us"),
-            None if stop_us is None else whole("stop_us", stop_us, unit="us"),
+            None if start_us is None else integer("start_us", start_us, unit="us"),
+            None if stop_us is None else integer("stop_us", stop_us, unit="us"),
         )
         given, x = x, recorded(x)
         if isinstance(x, Events | Frames) and not len(x.t):
-            what, why = ("event" if isinstance(x, Events) else "frame"), getattr(given, "_why_empty", str)()
-            raise refused("tare", f": there is no {what}{why}")
+            noun, why = ("event" if isinstance(x, Events) else "frame"), getattr(given, "_why_empty", str)()
+            raise refused("tare", f": there is no {noun}{why}")
         if isinstance(x, Events | Frames) and window[1] is not None and x.t.min() >= window[1]:
             raise ProblemError(f"tare to {stop_us} us: nothing came before it, but from {x.t.min()} to {x.t.max()} us")
         if isinstance(x, Events):
@@ -123,8 +123,8 @@ class Tare(Saved):
         if not self.array.fits(frames.array):
             (rows, columns), (of_rows, of_columns) = frames.array.shape, self.array.shape
             others = ", of which others exist" if frames.array.shape == self.array.shape else ""
-            of = f"{of_rows} x {of_columns}{others}"
-            raise ProblemError(f"frames of {rows} x {columns} taxels: the tare is of {of}")
+            expected = f"{of_rows} x {of_columns}{others}"
+            raise ProblemError(f"frames of {rows} x {columns} taxels: the tare is of {expected}")
         self.array._warn_apart(frames.array, "the frames")
         return frames._above(np.where(np.isnan(self.rest), np.inf, self.rest))
 
@@ -143,9 +143,9 @@ class Tare(Saved):
         """
         if not isinstance(text, str):
             raise refused("tare", f" is {shown(text)}: must be JSON text")
-        if other := _OTHER.match(text):
+        if stranger := _OTHER.match(text):
             raise FormatError(
-                f"is a {other[1]}, not a tare: must be a file that Tare.save or taxel live --save-tare wrote"
+                f"is a {stranger[1]}, not a tare: must be a file that Tare.save or taxel live --save-tare wrote"
             )
         tare = cls.__new__(cls)
         tare._text = _core.check_tare(checked_text("tare", text))
@@ -170,6 +170,6 @@ class Tare(Saved):
 
 def _of_taxels(values: list[float | None], array: Array) -> NDArray[np.float64]:
     """Return values by taxel, NaN where there is none, which cannot be changed."""
-    held = np.array([np.nan if value is None else value for value in values], dtype=float).reshape(array.shape)
-    held.setflags(write=False)
-    return held
+    rest = np.array([np.nan if value is None else value for value in values], dtype=float).reshape(array.shape)
+    rest.setflags(write=False)
+    return rest

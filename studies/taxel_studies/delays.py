@@ -39,7 +39,7 @@ TOY: dict[str, Any] = {"realisations": 2, "inputs": [40], "copies": [3], "shares
 SIZES = {"toy": TOY}
 #: A weight below this counts as 0, mV: a millionth of the bound.
 NONE = 3e-7
-#: Of gaitndd's foot-offs, the share within 10 ms, %, without selection of delays (notes to the gait study).
+#: The share of gaitndd's foot-offs within 10 ms, %, without selection of delays (notes to the gait study).
 GAIT = {"without": 82, "with copies from 0 to 50 ms": 57}
 
 

@@ -114,7 +114,7 @@ def _draw_one(p: Parameters, one: dict[str, Any]) -> Figure:
         for wanted, colour in ((1, "C3"), (0, "C0")):
             mine = here & (rise == wanted)
             x, y = taxel[mine] % REGION, taxel[mine] // REGION
-            # Of several events of a taxel the late ones lie a little to the right and below.
+            # The later ones of several events of a taxel lie a little to the right and below.
             aside = 0.5 * (t[mine] - begin) / (end - begin) - 0.25
             ax.plot(x + aside, y + aside, ".", ms=3, color=colour)
         ax.set_title(f"{begin:g} to {end:g} ms: {int(here.sum())} events", fontsize="medium")

@@ -76,10 +76,10 @@ def confirm(name: str, folder: Path, *, data: Path | None = None, strict: bool =
     if not file.exists():
         raise ProblemError(f"{file}: no toy result of {name} is kept; docs/figures.py keeps one with a figure")
     before, now = json.loads(file.read_text(encoding="utf-8")), toy_result(name, data, strict=strict)
-    differs = [line for key in _COMPARED for line in _differences(before[key], now[key], key)]
-    if differs:
-        more = f" and {len(differs) - 3} more" if len(differs) > 3 else ""
-        raise ProblemError(f"{name}: its toy result is another one: {'; '.join(differs[:3])}{more}")
+    differences = [line for key in _COMPARED for line in _differences(before[key], now[key], key)]
+    if differences:
+        more = f" and {len(differences) - 3} more" if len(differences) > 3 else ""
+        raise ProblemError(f"{name}: its toy result is another one: {'; '.join(differences[:3])}{more}")
 
 
 def keep_toy(name: str, folder: Path, *, data: Path | None = None) -> None:

@@ -293,7 +293,7 @@ def _with_handler(number: signal.Signals) -> Iterator[None]:
 
 @contextmanager
 def _ray(jobs: int, scheduler: str | None) -> Iterator[int]:
-    # Else a call after its end, as after Ctrl-C, starts another Ray.
+    # Without this a call after its end, as after Ctrl-C, starts another Ray.
     os.environ["RAY_ENABLE_AUTO_CONNECT"] = "0"
     import ray  # noqa: PLC0415  an extra
     from ray.util.joblib import register_ray  # noqa: PLC0415

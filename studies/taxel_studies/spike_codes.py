@@ -64,7 +64,7 @@ class RateCode(Code):
     most_hz: float = 1000.0
 
     def decode(self, trains: SpikeTrains, onset_ms: float) -> NDArray[np.float64]:
-        """Return a value a train."""
+        """Return one value for each train."""
         counts = trains.between(onset_ms, onset_ms + self.window_ms).counts
         return np.asarray(np.minimum(counts / (self.most_hz * 1e-3 * self.window_ms), 1.0))
 
@@ -80,7 +80,7 @@ class FirstSpikeLatency(Code):
     """
 
     def decode(self, trains: SpikeTrains, onset_ms: float) -> NDArray[np.float64]:
-        """Return a value a train."""
+        """Return one value for each train."""
         latency = self._rounded(self._first(trains, onset_ms))
         return np.asarray(np.where(latency < self.window_ms, 1.0 - latency / self.window_ms, 0.0))
 
@@ -98,7 +98,7 @@ class RelativeLatency(Code):
     """
 
     def decode(self, trains: SpikeTrains, onset_ms: float) -> NDArray[np.float64]:
-        """Return a value a train."""
+        """Return one value for each train."""
         since = self._since(trains, onset_ms)
         return np.asarray(np.where(since < self.window_ms, 1.0 - since / self.window_ms, 0.0))
 
@@ -121,7 +121,7 @@ class RankOrder(RelativeLatency):
     """
 
     def decode(self, trains: SpikeTrains, onset_ms: float) -> NDArray[np.float64]:
-        """Return a value a train."""
+        """Return one value for each train."""
         since = self._since(trains, onset_ms)
         fired = since < self.window_ms
         values, order = np.zeros(len(since)), np.sort(since[fired])

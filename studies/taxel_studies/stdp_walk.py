@@ -39,7 +39,7 @@ PARAMETERS: dict[str, Any] = {
     "feet": 0,
 }
 SIZES = {"toy": {"feet": 2, "passes": 2}}
-#: Of all feet the constants were chosen on every sixth; statements are of the others.
+#: The constants were chosen on every sixth foot; statements are about the others.
 CHOSEN_ON = 6
 #: A stride is found with this share of strides with one spike, and at most this deviation of its time, ms.
 ONCE, WANDERS_MS = 0.8, 50.0
@@ -121,7 +121,7 @@ def phases(
 
 
 def judged(times: NDArray[np.float64], foot: Piece, begin: float) -> dict[str, Any]:
-    """Return how often a neuron fired once a stride, when in the stride, and the circular deviation of that."""
+    """Return the share of strides with exactly one spike, its mean phase, and the circular deviation of the phase."""
     counts, phased, length = phases(times, foot.truth["contact"], begin, foot.scored[1])
     if not len(counts) or not phased:
         return {"strides": len(counts), "once": 0.0, "phase_ms": None, "wanders_ms": None}

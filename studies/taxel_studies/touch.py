@@ -123,7 +123,7 @@ def _opened(path: Path, table: Labels, contacts: list[Contact], kind: int) -> Dr
     events = recording.events
     started = next(t for t, start in events.markers if start)
     tare = Tare.take(events, stop_us=started)
-    return Drop(Example(events, table.of(recording), tare), events, tare, contacts, kind)
+    return Drop(Example(events, table.times(recording), tare), events, tare, contacts, kind)
 
 
 def drawn(params: dict[str, Any], seed: int, scenes: int, folder: Path, touches: str = "falls") -> list[Drop]:

@@ -76,7 +76,7 @@ def test_a_child_has_its_words_its_answers_and_its_exit_code(tmp_path: Path) -> 
     said, _ = child.communicate("heard\n")
     assert said == f"{['a b', '5', str(tmp_path)]} __main__ heard\n"
     assert child.returncode == 7
-    assert not child._held
+    assert not child._write_ends
 
 
 def test_a_child_has_neither_the_current_folder_nor_an_empty_entry_on_its_path(

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from taxel import Array, Events, Frames, SpikeTrains, Tare
 from taxel.detect import Example, Recipe, judge, run, score
 from taxel.detect.ages import Ages, in_frames, later_us
-from taxel.detect.training import fit_aligned
+from taxel.detect.fitting import fit_aligned
 
 KINDS = ("small", "large")
 

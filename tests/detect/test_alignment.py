@@ -13,7 +13,7 @@ from test_readout import recipe, tare, touches
 import taxel
 from taxel.detect import Alignment, Example, Fold, Part, Recipe, fit, judge, recipes, run, score
 from taxel.detect.alignment import align
-from taxel.detect.training import fit_aligned
+from taxel.detect.fitting import fit_aligned
 
 #: Each touch has a stretch of its own, ms: it is felt in the middle, unrelated inputs fire at both ends.
 STRETCH = 400.0

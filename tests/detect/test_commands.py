@@ -611,7 +611,7 @@ def test_an_example_may_be_a_recording(folder: Path) -> None:
     from taxel.detect import Example, fit
 
     one = taxel.open(folder / "1.npz")
-    labels = taxel.Labels(folder / "labels.csv").of(one)
+    labels = taxel.Labels(folder / "labels.csv").times(one)
     trained = [
         fit([Example(source, labels, tare())], taxel.detect.Recipe.load(folder / "recipe.toml"))
         for source in (one, one.events)

@@ -234,7 +234,7 @@ def test_spike_trains_are_learnt_and_judged_as_their_events_are() -> None:
 
 
 def test_points_that_differ_in_lambdas_alone_come_to_what_each_comes_to_by_itself() -> None:
-    from taxel.detect.training import Fitting, encode_examples
+    from taxel.detect.fitting import Fitting, encode_examples
 
     plans = [
         dataclasses.replace(

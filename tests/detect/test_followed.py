@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 import taxel
 from taxel import Frames, ProblemError, SpikeTrains, Tare
 from taxel.detect import Example, Recipe, run, score
+from taxel.detect.fitting import fit_aligned, possible
 from taxel.detect.followed import follow, silence
-from taxel.detect.training import fit_aligned, possible
 from taxel.encode import Composite, ContactArea, LocalLoad
 
 STEP_MS = 0.5

@@ -20,12 +20,12 @@ import taxel
 from taxel import Array, Frames, SpikeTrains, Tare
 from taxel._base import progress
 from taxel.cli import _recordings
-from taxel.detect import Example, PlainRule, Recipe, choose, judge, load, recipes, run, score, training
+from taxel.detect import Example, PlainRule, Recipe, choose, judge, load, recipes, run, score
 from taxel.detect.advice import advise
+from taxel.detect.fitting import fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.followed import follow
 from taxel.detect.plain_score import PlainScore
-from taxel.detect.training import fit_aligned
 from taxel.encode import ContactArea, LevelCrossing, LocalLoad
 
 LABELS = ("contact", "lift")
@@ -254,7 +254,7 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     followed, said = [], []
-    monkeypatch.setattr(training, "follow", lambda *of: followed.append(of[1]) or follow(*of))
+    monkeypatch.setattr("taxel.detect.fitting.follow", lambda *of: followed.append(of[1]) or follow(*of))
     frames, labels = touched((8, 8), 6, gain=200.0, noise=1.0)
     example = Example(frames, labels, Tare.take(frames, stop_us=900_000))
     judge(
@@ -272,7 +272,7 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
     }
     blind = Recipe.load("touch", floors, LABELS, 3.0)
     said.clear()
-    made = training.fit_aligned([example], blind, lambda step, *_: said.append(step))
+    made = fit_aligned([example], blind, lambda step, *_: said.append(step))
     assert [one for one in said if one.startswith("encoding")] == ["encoding 1 of 1"] * 4
     assert sorted(followed) == ["contact", "lift"]
     assert {one.inputs for one in made.readout.neurons.values()} <= {("area",), ("load",), ()}

@@ -9,7 +9,7 @@ import pytest
 
 from taxel import Array, Events, FormatError, Frames, ProblemError
 from taxel.detect import Recipe, recipes
-from taxel.detect.training import rows_of
+from taxel.detect.fitting import rows_of
 from taxel.encode import ContactArea
 
 #: The results of each recipe at version 0.1, as files of that version.

@@ -16,7 +16,7 @@ TIMES = st.lists(st.integers(-(10**6), 10**6), max_size=12)
 
 @given(st.integers(-(10**6), 10**6), st.integers(2, 12))
 def test_equal_values_have_no_spread_at_all(us: int, count: int) -> None:
-    spread = Spread.of([us / 1000] * count)
+    spread = Spread.from_values([us / 1000] * count)
     assert (spread.mean, spread.sd) == (us / 1000, 0.0)
     assert " ± 0 (" in repr(spread)
 
@@ -99,7 +99,7 @@ def test_nothing_against_nothing_is_no_error() -> None:
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=30))
 def test_the_spread_is_numpys(values: list[float]) -> None:
-    spread = Spread.of(values)
+    spread = Spread.from_values(values)
     expected = [np.mean(values), np.std(values, ddof=1), np.median(values), *np.percentile(values, [2.5, 97.5])]
     assert np.allclose(spread, expected, rtol=1e-9, atol=1e-6)
 

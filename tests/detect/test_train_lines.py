@@ -13,7 +13,7 @@ from test_readout import ARRAY, recipe, tare, touches
 import taxel
 from taxel.detect import Example, PlainRule, run, score
 from taxel.detect.advice import advise, loaded_at_rest
-from taxel.detect.training import Trained, fit_aligned
+from taxel.detect.fitting import Trained, fit_aligned
 from taxel.encode import ContactArea, LevelCrossing
 
 pytestmark = pytest.mark.usefixtures("undrawn")

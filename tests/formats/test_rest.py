@@ -13,8 +13,8 @@ from draws import mixed
 from shell import call
 
 import taxel
-from taxel.recording.pressure import readings
-from taxel.recording.rest import of_frames
+from taxel.recording.analysis.pressure import readings
+from taxel.recording.analysis.rest import of_frames
 
 from .making import SHARED
 

@@ -9,7 +9,7 @@ import taxel
 from taxel.encode import FA1, ChangeEvents
 from taxel.information import LabelledTrial, answer
 from taxel.information.rasters import event_grams, features, frame_grams
-from taxel.information.sampling import HeldValues, Spikes, contacts, finest_us, frames_of, spikes_of
+from taxel.information.sampling import HeldValues, SampledEvents, contacts, finest_us, frames_of, spikes_of
 from taxel.information.spiking import ConeRReadout, patterns_of
 from taxel.information.wire_rate import kilobits_per_second
 
@@ -122,7 +122,7 @@ def test_inner_products_by_bins_are_those_of_whole_rasters(tau):
     kept = trial != 4
     order = np.argsort(bins[kept], kind="stable")
     value = random.choice([-1.0, 1.0, 3.0], 150).astype(np.float32)
-    spikes = Spikes(5000, taxels, *(c[kept][order] for c in (trial, taxel, bins, value)), first, length)
+    spikes = SampledEvents(5000, taxels, *(c[kept][order] for c in (trial, taxel, bins, value)), first, length)
     windows = [4_000.0, 20_000.0, 50_000.0, 200_000.0]
     for window, gram in zip(windows, event_grams(spikes, windows, tau), strict=True):
         assert np.allclose(gram, grams_by_hand(spikes, window, tau), atol=1e-4)
@@ -149,7 +149,7 @@ def test_pooled_taxels_hold_the_mean_and_few_are_aligned_on_their_own_first_even
     assert pooled.taxels == 4
     assert set(pooled.taxel) == {0}
     _, _, all_ = sampled(trials, 1000)
-    second = all_.of(np.array([1]))
+    second = all_.select(np.array([1]))
     assert (second.bin == 0).all()
     assert second.taxels == 1
     late = second.first_us - all_.first_us
@@ -157,7 +157,7 @@ def test_pooled_taxels_hold_the_mean_and_few_are_aligned_on_their_own_first_even
 
 
 def test_what_a_setting_costs_on_the_wire():
-    spikes = Spikes(
+    spikes = SampledEvents(
         1000,
         400,
         np.zeros(301, int),
@@ -171,7 +171,7 @@ def test_what_a_setting_costs_on_the_wire():
     # 301 events; a datagram for the 300 at once, one for the last; two trials of 10 ms.
     assert kilobits_per_second(spikes, 10_000.0, values=False) == pytest.approx((301 * 16 + 2 * 192) / 20.0)
     assert kilobits_per_second(spikes, 10_000.0, values=True) == pytest.approx((301 * 32 + 2 * 192) / 20.0)
-    many = Spikes(
+    many = SampledEvents(
         1000, 900, np.zeros(900, int), np.arange(900), np.zeros(900, int), np.ones(900, np.float32), first, end
     )
     assert kilobits_per_second(many, 10_000.0, values=False) == pytest.approx((900 * 16 + 2 * 192) / 10.0)

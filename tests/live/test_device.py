@@ -1,8 +1,11 @@
 """The board on its serial line: commands, read-back, units, faults, and a cable that is pulled."""
 
+import contextlib
+import errno
 import json
 import os
 import pty
+import re
 import socket
 import subprocess
 import sys
@@ -89,10 +92,10 @@ def test_a_line_without_a_board_is_said() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ({"place": "ttyUSB0"}, "place is 'ttyUSB0'"),
+        ({"place": "ttyUSB0"}, 'place is "ttyUSB0"'),
         ({"place": 3}, "place is 3"),
-        ({"place": "host:99999"}, "place is 'host:99999'"),
-        ({"place": "/dev/null", "baud": 5}, "baud is 5: must be one of 9600"),
+        ({"place": "host:99999"}, 'place is "host:99999"'),
+        ({"place": "/dev/null", "baud": 5}, "baud is 5: must be a whole number from 300 to 4000000"),
         ({"place": "/dev/null", "timeout": 0}, "timeout is 0"),
     ],
 )
@@ -102,11 +105,70 @@ def test_nonsense_is_refused_by_name(arguments: dict[str, object], said: str) ->
     assert said in str(refused.value)
 
 
-def test_a_file_that_is_no_serial_device_is_refused() -> None:
-    with pytest.raises(DeviceError, match="/dev/null: no serial device"):
+def test_a_file_that_is_no_serial_port_is_refused() -> None:
+    with pytest.raises(DeviceError, match="/dev/null: no serial port"):
         Cable("/dev/null")
-    with pytest.raises(FileNotFoundError):
-        Cable("/dev/no-such-device")
+    for place in ("/dev/no-such-device", "COM250"):
+        with pytest.raises(FileNotFoundError) as refused:
+            Cable(place)
+        assert refused.value.filename == place
+
+
+def test_a_port_that_another_program_has_opened_is_refused() -> None:
+    ours, theirs = pty.openpty()
+    place = os.ttyname(theirs)
+    with Cable(place):
+        with pytest.raises(OSError, match="another program has opened this port") as refused:
+            Cable(place)
+        assert (refused.value.errno, refused.value.filename) == (errno.EBUSY, place)
+        refused_command = run("device", "show", place)
+        assert refused_command.stderr == f"taxel: {place}: another program has opened this port\n"
+    Cable(place).close()
+    os.close(ours)
+    os.close(theirs)
+
+
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [
+        (b"\xfe\x80\0\x1c" * 300, "bytes came that are no text: is its baud rate 9600?"),
+        (b"x" * 3000, "is this the board's serial line?"),
+        (b"ok REG4=0x0000008C", "is this the board's serial line?"),
+        (b"ok REG5=0x0000008C\nok REG4=8C\nbad REG5 rule 1\n", "is this the board's serial line?"),
+    ],
+)
+def test_garbage_and_a_line_without_an_end_are_no_answer(answer: bytes, why: str) -> None:
+    ours, theirs = pty.openpty()
+
+    def garble() -> None:
+        with contextlib.suppress(OSError):
+            while os.read(ours, 5):
+                os.write(ours, answer)
+
+    threading.Thread(target=garble, daemon=True).start()
+    with (
+        Cable(os.ttyname(theirs), baud=9600, timeout=1) as cable,
+        pytest.raises(DeviceError, match=re.escape(why)),
+    ):
+        cable.command(Command(4, 140))
+    os.close(theirs)
+
+
+def test_a_cable_that_is_pulled_while_an_answer_is_awaited_is_an_error() -> None:
+    ours, theirs = pty.openpty()
+
+    def pull() -> None:
+        os.read(ours, 5)
+        os.close(theirs)
+        os.close(ours)
+
+    threading.Thread(target=pull, daemon=True).start()
+    cable = Cable(os.ttyname(theirs), timeout=30)
+    with pytest.raises(OSError, match="the line has hung up"):
+        cable.read(4)
+    cable.close()
+    with pytest.raises(DeviceError, match="the line is closed"):
+        cable.listen()
 
 
 def test_the_board_says_what_it_is_when_it_is_asked(line: tuple[str, Board]) -> None:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import pty
+import socket
 import threading
-from collections.abc import Iterator
+import tty
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -146,3 +149,49 @@ def test_of_a_pipe_that_closes_at_once_nothing_arrived(tmp_path: Path) -> None:
     counts = summary.counters["sources"]["imu"]
     assert (counts["lines"], counts["bytes_in_no_line"], counts["bytes_of_unfinished_lines"]) == (0, 0, 0)
     assert (summary.verdict.parts["imu"], summary.verdict.parts["imu"].status) == ("nothing arrived", "nothing arrived")
+
+
+@contextlib.contextmanager
+def plugged(kind: str, link: Path) -> Iterator[tuple[str, Callable[[], Callable[[bytes], bool]]]]:
+    """Yield the place of a serial line, and a function that plugs it in anew and returns one that sends on it."""
+    with contextlib.ExitStack() as plug, socket.create_server((LOOPBACK, 0)) as server:
+
+        def plug_port() -> Callable[[bytes], bool]:
+            plug.close()
+            ours, theirs = pty.openpty()
+            tty.setraw(theirs)
+            link.symlink_to(os.ttyname(theirs))
+            for close, end in ((os.close, ours), (os.close, theirs), (os.unlink, link)):
+                plug.callback(close, end)
+            return lambda data: os.write(ours, data) > 0
+
+        def plug_server() -> Callable[[bytes], bool]:
+            plug.close()
+            accepted: list[socket.socket] = []
+
+            def send(data: bytes) -> bool:
+                if not accepted:
+                    accepted.append(plug.enter_context(server.accept()[0]))
+                return accepted[0].send(data) > 0
+
+            return send
+
+        if kind == "port":
+            yield str(link), plug_port
+        else:
+            yield f"{LOOPBACK}:{server.getsockname()[1]}", plug_server
+
+
+@pytest.mark.parametrize("kind", ["port", "server"])
+def test_a_serial_line_is_read_again_after_it_was_unplugged(tmp_path: Path, kind: str) -> None:
+    with plugged(kind, tmp_path / "line") as (place, plug):
+        send, sources = plug(), {"imu": f"serial:{place},columns=a:b"}
+        with Live(0, host=LOOPBACK, record=tmp_path / "a.mcap", sources=sources) as live:
+            send(b"1,2\n3,4\n5,")
+            until(lambda: counts_of(live)["lines"] == 2)
+            send = plug()
+            until(lambda: send(b"6,7\n") and counts_of(live)["lines"] > 2)
+            summary = live.stop()
+    counts = summary.counters["sources"]["imu"]
+    assert (counts["strange"], counts["bytes_in_no_line"], counts["bytes_of_unfinished_lines"]) == (0, 0, 2)
+    assert "the line has hung up" in counts["trouble"]

@@ -1,5 +1,6 @@
 """Detections on their way to other programs: the lines of --json, lost where there is no reader, never waited for."""
 
+import itertools
 import json
 import os
 import pty
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from loopback import free_port
+from loopback import free_port, until
 
 import taxel
 from taxel.live import Live
@@ -113,6 +114,41 @@ def test_a_detection_drives_a_serial_line(tmp_path: Path) -> None:
     assert counts["sent"] == [{"to": f"serial:{name}@9600", "sent": 3, "lost": 0, "waiting": 0, "trouble": None}]
 
 
+def test_an_unplugged_serial_line_loses_lines_and_is_opened_again(tmp_path: Path) -> None:
+    link, events, number = tmp_path / "line", presses(2000), itertools.count()
+
+    def plug() -> tuple[int, int]:
+        ends = pty.openpty()
+        link.symlink_to(os.ttyname(ends[1]))
+        return ends
+
+    def unplug(ends: tuple[int, int]) -> None:
+        link.unlink()
+        for end in ends:
+            os.close(end)
+
+    ends = plug()
+    with listen(f"serial:{link}", tmp_path / "said.mcap") as live:
+
+        def press() -> dict[str, Any]:
+            first = 20 * next(number)
+            play(events[first : first + 20], live.address[1])
+            counts: dict[str, Any] = live.counters["sent"][0]
+            return counts
+
+        until(lambda: press()["sent"] > 0)
+        unplug(ends)
+        until(lambda: "the line has hung up" in str(press()["trouble"]))
+        until(lambda: "No such file" in str(press()["trouble"]))
+        ends = plug()
+        before = live.counters["sent"][0]
+        until(lambda: press()["sent"] > before["sent"])
+        counts = live.stop().counters
+    unplug(ends)
+    assert before["lost"] > 0
+    assert counts["detections"] == counts["sent"][0]["sent"] + counts["sent"][0]["lost"]
+
+
 def test_who_does_not_read_loses_lines_and_holds_nothing(tmp_path: Path) -> None:
     """A pipe takes 64 KiB, 1024 lines wait, the rest is lost and counted: what went is whole, nothing else is lost."""
     pipe, presses_made = tmp_path / "slow", 1500
@@ -170,7 +206,7 @@ def test_a_reader_that_comes_late_hears_what_is_said_from_then_on(tmp_path: Path
 @pytest.mark.parametrize(
     ("to", "kind", "said"),
     [
-        ("nowhere", taxel.ProblemError, "must be udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD"),
+        ("nowhere", taxel.ProblemError, "must be udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD"),
         ("udp:9000", taxel.ProblemError, "must be a host and a port"),
         ("serial:/dev/null@fast", taxel.ProblemError, "'fast'".replace("'", '"')),
         ("pipe:/dev/null", taxel.ProblemError, "/dev/null: is no named pipe; mkfifo makes one"),

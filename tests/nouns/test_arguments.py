@@ -90,7 +90,7 @@ def test_a_rate_without_whole_us_is_refused(tmp_path, rate):
 
 
 FRAMES = Frames(np.ones((1, 1, 3)), [0], array=taxel.Array(1, 3, pitch_mm=1.0))
-TABLE = Calibration.table(taxel.Array(1, 3), [10.0], [1.0], unit="N", of="counts")
+TABLE = Calibration.table(taxel.Array(1, 3), [10.0], [1.0], unit="N", reading_unit="counts")
 
 NAN = {
     "Calibration.apply": lambda nan: TABLE.apply(Frames(np.ones((1, 1, 3)), [0], array=TABLE.array), rest=nan),

@@ -54,7 +54,7 @@ def calibrations(draw):
 @given(calibrations(), st.lists(st.floats(0.0, 200.0), min_size=2, max_size=8))
 def test_more_reading_is_never_less_load(calibration, given):
     readings = np.sort(np.array(given))[:, None, None] * np.ones(ARRAY.shape)
-    values = calibration.apply(frames(readings, calibration.of)).values
+    values = calibration.apply(frames(readings, calibration.reading_unit)).values
     assert (np.diff(values, axis=0) >= 0).all()
     assert (values >= 0).all()
     assert np.isfinite(values).all()
@@ -62,7 +62,9 @@ def test_more_reading_is_never_less_load(calibration, given):
 
 @given(calibrations(), st.floats(0.0, 1.0))
 def test_what_is_read_under_a_load_gives_the_load_back(calibration, share):
-    most = calibration.apply(frames(140.0 if calibration.of == "ticks" else 60.0, calibration.of)).values
+    most = calibration.apply(
+        frames(140.0 if calibration.reading_unit == "ticks" else 60.0, calibration.reading_unit)
+    ).values
     load = frames(share * most, calibration.unit)
     again = calibration.apply(calibration.readings(load))
     assert again.unit == calibration.unit
@@ -75,7 +77,7 @@ def test_what_is_read_under_a_load_gives_the_load_back(calibration, share):
 def test_json_gives_it_back(calibration):
     again = Calibration.from_json(calibration.to_json())
     assert again == calibration
-    read = frames(33.0, calibration.of)
+    read = frames(33.0, calibration.reading_unit)
     assert again.apply(read) == calibration.apply(read)
 
 
@@ -258,7 +260,7 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
             lambda: Calibration.fit([Load(frames(1.0), 1.0), Load(frames(1.0, "ticks"), 1.0)]),
             "frames of load 2: in ticks; the calibration takes counts",
         ),
-        (lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]), "of is 'N': must say what is read"),
+        (lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]), "reading_unit is 'N': must say what is read"),
         (lambda: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"), r"readings\[1\] is 1: must rise"),
         (lambda: Calibration.table(ARRAY, [1.0], [1.0, 2.0], unit="N"), "1 reading and 2 values"),
         (lambda: Calibration.table(ARRAY, [0.0, 1.0], [1.0, 2.0], unit="N"), "what reads 0 above rest bears 0"),

@@ -15,7 +15,7 @@ from taxel import _core
 from taxel.labels import TURN_US
 from taxel.live._requests.labels import LabelRequests
 from taxel.live._shown_files import Opening
-from taxel.recording.opening import is_recording
+from taxel.recording.recognition import is_recording
 
 ARRAY = {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}
 BEGAN_NS = 1_700_000_000_000_000_000
@@ -46,7 +46,7 @@ def table(path: Path, times: list[int], *, host: bool, pace: float = 1.0) -> tax
 def test_host_time_settles_how_many_turns_a_recording_is_behind_the_board(tmp_path: Path, begins_us: int) -> None:
     recording = record(tmp_path / "walk.mcap", begins_us)
     happened = [begins_us + offset for offset in (0, 10_000, 6_550_000, 13_110_000, 19_990_000)]
-    found = table(tmp_path / "labels.csv", happened, host=True).of(recording)["tick"]
+    found = table(tmp_path / "labels.csv", happened, host=True).times(recording)["tick"]
     assert set(found.tolist()) <= set(recording.events.t.tolist())
     assert found[0] == recording.events.t[0] == begins_us % TURN_US
     np.testing.assert_array_equal(np.diff(found), np.diff(happened))
@@ -63,21 +63,24 @@ def test_labels_find_the_recording_of_a_sender_that_did_not_keep_pace(
     recording = record(tmp_path / "walk.mcap", begins_us, pace=pace)
     # Just before the first and after the last datagram, and between them.
     happened = [begins_us + offset for offset in (-200_000, 0, 10_000, 6_555_000, 13_110_000, 19_990_000, 20_100_000)]
-    found = table(tmp_path / "labels.csv", happened, host=True, pace=pace).of(recording)["tick"]
+    found = table(tmp_path / "labels.csv", happened, host=True, pace=pace).times(recording)["tick"]
     assert found[1] == recording.events.t[0] == begins_us % TURN_US
     np.testing.assert_array_equal(np.diff(found), np.diff(happened))
 
 
 def test_without_host_time_times_are_taken_as_they_are(tmp_path: Path) -> None:
     recording = record(tmp_path / "walk.mcap", 40_000_000)
-    assert table(tmp_path / "labels.csv", [5, 40_000_000], host=False).of(recording)["tick"].tolist() == [5, 40_000_000]
+    assert table(tmp_path / "labels.csv", [5, 40_000_000], host=False).times(recording)["tick"].tolist() == [
+        5,
+        40_000_000,
+    ]
 
 
 def test_labels_of_another_run_are_refused(tmp_path: Path) -> None:
     recording = record(tmp_path / "walk.mcap", 0, 2.0)
     (tmp_path / "labels.csv").write_text(f"label,t_us,host_ns\ntick,100000,{BEGAN_NS + 3_000_000_000}\n")
     with pytest.raises(taxel.ProblemError, match="is of another run than"):
-        taxel.Labels(tmp_path / "labels.csv").of(recording)
+        taxel.Labels(tmp_path / "labels.csv").times(recording)
     with pytest.raises(taxel.ProblemError, match="is of another run than"):
         taxel.information.read_trials(tmp_path / "labels.csv", [recording], window_ms=5.0)
 
@@ -91,7 +94,7 @@ def test_a_table_names_recordings_by_path_name_or_stem(tmp_path: Path) -> None:
     assert labels.named("some/run.mcap") == "run.mcap"
     assert labels.named("/data/far.mcap") == "/data/far.mcap"
     assert labels.named("other.mcap") is None
-    assert labels.of(record(tmp_path / "walk.mcap", 0, 0.1))["a"].tolist() == [3, 5]
+    assert labels.times(record(tmp_path / "walk.mcap", 0, 0.1))["a"].tolist() == [3, 5]
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from refusal import refused
 
 import taxel
 from taxel import Array, Detections, Events, Frames, SpikeTrains, Tare
-from taxel._base.arguments import bare, column, floats, number, whole
+from taxel._base.arguments import bare, column, floats, integer, number
 from taxel._core import ProblemError
 
 pq = pytest.importorskip("quantities")
@@ -184,7 +184,7 @@ def test_what_has_no_dimension_is_a_plain_number() -> None:
 @given(st.lists(st.integers(-(2**40), 2**40), min_size=1))
 def test_whole_us_stay_whole_through_seconds(us: list[int]) -> None:
     assert column("t", np.array(us) / 1e6 * S, np.int64, "us").tolist() == us
-    assert whole("t", us[0] / 1e6 * S, unit="us") == us[0]
+    assert integer("t", us[0] / 1e6 * S, unit="us") == us[0]
     with pytest.raises(ProblemError, match="must be a whole number"):
         column("t", (np.array(us) + 0.25) / 1e6 * S, np.int64, "us")
 

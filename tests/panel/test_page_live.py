@@ -298,6 +298,7 @@ def test_looking_back_while_live_holds_the_view_and_not_the_board(page: Any) -> 
     press(page, "Space")
     shows(page, "state-word", "^Held$")
     held = still(page)
+    shows(page, "clock-more", r"^\d+(\.\d)? (ms|s) behind$")
     press(page, "ArrowLeft")
     until(lambda: clock(page) == pytest.approx(held - 0.1, abs=0.002), "a tenth of a second back")
     back = still(page)
@@ -311,6 +312,7 @@ def test_looking_back_while_live_holds_the_view_and_not_the_board(page: Any) -> 
     press(page, "l")
     shows(page, "state-word", "^Live$")
     until(lambda: clock(page) > held + 0.1, "it follows again")
+    shows(page, "clock-more", "^$")
 
 
 def test_the_crosshair_goes_by_keys_and_names_its_taxel(page: Any) -> None:

@@ -54,6 +54,7 @@ def test_a_recording_opens_on_all_of_its_time_and_its_first_touch(replay: Any) -
     until(lambda: 0.2 < clock(replay) < 0.212, "the first touch, where its force is greatest")
     start, stop = span(replay)
     assert (start, stop) == (pytest.approx(0.1, abs=0.15), pytest.approx(9.3, abs=0.15))
+    shows(replay, "clock-more", r"^of 9\.\d{3} s$")
     drawn = "document.getElementById('pressure-map').getContext('2d').getImageData(0, 0, 24, 16).data.buffer"
     assert replay.evaluate(f"new Set(new Uint32Array({drawn})).size") > 2, "the touch is in the map"
     # No crosshair is placed, and the lane of a watched taxel takes no room.

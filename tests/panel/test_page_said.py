@@ -21,8 +21,8 @@ from taxel import Array, Frames
 from taxel.live import Panel
 from taxel.live._requests.training import TrainingRequests
 from taxel.live._shown_files import Opening, ShownFiles
-from taxel.recording.pressure import readings
-from taxel.recording.rest import of_frames
+from taxel.recording.analysis.pressure import readings
+from taxel.recording.analysis.rest import of_frames
 
 __all__ = ["recording"]
 

@@ -21,7 +21,7 @@ from tests.panel.pages import clock, opened, pixel, press, shown, shows, span, u
 import taxel
 from taxel import Array, Frames
 from taxel.live import Panel
-from taxel.recording.pressure import force_n
+from taxel.recording.analysis.pressure import force_n
 
 pytestmark = pytest.mark.timeout(600)
 

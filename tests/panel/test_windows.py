@@ -178,3 +178,24 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
         assert page.ask("encode", encoder={"name": "contact_area"})["type"] == "done"
         assert panel.live is not live
         assert panel.live.address == address
+
+
+def test_the_spikes_of_a_readout_are_made_with_the_tare_that_it_measured(tmp_path):
+    readout = fit([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
+    array = tare().array
+    by_name = {"name": "contact_area"}
+    with (
+        Live(0, host="127.0.0.1", array=array, readout=readout, tare=0.5) as live,
+        Panel(live, folder=tmp_path) as panel,
+        Client(panel) as page,
+    ):
+        say(live, *(word(4000, x, y, 50) for x in range(8) for y in range(8)))
+        heard(live, 64)
+        reason = page.ask("encode", encoder=by_name)["reason"]
+        assert reason == "encoder contact_area: the readout measures its tare; choose the encoder again after that"
+        say(live, *(word(600_000, x, 0, 50) for x in range(8)))
+        while page.until("counters")["taring"]:
+            pass
+        assert page.ask("encode", encoder=by_name)["type"] == "done"
+        # Other parameters are not the readout's, and have no tare.
+        assert "without a tare" in page.ask("encode", encoder={**by_name, "noise_floor": 20.0})["reason"]

@@ -84,7 +84,7 @@ def test_opening_cutting_and_listing_read_no_datagram(tmp_path: Path, monkeypatc
             return getattr(self.of, name)
 
     write(tmp_path / "a.mcap")
-    monkeypatch.setattr("taxel.recording.read_mcap._core.RecordingReader", Reader)
+    monkeypatch.setattr("taxel.recording.readers.mcap._core.RecordingReader", Reader)
     recording = taxel.open(tmp_path / "a.mcap")
     [part] = taxel.cut(recording, start_us=1000, stop_us=2000, columns=slice(2, 5))
     [half] = taxel.cut(recording, rows=slice(2, 5))

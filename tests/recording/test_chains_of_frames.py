@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 import taxel
 from taxel import Array, Frames, Note, _core
-from taxel.recording.contents import Contents, FrameSource, Source, alone, source_from
+from taxel.recording.contents import Contents, FrameSource, RecordedSource, alone, source_from
 from taxel.recording.once import known
-from taxel.recording.parts import Losses, Marks, Origin, Sensor
+from taxel.recording.sections import Losses, Marks, Origin, Sensor
 
 #: The kinds of files that hold frames.
 KINDS = (".mcap", ".npz", ".h5", ".csv")
@@ -98,7 +98,7 @@ class Model:
 def insole(folder: Path) -> tuple[taxel.Recording, dict[str, Model]]:
     """Frames of one foot in kPa, turned, with notes and detections, from a file."""
     model = some_feet("left")["left"]
-    taxel.convert(taxel.Recording(Contents.of(source_of("left", model))), folder / "insole.npz")
+    taxel.convert(taxel.Recording(Contents.single(source_of("left", model))), folder / "insole.npz")
     return taxel.open(folder / "insole.npz"), {"board": model}
 
 
@@ -119,7 +119,7 @@ def some_feet(*names: str) -> dict[str, Model]:
     return models
 
 
-def source_of(name: str, model: Model) -> Source:
+def source_of(name: str, model: Model) -> RecordedSource:
     label, t, known_us = zip(*model.found, strict=True)
     marks = Marks(
         notes=known(tuple(Note(text, at) for text, at in model.notes)),

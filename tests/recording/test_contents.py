@@ -1,4 +1,4 @@
-"""What a function does with a field follows from the type of its part: it is carried, changed, or said to be lost."""
+"""What a function does with a field follows from the type of its section: it is kept, changed, or said to be lost."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ import pytest
 import taxel
 from taxel import Note
 from taxel.recording.between import between
-from taxel.recording.contents import Board, Contents, Drawn, FrameSource, Source, Stream, parts_of
+from taxel.recording.contents import BoardSource, Contents, Drawn, FrameSource, RecordedSource, Stream, sections_of
 from taxel.recording.cut import region
 from taxel.recording.frames import as_frames, calibrate
 from taxel.recording.merge import merge_contents
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import known
-from taxel.recording.parts import Columns, Timing
 from taxel.recording.raw import Samples
 from taxel.recording.recording import with_notes
-from taxel.recording.stored import storable
+from taxel.recording.sections import SampleColumns, Timing
+from taxel.recording.writers.stored import storable
 
-from .parts import flat, holds, unsaid
+from .sections import flat, holds, unsaid
 from .test_chains import ARRAY, KINDS, write
 
 
-def full(folder: Path, kind: type[Source]) -> Contents:
+def full(folder: Path, kind: type[RecordedSource]) -> Contents:
     """Return contents of a type of source with something in every field, beside another source."""
     (folder / "calibration.json").write_text(taxel.Calibration.law(ARRAY, date="2026-11-21").to_json())
     one = taxel.open(write(folder / "full.mcap"))._contents.main
-    assert isinstance(one, Board)
+    assert isinstance(one, BoardSource)
     losses = replace(
         one.losses,
         remarks=("by another's times",),
@@ -52,13 +52,13 @@ def full(folder: Path, kind: type[Source]) -> Contents:
     drawn = as_frames(one, 100)
     readings, five = replace(drawn.frame_table, untimed=True, turned=255.0), np.arange(5)
     samples = Samples({}, five, five.astype(np.uint64), five, five[:, None] * 1.0)
-    every: dict[type[Source], Source] = {
-        Board: one,
+    every: dict[type[RecordedSource], RecordedSource] = {
+        BoardSource: one,
         Drawn: Drawn(frame_table=readings, wire=wire, **header),
         FrameSource: FrameSource(frame_table=readings, **header),
         Stream: Stream(
             frame_table=readings,
-            stream=Columns(tuple(f"c{k}" for k in range(10)), known(samples)),
+            stream=SampleColumns(tuple(f"c{k}" for k in range(10)), known(samples)),
             **header,
         ),
     }
@@ -67,7 +67,7 @@ def full(folder: Path, kind: type[Source]) -> Contents:
 
 
 def marked(of: Contents) -> Contents:
-    """Return contents that are a part by time on another clock."""
+    """Return contents that are a slice on another clock."""
     timing = Timing(of.main.timing.clock, "other", known((0, 300_000)))
     return Contents(replace(of.main, timing=timing), of.sources)
 
@@ -78,7 +78,7 @@ NAMED = {"origin.path", "origin.name", "origin.kind", "origin.label", "origin.so
 FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
     "between": (
         lambda of, _: between(of, 1000.0, 200_000.0),
-        {*TABLE, *TIMED, "settings.held", "timing.stretch", "stream.samples", "losses.verdict"},
+        {*TABLE, *TIMED, "settings.held", "timing.interval", "stream.samples", "losses.verdict"},
     ),
     "region": (
         lambda of, _: region(of, slice(1, 5), slice(None)),
@@ -86,7 +86,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
     ),
     "merge": (
         lambda of, _: merge_contents([of, of], gap=0 if isinstance(of.main, FrameSource) else None),
-        {*TABLE, *TIMED, *NAMED, "losses.verdict", "timing.stretch"},
+        {*TABLE, *TIMED, *NAMED, "losses.verdict", "timing.interval"},
     ),
     "on_clock": (
         lambda of, _: on_clock(of, "other"),
@@ -104,7 +104,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
             {
                 *TABLE,
                 *NAMED,
-                "timing.stretch",
+                "timing.interval",
                 "sensor.calibration",
                 "wire.version_2",
                 "wire.origin_us",
@@ -116,10 +116,10 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
 }
 
 
-@pytest.mark.parametrize("kind", [Board, FrameSource, Drawn, Stream])
+@pytest.mark.parametrize("kind", [BoardSource, FrameSource, Drawn, Stream])
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
-    tmp_path: Path, function: str, kind: type[Source]
+    tmp_path: Path, function: str, kind: type[RecordedSource]
 ) -> None:
     of = full(tmp_path, kind)
     for name, value in flat(marked(of).main).items():
@@ -127,7 +127,7 @@ def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
     if function not in ("between", "on_clock"):
         of = marked(of)
     work, anew = FUNCTIONS[function]
-    if function == ".lsa" and kind is not Board:
+    if function == ".lsa" and kind is not BoardSource:
         return
     after = work(of, tmp_path)
     said = after.main.losses.lost()
@@ -138,15 +138,15 @@ def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
 
 
 @dataclass(frozen=True, eq=False)
-class Coloured(Board):
-    """A board with a part that no function has a rule for."""
+class Coloured(BoardSource):
+    """A board with a section that no function has a rule for."""
 
     colour: str = field(default="red", kw_only=True)
 
 
 @pytest.mark.parametrize("function", ["between", "region", "on_clock", *KINDS])
-def test_a_part_without_a_rule_is_refused_by_each_function(tmp_path: Path, function: str) -> None:
-    of = full(tmp_path, Board)
-    one = Coloured(**parts_of(of.main if function in ("between", "on_clock") else marked(of).main))
-    with pytest.raises((AssertionError, AttributeError), match=r"'red'|'str' object has no attribute 'lines'"):
+def test_a_section_without_a_rule_is_refused_by_each_function(tmp_path: Path, function: str) -> None:
+    of = full(tmp_path, BoardSource)
+    one = Coloured(**sections_of(of.main if function in ("between", "on_clock") else marked(of).main))
+    with pytest.raises((AssertionError, AttributeError), match=r"'red'|'str' object has no attribute 'losses'"):
         FUNCTIONS[function][0](Contents(one, {"board": one, "other": of.sources["other"]}), tmp_path)

@@ -173,7 +173,7 @@ def test_a_csv_of_frames_has_a_column_a_taxel_that_exists(tmp_path: Path) -> Non
 def test_a_csv_of_frames_keeps_each_value_to_the_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int
 ) -> None:
-    monkeypatch.setattr(taxel.recording.write_csv, "_FRAMES", at_once)
+    monkeypatch.setattr(taxel.recording.writers.csv, "_FRAMES", at_once)
     values = np.array([[0.0, -0.0, np.nan], [0.1, 1e-30, 1e30], [7.0, -7.5, 0.1]], np.float32)
     taxel.convert(taxel.Frames(values[:, None], [0, 5, 9]), tmp_path / "a.csv")
     read = taxel.open(tmp_path / "a.csv").frames()

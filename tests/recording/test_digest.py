@@ -19,9 +19,9 @@ import taxel
 from taxel._core import FormatError
 from taxel.recording.contents import Contents
 from taxel.recording.once import known
-from taxel.recording.read_npz import source_of_columns
+from taxel.recording.readers.npz import source_of_columns
 from taxel.recording.verdict import Verdict
-from taxel.recording.write_npz import columns_of
+from taxel.recording.writers.npz import columns_of
 
 from .making import record, some_events, some_frames
 
@@ -37,7 +37,7 @@ def converted(folder: Path, kind: str) -> Path:
     path = folder / f"b.{kind}"
     one = replace(contents.main, losses=replace(contents.main.losses, verdict=known(lost)))
     one = replace(one, settings=replace(one.settings, held=known(held)))
-    taxel.convert(taxel.Recording(Contents.of(one)), path)
+    taxel.convert(taxel.Recording(Contents.single(one)), path)
     assert "12345" in taxel.open(path).verdict
     return path
 
@@ -159,7 +159,7 @@ def test_merged_recordings_have_their_doubtful_times_by_the_merged_times(tmp_pat
         verdict = Verdict.from_dict({"status": status, "text": told, "doubtful_after_us": after})
         one = taxel.open(tmp_path / f"{name}.mcap")._contents.main
         one = replace(one, losses=replace(one.losses, verdict=known(verdict)))
-        parts.append(taxel.Recording(Contents.of(one)))
+        parts.append(taxel.Recording(Contents.single(one)))
     merged = taxel.merge(parts, gap_us=1000)
     shift = int(merged.events.t[300] - parts[1].events.t[0])
     assert shift > 1000

@@ -23,10 +23,10 @@ from taxel import Array, Frames, Note, ProblemError, SpikeTrains
 from taxel.detect import Example, Part, Recipe, judge
 from taxel.detect.folds import _split
 from taxel.encode import LevelCrossing
-from taxel.recording.contents import Contents, Source, alone, source_from
+from taxel.recording.contents import Contents, RecordedSource, alone, source_from
 from taxel.recording.once import known
 from taxel.recording.opening import join_feet
-from taxel.recording.parts import Losses, Marks, Origin
+from taxel.recording.sections import Losses, Marks, Origin
 from taxel.recording.text_options import TextOptions
 
 WHOLE = st.integers(0, 65_535).map(float)
@@ -160,7 +160,7 @@ def test_each_source_has_low_rate_pictures_but_where_frames_are_numbered(tmp_pat
     for images, frames in ((shown["/pressure"], left), (shown["/right/pressure"], right)):
         assert {one["t_us"] for one in images} <= set(frames.t.tolist())
         assert [one["log_us"] for one in images] == [one["t_us"] + 3000 for one in images]  # the file begins at 0
-    numbered = Contents.of(source_from(right, Origin(tmp_path / "n", "n", "npz"), untimed=True))
+    numbered = Contents.single(source_from(right, Origin(tmp_path / "n", "n", "npz"), untimed=True))
     taxel.convert(taxel.Recording(numbered), tmp_path / "numbered.mcap")
     assert low_rate(tmp_path / "numbered.mcap") == {}
 
@@ -172,7 +172,7 @@ def test_everything_beside_the_frames_is_kept(tmp_path: Path) -> None:
         notes=known((Note("heel", 5000), Note("bare"))), detections=known(taxel.Detections(["lift"], [100], [200]))
     )
     origin, losses = Origin(tmp_path / "a", "a", "npz", source="an amplifier"), Losses(lost=known(("something",)))
-    of = Contents.of(source_from(frames, origin, columns=("hip", "knee"), marks=marks, losses=losses))
+    of = Contents.single(source_from(frames, origin, columns=("hip", "knee"), marks=marks, losses=losses))
     lost = taxel.convert(taxel.Recording(of), tmp_path / "a.mcap")
     assert lost == ["something"]
     back = taxel.open(tmp_path / "a.mcap")
@@ -255,11 +255,11 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
     array, quiet = Array(6, 6), np.random.default_rng(4).integers(0, 3, (400, 6, 6)).astype(np.float32)
     pressed = quiet.copy()
     pressed[30:80, 1:4, 1:4] += 300
-    sources: dict[str, Source] = {}
+    sources: dict[str, RecordedSource] = {}
     for foot, values in (("left", quiet), ("right", pressed)):
         frames = Frames(values, np.arange(400) * 10_000, array=array)
         sources[foot] = source_from(frames, Origin(tmp_path / "a.asc", f"a {foot}", "pedar", foot))
-    [both] = join_feet([taxel.Recording(Contents.of(one)) for one in sources.values()])
+    [both] = join_feet([taxel.Recording(Contents.single(one)) for one in sources.values()])
     taxel.convert(both, tmp_path / "a.mcap")
     code, _, errors = call(capsys, "info", tmp_path / "a.mcap", "--tare", "0.5")
     assert code == 0
@@ -269,17 +269,17 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
 def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
     array = Array(1, 2)
     frames = Frames(np.ones((5, 1, 2)), np.arange(5) * 10_000, unit="N", array=array)
-    sources: dict[str, Source] = {}
+    sources: dict[str, RecordedSource] = {}
     for foot in ("left", "right"):
         sources[foot] = source_from(frames, Origin(tmp_path / "walk.asc", f"walk {foot}", "pedar", foot))
-    [both] = join_feet([taxel.Recording(Contents.of(one)) for one in sources.values()])
+    [both] = join_feet([taxel.Recording(Contents.single(one)) for one in sources.values()])
     taxel.convert(both, tmp_path / "walk.mcap")
     (tmp_path / "walk.notes.csv").write_text("label,t_us,source\nheel,10000,left\nturn,20000,\ntoe,30000,right\n")
     back = taxel.open(tmp_path / "walk.mcap")
     said = {name: [note.text for note in one.notes] for name, one in back.sources.items()}
     assert said == {"left": ["heel", "turn"], "right": ["turn", "toe"]}
     labels = taxel.Labels(tmp_path / "walk.notes.csv")
-    assert sorted(labels.of(back.sources["right"])) == ["toe", "turn"]
+    assert sorted(labels.times(back.sources["right"])) == ["toe", "turn"]
 
 
 def test_labels_of_a_source_that_is_not_there_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

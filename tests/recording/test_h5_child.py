@@ -18,8 +18,8 @@ import taxel
 from taxel._base import h5_file
 from taxel._base.h5_file import H5File
 from taxel._core import FormatError
-from taxel.recording import read_h5
-from taxel.recording.read_h5 import is_h5_of_taxel
+from taxel.recording.readers import h5 as read_h5
+from taxel.recording.readers.h5 import is_h5_of_taxel
 
 from .making import some_events
 

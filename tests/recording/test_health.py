@@ -11,8 +11,8 @@ from draws import seeds
 import taxel
 from taxel import _core
 from taxel._core import ProblemError
-from taxel.recording.health import _around
-from taxel.recording.rest import flickering, ticks_by_unit
+from taxel.recording.analysis.health import _around
+from taxel.recording.analysis.rest import flickering, ticks_by_unit
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taxel import Frames
-from taxel.recording.rest import frames_above, of_frames, ticks_by_unit
+from taxel.recording.analysis.rest import frames_above, of_frames, ticks_by_unit
 
 
 @pytest.mark.parametrize("seconds", [60, 600])

@@ -170,14 +170,14 @@ def test_few_events_on_a_large_sensor_take_little_memory(tmp_path: Path) -> None
 
 
 def test_pressure_over_time_is_that_of_whole_frames(tmp_path: Path) -> None:
-    from taxel.recording.pressure import Series, above_rest, series
+    from taxel.recording.analysis.pressure import Series, above_rest, series
 
     for k, recording in enumerate([taxel.open(write(tmp_path / "a.mcap")), taxel.open(write(tmp_path / "b.mcap", 1))]):
         for part in (recording, recording.between(100_000, 220_000)):
             found, whole = series(part), above_rest(part)
             assert found is not None
             assert whole is not None
-            dense = Series.of(*whole)
+            dense = Series.from_frames(*whole)
             for name in ("t", "area", "peak", "total", "centre"):
                 np.testing.assert_array_equal(getattr(found, name), getattr(dense, name), err_msg=f"{k} {name}")
             assert (found.unit, found.above) == (dense.unit, dense.above)

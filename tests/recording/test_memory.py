@@ -477,7 +477,7 @@ def test_memory_that_is_missing_is_said_with_what_there_is(tmp_path: Path, monke
         raise MemoryError
 
     taxel.convert(some_events(), tmp_path / "a.npz")
-    monkeypatch.setattr("taxel.recording.read_npz.read_arrays", fail)
+    monkeypatch.setattr("taxel.recording.readers.npz.read_arrays", fail)
     with refused(r"a.npz: needs more memory than there is \(\d+ bytes are available\); a larger limit", FormatError):
         taxel.open(tmp_path / "a.npz")
 

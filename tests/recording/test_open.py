@@ -87,11 +87,12 @@ def test_a_pickle_in_a_npz_is_never_loaded(tmp_path: Path) -> None:
         taxel.open(path)
 
 
-def test_missing_files_and_folders_are_oserrors(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_folder_are_refused_where_one_recording_is_opened(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         taxel.open(tmp_path / "nothing.mcap")
-    with pytest.raises(IsADirectoryError):
-        taxel.convert(tmp_path, tmp_path / "a.npz")
+    for refuse in (taxel.open, lambda path: taxel.convert(path, tmp_path / "a.npz")):
+        with pytest.raises(ProblemError, match=r": a folder; taxel\.open_all opens its recordings"):
+            refuse(tmp_path)
 
 
 @pytest.mark.parametrize("path", [3, None, b"a.mcap", 1.5, ["a.mcap"], "", "a\0b"])
@@ -180,7 +181,7 @@ def test_a_csv_is_the_same_however_much_of_it_is_read_at_once(
     lines = path.read_bytes().split(b"\n")
     wrong = [*lines[:20], b"", lines[20].rpartition(b",")[0] + b",abc", *lines[21:]]
     for size in (1, 37, 400, 1 << 22):
-        monkeypatch.setattr(taxel.recording.read_csv, "_AT_ONCE", size)
+        monkeypatch.setattr(taxel.recording.readers.csv, "_AT_ONCE", size)
         path.write_bytes(b"\r\n".join(lines))
         read = taxel.open(path).frames() if are_frames else taxel.open(path).events
         assert read == table

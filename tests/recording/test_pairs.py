@@ -13,13 +13,13 @@ import taxel
 from taxel.formats import FORMATS
 
 from .making import some_frames
-from .parts import unsaid
+from .sections import unsaid
 from .test_chains import KINDS, write
 
 #: Fields of the table itself and of how it is stored: they have tests of their own.
 STORED = {
     "origin.path", "origin.name", "origin.kind", "origin.label", "event_table.events", "frame_table.frames",
-    "timing.stretch", "timing.clock", "timing.clock_of", "sensor.calibration", "wire.datagrams", "wire.payload",
+    "timing.interval", "timing.clock", "timing.clock_of", "sensor.calibration", "wire.datagrams", "wire.payload",
     "wire.version_2", "wire.differences", "wire.origin_us", "wire.unmarked", "stream.samples", "losses.lost",
 }  # fmt: skip
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel.recording.pressure import above_rest, series
-from taxel.recording.rest import by_unit
+from taxel.recording.analysis.pressure import above_rest, series
+from taxel.recording.analysis.rest import by_unit
 
 from .test_commands import run
 

@@ -202,7 +202,7 @@ def test_the_command_line_shows_and_writes_one_source(
 @pytest.mark.parametrize(
     ("sources", "said"),
     [
-        ({"imu": "nowhere"}, "must be udp:HOST:PORT, serial:PATH@BAUD, pipe:PATH or given"),
+        ({"imu": "nowhere"}, "must be udp:HOST:PORT, serial:PLACE@BAUD, pipe:PATH or given"),
         ({"imu": "given"}, "needs columns=A:B:C"),
         ({"imu": "given,columns=a:a"}, "two of that name"),
         ({"imu": "given,columns=t_us"}, "holds no column of values"),

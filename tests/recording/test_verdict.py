@@ -12,7 +12,7 @@ import taxel
 from taxel import _core
 from taxel.recording.contents import Contents, source_from
 from taxel.recording.once import known
-from taxel.recording.parts import Losses, Origin
+from taxel.recording.sections import Losses, Origin
 
 from .making import record, some_events
 
@@ -85,7 +85,7 @@ def test_remarks_go_to_files_and_back_beside_the_verdict(tmp_path: Path, kind: s
     fine = taxel.Verdict.from_dict({"status": "complete", "text": "nothing lost"})
     losses = Losses(remarks=said, verdict=known(fine))
     of = source_from(frames, Origin(tmp_path / "a.bag", "a.bag", "ros"), losses=losses)
-    taxel.convert(taxel.Recording(Contents.of(of)), tmp_path / f"a{kind}")
+    taxel.convert(taxel.Recording(Contents.single(of)), tmp_path / f"a{kind}")
     back = taxel.open(tmp_path / f"a{kind}")
     made = ("converted from a.bag",) * (kind == ".mcap")
     assert (back.verdict, back.remarks) == ("nothing lost", said + made)

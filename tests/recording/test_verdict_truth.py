@@ -27,7 +27,7 @@ from taxel import Verdict, _core
 from taxel.live.summary import summary_of
 from taxel.recording.contents import alone, source_from
 from taxel.recording.once import known
-from taxel.recording.parts import Losses, Origin
+from taxel.recording.sections import Losses, Origin
 from taxel.recording.verdict import STATUSES
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers

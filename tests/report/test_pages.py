@@ -152,7 +152,7 @@ def test_no_table_of_a_report_is_cut(tmp_path, name, width):
     score = {"events": 1500, "found": 1400, "missed": 100, "false": 100}
     score["error"] = score["delay"] = "-11.55 ± 105.4 (median -11.92, 95 % in -103.46 to 120.62)"
     row = {"recording": name, "label": "contact", "detections": 1500, "score": score}
-    moment = {"label": "contact", "t": 123_456_789.0, "what": "missed"}
+    moment = {"label": "contact", "t": 123_456_789.0, "title": "missed"}
     text = render(
         "report/listening.html.j2",
         title="t",

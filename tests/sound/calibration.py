@@ -23,7 +23,7 @@ SOUND: dict[str, Sound] = {
         readings=[5.0, 50.0],
         values=[1.0, 9.0],
         unit="kPa",
-        of="counts",
+        reading_unit="counts",
         **CALIBRATION_HOW,
     ),
     "taxel.Calibration.fit": plain(

@@ -87,7 +87,7 @@ SOUND: dict[str, Sound] = {
         taxel.detect.run, readout=READOUT, source=FRAMES, frame_us=192.0, tare=TARE, wire_version=2
     ),
     "taxel.detect.score": plain(taxel.detect.score, found=FOUND, truth={"a": [10], "b": [25]}, window_ms=50.0),
-    "taxel.detect.Spread.of": plain(taxel.detect.Spread.of, values=[1.0, 2.0]),
+    "taxel.detect.Spread.from_values": plain(taxel.detect.Spread.from_values, values=[1.0, 2.0]),
     "taxel.detect.Recipe": plain(
         taxel.detect.Recipe,
         encoder=LEVELS,
@@ -165,7 +165,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.detect.Judged": lambda: judged(2),
     "taxel.detect.Trained": lambda: judged(2).trained[0],
     "taxel.detect.Score": lambda: taxel.detect.score(FOUND, {"a": [10], "b": [25]}),
-    "taxel.detect.Spread": lambda: taxel.detect.Spread.of([1.0, 2.0]),
+    "taxel.detect.Spread": lambda: taxel.detect.Spread.from_values([1.0, 2.0]),
     "taxel.detect.Outcome": lambda: taxel.detect.Outcome("walk", EXAMPLE, FOUND),
 }
 

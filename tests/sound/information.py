@@ -143,7 +143,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.information.Estimate": lambda: FOUND_BITS,
     "taxel.information.Nested": lambda: NESTED,
     "taxel.information.Point": lambda: answer().full,
-    "taxel.information.Verdict": lambda: taxel.information.keeps(FOUND_BITS, FOUND_BITS),
+    "taxel.information.Keeping": lambda: taxel.information.keeps(FOUND_BITS, FOUND_BITS),
     "taxel.information.ZeroTest": lambda: answer().zero,
 }
 

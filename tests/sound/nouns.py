@@ -24,7 +24,7 @@ SOUND: dict[str, Sound] = {
         names=[f"n{k}" for k in range(16)],
     ),
     "taxel.Places": plain(taxel.Places, x=[0.0, 1.0], y=[0.0, 0.0], area=[1.0, 2.0], unit="mm"),
-    "taxel.Array.fits": method(ARRAY, "fits", other=taxel.Array(4, 4)),
+    "taxel.Array.fits": method(ARRAY, "fits", array=taxel.Array(4, 4)),
     "taxel.Array.index": method(ARRAY, "index", x=1, y=2),
     "taxel.Array.region": method(ARRAY, "region", x=slice(0, 2), y=slice(0, 2)),
     "taxel.Events": plain(
@@ -96,7 +96,7 @@ SOUND: dict[str, Sound] = {
         taxel.Labels("here_labels.csv").named,
         {"recording": "walk.mcap", "trial": "walk 1", "source": "left"},
     ),
-    "taxel.Labels.of": lambda: (taxel.Labels("here_labels.csv").of, {"recording": taxel.open("here_events.npz")}),
+    "taxel.Labels.times": lambda: (taxel.Labels("here_labels.csv").times, {"recording": taxel.open("here_events.npz")}),
     "taxel.Verdict.from_dict": plain(
         taxel.Verdict.from_dict, held={"status": "lost", "text": "LOST: 2 datagrams", "lost": {"lost_on_the_way": 2}}
     ),

@@ -7,10 +7,10 @@ from typing import Any
 import taxel
 from sound.things import ARRAY, EVENTS, FRAMES, TARE, Sound, plain
 from taxel.recording.contents import Contents, source_from
-from taxel.recording.parts import Origin
+from taxel.recording.sections import Origin
 
 #: A recording of numbered frames, without times.
-NUMBERED = Contents.of(source_from(FRAMES, Origin(Path("grasp"), "grasp", "icub"), untimed=True))
+NUMBERED = Contents.single(source_from(FRAMES, Origin(Path("grasp"), "grasp", "icub"), untimed=True))
 
 #: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {

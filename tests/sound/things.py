@@ -16,7 +16,7 @@ TRAINS = taxel.SpikeTrains.from_lists([[1.0, 2.0], [3.0]], 0.0, 20.0, [[1.0, -1.
 UNSIGNED = taxel.SpikeTrains.from_lists([[1.0, 2.0], [3.0]], 0.0, 20.0)
 FOUND = taxel.Detections(["a", "b"], [10, 20], [11, 22], [0.5, 0.5])
 TARE = taxel.Tare.take(FRAMES)
-TICKS = taxel.Calibration.table(ARRAY, [5.0, 50.0], [1.0, 9.0], unit="N", of="ticks")
+TICKS = taxel.Calibration.table(ARRAY, [5.0, 50.0], [1.0, 9.0], unit="N", reading_unit="ticks")
 LEVELS = taxel.encode.LevelCrossing([0.5])
 PLAIN = TRAINS.split_by_sign()
 REGISTERS = taxel.wire.Registers()

@@ -74,7 +74,7 @@ def test_each_task_answers_and_writes_what_it_says(tmp_path: Path) -> None:
     request: dict[str, Any] = {"recordings": [str(mat(tmp_path))], "options": {"exponent": 1.0}}
     loads = [{"load": 9.0, "from_s": 1.0, "to_s": 1.2}]
     line, _ = asked("calibrate", {**request, "loads": loads, "out": str(tmp_path / "c.json")})
-    assert taxel.Calibration.load(tmp_path / "c.json").of == line["result"]["of"] == "counts"
+    assert taxel.Calibration.load(tmp_path / "c.json").reading_unit == line["result"]["of"] == "counts"
 
 
 def test_folds_are_counted_and_the_last_line_is_the_result(tmp_path: Path) -> None:

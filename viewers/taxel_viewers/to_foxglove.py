@@ -193,8 +193,8 @@ def _colours() -> NDArray[np.uint8]:
     """Return 256 colours that can be distinguished with a colour vision deficiency."""
     from matplotlib import colormaps  # noqa: PLC0415  loads slowly
 
-    table: NDArray[np.uint8] = (np.asarray(colormaps["viridis"](np.arange(256)))[:, :3] * 255).astype(np.uint8)
-    return table
+    colour_map: NDArray[np.uint8] = (np.asarray(colormaps["viridis"](np.arange(256)))[:, :3] * 255).astype(np.uint8)
+    return colour_map
 
 
 #: Images by topic, in colours and in numbers.

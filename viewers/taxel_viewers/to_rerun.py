@@ -82,8 +82,8 @@ class ToRerun:
                 for name, column in values.items():
                     self._column(f"contact/{name}", item.t, column)
             case Spikes():
-                more = item.value >= 0
-                for name, chosen in (("more", more), ("less", ~more)):
+                increase = item.value >= 0
+                for name, chosen in (("more", increase), ("less", ~increase)):
                     if chosen.any():
                         self._column(f"spikes/{name}", item.t[chosen], item.train[chosen])
             case Detection():

@@ -254,7 +254,7 @@ impl FromPyObject<'_, '_> for SpikesIn {
         let times = slice("times", &times)?;
         let values = (SpikeKind::named(&kind).map_err(core)?, values.as_ref().map(|v| slice("values", v)).transpose()?);
         let copy = |interrupt: Stop<'_>| SpikeTrains::copy_of(times, offsets, values, (start, stop), interrupt);
-        // Of few spikes a copy costs less than releasing the GIL.
+        // A copy of few spikes costs less than releasing the GIL.
         let few = times.len() < MANY_SPIKES;
         if few { copy(Stop::never()).map_err(core) } else { enter(object.py(), copy) }.map(Self)
     }
@@ -265,7 +265,7 @@ pub fn to_patterns(patterns: Vec<SpikesIn>) -> Vec<SpikeTrains> {
     patterns.into_iter().map(|SpikesIn(pattern)| pattern).collect()
 }
 
-/// So many spikes are copied without the GIL, so that Ctrl-C can interrupt the copy.
+/// Number of spikes from which they are copied without the GIL, so that Ctrl-C can interrupt the copy.
 const MANY_SPIKES: usize = 1 << 20;
 
 /// Spike trains as Python gets them: the same parts, as new arrays.

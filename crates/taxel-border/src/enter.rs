@@ -74,7 +74,7 @@ impl ProgressCaller<'_> {
         if !self.raised()
             && let Err(error) = Python::attach(|py| call(py, function).map(drop))
         {
-            self.keep(error);
+            self.store_first(error);
         }
     }
 
@@ -82,7 +82,7 @@ impl ProgressCaller<'_> {
         unpoisoned(self.0).is_some()
     }
 
-    fn keep(self, error: PyErr) {
+    fn store_first(self, error: PyErr) {
         unpoisoned(self.0).get_or_insert(error);
     }
 }
@@ -145,7 +145,7 @@ where
             {
                 *last = Instant::now();
                 if let Err(error) = Python::attach(|py| py.check_signals()) {
-                    caller.keep(error);
+                    caller.store_first(error);
                 }
             }
             caller.raised()

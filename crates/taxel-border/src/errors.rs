@@ -5,7 +5,7 @@ use std::ffi::CStr;
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyOSError};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
-use taxel_core::{Error as CoreError, Reason, reading};
+use taxel_core::{Error as CoreError, Reason};
 use taxel_live::Error as LiveError;
 
 // The classes that `register` makes; an extension beside `_core` raises the same ones.
@@ -28,7 +28,7 @@ pub fn core(error: CoreError) -> PyErr {
     }
 }
 
-/// The exception of a reason: its argument and its hint are attributes, of which `error_line` makes what is shown.
+/// The exception of a reason: its argument and its hint are attributes, of which `taxel._base.errors` makes what is shown.
 fn with_help(raised: fn(String) -> PyErr, Reason { text, argument, hint }: Reason) -> PyErr {
     let error = raised(text);
     let hint = hint.and_then(|hint| Some(serde_json::to_value(hint).ok()?.as_str()?.to_owned()));
@@ -38,13 +38,6 @@ fn with_help(raised: fn(String) -> PyErr, Reason { text, argument, hint }: Reaso
         value.setattr("hint", hint)
     });
     set.err().unwrap_or(error)
-}
-
-/// Composes the line of an error, with the reader's name of its argument, as an option of the command line.
-#[pyfunction]
-fn error_line(text: String, argument: &str, hint: Option<&str>) -> PyResult<String> {
-    let hint = reading::from_value(hint.into()).map_err(|unfit| core(unfit.problem("hint")))?;
-    Ok(Reason { text, argument: None, hint }.line(argument))
 }
 
 /// The exception of an error of the live path.
@@ -62,16 +55,22 @@ pub fn live(error: LiveError) -> PyErr {
 }
 
 fn os_error(source: std::io::Error, place: String) -> PyErr {
-    match source.raw_os_error() {
+    use std::io::ErrorKind::{AlreadyExists, NotFound, PermissionDenied, ResourceBusy};
+    // An error that the system's code did not make has none: the codes of Python's classes by kind, the same in every system.
+    let code = source.raw_os_error().or(match source.kind() {
+        NotFound => Some(2),
+        PermissionDenied => Some(13),
+        ResourceBusy => Some(16),
+        AlreadyExists => Some(17),
+        _ => None,
+    });
+    let message = source.to_string();
+    match code {
         Some(code) => {
-            let message = source.to_string();
             let text = message.split(" (os error").next().unwrap_or(&message).to_owned();
             PyOSError::new_err((code, text, place))
         }
-        None if source.kind() == std::io::ErrorKind::AlreadyExists => {
-            pyo3::exceptions::PyFileExistsError::new_err(format!("{place}: {source}"))
-        }
-        None => PyOSError::new_err(format!("{place}: {source}")),
+        None => PyOSError::new_err(format!("{place}: {message}")),
     }
 }
 
@@ -118,5 +117,5 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     make(c"taxel.NotFittedError", c"A learner that was used before `fit`.", &problem)?;
     make(c"taxel.DeviceError", c"The board, its registers or its commands.", &error)?;
     make(c"taxel.SceneError", c"A simulated scene that cannot be played.", &error)?;
-    module.add_function(wrap_pyfunction!(error_line, module)?)
+    Ok(())
 }

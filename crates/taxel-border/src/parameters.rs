@@ -9,35 +9,35 @@ use taxel_core::{Result as CoreResult, problem, reading};
 
 use crate::errors::core;
 
-/// Reads `what` from its JSON, or reports which of its parameters makes no sense.
+/// Reads the value called `name` from its JSON, or reports which of its parameters makes no sense.
 ///
 /// # Errors
 ///
 /// A `ProblemError` that names the parameter.
-pub fn parsed<T: DeserializeOwned>(what: &str, json: &str) -> PyResult<T> {
+pub fn parsed<T: DeserializeOwned>(name: &str, json: &str) -> PyResult<T> {
     // Groups of parameters are ours; whoever wrote the parameter knows its name alone.
-    reading::from_text(json).map_err(|unfit| core(unfit.by_name().problem(what)))
+    reading::from_text(json).map_err(|unfit| core(unfit.by_name().problem(name)))
 }
 
-/// Reads `what` from its JSON and checks it; returns it with every default filled in.
+/// Reads the value called `name` from its JSON and checks it; returns it with every default filled in.
 ///
 /// # Errors
 ///
 /// A `ProblemError` that names the parameter.
 pub fn checked<T: DeserializeOwned + Serialize>(
-    what: &str,
+    name: &str,
     json: &str,
     check: impl Fn(&T) -> CoreResult<()>,
 ) -> PyResult<Value> {
-    let value: T = parsed(what, json)?;
+    let value: T = parsed(name, json)?;
     check(&value).map_err(core)?;
     Ok(json!(value))
 }
 
 /// The error of what has no parameters.
 #[must_use]
-pub fn unknown(of: &str) -> PyErr {
-    core(problem!("{of}: nothing of that name has parameters"))
+pub fn unknown(name: &str) -> PyErr {
+    core(problem!("{name}: nothing of that name has parameters"))
 }
 
 /// A value that Python gets as dictionaries, lists, numbers and strings: a file's document, or numbers by cause.

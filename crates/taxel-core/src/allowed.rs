@@ -127,16 +127,16 @@ impl Parameter {
     /// `Problem`, naming the parameter, its value and what is valid.
     pub fn check(&self, value: &dyn ParameterNumbers) -> Result<()> {
         let mut outcome = Ok(());
-        value.each(&mut |place, value| {
+        value.each(&mut |index, value| {
             if outcome.is_ok() && !self.range.holds(value) {
-                let place = place.map_or(String::new(), |k| format!("[{k}]"));
+                let entry = index.map_or(String::new(), |k| format!("[{k}]"));
                 let (name, unit, range) = (self.name, self.unit, self.range);
                 let near = if range.spans(value) { format!(", {LEAST:e} at least") } else { String::new() };
                 let value = number_text(value);
                 outcome = Err(match unit.strip_prefix('1') {
-                    Some(per) => problem!(name; "{place} is {value}{per}: must be {range}{near}"),
-                    None if unit.is_empty() => problem!(name; "{place} is {value}: must be {range}{near}"),
-                    None => problem!(name; "{place} is {value} {unit}: must be {range}{near}"),
+                    Some(per) => problem!(name; "{entry} is {value}{per}: must be {range}{near}"),
+                    None if unit.is_empty() => problem!(name; "{entry} is {value}: must be {range}{near}"),
+                    None => problem!(name; "{entry} is {value} {unit}: must be {range}{near}"),
                 });
             }
         });
@@ -243,13 +243,13 @@ pub fn one_weight_a_train(weights: &[f64], trains: usize) -> Result<()> {
 
 /// The error of what is no weight.
 #[must_use]
-pub fn weight_error(place: &str, weight: f64) -> Error {
+pub fn weight_error(name: &str, weight: f64) -> Error {
     let right = if weight.is_finite() {
         format!("from -{LARGEST_WEIGHT:e} to {LARGEST_WEIGHT:e}")
     } else {
         "finite".to_owned()
     };
-    problem!("{place} is {}: must be {right}", number_text(weight))
+    problem!("{name} is {}: must be {right}", number_text(weight))
 }
 
 #[cfg(test)]

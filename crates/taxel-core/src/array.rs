@@ -163,7 +163,7 @@ impl Array {
                     let right = if is_area { "above 0 and finite" } else { "finite" };
                     return Err(problem!(
                         "{name} of the taxel at {} is {value}: must be {right}",
-                        self.place_of(taxel)
+                        self.position_text(taxel)
                     ));
                 }
             }
@@ -171,7 +171,7 @@ impl Array {
         Ok(())
     }
 
-    /// Number of places in the grid, whether a taxel exists there or not.
+    /// Number of cells in the grid, whether a taxel exists there or not.
     #[must_use]
     pub fn len(&self) -> usize {
         usize::from(self.rows) * usize::from(self.columns)
@@ -191,7 +191,7 @@ impl Array {
 
     /// Where a taxel is, in text for people; `taxel` is its index, row by row.
     #[must_use]
-    pub fn place_of(&self, taxel: usize) -> String {
+    pub fn position_text(&self, taxel: usize) -> String {
         let columns = usize::from(self.columns).max(1);
         format!("row {}, column {}", taxel / columns, taxel % columns)
     }
@@ -225,46 +225,48 @@ impl Array {
             && (self.exists == other.exists || (0..self.len()).all(|taxel| self.has(taxel) == other.has(taxel)))
     }
 
-    /// The distance between neighbours, for `what` that needs it.
+    /// The distance between neighbours, for `subject` that needs it.
     ///
     /// # Errors
     ///
     /// `Problem` if it is not known.
-    pub fn pitch(&self, what: &str) -> Result<Pitch> {
+    pub fn pitch(&self, subject: &str) -> Result<Pitch> {
         let name = &self.name;
         self.pitch_mm.ok_or_else(|| match self.places {
-            None => problem!("{what} needs mm, and the pitch of {name} is not known").with_hint("array", Hint::Pitch),
-            Some(_) => problem!("{what} needs one pitch, and {name} has a place for each taxel"),
+            None => {
+                problem!("{subject} needs mm, and the pitch of {name} is not known").with_hint("array", Hint::Pitch)
+            }
+            Some(_) => problem!("{subject} needs one pitch, and {name} has a place for each taxel"),
         })
     }
 
-    /// The distance between neighbours, for `what` that needs the same between rows and between columns, mm.
+    /// The distance between neighbours, for `subject` that needs the same between rows and between columns, mm.
     ///
     /// # Errors
     ///
     /// `Problem` if it is not known, or not the same.
-    pub fn square_pitch(&self, what: &str) -> Result<f64> {
-        let Pitch { rows, columns } = self.pitch(what)?;
+    pub fn square_pitch(&self, subject: &str) -> Result<f64> {
+        let Pitch { rows, columns } = self.pitch(subject)?;
         if rows == columns {
             return Ok(rows);
         }
         Err(problem!(
-            "{what} needs the same pitch between rows and between columns; {} has {rows} and {columns} mm",
+            "{subject} needs the same pitch between rows and between columns; {} has {rows} and {columns} mm",
             self.name
         ))
     }
 
-    /// Refuses, for `what` that needs them, an array whose taxels are not known to have neighbours: channels.
+    /// Refuses, for `subject` that needs them, an array whose taxels are not known to have neighbours: channels.
     ///
     /// # Errors
     ///
     /// `Problem` for a single row or column without a pitch.
-    pub fn check_neighbours(&self, what: &str) -> Result<()> {
+    pub fn check_neighbours(&self, subject: &str) -> Result<()> {
         if self.pitch_mm.is_some() || (self.rows > 1 && self.columns > 1) || self.len() == 1 {
             return Ok(());
         }
         Err(problem!(
-            "{what} needs neighbours on a grid; {} has {} x {} channels without a pitch",
+            "{subject} needs neighbours on a grid; {} has {} x {} channels without a pitch",
             self.name,
             self.rows,
             self.columns

@@ -48,14 +48,14 @@ fn pitch_of(array: &Array) -> Result<f64> {
     array.square_pitch("a scene").map_err(scene)
 }
 
-/// Checks that a value of a scene is within its range; `place` names its owner in the error.
-fn within(place: &str, name: &'static str, value: f64, unit: &'static str, range: Range) -> Result<()> {
-    of_scene(place, Parameter { name, unit, range }.check(&value))
+/// Checks that a value of a scene is within its range; `path` names its owner in the error.
+fn within(path: &str, name: &'static str, value: f64, unit: &'static str, range: Range) -> Result<()> {
+    of_scene(path, Parameter { name, unit, range }.check(&value))
 }
 
-/// The outcome of a check as that of a scene; `place` names its owner in the error.
-fn of_scene(place: &str, outcome: Result<()>) -> Result<()> {
-    outcome.map_err(|error| scene(error).in_part(place))
+/// The outcome of a check as that of a scene; `path` names its owner in the error.
+fn of_scene(path: &str, outcome: Result<()>) -> Result<()> {
+    outcome.map_err(|error| scene(error).in_part(path))
 }
 
 /// The same error as one of the scene.

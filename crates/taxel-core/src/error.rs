@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// An error, in kinds that a caller can distinguish.
 ///
@@ -43,6 +43,21 @@ impl Error {
     #[must_use]
     pub fn scene(text: impl Into<Reason>) -> Self {
         Self::Scene(text.into())
+    }
+
+    /// The same error as one of bytes or a file.
+    #[must_use]
+    pub fn into_format(self) -> Self {
+        if let Self::Problem(reason) = self { Self::Format(reason) } else { self }
+    }
+
+    /// What is refused and why; `None` if the caller asked to stop.
+    #[must_use]
+    pub fn reason(&self) -> Option<&Reason> {
+        match self {
+            Self::Format(reason) | Self::Problem(reason) | Self::Device(reason) | Self::Scene(reason) => Some(reason),
+            Self::Interrupted => None,
+        }
     }
 
     /// The error of a parameter: its text continues after the parameter's name.
@@ -86,26 +101,6 @@ pub struct Reason {
 }
 
 impl Reason {
-    /// The line of the error, in which the parameter has the name that the reader knows it by.
-    #[must_use]
-    pub fn line(&self, argument: &str) -> String {
-        let text = &self.text;
-        match self.hint {
-            None => format!("{argument}{text}"),
-            Some(Hint::Give) => format!("{text}; give {argument}"),
-            Some(Hint::Larger) => format!("{text}; a larger {argument} reads more"),
-            Some(Hint::LayOut) => format!(
-                "{text}; give {argument}, or rows and columns in a layout file, if they are a grid's taxels row by row"
-            ),
-            Some(Hint::Unfelt) => format!(
-                "{text}; either the tare holds a touch, as it ends before the first label, which may be late (give \
-                 {argument}), or readings fall with pressure (falls = true in a layout file), or another source felt \
-                 it (a column source in the labels); taxel info shows what was touched"
-            ),
-            Some(Hint::Pitch) => format!("{text}; give {argument} with the pitch in mm, or pitch_mm in a layout file"),
-        }
-    }
-
     /// The parameter is one of the part, so that a caller of the whole has no argument of that name; a remedy stays.
     fn in_part(self, part: &str) -> Self {
         match self.hint {
@@ -115,9 +110,13 @@ impl Reason {
     }
 }
 
+/// Without the remedy, which the command line and the page put into words of their own.
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.line(self.argument.as_deref().unwrap_or_default()))
+        if let (None, Some(argument)) = (self.hint, &self.argument) {
+            f.write_str(argument)?;
+        }
+        f.write_str(&self.text)
     }
 }
 
@@ -134,19 +133,17 @@ impl From<String> for Reason {
 }
 
 /// What helps against an error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Hint {
     /// Give the parameter, which is left out.
     Give,
     /// Give the limit, or a larger one.
     Larger,
-    /// Lay a row of channels out as a grid.
+    /// Give the grid of which a row of channels are the taxels.
     LayOut,
     /// Give the distance of the taxels.
     Pitch,
-    /// See why nothing was felt of what was labelled.
-    Unfelt,
 }
 
 /// Digits of a number that people read: more than that of any time in us or ns, or of a rounded fraction.

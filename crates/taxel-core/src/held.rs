@@ -53,7 +53,7 @@ impl<V> From<Vec<V>> for Held<V> {
 }
 
 impl Held {
-    /// Whether no taxel had an event so far.
+    /// The values of an array of so many taxels, none of which has had an event.
     #[must_use]
     pub fn unknown(taxels: usize) -> Self {
         Self::all(taxels, UNKNOWN)
@@ -103,7 +103,7 @@ impl EventsView<'_> {
 #[derive(Debug, Clone, Copy)]
 struct HeldChange<V> {
     t: i64,
-    place: u32,
+    slot: u32,
     value: V,
 }
 
@@ -145,23 +145,23 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
     ) -> Result<Self> {
         /// Marks a taxel that was not chosen.
         const NONE: u32 = u32::MAX;
-        let places = chosen.map(|chosen| {
-            let mut places = vec![NONE; array.len()];
-            for (place, &taxel) in (0..).zip(chosen) {
-                if let Some(entry) = places.get_mut(taxel as usize) {
-                    *entry = place;
+        let slots = chosen.map(|chosen| {
+            let mut slots = vec![NONE; array.len()];
+            for (slot, &taxel) in (0..).zip(chosen) {
+                if let Some(entry) = slots.get_mut(taxel as usize) {
+                    *entry = slot;
                 }
             }
-            places
+            slots
         });
         let wanted = chosen.map_or(array.len(), <[u32]>::len);
         if begins.len() != wanted {
             return Err(problem!("{} values to begin with: must be {wanted}, one a taxel", begins.len()));
         }
         // Readers limit an array to 2^22 taxels, so an index fits in 32 bits.
-        let place = |taxel: usize| places.as_ref().map_or(taxel as u32, |places| places[taxel]);
-        let changes = values.map(|(t, taxel, value)| HeldChange { t, place: place(taxel), value });
-        let mut changes: Vec<HeldChange<V>> = changes.filter(|change| change.place != NONE).collect();
+        let slot = |taxel: usize| slots.as_ref().map_or(taxel as u32, |slots| slots[taxel]);
+        let changes = values.map(|(t, taxel, value)| HeldChange { t, slot: slot(taxel), value });
+        let mut changes: Vec<HeldChange<V>> = changes.filter(|change| change.slot != NONE).collect();
         changes.sort_by_key(|change| change.t);
         Ok(Self { changes, states: vec![], stride: begins.len().max(4096), held: begins.into(), applied: 0 })
     }
@@ -191,7 +191,7 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
             }
             let next = end.min((self.applied / self.stride + 1) * self.stride);
             for change in &self.changes[self.applied..next] {
-                self.held.values[change.place as usize] = change.value;
+                self.held.values[change.slot as usize] = change.value;
             }
             self.applied = next;
         }
@@ -214,8 +214,8 @@ impl HeldOverTime<f32> {
             Self::from_values(events.array, steps, chosen, vec![0.0; chosen.map_or(events.array.len(), <[u32]>::len)])?;
         let mut level = stepped.held.clone();
         for change in &mut stepped.changes {
-            change.value += level.values[change.place as usize];
-            level.set(change.place as usize, change.value);
+            change.value += level.values[change.slot as usize];
+            level.set(change.slot as usize, change.value);
         }
         Ok(stepped)
     }

@@ -15,20 +15,16 @@
 pub mod allowed;
 pub mod error;
 pub mod parameters;
-pub mod preload;
 pub mod reading;
 pub mod vectors;
 
 pub mod array;
-pub mod baseline;
 pub mod events;
-pub mod frame_noise;
 pub mod frames;
+pub mod health;
 pub mod held;
 pub mod rest;
 pub mod spikes;
-pub mod touch_counts;
-pub mod tracked_rest;
 
 pub mod circuit;
 

@@ -6,28 +6,28 @@ use serde_json::error::Category;
 
 use crate::Error;
 
-/// The part of a JSON text that is not valid: its place, its value, and what is valid.
+/// The part of a JSON text that is not valid: its path, its value, and what is valid.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unfit {
     /// Path from the outermost name to the innermost, as `neuron.lambdas[2]`; empty for the whole text.
-    place: String,
-    /// The message, which continues after the place.
+    path: String,
+    /// The message, which continues after the path.
     message: String,
 }
 
 impl Unfit {
-    /// The whole error for a text that describes `what`.
+    /// The whole error for a text that describes `subject`.
     #[must_use]
-    pub fn text(&self, what: &str) -> String {
-        let colon = if self.message.starts_with(" is ") && self.place.is_empty() { "" } else { ": " };
-        format!("{what}{colon}{}{}", self.place, self.message)
+    pub fn text(&self, subject: &str) -> String {
+        let colon = if self.message.starts_with(" is ") && self.path.is_empty() { "" } else { ": " };
+        format!("{subject}{colon}{}{}", self.path, self.message)
     }
 
-    /// The error of the parameter, for a caller who passed `what` its parameters.
+    /// The error of the parameter, for a caller who passed `subject` its parameters.
     #[must_use]
-    pub fn problem(self, what: &str) -> Error {
-        match self.place.find(['.', '[']).map_or((self.place.as_str(), ""), |end| self.place.split_at(end)) {
-            ("", _) => Error::Problem(self.text(what).into()),
+    pub fn problem(self, subject: &str) -> Error {
+        match self.path.find(['.', '[']).map_or((self.path.as_str(), ""), |end| self.path.split_at(end)) {
+            ("", _) => Error::Problem(self.text(subject).into()),
             (argument, rest) => Error::argument(argument, &format!("{rest}{}", self.message)),
         }
     }
@@ -35,7 +35,7 @@ impl Unfit {
     /// The error for a caller who passed the parameter by its own name and does not know the groups that contain it.
     #[must_use]
     pub fn by_name(mut self) -> Self {
-        self.place = self.place.rsplit('.').next().unwrap_or_default().to_owned();
+        self.path = self.path.rsplit('.').next().unwrap_or_default().to_owned();
         self
     }
 }
@@ -52,7 +52,7 @@ pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, Unfit> {
             // Serde names the token that it expected, which is seldom the wrong one.
             _ => format!("not JSON: see line {}, column {}", error.line(), error.column()),
         };
-        Unfit { place: String::new(), message }
+        Unfit { path: String::new(), message }
     })?;
     from_value(value)
 }
@@ -64,7 +64,7 @@ pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, Unfit> {
 /// [`Unfit`] if the value is not a valid `T`.
 pub fn from_value<T: DeserializeOwned>(value: Value) -> Result<T, Unfit> {
     serde_path_to_error::deserialize(&value).map_err(|error| {
-        let place = error.path().to_string();
+        let path = error.path().to_string();
         let mut pointer = String::new();
         for segment in error.path() {
             let (step, stays) = match segment {
@@ -80,7 +80,7 @@ pub fn from_value<T: DeserializeOwned>(value: Value) -> Result<T, Unfit> {
         }
         let message = error.inner().to_string();
         let message = names::<T>(&value, &pointer, &message).unwrap_or(message);
-        in_words(if place == "." { String::new() } else { place }, value.pointer(&pointer), &message)
+        in_words(if path == "." { String::new() } else { path }, value.pointer(&pointer), &message)
     })
 }
 
@@ -97,20 +97,20 @@ fn names<T: DeserializeOwned>(value: &Value, pointer: &str, message: &str) -> Op
 }
 
 /// Rewrites an error of serde_json in plain terms; its text is the only information that serde_json gives.
-fn in_words(place: String, value: Option<&Value>, message: &str) -> Unfit {
+fn in_words(path: String, value: Option<&Value>, message: &str) -> Unfit {
     let quoted = |start: &str| message.strip_prefix(start).and_then(|rest| rest.split('`').nth(1));
     let wanted = message.split_once(", expected ").map_or("", |(_, wanted)| wanted);
     let must = |right: &str| value.map_or(format!(": {right}"), |value| format!(" is {}: {right}", value_text(value)));
     if let Some(name) = quoted("unknown field ") {
         let meant = nearest(name, wanted).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
         return Unfit {
-            place: beside(&place, name),
+            path: beside(&path, name),
             message: format!(" is not known{meant}: there is {}", choice(wanted)),
         };
     }
     if let Some(name) = quoted("missing field ") {
-        let dot = if place.is_empty() { "" } else { "." };
-        return Unfit { place: format!("{place}{dot}{name}"), message: " is missing".to_owned() };
+        let dot = if path.is_empty() { "" } else { "." };
+        return Unfit { path: format!("{path}{dot}{name}"), message: " is missing".to_owned() };
     }
     let message = if message.starts_with("unknown variant ") {
         must(&format!("must be {}", choice(wanted)))
@@ -121,13 +121,13 @@ fn in_words(place: String, value: Option<&Value>, message: &str) -> Unfit {
     } else {
         format!(": {message}")
     };
-    Unfit { place, message }
+    Unfit { path, message }
 }
 
-/// The place of a name that its group does not contain; for some types the path ends with the name, for others before
+/// The path of a name that its group does not contain; for some types the path ends with the name, for others before
 /// it.
-fn beside(place: &str, name: &str) -> String {
-    match place.strip_suffix(name).unwrap_or(place).trim_end_matches('.') {
+fn beside(path: &str, name: &str) -> String {
+    match path.strip_suffix(name).unwrap_or(path).trim_end_matches('.') {
         "" => name.to_owned(),
         group => format!("{group}.{name}"),
     }

@@ -118,12 +118,12 @@ impl SpikeTrains {
         let mut times = vec![0.0; spikes.len()];
         let mut values = vec![0.0; if valued { spikes.len() } else { 0 }];
         for s in spikes {
-            let place = &mut next[s.train as usize];
-            times[*place] = s.t;
+            let entry = &mut next[s.train as usize];
+            times[*entry] = s.t;
             if valued {
-                values[*place] = s.value;
+                values[*entry] = s.value;
             }
-            *place += 1;
+            *entry += 1;
         }
         for train in offsets.windows(2).map(|ends| ends[0]..ends[1]) {
             if !times[train.clone()].is_sorted() {

@@ -9,6 +9,7 @@ mod cut;
 pub mod decoder;
 pub mod registers;
 pub mod sender_decoder;
+mod status_line;
 pub mod v1;
 pub mod v2;
 
@@ -18,6 +19,7 @@ pub use cut::{CutDatagrams, cut};
 pub use decoder::{Counts, Decoder, Pairing, decode, most_rows};
 pub use registers::{Registers, WriteRefusal};
 pub use sender_decoder::{DatagramInfo, SenderDecoder, SenderTotals, StepBack};
+pub use status_line::{Greeting, StatusLine};
 pub use v1::{STAMP_US, WORD_BYTES, Word, encode};
 
 /// A year, us: bounds a silence, so that no arrival time can overflow a board's 64-bit clock.
@@ -32,7 +34,7 @@ fn silence(before: i64, now: i64) -> i64 {
 /// the values after the semicolon.
 #[macro_export]
 macro_rules! counts_since {
-    ($now:expr, $earlier:expr; $($field:ident),+; $($other:tt)*) => {
-        Self { $($field: $now.$field - $earlier.$field,)+ $($other)* }
+    ($now:expr, $earlier:expr; $($field:ident),+; $($further:tt)*) => {
+        Self { $($field: $now.$field - $earlier.$field,)+ $($further)* }
     };
 }

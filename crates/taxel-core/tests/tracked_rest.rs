@@ -1,8 +1,7 @@
 //! The rest of a sensor whose rest was not measured.
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
-use taxel_core::rest::Value;
-use taxel_core::tracked_rest::{QUIET_US, TrackedRest};
+use taxel_core::rest::{QUIET_US, TrackedRest, Value};
 
 /// Samples of an 8 x 8 array every 50 ms: `value` of the sample's number and taxel.
 fn sampled(rest: &mut TrackedRest, from: i64, samples: i64, mut value: impl FnMut(i64, usize) -> f32) -> Vec<f32> {

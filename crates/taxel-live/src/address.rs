@@ -26,12 +26,18 @@ pub fn of_host(host: &str, port: u16) -> Result<SocketAddr> {
 ///
 /// `Core(Problem)` if the text is not an address.
 pub fn of_text(text: &str) -> Result<SocketAddr> {
-    let (host, port) = text.rsplit_once(':').unwrap_or_default();
-    let host = host.strip_prefix('[').and_then(|inner| inner.strip_suffix(']')).unwrap_or(host);
-    match port.parse() {
-        Ok(port) if !host.is_empty() => of_host(host, port),
-        _ => Err(problem!("address {text:?}: must be a host and a port, as 127.0.0.1:5208").into()),
+    match host_and_port(text) {
+        Some((host, port)) => of_host(host, port),
+        None => Err(problem!("address {text:?}: must be a host and a port, as 127.0.0.1:5208").into()),
     }
+}
+
+/// Splits an address into host and port; `None` if it is not an address.
+#[must_use]
+pub fn host_and_port(text: &str) -> Option<(&str, u16)> {
+    let (host, port) = text.rsplit_once(':')?;
+    let host = host.strip_prefix('[').and_then(|inner| inner.strip_suffix(']')).unwrap_or(host);
+    port.parse().ok().filter(|_| !host.is_empty()).map(|port| (host, port))
 }
 
 #[cfg(test)]

@@ -40,14 +40,14 @@ use socket::Socket;
 /// Interval at which the thread checks whether it must stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// Of how many messages of a batch the sender is asked. Asking costs 9 % of receiving a message; of batches as full as those
+/// Number of messages of a batch whose sender is read. Reading it costs 9 % of receiving a message; for batches as full as those
 /// at the highest rates, 140 messages of 1400 bytes, less than 1 %. At other rates it is every message.
-const ASKED: u64 = 12;
+const SENDERS_READ: u64 = 12;
 
 /// Largest amount received at a time, bytes.
 const AT_ONCE: usize = 4 * socket::LARGEST;
 
-/// The source of datagrams.
+/// Where datagrams come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
     /// A board sends to this address.
@@ -70,12 +70,12 @@ impl std::fmt::Display for Origin {
 #[derive(Debug)]
 pub struct Receiver {
     queue: Arc<BatchQueue>,
-    place: Origin,
-    from: From,
+    origin: Origin,
+    input: Input,
 }
 
 #[derive(Debug)]
-enum From {
+enum Input {
     /// The socket, locked by a caller while it waits for datagrams, or `None` after it was moved into the thread; and
     /// the thread.
     Socket(Mutex<Option<Socket>>, Mutex<Option<JoinHandle<()>>>),
@@ -98,17 +98,17 @@ impl Receiver {
             )
             .into());
         }
-        let place = format!("UDP {address}");
-        let socket = Socket::bind(address, &options).map_err(Error::socket(&place))?;
-        let address = socket.address().map_err(Error::socket(&place))?;
+        let name = format!("UDP {address}");
+        let socket = Socket::bind(address, &options).map_err(Error::socket(&name))?;
+        let address = socket.address().map_err(Error::socket(&name))?;
         let counts = CaptureCounts {
             kernel_buffer_bytes: socket.kernel_buffer_bytes(),
             gro: socket.gro(),
             ..CaptureCounts::default()
         };
         let queue = Arc::new(BatchQueue::new(options.queue_bytes, counts));
-        let from = From::Socket(Mutex::new(Some(socket)), Mutex::default());
-        Ok(Self { queue, place: Origin::Udp(address), from })
+        let input = Input::Socket(Mutex::new(Some(socket)), Mutex::default());
+        Ok(Self { queue, origin: Origin::Udp(address), input })
     }
 
     /// Receives in a separate thread from now on; a feed always has one. If no readout waits for events, the thread
@@ -119,7 +119,7 @@ impl Receiver {
     ///
     /// `Socket` if the system cannot create a thread.
     pub fn receive_in_thread(&self, gather: Duration) -> Result<()> {
-        let From::Socket(socket, thread) = &self.from else { return Ok(()) };
+        let Input::Socket(socket, thread) = &self.input else { return Ok(()) };
         let Some(socket) = lock(socket).take() else { return Ok(()) };
         let queue = Arc::clone(&self.queue);
         let begun = std::thread::Builder::new()
@@ -128,7 +128,7 @@ impl Receiver {
             .map_err(|error| {
                 // The socket was moved into the thread that could not start, so nothing can be received any more.
                 self.queue.close(None);
-                Error::socket(&self.place)(error)
+                Error::socket(&self.origin)(error)
             })?;
         *lock(thread) = Some(begun);
         Ok(())
@@ -139,19 +139,19 @@ impl Receiver {
     pub fn fed(name: &str, options: ReceiverOptions) -> (Self, ParcelFeed) {
         let queue = Arc::new(BatchQueue::new(options.queue_bytes, CaptureCounts::default()));
         let feed = ParcelFeed::new(Arc::clone(&queue));
-        (Self { queue, place: Origin::Bridge(name.to_owned()), from: From::Feed(feed.clone()) }, feed)
+        (Self { queue, origin: Origin::Bridge(name.to_owned()), input: Input::Feed(feed.clone()) }, feed)
     }
 
-    /// The source of datagrams, with the actual port if 0 was requested.
+    /// Where datagrams come from, with the actual port if 0 was requested.
     #[must_use]
-    pub fn place(&self) -> &Origin {
-        &self.place
+    pub fn origin(&self) -> &Origin {
+        &self.origin
     }
 
     /// The address of the socket; unspecified, with port 0, if there is no socket.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
-        match self.place {
+        match self.origin {
             Origin::Udp(address) => address,
             Origin::Bridge(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
         }
@@ -160,18 +160,18 @@ impl Receiver {
     /// Counts of the bridge, if datagrams are received over one.
     #[must_use]
     pub fn bridged(&self) -> Option<Bridged> {
-        match &self.from {
-            From::Socket(..) => None,
-            From::Feed(feed) => Some(feed.bridged()),
+        match &self.input {
+            Input::Socket(..) => None,
+            Input::Feed(feed) => Some(feed.bridged()),
         }
     }
 
     /// If the queue is empty: the time before which every arrived datagram was read, ns of this computer's clock.
     #[must_use]
     pub fn silent_until(&self) -> Option<i64> {
-        match &self.from {
-            From::Socket(..) => Some(now_ns()),
-            From::Feed(_) => self.queue.silent_until(),
+        match &self.input {
+            Input::Socket(..) => Some(now_ns()),
+            Input::Feed(_) => self.queue.silent_until(),
         }
     }
 
@@ -182,8 +182,8 @@ impl Receiver {
     ///
     /// `Socket` if receiving ended because the socket failed.
     pub fn receive(&self, batch: &mut Batch, timeout: Duration) -> Result<bool> {
-        let received = match &self.from {
-            From::Socket(socket, _) => {
+        let received = match &self.input {
+            Input::Socket(socket, _) => {
                 let mut socket = lock(socket);
                 match &mut *socket {
                     Some(open) => {
@@ -198,9 +198,9 @@ impl Receiver {
                     None => self.queue.pop(batch, timeout),
                 }
             }
-            From::Feed(_) => self.queue.pop(batch, timeout),
+            Input::Feed(_) => self.queue.pop(batch, timeout),
         };
-        received.map_err(Error::socket(&self.place))
+        received.map_err(Error::socket(&self.origin))
     }
 
     /// Receives in the caller's thread.
@@ -235,7 +235,7 @@ impl Receiver {
     /// Requests the end: what has arrived so far is received, then nothing more.
     pub fn stop(&self) {
         self.queue.stop();
-        if let From::Feed(_) = self.from {
+        if let Input::Feed(_) = self.input {
             self.queue.close(None);
         }
     }
@@ -244,7 +244,7 @@ impl Receiver {
 impl Drop for Receiver {
     fn drop(&mut self) {
         self.stop();
-        if let From::Socket(_, thread) = &self.from
+        if let Input::Socket(_, thread) = &self.input
             && let Some(thread) = lock(thread).take()
         {
             let _ = thread.join();
@@ -283,7 +283,7 @@ fn receive(mut socket: Socket, queue: &BatchQueue, gather: Duration) {
 fn fill(socket: &mut Socket, batch: &mut Batch, wait: Option<Duration>) -> io::Result<u64> {
     let mut messages = 0;
     while batch.room() >= socket::LARGEST {
-        if socket.receive(batch, messages < ASKED)? {
+        if socket.receive(batch, messages < SENDERS_READ)? {
             messages += 1;
         } else if messages > 0 || !wait.map_or(Ok(false), |timeout| socket.wait(timeout))? {
             break;

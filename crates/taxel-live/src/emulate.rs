@@ -176,8 +176,8 @@ impl Emulator {
         if let Some(k) = options.commands.windows(2).position(|w| w[1].0 < w[0].0) {
             return Err(taxel_core::problem!("command {}: its frame lies before that of command {k}", k + 1).into());
         }
-        if let Some(every) = options.reset_every_s.filter(|every| !(1e-3..=1e9).contains(every)) {
-            return Err(taxel_core::problem!("reset_every_s"; " is {every}: must be from 0.001 to 1e9").into());
+        if let Some(interval_s) = options.reset_every_s.filter(|interval_s| !(1e-3..=1e9).contains(interval_s)) {
+            return Err(taxel_core::problem!("reset_every_s"; " is {interval_s}: must be from 0.001 to 1e9").into());
         }
         if !(-100_000.0..=100_000.0).contains(&options.drift_ppm) {
             return Err(
@@ -268,8 +268,8 @@ impl Emulator {
 
     /// Resets the board where its time since its start, us, has reached the next reset.
     fn reset_where_due(&mut self, run: &mut BoardRun, since_us: f64) -> Result<()> {
-        if let Some(every) = self.options.reset_every_s
-            && since_us >= (run.resets + 1) as f64 * every * 1e6
+        if let Some(interval_s) = self.options.reset_every_s
+            && since_us >= (run.resets + 1) as f64 * interval_s * 1e6
         {
             run.before_reset_us = since_us;
             run.resets += 1;

@@ -19,10 +19,10 @@ pub enum Error {
     /// A detection that could not be delivered.
     #[error("detections: {0}")]
     Sink(std::io::Error),
-    /// A socket that could not be opened or used.
+    /// A socket or a serial line that could not be opened or used.
     #[error("{place}: {source}")]
     Socket {
-        /// The address.
+        /// The address, or the serial port.
         place: String,
         /// The error of the operating system.
         source: std::io::Error,
@@ -43,7 +43,7 @@ impl Error {
         taxel_core::Error::format(format!("{}: {text}", path.display())).into()
     }
 
-    /// Adds the address to an error of the operating system.
+    /// Adds the address, or the serial port, to an error of the operating system.
     pub fn socket(place: impl ToString) -> impl FnOnce(std::io::Error) -> Self {
         let place = place.to_string();
         move |source| Self::Socket { place, source }

@@ -1,6 +1,7 @@
 //! Input and output around `taxel-core`: sockets, files and threads.
 
 pub mod address;
+pub mod board_line;
 pub mod bridged;
 pub mod clock;
 pub mod error;
@@ -9,6 +10,8 @@ mod latency;
 pub mod locked;
 pub mod ports;
 mod regular_file;
+pub mod serial_line;
+pub mod text_lines;
 
 pub mod capture;
 pub mod emulate;

@@ -9,19 +9,19 @@
 
 mod copies;
 mod counters;
-mod decode;
+mod decode_stage;
 mod handle;
 mod observers;
 mod options;
 mod output;
 mod preview_buffer;
-mod read_out;
 mod readout_queue;
-mod receive;
-mod record;
-mod recorder;
-mod recordings;
+mod readout_stage;
+mod receive_stage;
+mod record_stage;
+mod recording_switch;
 mod running_readout;
+mod running_recording;
 mod sending;
 mod shared;
 mod sink;
@@ -56,10 +56,10 @@ pub use handle::Handle;
 pub use options::{LiveOptions, Record, StatedTare};
 use output::DetectionOutput;
 use readout_queue::ReadoutQueue;
-use recorder::{Recorder, RecordingPart};
-use recordings::Recordings;
+use recording_switch::RecordingSwitch;
 pub use running_readout::ReadoutSetup;
 use running_readout::RunningReadout;
+use running_recording::{RecordingPart, RunningRecording};
 use sending::Sending;
 pub use sending::{Destination, Sent};
 use shared::{PipelineShared, PublishedState, RecordingSlot};
@@ -82,7 +82,7 @@ pub struct Live {
     detections: channel::Receiver<OutputDetection>,
     threads: Vec<JoinHandle<()>>,
     others: Mutex<Others<Live>>,
-    recordings: Arc<Recordings>,
+    recording_switch: Arc<RecordingSwitch>,
 }
 
 impl Live {
@@ -169,17 +169,17 @@ impl Live {
         let record = options.recording()?;
         let sending = options.send.iter().map(|to| Sending::open(&to.parse()?)).collect::<Result<Vec<_>>>()?;
         let receiver = receiver()?;
-        let recorder = match (&record, host) {
+        let recording = match (&record, host) {
             (None, _) => None,
-            (Some(record), None) => Some(Recorder::create(record, &options, &sources, receiver.place())?),
-            (Some(record), Some(host)) => Some(Recorder::join(host, record, &options, receiver.place())),
+            (Some(record), None) => Some(RunningRecording::create(record, &options, &sources, receiver.origin())?),
+            (Some(record), Some(host)) => Some(RunningRecording::join(host, record, &options, receiver.origin())),
         };
         let published = PublishedState { frame: vec![0; options.array.len()], ..PublishedState::default() };
         let shared = Arc::new(PipelineShared {
             receiver,
             readout_queue: ReadoutQueue::new(&options.array, options.readout_events),
             published: Mutex::new(published),
-            recording: RecordingSlot { recorder: Mutex::new(recorder), ..RecordingSlot::default() },
+            recording: RecordingSlot { running: Mutex::new(recording), ..RecordingSlot::default() },
             requests: Mutex::default(),
             requested: AtomicBool::new(false),
             subscribers: Mutex::default(),
@@ -200,14 +200,19 @@ impl Live {
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
             // Nothing arrived: a new file is removed.
-            let recorder = lock(&shared.recording.recorder).take();
-            drop(recorder.map(|recorder| recorder.finish(&Counters::default())));
+            let recording = lock(&shared.recording.running).take();
+            drop(recording.map(|recording| recording.finish(&Counters::default())));
         })?;
         let boards = others.boards.iter().map(|(name, board)| (name.clone(), Arc::clone(&board.shared)));
-        let recordings = Recordings::new(Arc::clone(&shared), boards.collect(), others.numbers.clone());
+        let recording_switch = RecordingSwitch::new(Arc::clone(&shared), boards.collect(), others.numbers.clone());
         let others = Mutex::new(others);
-        let mut live =
-            Self { shared: Arc::clone(&shared), detections, threads: vec![], others, recordings: Arc::new(recordings) };
+        let mut live = Self {
+            shared: Arc::clone(&shared),
+            detections,
+            threads: vec![],
+            others,
+            recording_switch: Arc::new(recording_switch),
+        };
         // The destinations come first: a device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|sending| Box::new(sending) as Box<dyn Sink>);
         let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
@@ -235,16 +240,16 @@ impl Live {
         self.shared.receiver.address()
     }
 
-    /// The source of datagrams.
+    /// Where datagrams come from.
     #[must_use]
-    pub fn place(&self) -> &Origin {
-        self.shared.receiver.place()
+    pub fn origin(&self) -> &Origin {
+        self.shared.receiver.origin()
     }
 
     /// A handle with the operations that other threads may use while the pipeline runs.
     #[must_use]
     pub fn handle(&self) -> Handle {
-        Handle { shared: Arc::clone(&self.shared), recordings: Arc::clone(&self.recordings) }
+        Handle { shared: Arc::clone(&self.shared), recording_switch: Arc::clone(&self.recording_switch) }
     }
 
     /// The next detection; `None` after `timeout` without one, or at once if the pipeline has ended.
@@ -382,9 +387,9 @@ impl Live {
     /// Restarts the recording that runs, where no source has given anything; returns whether it did.
     #[must_use]
     pub fn record_again(&self) -> bool {
-        // Read before the recorder is locked: counting and recording must not wait for each other.
+        // Read before the recording is locked: counting and recording must not wait for each other.
         let now = self.shared.counters();
-        lock(&self.shared.recording.recorder).as_mut().is_some_and(|recorder| recorder.restart_if_empty(&now))
+        lock(&self.shared.recording.running).as_mut().is_some_and(|recording| recording.restart_if_empty(&now))
     }
 
     /// As [`Handle::end_recording`].
@@ -417,11 +422,16 @@ impl Live {
         let joined = self.join();
         let (sources, ended) = others.map_or_else(|error| (BTreeMap::new(), Err(error)), |counts| (counts, Ok(())));
         let counters = Counters { sources, ..self.shared.counters() };
-        let recorder = lock(&self.shared.recording.recorder).take();
-        let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
-        let lost = recorder::losses(&counters, None);
-        let verdict =
-            recordings::verdict(&self.shared.options.name, self.place(), &counters, counters.nothing_came(), &lost);
+        let recording = lock(&self.shared.recording.running).take();
+        let path = recording.map_or(Ok(None), |recording| recording.finish(&counters))?;
+        let lost = running_recording::losses(&counters, None);
+        let verdict = recording_switch::verdict(
+            &self.shared.options.name,
+            self.origin(),
+            &counters,
+            counters.nothing_came(),
+            &lost,
+        );
         joined?;
         self.check()?;
         ended?;

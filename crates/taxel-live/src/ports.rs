@@ -9,7 +9,7 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Port {
-    /// Path of the device, as "/dev/ttyUSB0".
+    /// Name of the port, as "COM3" or "/dev/ttyACM0".
     pub place: String,
     /// "usb", "pci", "bluetooth" or "other".
     pub kind: &'static str,
@@ -28,10 +28,9 @@ pub struct Port {
 ///
 /// # Errors
 ///
-/// `File` if the system cannot list its ports.
+/// `Socket` if the system cannot list its ports.
 pub fn ports() -> Result<Vec<Port>> {
-    let found = serialport::available_ports()
-        .map_err(|error| Error::file(std::path::Path::new("/sys/class/tty"))(error.into()))?;
+    let found = serialport::available_ports().map_err(|error| Error::socket("serial ports")(error.into()))?;
     let mut ports: Vec<Port> = found.into_iter().map(|port| described(port.port_name, port.port_type)).collect();
     ports.sort_by(|a, b| (a.kind != "usb", &a.place).cmp(&(b.kind != "usb", &b.place)));
     Ok(ports)
@@ -50,5 +49,25 @@ fn described(place: String, kind: SerialPortType) -> Port {
         SerialPortType::PciPort => port("pci"),
         SerialPortType::BluetoothPort => port("bluetooth"),
         SerialPortType::Unknown => port("other"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serialport::UsbPortInfo;
+
+    use super::*;
+
+    #[test]
+    fn a_usb_port_has_its_product_in_every_system() {
+        for place in ["COM3", "/dev/ttyACM0"] {
+            let [product, maker, serial] = ["Uno", "Arduino", "75"].map(|text| Some(text.to_owned()));
+            let (manufacturer, serial_number) = (maker.clone(), serial.clone());
+            let usb = UsbPortInfo { vid: 0x2341, pid: 0x43, serial_number, manufacturer, product: product.clone() };
+            let port = described(place.to_owned(), SerialPortType::UsbPort(usb));
+            let (place, usb) = (place.to_owned(), Some((0x2341, 0x43)));
+            assert_eq!(port, Port { place, kind: "usb", product, maker, serial, usb });
+        }
+        assert_eq!(described("COM1".to_owned(), SerialPortType::Unknown).kind, "other");
     }
 }

@@ -28,7 +28,7 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
 pub(crate) use damage::ADDRESS;
-pub use damage::{DamageCounts, LeftOut, damage, damage_of_version_1};
+pub use damage::{DamageCounts, damage, damage_of_version_1};
 pub use event_previews::EventPreviews;
 pub use frames::{FrameEncoding, FrameProperties, Frames};
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};

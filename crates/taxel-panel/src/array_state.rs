@@ -5,14 +5,13 @@
 
 use std::sync::Arc;
 
-use super::centre::Coordinates;
+use super::load::Coordinates;
 use super::load::Load;
+use super::load::Weights;
 use super::time_columns::{COLUMN_US, MISSING, TimeColumns, column_of};
-use super::weights::Weights;
 use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
-use taxel_core::rest::{NOISE_FLOOR, Rest, Value};
-use taxel_core::tracked_rest::TrackedRest;
+use taxel_core::rest::{NOISE_FLOOR, Rest, TrackedRest, Value};
 use taxel_live::pipeline::TaxelChange;
 
 /// Columns of [`COLUMN_US`] after which a change has decayed: 127, less a sixteenth per column, is then 0.
@@ -94,7 +93,7 @@ fn tracked_from(columns: usize, values: &[u16]) -> TrackedRest {
 #[derive(Debug, Clone)]
 pub struct ArrayState {
     /// Column and row of each taxel, looked up because a division per change would dominate the cost.
-    places: Arc<[(u16, u16)]>,
+    positions: Arc<[(u16, u16)]>,
     floor: u16,
     /// Ticks above rest that count as none in the sums.
     sum_floor: u16,
@@ -139,9 +138,9 @@ impl ArrayState {
         let columns = usize::from(array.columns).max(1);
         // An array has 65 535 rows and columns at most.
         #[allow(clippy::cast_possible_truncation)]
-        let place = |taxel: usize| ((taxel % columns) as u16, (taxel / columns) as u16);
+        let position = |taxel: usize| ((taxel % columns) as u16, (taxel / columns) as u16);
         let mut state = Self {
-            places: (0..from.held.len()).map(place).collect(),
+            positions: (0..from.held.len()).map(position).collect(),
             floor,
             sum_floor: floor,
             columns,
@@ -208,7 +207,7 @@ impl ArrayState {
     fn sum_above_rest(&mut self) {
         self.load = Load::default();
         self.loads.fill(Load::default());
-        for taxel in 0..self.places.len() {
+        for taxel in 0..self.positions.len() {
             self.change_above_rest(taxel, 0, self.above(taxel));
         }
     }
@@ -221,7 +220,7 @@ impl ArrayState {
     /// Updates the sums for a taxel that was `before` ticks above rest and is `now`.
     fn change_above_rest(&mut self, taxel: usize, before: u16, now: u16) {
         self.load.change(taxel, (before, now), self.floor, &self.centre, &self.weights);
-        if let Some(&source) = self.source_of.get(usize::from(self.places[taxel].0)) {
+        if let Some(&source) = self.source_of.get(usize::from(self.positions[taxel].0)) {
             self.loads[source].change(taxel, (before, now), self.floor, &self.centre, &self.weights);
         }
     }
@@ -238,7 +237,7 @@ impl ArrayState {
                 _ => column_of(t, self.column_us),
             };
             self.time_columns
-                .count(column, together.iter().map(|change| (self.places[change.taxel as usize].1, change.up)));
+                .count(column, together.iter().map(|change| (self.positions[change.taxel as usize].1, change.up)));
         }
     }
 
@@ -508,8 +507,8 @@ impl ArrayState {
     fn store_curve(&mut self, column: i64) {
         let missing = self.frames.is_some() && self.held.values().iter().all(|&value| value == UNKNOWN);
         let curve = |load: &Load| load.curve(&self.centre, &self.weights);
-        let whole = if missing { MISSING } else { curve(&self.load) };
-        self.time_columns.set_curve(column, whole);
+        let total = if missing { MISSING } else { curve(&self.load) };
+        self.time_columns.set_curve(column, total);
         if self.time_columns.value_count() > 0 {
             let channels = (0..self.time_columns.channel_count()).map(|channel| self.above(channel).into());
             let sources = self.loads.iter().enumerate().flat_map(|(source, load)| match self.knows(source) {
@@ -523,7 +522,7 @@ impl ArrayState {
 
     /// Whether any taxel of a source has a value.
     fn knows(&self, source: usize) -> bool {
-        let mut held = self.places.iter().zip(self.held.values());
+        let mut held = self.positions.iter().zip(self.held.values());
         held.any(|(&(x, _), &held)| held != UNKNOWN && self.source_of[usize::from(x)] == source)
     }
 
@@ -536,8 +535,8 @@ impl ArrayState {
 
 #[cfg(test)]
 mod tests {
-    use super::super::time_columns::SPAN;
     use super::*;
+    use crate::time_columns::SPAN;
 
     fn blank(taxels: usize) -> Keyframe {
         Keyframe::blank(taxels)

@@ -150,7 +150,7 @@ pub struct Detected {
 /// How much of a file is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Opening {
-    /// Of a large text table the beginning, so that something is shown soon; of any other file all.
+    /// The beginning of a large text table, so that something is shown soon; all of any other file.
     Beginning,
     /// All of it.
     Whole,
@@ -197,7 +197,7 @@ pub trait BoardRequests: Send + Sync {
     fn board_lines(&self) -> Reply<BoardLines>;
 
     /// Connects the board's serial line, or disconnects it.
-    fn connect(&self, place: Option<&str>) -> Reply<()>;
+    fn connect(&self, address: Option<&str>) -> Reply<()>;
 
     /// Receives the board's datagrams on another address.
     fn listen(&self, host: &str, port: u16) -> Reply<()>;

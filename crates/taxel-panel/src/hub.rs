@@ -1,5 +1,13 @@
 //! What all clients share: the live source, the board's registers, the folder of recordings, labels, and the recorder.
 
+pub(super) mod clients;
+pub(super) mod folder;
+pub(super) mod indexed;
+pub(super) mod labels;
+pub(super) mod live_source;
+pub(super) mod presets;
+pub(super) mod recorder;
+
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -13,17 +21,16 @@ use taxel_live::pipeline::{Counters, Handle};
 use taxel_live::recording::now_ns;
 use tokio::sync::{Notify, OwnedMutexGuard};
 
-use super::clients::{Broadcast, Clients};
-use super::folder::{Folder, Listed};
 use super::handler::{Reply, RequestHandlers, UserPresets};
-use super::labels::LabelTables;
-use super::limits::{MOST_BYTES, MOST_CREDITS};
-use super::live_source::LiveSource;
-use super::messages::{ArrayInfo, FileInfo, Message};
 use super::options::PanelOptions;
-use super::presets;
-use super::recorder::RecorderControl;
+use super::protocol::limits::{MOST_BYTES, MOST_CREDITS};
+use super::protocol::messages::{ArrayInfo, FileInfo, Message};
 use super::time_columns::{COLUMN_US, COLUMNS_US, SPAN};
+use clients::{Broadcast, Clients};
+use folder::{Folder, Listed};
+use labels::LabelTables;
+use live_source::LiveSource;
+use recorder::RecorderControl;
 
 /// How often new events are fetched from the live source.
 const RECEIVE_EVERY: Duration = Duration::from_millis(16);
@@ -232,7 +239,7 @@ impl Hub {
             live: live.is_some(),
             array: live.map(|live| ArrayInfo::from(live.array())),
             options: live.map(|live| Box::new(live.handle.options().clone())),
-            udp: live.and_then(|live| match live.handle.place() {
+            udp: live.and_then(|live| match live.handle.origin() {
                 Origin::Udp(address) => Some(address.to_string()),
                 Origin::Bridge(_) => None,
             }),
@@ -241,7 +248,7 @@ impl Hub {
             folder: self.options.folder.display().to_string(),
             open: self.options.open.clone(),
             readout: live.and_then(|live| live.labels.clone()),
-            readout_encoders: live.map(|live| live.encoders.clone()).unwrap_or_default(),
+            readout_encoders: live.map(|live| live.encoders()).unwrap_or_default(),
             encoders: encode::NAMES,
             column_us: COLUMN_US,
             columns_us: COLUMNS_US,

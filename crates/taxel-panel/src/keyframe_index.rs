@@ -17,8 +17,8 @@ use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
 
 use super::array_state::{Keyframe, RestSource};
+use super::load::Weights;
 use super::time_columns::TimeColumns;
-use super::weights::Weights;
 
 pub use activity::Activity;
 

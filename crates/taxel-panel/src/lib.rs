@@ -7,39 +7,19 @@
 
 mod array_state;
 pub mod assets;
-mod centre;
-mod clients;
-mod connections;
-mod encoded_spikes;
-mod folder;
-mod frame;
 mod handler;
 mod hub;
-mod indexed;
 mod keyframe_index;
-mod label_requests;
-mod labels;
-mod limited;
-mod limits;
-mod live_source;
 mod load;
-mod messages;
-mod opening;
 mod options;
-mod player;
-mod presets;
+mod protocol;
 mod readout_encoders;
-mod recorder;
-mod recording_session;
-mod refusal;
-mod registers;
-mod request;
 mod requests;
 mod server;
 mod session;
 mod taxel_history;
 mod time_columns;
-mod weights;
+mod view;
 
 /// The JSON schemas of the requests (`requests`), of the messages that are text (`messages`) and of the options of a live source
 /// (`options`), for `tools/messages.py`.
@@ -47,8 +27,8 @@ mod weights;
 #[must_use]
 pub fn message_schemas() -> String {
     let settings = schemars::generate::SchemaSettings::draft2020_12;
-    let requests = settings().into_generator().into_root_schema_for::<request::Request>();
-    let messages = settings().for_serialize().into_generator().into_root_schema_for::<messages::Message>();
+    let requests = settings().into_generator().into_root_schema_for::<protocol::request::Request>();
+    let messages = settings().for_serialize().into_generator().into_root_schema_for::<protocol::messages::Message>();
     let options = settings().into_generator().into_root_schema_for::<taxel_live::pipeline::LiveOptions>();
     serde_json::json!({ "requests": requests, "messages": messages, "options": options }).to_string()
 }
@@ -60,6 +40,6 @@ pub use handler::{
     TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
-pub use keyframe_index::frames::{FrameFile, FrameIndex, FramePlace, FrameRest, FrameSource};
+pub use keyframe_index::frames::{FrameArea, FrameFile, FrameIndex, FrameRest, FrameSource};
 pub use options::PanelOptions;
 pub use server::Panel;

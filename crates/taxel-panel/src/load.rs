@@ -1,64 +1,9 @@
-//! The load on a sensor, or on a part of it, as sums from which single taxels can be taken away again.
+//! The load on a sensor: its sum, its area and its centre, which follow each change of a taxel.
 
-use super::centre::Coordinates;
-use super::time_columns::{Curve, NOTHING};
-use super::weights::Weights;
+mod centre;
+mod sums;
+mod weights;
 
-/// Sums over taxels, modulo 2^64: a decrease wraps, and the sums are right.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Load {
-    sum: u64,
-    /// The sum by weight, where the taxels do not count alike.
-    weighted: u64,
-    /// The sum over the taxels that are loaded, and that times their coordinates.
-    loaded: u64,
-    loaded_x: u64,
-    loaded_y: u64,
-    area: u32,
-}
-
-impl Load {
-    /// A taxel that was `before` ticks above rest is `now`; it is loaded above the noise floor.
-    #[inline(always)]
-    pub(crate) fn change(
-        &mut self,
-        taxel: usize,
-        (before, now): (u16, u16),
-        floor: u16,
-        at: &Coordinates,
-        weights: &Weights,
-    ) {
-        let less = |now: u16, before: u16| u64::from(now).wrapping_sub(before.into());
-        let more = less(now, before);
-        self.sum = self.sum.wrapping_add(more);
-        self.weighted = self.weighted.wrapping_add(weights.weighed(taxel, more));
-        let loaded = |above: u16| if above > floor { above } else { 0 };
-        let (before, now) = (loaded(before), loaded(now));
-        let ((x, y), more) = (at.get(taxel), less(now, before));
-        self.loaded = self.loaded.wrapping_add(more);
-        self.loaded_x = self.loaded_x.wrapping_add(more.wrapping_mul(x));
-        self.loaded_y = self.loaded_y.wrapping_add(more.wrapping_mul(y));
-        self.area = self.area + u32::from(now > 0) - u32::from(before > 0);
-    }
-
-    /// Both loads together.
-    pub(crate) fn plus(self, more: &Self) -> Self {
-        Self {
-            sum: self.sum + more.sum,
-            weighted: self.weighted + more.weighted,
-            loaded: self.loaded + more.loaded,
-            loaded_x: self.loaded_x + more.loaded_x,
-            loaded_y: self.loaded_y + more.loaded_y,
-            area: self.area + more.area,
-        }
-    }
-
-    /// Its curve: the sum, the area and the centre of the loaded taxels.
-    pub(crate) fn curve(&self, at: &Coordinates, weights: &Weights) -> Curve {
-        if self.sum == 0 {
-            return NOTHING;
-        }
-        let (x, y) = at.centre(self.loaded, self.loaded_x, self.loaded_y);
-        Curve { sum: weights.sum(self.sum, self.weighted), area: self.area, x, y }
-    }
-}
+pub(crate) use centre::Coordinates;
+pub(crate) use sums::Load;
+pub(crate) use weights::Weights;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value, json};
-use taxel_core::encode::{Composite, Encoder};
+use taxel_core::encode::{Composite, Encoder, Tare};
 use taxel_core::problem;
 use taxel_live::Result;
 
@@ -24,6 +24,13 @@ impl From<Encoder> for ReadoutEncoders {
         }
         encoders.insert(name_of(&encoder), encoder);
         Self(encoders)
+    }
+}
+
+impl ReadoutEncoders {
+    /// These encoders with a tare.
+    pub(super) fn with_tare(&self, tare: &Tare) -> Self {
+        Self(self.0.iter().map(|(name, encoder)| (name.clone(), encoder.with_tare(tare))).collect())
     }
 }
 

@@ -1,5 +1,10 @@
 //! The requests that do not concern the client's own view, and may take long: docs/panel-protocol.md, *From the client*.
 
+pub(super) mod labels;
+pub(super) mod opening;
+mod recording;
+pub(super) mod registers;
+
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,18 +14,17 @@ use taxel_core::held::UNKNOWN;
 use taxel_live::locked::lock;
 use taxel_live::ports::ports;
 
-use super::clients::Broadcast;
 use super::handler::{Cut, Detected, LabelRow, TrainingResult};
 use super::hub::Hub;
-use super::indexed::{Indexed, OpenRecording};
-use super::labels::LabelChange;
-use super::live_source::LiveSource;
-use super::messages::{FoundDetection, InterfaceAddress, Message};
+use super::hub::clients::Broadcast;
+use super::hub::indexed::{Indexed, OpenRecording};
+use super::hub::labels::LabelChange;
+use super::hub::live_source::LiveSource;
+use super::hub::recorder::RecordingPlan;
+use super::protocol::messages::{FoundDetection, InterfaceAddress, Message};
+use super::protocol::refusal::{Answer, Refusal};
+use super::protocol::request::{Id, RecordRequest, Request, RestHow, Taxel};
 use super::readout_encoders::ReadoutEncoders;
-use super::recorder::RecordingPlan;
-use super::refusal::{Answer, Refusal};
-use super::request::{Id, RecordRequest, Request, RestHow, Taxel};
-use super::{label_requests, recording_session, registers};
 
 /// Carries out a request; `shown` is the recording that the client shows. Returns the message for that client alone.
 ///
@@ -32,7 +36,7 @@ pub(super) async fn carry_out(
     shown: Option<&OpenRecording>,
     request: Request,
 ) -> Answer<Option<Message>> {
-    let change = |change| label_requests::change(&hub, shown, vec![change]);
+    let change = |change| labels::change(&hub, shown, vec![change]);
     match request {
         Request::Set { values } => registers::set(&hub, &values).await?,
         Request::Read {} => registers::read(&hub).await?,
@@ -44,11 +48,11 @@ pub(super) async fn carry_out(
         Request::Stop {} => hub.recorder.end()?,
         Request::Note { text } => board(&hub)?.handle.note(&text.0)?,
         Request::Mark { label, t_us, source, replaces_us } => {
-            let row = label_requests::row(shown, label, t_us.0, source);
+            let row = labels::row(shown, label, t_us.0, source);
             change(LabelChange::Mark(LabelRow { replaces_us: replaces_us.map(|t| t.0), ..row })).await?;
         }
         Request::Marks { labels } => {
-            label_requests::change(&hub, shown, label_requests::marks(shown, labels.0)?).await?;
+            labels::change(&hub, shown, labels::marks(shown, labels.0)?).await?;
         }
         Request::Rename { label_id, label } => {
             change(LabelChange::Rename { id: number(label_id), label: label.0 }).await?
@@ -56,7 +60,7 @@ pub(super) async fn carry_out(
         Request::Move { label_id, t_us } => change(LabelChange::Move { id: number(label_id), t_us: t_us.0 }).await?,
         Request::Delete { label_id } => change(LabelChange::Delete { id: number(label_id) }).await?,
         Request::Settle { conflict_id, keep } => {
-            label_requests::settle(&hub, shown, number(conflict_id), keep).await?;
+            labels::settle(&hub, shown, number(conflict_id), keep).await?;
         }
         Request::Health {} => return health(&hub, shown).await.map(Some),
         Request::Cut { start_us, stop_us, name } => {
@@ -118,15 +122,15 @@ fn check_restart(hub: &Hub) -> Answer {
 }
 
 /// Connects the board's serial line, or disconnects it.
-async fn control(hub: &Hub, place: Option<String>) -> Answer {
+async fn control(hub: &Hub, address: Option<String>) -> Answer {
     let connected = {
-        let place = place.clone();
-        hub.ask(move |handlers| handlers.board.connect(place.as_deref())).await
+        let address = address.clone();
+        hub.ask(move |handlers| handlers.board.connect(address.as_deref())).await
     };
-    let connects = place.is_some();
+    let connects = address.is_some();
     {
         let mut board = hub.board();
-        board.control = place.filter(|_| connected.is_ok());
+        board.control = address.filter(|_| connected.is_ok());
         board.known = false;
     }
     hub.clients.send(Broadcast::Hello);
@@ -169,7 +173,7 @@ fn record(hub: &Arc<Hub>, request: RecordRequest) -> Answer {
     let RecordRequest { name, index, countdown_s, length_s, advance, label, format } = request;
     let advance = advance.unwrap_or(false);
     if advance && (index.is_none() || length_s.is_none()) {
-        return Err(Refusal::of("advance", "needs an index and a length"));
+        return Err(Refusal::of_field("advance", "needs an index and a length"));
     }
     if hub.live().is_none() {
         return Err("no board is listened to: nothing to record".into());
@@ -183,7 +187,7 @@ fn record(hub: &Arc<Hub>, request: RecordRequest) -> Answer {
         advance,
         label: label.map(|label| label.0),
     };
-    recording_session::start(hub, plan).map_err(|reason| Refusal { reason, field: Some("name".to_owned()) })
+    recording::start(hub, plan).map_err(|reason| Refusal { reason, field: Some("name".to_owned()) })
 }
 
 // ---------------------------------------------------------------------------------------------- training
@@ -206,7 +210,7 @@ pub(super) fn readout_of(recording: &str) -> String {
 
 /// Runs a readout: on the recording that is shown, or on the live source from now on.
 async fn read_out(hub: &Hub, shown: Option<&OpenRecording>, readout: String) -> Answer<Option<Message>> {
-    let path = hub.folder.file(&readout).map_err(|error| Refusal::of("readout", error))?;
+    let path = hub.folder.file(&readout).map_err(|error| Refusal::of_field("readout", error))?;
     let Some(OpenRecording { name, trial, .. }) = shown.cloned() else {
         check_restart(hub)?;
         hub.ask(move |handlers| handlers.board.read_out(&path)).await?;
@@ -255,12 +259,12 @@ async fn health(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<Message> {
 async fn cut(hub: &Hub, shown: Option<&OpenRecording>, (start_us, stop_us): (i64, i64), to: &str) -> Answer<Message> {
     let OpenRecording { name, trial, indexed } = shown.ok_or("cut: open a recording first")?.clone();
     if start_us >= stop_us {
-        return Err(Refusal::of("stop_us", "must lie after start_us"));
+        return Err(Refusal::of_field("stop_us", "must lie after start_us"));
     }
     let (path, us) = (hub.folder.file(&name)?, indexed.us());
-    let out = hub.folder.file(to).map_err(|error| Refusal::of("name", error))?;
+    let out = hub.folder.file(to).map_err(|error| Refusal::of_field("name", error))?;
     if out.exists() {
-        return Err(Refusal::of("name", format!("{to} exists already; name another")));
+        return Err(Refusal::of_field("name", format!("{to} exists already; name another")));
     }
     // The first frame from the start on, and the first after the end.
     let in_file = |t: i64| -(-t).div_euclid(us);

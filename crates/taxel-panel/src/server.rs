@@ -1,5 +1,7 @@
 //! The HTTP server: the page's files for every program on this machine, the web socket for those that have the token.
 
+mod connections;
+
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -13,15 +15,14 @@ use axum::response::{IntoResponse, Response};
 use tokio::sync::watch;
 
 use super::assets::asset;
-use super::connections::LimitedListener;
 use super::handler::RequestHandlers;
 use super::hub::Hub;
-use super::label_requests;
-use super::limits::MOST_BYTES;
-use super::opening;
 use super::options::PanelOptions;
-use super::registers::prepare;
+use super::protocol::limits::MOST_BYTES;
+use super::requests::registers::prepare;
+use super::requests::{labels, opening};
 use super::session;
+use connections::LimitedListener;
 use taxel_live::pipeline::Handle;
 use taxel_live::{Error, Result};
 
@@ -62,10 +63,10 @@ impl Panel {
     /// `Socket` where the port is taken, `File` where the folder does not exist, or the system gives no random numbers.
     pub fn start(options: PanelOptions, live: Option<Handle>, handlers: RequestHandlers) -> Result<Self> {
         let folder = options.folder.canonicalize().map_err(Error::file(&options.folder))?;
-        let place = format!("panel {}", options.address);
-        let listener = std::net::TcpListener::bind(options.address).map_err(Error::socket(&place))?;
-        listener.set_nonblocking(true).map_err(Error::socket(&place))?;
-        let address = listener.local_addr().map_err(Error::socket(&place))?;
+        let name = format!("panel {}", options.address);
+        let listener = std::net::TcpListener::bind(options.address).map_err(Error::socket(&name))?;
+        listener.set_nonblocking(true).map_err(Error::socket(&name))?;
+        let address = listener.local_addr().map_err(Error::socket(&name))?;
         let token = token()?;
         let hub = Hub::new(PanelOptions { folder, address, ..options }, live, handlers)?;
         let (end, ended) = watch::channel(false);
@@ -74,14 +75,14 @@ impl Panel {
             .enable_all()
             .max_blocking_threads(8)
             .build()
-            .map_err(Error::socket(&place))?;
+            .map_err(Error::socket(&name))?;
         let thread = std::thread::Builder::new()
             .name("taxel-panel".to_owned())
             .spawn(move || {
                 runtime.block_on(serve(listener, gate));
                 runtime.shutdown_timeout(Duration::from_secs(2));
             })
-            .map_err(Error::socket(&place))?;
+            .map_err(Error::socket(&name))?;
         Ok(Self { hub, address, token, end, thread: Some(thread) })
     }
 
@@ -178,7 +179,7 @@ async fn serve(listener: std::net::TcpListener, gate: Arc<Gate>) {
             prepare(&hub).await;
         }
     });
-    let followed = tokio::spawn(label_requests::follow(Arc::clone(&gate.hub)));
+    let followed = tokio::spawn(labels::follow(Arc::clone(&gate.hub)));
     // The recording to show first is read while the browser starts; the client that opens it gets the error, if any.
     let hub = Arc::clone(&gate.hub);
     let first = tokio::spawn(async move {

@@ -16,14 +16,14 @@ use axum::extract::ws::WebSocket;
 use serde_json::{Map, Value};
 use tokio::sync::{broadcast, mpsc, watch};
 
-use super::clients::{Broadcast, ClientSlot};
-use super::frame::RECORDS;
 use super::hub::Hub;
-use super::limits::MOST_BYTES;
-use super::messages::Message;
-use super::refusal::{Answer, Refusal};
-use super::registers::prepare;
-use super::request::Request;
+use super::hub::clients::{Broadcast, ClientSlot};
+use super::protocol::limits::MOST_BYTES;
+use super::protocol::messages::Message;
+use super::protocol::refusal::{Answer, Refusal};
+use super::protocol::request::Request;
+use super::requests::registers::prepare;
+use super::view::frame::RECORDS;
 use connection::{Closing, Connection, GOING_AWAY, Incoming, POLICY, TOO_BIG};
 use flow::{FRAME_TIME, FlowControl};
 use pending::PendingRequests;
@@ -85,13 +85,13 @@ impl ClientSession {
         {
             let Incoming::Text(text) = incoming else { continue };
             let keys: Map<String, Value> = serde_json::from_str(&text).unwrap_or_default();
-            let what = keys.get("type").and_then(Value::as_str).unwrap_or_default().to_owned();
-            let Ok(request) = Request::read(&what, keys) else { continue };
+            let kind = keys.get("type").and_then(Value::as_str).unwrap_or_default().to_owned();
+            let Ok(request) = Request::read(&kind, keys) else { continue };
             while !self.pending.has_room() {
                 tokio::time::sleep(FRAME_TIME).await;
             }
             if request.changes_labels() {
-                self.pending.begin(&self.hub, Value::Null, what, request, text.len(), self.viewport.open_recording());
+                self.pending.begin(&self.hub, Value::Null, kind, request, text.len(), self.viewport.open_recording());
             } else if matches!(request, Request::Open { .. } | Request::Live {}) {
                 // The labels after it are of what it shows.
                 let _ = self.handle_view_request(request).await;
@@ -237,15 +237,15 @@ impl ClientSession {
             _ => false,
         };
         if !is_id {
-            let refusal = Refusal::of("id", "must be a whole number or a text of 64 characters");
+            let refusal = Refusal::of_field("id", "must be a whole number or a text of 64 characters");
             return self.refuse(Value::Null, String::new(), refusal).await;
         }
-        let Some(what) = keys.get("type").and_then(Value::as_str).map(str::to_owned) else {
-            return self.refuse(id, String::new(), Refusal::of("type", "is missing")).await;
+        let Some(kind) = keys.get("type").and_then(Value::as_str).map(str::to_owned) else {
+            return self.refuse(id, String::new(), Refusal::of_field("type", "is missing")).await;
         };
-        let request = match Request::read(&what, keys) {
+        let request = match Request::read(&kind, keys) {
             Ok(request) => request,
-            Err(refusal) => return self.refuse(id, what, refusal).await,
+            Err(refusal) => return self.refuse(id, kind, refusal).await,
         };
         match self.handle_view_request(request).await {
             Ok(Ok(messages)) => {
@@ -257,10 +257,10 @@ impl ClientSession {
                 }
                 self.connection.send_message(&Message::Done { id }).await
             }
-            Ok(Err(refusal)) => self.refuse(id, what, refusal).await,
+            Ok(Err(refusal)) => self.refuse(id, kind, refusal).await,
             Err(request) => {
                 let shown = self.viewport.open_recording();
-                if let Some(busy) = self.pending.begin(&self.hub, id, what, request, text.len(), shown) {
+                if let Some(busy) = self.pending.begin(&self.hub, id, kind, request, text.len(), shown) {
                     self.count_refusal();
                     self.connection.send_message(&busy).await?;
                 }
@@ -304,9 +304,9 @@ impl ClientSession {
         Ok(done.map(|()| vec![]))
     }
 
-    async fn refuse(&mut self, id: Value, what: String, refusal: Refusal) -> Result<(), Closing> {
+    async fn refuse(&mut self, id: Value, kind: String, refusal: Refusal) -> Result<(), Closing> {
         self.count_refusal();
-        self.connection.send_message(&Message::refused(id, what, refusal)).await?;
+        self.connection.send_message(&Message::refused(id, kind, refusal)).await?;
         self.check_refusals()
     }
 

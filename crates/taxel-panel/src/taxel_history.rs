@@ -56,17 +56,17 @@ impl TaxelHistory {
 
     /// Appends least, greatest and last value of these columns; [`UNKNOWN`] before the history begins.
     pub fn write(&self, columns: std::ops::Range<i64>, out: &mut Vec<u8>) {
-        let mut place = self.columns.partition_point(|(column, _)| *column < columns.start);
+        let mut index = self.columns.partition_point(|(column, _)| *column < columns.start);
         let (since, held) = self.first;
-        let mut last = if place == 0 { held } else { self.columns[place - 1].1[2] };
+        let mut last = if index == 0 { held } else { self.columns[index - 1].1[2] };
         for column in columns {
             if column < since {
                 out.extend_from_slice(&[0xFF; 6]);
                 continue;
             }
-            let three = match self.columns.get(place) {
+            let three = match self.columns.get(index) {
                 Some((there, three)) if *there == column => {
-                    place += 1;
+                    index += 1;
                     *three
                 }
                 _ => [last; 3],
@@ -79,8 +79,8 @@ impl TaxelHistory {
 
 #[cfg(test)]
 mod tests {
-    use super::super::time_columns::COLUMN_US;
     use super::*;
+    use crate::time_columns::COLUMN_US;
 
     fn change(t: i64, taxel: u32, ticks: u16) -> TaxelChange {
         TaxelChange { t, taxel, ticks, up: true, repaired: false }

@@ -20,7 +20,7 @@ pub const LATE_US: i64 = 120_000;
 /// Columns of time in a block of a [`TimeColumns`].
 const BLOCK: i64 = 250;
 
-/// Of channels up to this number each has a curve of its own.
+/// Maximum number of channels that each have a curve.
 const MOST_CHANNELS: usize = 64;
 
 /// What is stored of a source: its sum, and the bits of the coordinates of its centre.
@@ -81,7 +81,7 @@ struct ColumnShape {
 }
 
 impl ColumnShape {
-    fn of(array: &Array) -> Self {
+    fn new(array: &Array) -> Self {
         let channels = if array.is_channels() && array.len() <= MOST_CHANNELS { array.len() } else { 0 };
         Self { rows: array.rows.into(), channels, sources: 0 }
     }
@@ -125,7 +125,7 @@ impl TimeColumns {
     /// Columns of an array that take at most about `bytes` bytes: the oldest blocks are dropped.
     #[must_use]
     pub fn new(array: &Array, bytes: usize) -> Self {
-        let shape = ColumnShape::of(array);
+        let shape = ColumnShape::new(array);
         let block = shape.block_bytes();
         Self {
             shape,
@@ -168,7 +168,7 @@ impl TimeColumns {
     /// Bytes that `columns` columns of an array take.
     #[must_use]
     pub fn bytes_for(array: &Array, columns: i64) -> usize {
-        (usize::try_from(columns / BLOCK).unwrap_or(0) + 2) * ColumnShape::of(array).block_bytes()
+        (usize::try_from(columns / BLOCK).unwrap_or(0) + 2) * ColumnShape::new(array).block_bytes()
     }
 
     /// Rows of the array.
@@ -196,7 +196,7 @@ impl TimeColumns {
     }
 
     /// Index of a block, or where it would be inserted.
-    fn place(&self, key: i64) -> Result<usize, usize> {
+    fn block_index(&self, key: i64) -> Result<usize, usize> {
         match self.blocks.back() {
             Some(&(last, _)) if last == key => Ok(self.blocks.len() - 1),
             _ => self.blocks.binary_search_by_key(&key, |&(key, _)| key),
@@ -205,27 +205,27 @@ impl TimeColumns {
 
     fn block(&mut self, column: i64) -> (&mut ColumnBlock, usize) {
         let (key, rows, count) = (column.div_euclid(BLOCK), self.shape.rows, self.shape.values());
-        let place = match self.place(key) {
-            Ok(place) => place,
-            Err(mut place) => {
+        let index = match self.block_index(key) {
+            Ok(index) => index,
+            Err(mut index) => {
                 if self.blocks.len() >= self.max_blocks
                     && let Some((oldest, _)) = self.blocks.pop_front()
                 {
-                    place = place.saturating_sub(1);
+                    index = index.saturating_sub(1);
                     if let Some(reach) = &mut self.reach {
                         reach.0 = reach.0.max((oldest + 1) * BLOCK);
                     }
                 }
                 let n = BLOCK.unsigned_abs() as usize;
-                let before = place.checked_sub(1).map(|before| &self.blocks[before].1);
+                let before = index.checked_sub(1).map(|before| &self.blocks[before].1);
                 let curve = before.map_or(NOTHING, |before| before.curves[n - 1]);
                 let values = before.map_or_else(|| vec![0; count], |b| b.values[(n - 1) * count..].to_vec());
                 let block = ColumnBlock { raster: vec![0; n * rows], curves: vec![curve; n], values: values.repeat(n) };
-                self.blocks.insert(place, (key, block));
-                place
+                self.blocks.insert(index, (key, block));
+                index
             }
         };
-        (&mut self.blocks[place].1, column.rem_euclid(BLOCK).unsigned_abs() as usize)
+        (&mut self.blocks[index].1, column.rem_euclid(BLOCK).unsigned_abs() as usize)
     }
 
     /// Extends the known columns up to this one.
@@ -242,8 +242,8 @@ impl TimeColumns {
         self.reach = Some((reach.0.min(column), column));
         let key = column.div_euclid(BLOCK);
         self.blocks.truncate(self.blocks.partition_point(|&(there, _)| there <= key));
-        if let Ok(place) = self.place(key) {
-            let block = &mut self.blocks[place].1;
+        if let Ok(index) = self.block_index(key) {
+            let block = &mut self.blocks[index].1;
             let k = usize::try_from(column.rem_euclid(BLOCK)).unwrap_or(0);
             block.raster[(k + 1) * self.shape.rows..].fill(0);
             let curve = block.curves[k];
@@ -295,11 +295,11 @@ impl TimeColumns {
     /// The values at the end of a column; `None` before the first block.
     fn values_at(&self, column: i64) -> Option<&[u32]> {
         let (key, n, count) = (column.div_euclid(BLOCK), BLOCK.unsigned_abs() as usize, self.shape.values());
-        let (place, k) = match self.place(key) {
-            Ok(place) => (place, column.rem_euclid(BLOCK).unsigned_abs() as usize),
-            Err(place) => (place.checked_sub(1)?, n - 1),
+        let (index, k) = match self.block_index(key) {
+            Ok(index) => (index, column.rem_euclid(BLOCK).unsigned_abs() as usize),
+            Err(index) => (index.checked_sub(1)?, n - 1),
         };
-        Some(&self.blocks[place].1.values[k * count..(k + 1) * count])
+        Some(&self.blocks[index].1.values[k * count..(k + 1) * count])
     }
 
     /// Raises the values in `out` to the greatest of each in columns, and the sources to where the sum of each is greatest;
@@ -341,10 +341,10 @@ impl TimeColumns {
     #[must_use]
     pub fn curve(&self, column: i64) -> Curve {
         let (key, k) = (column.div_euclid(BLOCK), column.rem_euclid(BLOCK).unsigned_abs() as usize);
-        match self.place(key) {
-            Ok(place) => self.blocks[place].1.curves[k],
+        match self.block_index(key) {
+            Ok(index) => self.blocks[index].1.curves[k],
             Err(0) => NOTHING,
-            Err(place) => self.blocks[place - 1].1.curves.last().copied().unwrap_or(NOTHING),
+            Err(index) => self.blocks[index - 1].1.curves.last().copied().unwrap_or(NOTHING),
         }
     }
 
@@ -376,8 +376,8 @@ impl TimeColumns {
     pub fn first_touch(&self) -> Option<i64> {
         let mut sums: Vec<u32> = self.stored().map(|(_, curve)| curve.sum).collect();
         let most = *sums.iter().max()?;
-        let place = sums.len() / QUIET_SHARE;
-        let (_, &mut quiet, _) = sums.select_nth_unstable(place);
+        let rank = sums.len() / QUIET_SHARE;
+        let (_, &mut quiet, _) = sums.select_nth_unstable(rank);
         let least = quiet + ((most - quiet) / TOUCH_SHARE).max(1);
         let touch =
             self.stored().skip_while(|(_, curve)| curve.sum < least).take_while(|(_, curve)| curve.sum >= least);
@@ -395,8 +395,8 @@ impl TimeColumns {
             let within = |column: i64| usize::try_from((column - key * BLOCK).clamp(0, BLOCK)).unwrap_or(0);
             let rows = self.shape.rows;
             let cells = &block.raster[within(columns.start) * rows..within(columns.end) * rows];
-            for (place, cell) in cells.iter().enumerate().filter(|(_, cell)| **cell > 0) {
-                let sum = &mut out[place % rows];
+            for (n, cell) in cells.iter().enumerate().filter(|(_, cell)| **cell > 0) {
+                let sum = &mut out[n % rows];
                 let (ups, downs) = ((*sum & 15) + (cell & 15), (*sum >> 4) + (cell >> 4));
                 *sum = ups.min(15) | downs.min(15) << 4;
             }

@@ -4,7 +4,7 @@ import { Connection } from "./connection.js";
 import { entitle, make, part, write } from "./dom.js";
 import { FIELDS, PRESETS, refused, warned } from "./registers.js";
 import { RefusedError } from "./server.js";
-import { whole } from "./words.js";
+import { integer } from "./words.js";
 
 /** @typedef {import("./registers.js").Field} Field */
 /** @typedef {import("./messages.js").Registers} RegistersMessage */
@@ -49,7 +49,7 @@ class Control {
     this.held = Number(field.default);
     /** @type {number | null} typed and not held by the board */
     this.wanted = null;
-    this.unit = field.unit === "10 ns" ? { name: "µs", spoken: "microseconds", per: 100, places: 2 } : { name: field.unit, spoken: field.unit, per: 1, places: 0 };
+    this.unit = field.unit === "10 ns" ? { name: "µs", spoken: "microseconds", per: 100, decimals: 2 } : { name: field.unit, spoken: field.unit, per: 1, decimals: 0 };
     const id = `register-${field.name}`;
     const label = make("label", { for: id, title: `${field.name} (${field.manual}): ${field.text}` }, SPOKEN[field.name] ?? field.name);
     this.reason = make("p", { class: "reason", id: `${id}-reason`, role: "alert", hidden: true });
@@ -109,16 +109,16 @@ class Control {
     if (notify) this.notify();
   }
 
-  /** @param {number} place of the slider @returns {number} even steps in ratio, as what is sensible spans decades */
-  valueAt(place) {
+  /** @param {number} position of the slider @returns {number} even steps in ratio, as what is sensible spans decades */
+  valueAt(position) {
     const { least } = this.field;
     const low = Math.max(1, least);
-    if (this.field.bits <= 8) return Math.round(least + (place / SLIDER) * (this.top - least));
-    return Math.round(low * (this.top / low) ** (place / SLIDER));
+    if (this.field.bits <= 8) return Math.round(least + (position / SLIDER) * (this.top - least));
+    return Math.round(low * (this.top / low) ** (position / SLIDER));
   }
 
-  /** @param {number} value @returns {number} the slider's place */
-  place(value) {
+  /** @param {number} value @returns {number} the slider's position */
+  positionOf(value) {
     const { least } = this.field;
     const low = Math.max(1, least);
     const share = this.field.bits <= 8 ? (value - least) / (this.top - least) : Math.log(Math.max(low, value) / low) / Math.log(this.top / low);
@@ -127,14 +127,14 @@ class Control {
 
   /** @param {number} value */
   text(value) {
-    return (value / this.unit.per).toFixed(this.unit.places);
+    return (value / this.unit.per).toFixed(this.unit.decimals);
   }
 
-  /** @param {number} held by the board */
-  take(held) {
-    if (this.wanted === held) this.wanted = null;
-    const same = this.held === held;
-    this.held = held;
+  /** @param {number} value that the board holds */
+  take(value) {
+    if (this.wanted === value) this.wanted = null;
+    const same = this.held === value;
+    this.held = value;
     // Text that is being typed stays.
     if (this.wanted === null && !(same && document.activeElement === this.input)) this.show();
   }
@@ -163,7 +163,7 @@ class Control {
   /** @param {number} value */
   slide(value) {
     if (!this.slider || Number.isNaN(value)) return;
-    this.slider.value = String(this.place(value));
+    this.slider.value = String(this.positionOf(value));
     this.slider.setAttribute("aria-valuetext", `${this.text(value)} ${this.unit.spoken}`);
   }
 
@@ -268,7 +268,7 @@ export class Board {
     for (const [name, control] of this.controls) if (this.values[name] !== undefined) control.take(this.values[name]);
     this.preset = preset;
     this.showPresets();
-    const rate = frame_us ? `${whole(1e6 / frame_us)} frames/s, a frame takes ${frame_us.toFixed(1)} µs` : "";
+    const rate = frame_us ? `${integer(1e6 / frame_us)} frames/s, a frame takes ${frame_us.toFixed(1)} µs` : "";
     const unread = "the registers have not been read";
     write(part("frame-rate", HTMLElement), known ? rate : stated ? `${rate} (as stated at the start; ${unread})` : `Frame rate not known: ${unread}.`);
     this.warn();
@@ -322,9 +322,9 @@ export class Board {
 
   warn() {
     const warnings = Object.keys(this.values).length ? warned(this.wanted()).map(({ text }) => text) : [];
-    const place = part("registers-warning", HTMLElement);
-    place.hidden = !warnings.length;
-    write(place, warnings.join(". "));
+    const warning = part("registers-warning", HTMLElement);
+    warning.hidden = !warnings.length;
+    write(warning, warnings.join(". "));
   }
 
   /** Looks again at what is typed and was refused: a change elsewhere may have made it good. */
@@ -337,8 +337,8 @@ export class Board {
     const broken = refused(this.wanted());
     for (const control of waiting) {
       const { name } = control.field;
-      const mine = broken.find(({ text }) => new RegExp(`\\b${name}\\b`).test(text)) ?? (waiting.length === 1 ? broken[0] : undefined);
-      control.refuse(mine?.text ?? null);
+      const fault = broken.find(({ text }) => new RegExp(`\\b${name}\\b`).test(text)) ?? (waiting.length === 1 ? broken[0] : undefined);
+      control.refuse(fault?.text ?? null);
     }
     return !broken.length;
   }

@@ -9,17 +9,17 @@ import { rounded } from "./words.js";
 const LEAST = 8;
 /** Room between two curves, CSS pixels. */
 const GAP = 2;
-/** So many names have room beside their curves. */
+/** How many names have room beside their curves. */
 const NAMED = 8;
 
 /** The canvas of the curves; all have one scale, so that they can be compared. */
 export class Channels {
-  /** @param {HTMLElement} place */
-  constructor(place) {
-    this.place = place;
+  /** @param {HTMLElement} element */
+  constructor(element) {
+    this.element = element;
     this.names = make("span", { id: "channel-names", class: "rows", "aria-hidden": "true" });
     this.canvas = make("canvas", { id: "channels" });
-    place.append(this.names, this.canvas);
+    element.append(this.names, this.canvas);
     this.context = ground(this.canvas);
     /** The sensor whose channels are named. @type {import("./geometry.js").Geometry | null} */
     this.sensor = null;
@@ -28,14 +28,14 @@ export class Channels {
   /**
    * Names the sources that stand one above the other; else the channels, or only the first and the last without names or of many.
    * @param {import("./geometry.js").Geometry} sensor
-   * @param {number[]} places
+   * @param {number[]} taxels
    */
-  name(sensor, places) {
+  name(sensor, taxels) {
     const { array, sources } = sensor;
     this.sensor = sensor;
-    this.place.parentElement?.style.setProperty("--count", String(places.length));
-    const all = array.names !== undefined && places.length <= NAMED;
-    const shown = (all ? places : [places[0], places[places.length - 1]]).map((k) => array.names?.[k] || String(k));
+    this.element.parentElement?.style.setProperty("--count", String(taxels.length));
+    const all = array.names !== undefined && taxels.length <= NAMED;
+    const shown = (all ? taxels : [taxels[0], taxels[taxels.length - 1]]).map((k) => array.names?.[k] || String(k));
     const several = sources.length > 1;
     this.names.classList.toggle("several", several || all);
     this.names.replaceChildren(...(several ? sources.map(({ name }) => name) : shown).map((name) => make("span", { title: name }, name)));
@@ -48,9 +48,9 @@ export class Channels {
    */
   draw(timeline, { sensor, taxel, values }) {
     if (sensor.kind !== "channels") return "";
-    const places = sensor.existing;
+    const taxels = sensor.existing;
     const watched = taxel && Math.max(...taxel);
-    if (this.sensor !== sensor) this.name(sensor, places);
+    if (this.sensor !== sensor) this.name(sensor, taxels);
     const { width, height, ratio } = fitted(this.canvas);
     const { context } = this;
     const { columns, window, column_us, span_us, channels, channel_count: all } = timeline;
@@ -61,11 +61,11 @@ export class Channels {
     // A column more on the left, so that curves begin at the edge.
     const shown = Array.from({ length: last - first + 2 }, (_, i) => timeline.known(first - 1 + i));
     let most = LEAST;
-    for (const place of shown) if (place >= 0) for (const channel of places) most = Math.max(most, channels[place * all + channel]);
-    const high = height / places.length;
+    for (const column of shown) if (column >= 0) for (const channel of taxels) most = Math.max(most, channels[column * all + channel]);
+    const high = height / taxels.length;
     const [line, chosen, grid] = ["more", "less", "grid"].map(themed);
     context.lineWidth = 1.25;
-    places.forEach((channel, k) => {
+    taxels.forEach((channel, k) => {
       const floor = (k + 1) * high - 0.5;
       context.fillStyle = grid;
       context.fillRect(0, floor, width, 0.5);
@@ -79,11 +79,11 @@ export class Channels {
         area.lineTo(from, floor);
         from = NaN;
       };
-      shown.forEach((place, i) => {
-        if (place < 0) return end();
+      shown.forEach((column, i) => {
+        if (column < 0) return end();
         // A curve has the value at the end of its column.
         x = (((first + i) * column_us - window[0]) / span_us) * width;
-        const y = floor - (channels[place * all + channel] / most) * (high - GAP);
+        const y = floor - (channels[column * all + channel] / most) * (high - GAP);
         if (Number.isNaN(from)) {
           from = x;
           curve.moveTo(x, y);

@@ -54,9 +54,9 @@ export const UNKNOWN = {
  * @returns {Colour}
  */
 function mixed(knots, at) {
-  const place = Math.min(1, Math.max(0, at)) * (knots.length - 1);
-  const low = Math.min(knots.length - 2, Math.floor(place));
-  const share = place - low;
+  const position = Math.min(1, Math.max(0, at)) * (knots.length - 1);
+  const low = Math.min(knots.length - 2, Math.floor(position));
+  const share = position - low;
   const [a, b] = [knots[low], knots[low + 1]];
   const channel = (/** @type {0 | 1 | 2} */ i) => Math.round(a[i] + (b[i] - a[i]) * share);
   return [channel(0), channel(1), channel(2)];

@@ -13,8 +13,8 @@ const at = (t_us) => (timeUnit() === "seconds" ? `${listedTime(t_us)} s` : secon
 
 /** @param {ConflictRow} row @returns {string} */
 function described({ label, t_us, source, trial, replaces_us }) {
-  const what = label ? `${label}, ${at(t_us)}` : `no label for the note at ${at(replaces_us ?? t_us)}`;
-  return [what, source, trial].filter(Boolean).join(", ");
+  const labelAndTime = label ? `${label}, ${at(t_us)}` : `no label for the note at ${at(replaces_us ?? t_us)}`;
+  return [labelAndTime, source, trial].filter(Boolean).join(", ");
 }
 
 /** The block above the list of labels, while there is a conflict. */
@@ -57,8 +57,8 @@ export class LabelConflict {
     const were = (/** @type {number} */ count) => (count === 1 ? "was" : "were");
     const lacks = missing.length ? `lacks ${counted(missing.length, "label")} that ${were(missing.length)} set on the page` : "";
     const again = returned.length ? `has ${counted(returned.length, "label")} again that ${were(returned.length)} deleted or changed on the page` : "";
-    const what = `Another program saved ${message.path}: it ${[lacks, again].filter(Boolean).join(", and ")}.`;
-    write(part("conflict-text", HTMLElement), `${what} Choose which version counts.${added.length ? " New labels of the file stay in both." : ""}`);
+    const change = `Another program saved ${message.path}: it ${[lacks, again].filter(Boolean).join(", and ")}.`;
+    write(part("conflict-text", HTMLElement), `${change} Choose which version counts.${added.length ? " New labels of the file stay in both." : ""}`);
     const line = (/** @type {string} */ acknowledged, /** @type {string} */ file, /** @type {string} */ kind) =>
       make("tr", { class: kind }, make("td", {}, acknowledged), make("td", {}, file));
     part("conflict-rows", HTMLElement).replaceChildren(
@@ -66,8 +66,8 @@ export class LabelConflict {
       ...returned.map((row) => line("deleted or changed", described(row), "returned")),
       ...added.map((row) => line("–", `${described(row)} (new)`, "new")),
     );
-    this.notice = what;
-    notify(what, true, { text: "Look", action: () => this.look() });
+    this.notice = change;
+    notify(change, true, { text: "Look", action: () => this.look() });
   }
 
   /** Brings the block to the front. */

@@ -7,19 +7,19 @@ import { make, part, write } from "./dom.js";
 /** @typedef {import("./messages.js").Port} Port */
 /** @typedef {import("./server.js").Server} Server */
 /** @typedef {import("./settings.js").Settings} Settings */
-/** @typedef {{ label: string, places: { place: string, text: string }[] }} Group */
+/** @typedef {{ label: string, choices: { address: string, text: string }[] }} Group */
 
-/** Places of a kind that the browser remembers. */
-const REMEMBERED = 8;
+/** How many addresses of each kind the browser stores. */
+const STORED = 8;
 const MOST_LINES = 200;
 
-/** A place to choose from a list, or to type, and to connect to. */
-class PlaceForm {
+/** An address to choose from a list, or to type, and to connect to: a serial port, or host and port. */
+class AddressForm {
   /**
    * @param {"control" | "udp"} name of its parts in the page
-   * @param {"lines" | "addresses"} setting the setting that remembers earlier places
+   * @param {"lines" | "addresses"} setting the setting that stores earlier addresses
    * @param {Settings} settings
-   * @param {(place: string) => Promise<void>} connect
+   * @param {(address: string) => Promise<void>} connect
    */
   constructor(name, setting, settings, connect) {
     this.setting = setting;
@@ -36,10 +36,10 @@ class PlaceForm {
     };
     part(`${name}-form`, HTMLFormElement).onsubmit = (event) => {
       event.preventDefault();
-      const place = this.input.value.trim();
-      connect(place).then(() => {
+      const address = this.input.value.trim();
+      connect(address).then(() => {
         this.refuse(null);
-        this.remember(place);
+        this.remember(address);
       }, (error) => this.refuse(error.message));
     };
   }
@@ -51,10 +51,10 @@ class PlaceForm {
     write(this.why, reason ?? "");
   }
 
-  /** @param {string} place */
-  remember(place) {
-    const before = this.before.filter((earlier) => earlier !== place);
-    this.settings.set(this.setting, [place, ...before].slice(0, REMEMBERED).join("\n"));
+  /** @param {string} address */
+  remember(address) {
+    const before = this.before.filter((earlier) => earlier !== address);
+    this.settings.set(this.setting, [address, ...before].slice(0, STORED).join("\n"));
     this.show();
   }
 
@@ -70,21 +70,21 @@ class PlaceForm {
   }
 
   show() {
-    const found = this.groups.flatMap(({ places }) => places.map(({ place }) => place));
-    const before = this.before.filter((place) => !found.includes(place));
-    const groups = [...this.groups, { label: "Used before", places: before.map((place) => ({ place, text: place })) }];
+    const found = this.groups.flatMap(({ choices }) => choices.map(({ address }) => address));
+    const before = this.before.filter((earlier) => !found.includes(earlier));
+    const groups = [...this.groups, { label: "Used before", choices: before.map((address) => ({ address, text: address })) }];
     const options = groups
-      .filter(({ places }) => places.length)
-      .map(({ label, places }) => make("optgroup", { label }, ...places.map(({ place, text }) => make("option", { value: place }, text))));
+      .filter(({ choices }) => choices.length)
+      .map(({ label, choices }) => make("optgroup", { label }, ...choices.map(({ address, text }) => make("option", { value: address }, text))));
     const first = options.length ? "choose or type" : this.none;
     this.choice.replaceChildren(make("option", { value: "" }, first), ...options);
     this.choice.value = [...this.choice.options].some(({ value }) => value === this.input.value) ? this.input.value : "";
   }
 
-  /** @param {string | null} place where it is now */
-  at(place) {
+  /** @param {string | null} address where it is now */
+  at(address) {
     // Text that is being typed stays, and so does a refused address.
-    if (document.activeElement !== this.input && (place !== null || this.why.hidden)) this.input.value = place ?? "";
+    if (document.activeElement !== this.input && (address !== null || this.why.hidden)) this.input.value = address ?? "";
     this.show();
   }
 }
@@ -99,9 +99,9 @@ export class Connection {
   constructor(server, settings, failed) {
     this.server = server;
     this.udp = "";
-    this.line = new PlaceForm("control", "lines", settings, (place) => server.request({ type: "control", place: place || null }));
-    this.events = new PlaceForm("udp", "addresses", settings, (place) => {
-      const [host, port] = address(place);
+    this.line = new AddressForm("control", "lines", settings, (line) => server.request({ type: "control", place: line || null }));
+    this.events = new AddressForm("udp", "addresses", settings, (address) => {
+      const [host, port] = hostAndPort(address);
       return server.request({ type: "listen", host, port });
     });
     const drop = part("control-drop", HTMLButtonElement);
@@ -141,12 +141,12 @@ export class Connection {
 
   /** @param {Places} places */
   offer({ serial, addresses }) {
-    const ports = serial.map((port) => ({ place: port.place, text: [port.place, described(port)].filter(Boolean).join(" · ") }));
-    this.line.offer([{ label: "Serial ports", places: ports }], "no serial port found: type a place below");
-    const port = address(this.udp)[1] || 5208;
-    const each = addresses.map(({ host, name }) => ({ place: `${host}:${port}`, text: `${host}:${port} · ${name}` }));
-    const every = { place: `0.0.0.0:${port}`, text: `0.0.0.0:${port} · every address` };
-    this.events.offer([{ label: "This machine", places: [every, ...each] }], "type an address below");
+    const ports = serial.map((port) => ({ address: port.place, text: [port.place, described(port)].filter(Boolean).join(" · ") }));
+    this.line.offer([{ label: "Serial ports", choices: ports }], "no serial port found: type a place below");
+    const port = hostAndPort(this.udp)[1] || 5208;
+    const each = addresses.map(({ host, name }) => ({ address: `${host}:${port}`, text: `${host}:${port} · ${name}` }));
+    const all = { address: `0.0.0.0:${port}`, text: `0.0.0.0:${port} · every address` };
+    this.events.offer([{ label: "This machine", choices: [all, ...each] }], "type an address below");
   }
 
   /** @param {string} text a line from the board */
@@ -165,7 +165,7 @@ function described({ kind, product, maker, serial }) {
 }
 
 /** @param {string} text @returns {[string, number]} host and port; an address in brackets may hold colons */
-function address(text) {
+function hostAndPort(text) {
   const at = text.trim().lastIndexOf(":");
   const host = at < 0 ? "" : text.trim().slice(0, at).replace(/^\[|\]$/g, "");
   return [host || "127.0.0.1", Number(text.trim().slice(at + 1))];

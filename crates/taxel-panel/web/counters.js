@@ -1,7 +1,7 @@
 // The counters in the header, and the losses by place.
 
 import { entitle, make, part, write } from "./dom.js";
-import { short, whole } from "./words.js";
+import { short, integer } from "./words.js";
 
 /** @typedef {import("./messages.js").Counters} CountersMessage */
 /** @typedef {import("./messages.js").Pace} Pace */
@@ -28,28 +28,28 @@ export function writeCounters(counters, drawn) {
   put("drawn", String(drawn));
   if (!counters) return;
   const { lost, latency } = counters;
-  put("events", number(counters.events_per_s, whole));
+  put("events", number(counters.events_per_s, integer));
   put("data", number(counters.bytes_per_s, (bytes) => (bytes / 1e6).toFixed(2)));
   // The rate follows from the registers, so it says nothing of a board that is off.
   const arrives = counters.arrival.state === "arriving";
-  put("frames", number(arrives ? counters.frames_per_s : null, whole));
-  entitle(part("frames", HTMLElement), "title", counters.frames_per_s === null ? "not known: give --rate-hz and --bits, or --preset, or connect the control line" : arrives ? "" : `nothing arrives; the registers say ${whole(counters.frames_per_s)}/s`);
+  put("frames", number(arrives ? counters.frames_per_s : null, integer));
+  entitle(part("frames", HTMLElement), "title", counters.frames_per_s === null ? "not known: give --rate-hz and --bits, or --preset, or connect the control line" : arrives ? "" : `nothing arrives; the registers say ${integer(counters.frames_per_s)}/s`);
   // Events that only the panel lacks are in every recording and in the readout.
-  const all = Object.entries(lost).reduce((sum, [place, count]) => sum + (place === "panel" ? 0 : count), 0);
-  put("lost", whole(all));
+  const all = Object.entries(lost).reduce((sum, [stage, count]) => sum + (stage === "panel" ? 0 : count), 0);
+  put("lost", integer(all));
   part("lost-block", HTMLElement).classList.toggle("bad", all > 0);
-  put("queue", number(counters.queue, whole));
+  put("queue", number(counters.queue, integer));
   // The latency of detections, where there are any; else that of decoding.
   const shown = latency.report?.count ? latency.report : latency.decode;
-  put("latency", shown && shown.p50_us !== null && shown.p99_us !== null ? `${whole(shown.p50_us)} / ${whole(shown.p99_us)}` : "–");
-  const places = part("loss-list", HTMLElement);
-  for (const [place, count] of Object.entries(lost)) {
-    let row = places.querySelector(`[data-place="${CSS.escape(place)}"]`);
+  put("latency", shown && shown.p50_us !== null && shown.p99_us !== null ? `${integer(shown.p50_us)} / ${integer(shown.p99_us)}` : "–");
+  const list = part("loss-list", HTMLElement);
+  for (const [stage, count] of Object.entries(lost)) {
+    let row = list.querySelector(`[data-place="${CSS.escape(stage)}"]`);
     if (!row) {
-      row = make("tr", { "data-place": place }, make("th", { scope: "row", title: LOSSES[place] ?? "" }, place), make("td"));
-      places.append(row);
+      row = make("tr", { "data-place": stage }, make("th", { scope: "row", title: LOSSES[stage] ?? "" }, stage), make("td"));
+      list.append(row);
     }
-    write(/** @type {Element} */ (row.lastElementChild), whole(count));
+    write(/** @type {Element} */ (row.lastElementChild), integer(count));
   }
   put("reach", counters.reach_us ? `the last ${((counters.reach_us[1] - counters.reach_us[0]) / 1e6).toFixed(0)} s can be viewed` : "");
   put("wire", counters.wire_version ? `wire version ${counters.wire_version}` : "");

@@ -41,8 +41,8 @@ export class Cursor {
     lanes.addEventListener("pointerleave", () => point(null));
     lanes.addEventListener("wheel", (event) => this.turn(event), { passive: false });
     lanes.addEventListener("pointerdown", (event) => {
-      const mine = event.button === 0 && event.target instanceof Element && !event.target.closest(NOT_TIME);
-      this.press = mine ? { x: event.clientX, drags: false } : null;
+      const onTime = event.button === 0 && event.target instanceof Element && !event.target.closest(NOT_TIME);
+      this.press = onTime ? { x: event.clientX, drags: false } : null;
     });
     lanes.addEventListener("pointerup", (event) => {
       const { press } = this;
@@ -99,15 +99,15 @@ export class Cursor {
   /** Draws the lines at the cursor and at the time shown. */
   draw() {
     const timeline = this.timeline();
-    const place = (/** @type {HTMLElement} */ line, /** @type {number | null} */ t_us) => {
+    const moveTo = (/** @type {HTMLElement} */ line, /** @type {number | null} */ t_us) => {
       const share = t_us === null ? null : (timeline?.share(t_us) ?? null);
       line.hidden = share === null;
       if (share !== null) line.style.left = `${(100 * share).toFixed(3)}%`;
     };
     const cursor = timeline?.cursor_us ?? null;
-    place(part("cursor-line", HTMLElement), cursor);
+    moveTo(part("cursor-line", HTMLElement), cursor);
     write(part("cursor-time", HTMLElement), cursor === null ? "" : seconds(cursor));
     const t_us = timeline?.t_us ?? null;
-    place(part("time-line", HTMLElement), timeline?.following ? null : t_us);
+    moveTo(part("time-line", HTMLElement), timeline?.following ? null : t_us);
   }
 }

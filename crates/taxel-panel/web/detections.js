@@ -1,7 +1,7 @@
 // Detections: the list beside the views, and the marks over the lanes.
 
 import { entitle, make, part, write } from "./dom.js";
-import { seconds, short, whole } from "./words.js";
+import { seconds, short, integer } from "./words.js";
 
 /** @typedef {{ label: string, t_us: number, latency_us: number | null }} Detection */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
@@ -40,7 +40,7 @@ export class Detections {
   show(detections, none, labels) {
     this.shown = detections;
     this.labels = labels;
-    write(part("detection-count", HTMLElement), detections.length ? `${whole(detections.length)}${detections.length > LISTED ? `, ${LISTED} listed` : ""}` : "");
+    write(part("detection-count", HTMLElement), detections.length ? `${integer(detections.length)}${detections.length > LISTED ? `, ${LISTED} listed` : ""}` : "");
     const empty = part("detections-none", HTMLElement);
     empty.hidden = detections.length > 0;
     write(empty, none);

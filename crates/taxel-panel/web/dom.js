@@ -40,14 +40,14 @@ export function part(id, kind) {
  * @returns {HTMLElementTagNameMap[T]}
  */
 export function make(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
+  const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
     // A value is sent back to the server, and stays as it is.
     const text = name === "value" ? String(value) : escaped(String(value));
-    if (value !== false) made.setAttribute(name, value === true ? "" : text);
+    if (value !== false) element.setAttribute(name, value === true ? "" : text);
   }
-  made.append(...children.map((child) => (typeof child === "string" ? escaped(child) : child)));
-  return made;
+  element.append(...children.map((child) => (typeof child === "string" ? escaped(child) : child)));
+  return element;
 }
 
 /**

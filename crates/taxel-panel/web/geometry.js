@@ -10,7 +10,7 @@ import { counted, rounded } from "./words.js";
 /** @typedef {{ words: Uint32Array, levels: Float32Array, ground: string, edge: string }} Colours by taxel a pixel, and its height from 0 to 1;
  *   the colours of the sensor's ground and of its edge */
 
-/** Of a sensor with places, room around the outermost ones, in the distance between neighbours. */
+/** Room around the outermost places of a sensor, in the distance between neighbours. */
 const MARGIN = 0.75;
 /** Size of a place's dot in the distance between neighbours. */
 const DOT = 0.62;
@@ -55,8 +55,8 @@ class Sensor {
    * @returns {Taxel} the taxel as far away, or the nearest one beyond places without a taxel; where there is none, the one it is from
    */
   moved([x, y], [dx, dy]) {
-    const held = (/** @type {number} */ at, /** @type {number} */ count) => Math.max(0, Math.min(count - 1, at));
-    let [column, row] = [held(x + dx, this.columns), held(y + dy, this.rows)];
+    const within = (/** @type {number} */ at, /** @type {number} */ count) => Math.max(0, Math.min(count - 1, at));
+    let [column, row] = [within(x + dx, this.columns), within(y + dy, this.rows)];
     const [stepX, stepY] = [Math.sign(dx), Math.sign(dy)];
     while (column >= 0 && row >= 0 && column < this.columns && row < this.rows) {
       if (this.has(column, row)) return [column, row];

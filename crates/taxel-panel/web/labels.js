@@ -55,7 +55,7 @@ export class Labels {
     this.chosen = null;
     /** The name that was marked by the last click. */
     this.clicked = "";
-    /** A click without a name: it is marked as soon as there is one. @type {number | null} */
+    /** Time of a click that was made before a label name was typed; the label is set when there is a name. @type {number | null} */
     this.waiting_us = null;
     /** The one being dragged, and where to. @type {{ label_id: number, t_us: number } | null} */
     this.dragged = null;
@@ -79,7 +79,7 @@ export class Labels {
       if (this.waiting_us === null) this.markHere();
       else this.mark(this.waiting_us);
     };
-    new ResizeObserver(() => this.place()).observe(this.lane);
+    new ResizeObserver(() => this.arrange()).observe(this.lane);
   }
 
   /** @returns {Label[]} of the recording or the trial shown, by time */
@@ -228,7 +228,7 @@ export class Labels {
       if (edited && focused instanceof HTMLElement) focused.focus();
     }
     for (const row of rows) row.classList.toggle("chosen", row.dataset.id === String(this.chosen));
-    this.place();
+    this.arrange();
   }
 
   /** Says where the labels are saved, or that they are being saved. */
@@ -244,9 +244,9 @@ export class Labels {
     const time = make("input", { type: "text", inputmode: "decimal", value: listedTime(t_us), "aria-label": `time of ${label}, ${timeUnit()}` });
     const go = make("button", { type: "button", class: "small", "aria-label": `go to ${label}, ${seconds(t_us)}` }, "Go");
     const away = make("button", { type: "button", class: "small", "aria-label": `delete ${label}, ${seconds(t_us)}` }, "×");
-    // Of a label whose time was just typed the row is an older one.
-    const held = () => this.labels.find((known) => known.label_id === label_id) ?? { label, t_us };
-    const [heldName, heldTime] = [() => held().label, () => listedTime(held().t_us)];
+    // The row is older than a label whose time was just typed.
+    const stored = () => this.labels.find((known) => known.label_id === label_id) ?? { label, t_us };
+    const [heldName, heldTime] = [() => stored().label, () => listedTime(stored().t_us)];
     name.onchange = () => this.change(name, { type: "rename", label_id, label: name.value.trim() }, heldName);
     time.onchange = () => {
       const wanted = readTime(time.value);
@@ -255,7 +255,7 @@ export class Labels {
     };
     go.onclick = () => {
       this.chosen = label_id;
-      this.player.seek(held().t_us);
+      this.player.seek(stored().t_us);
       this.show();
     };
     away.onclick = () => this.remove(label_id);
@@ -264,14 +264,14 @@ export class Labels {
     return row;
   }
 
-  /** Asks for what was typed. @param {HTMLInputElement} input @param {import("./messages.js").MoveRequest | import("./messages.js").RenameRequest} message @param {() => string} held */
-  async change(input, message, held) {
+  /** Asks for what was typed. @param {HTMLInputElement} input @param {import("./messages.js").MoveRequest | import("./messages.js").RenameRequest} message @param {() => string} stored */
+  async change(input, message, stored) {
     try {
       await this.save(message);
       if (input.hasAttribute("aria-invalid")) silence();
-      this.holds(input, held());
+      this.holds(input, stored());
     } catch (error) {
-      this.refused(input, held, error);
+      this.refused(input, stored, error);
     }
   }
 
@@ -282,19 +282,19 @@ export class Labels {
     input.onkeydown = null;
   }
 
-  /** @param {HTMLInputElement} input @param {() => string} held what the label holds @param {unknown} error */
-  refused(input, held, error) {
+  /** @param {HTMLInputElement} input @param {() => string} stored what the label holds @param {unknown} error */
+  refused(input, stored, error) {
     this.failed(error);
     input.setAttribute("aria-invalid", "true");
     input.onkeydown = (event) => {
       if (event.key !== "Escape") return;
-      this.holds(input, held());
+      this.holds(input, stored());
       event.stopPropagation();
     };
   }
 
   /** Puts each flag in the window where its time is; its handle on the first level where it covers no other. */
-  place() {
+  arrange() {
     const timeline = this.timeline();
     const { clientWidth } = this.lane;
     const seen = new Set();
@@ -340,13 +340,13 @@ export class Labels {
   /** @param {number} label_id @returns {HTMLButtonElement} */
   flag(label_id) {
     const flag = make("button", { type: "button", class: "flag" }, make("i"), make("span"));
-    const mine = () => this.labels.find((label) => label.label_id === label_id);
+    const current = () => this.labels.find((label) => label.label_id === label_id);
     let from = 0;
     // The pointer holds the handle, which stands beside the label's time.
     let beside_us = 0;
     flag.addEventListener("pointerdown", (event) => {
       from = event.clientX;
-      beside_us = (mine()?.t_us ?? 0) - (this.timeAt(from) ?? 0);
+      beside_us = (current()?.t_us ?? 0) - (this.timeAt(from) ?? 0);
       flag.setPointerCapture(event.pointerId);
     });
     flag.addEventListener("pointermove", (event) => {
@@ -355,7 +355,7 @@ export class Labels {
       const t_us = this.timeAt(event.clientX);
       if (t_us === null) return;
       this.dragged = { label_id, t_us: t_us + beside_us };
-      this.place();
+      this.arrange();
     });
     flag.addEventListener("pointerup", () => {
       const { dragged } = this;
@@ -367,19 +367,19 @@ export class Labels {
     });
     flag.addEventListener("pointercancel", () => {
       this.dragged = null;
-      this.place();
+      this.arrange();
     });
     flag.addEventListener("focus", () => {
       this.chosen = label_id;
       this.show();
     });
     flag.addEventListener("keydown", (event) => {
-      const label = mine();
+      const label = current();
       if (event.key === "Escape" && this.dragged) {
         // The press goes on, but moves nothing.
         this.dragged = null;
         from = NaN;
-        return this.place();
+        return this.arrange();
       }
       if (!label || event.ctrlKey || event.altKey || event.metaKey) return;
       const far = event.shiftKey ? 100 * STEP_US : STEP_US;

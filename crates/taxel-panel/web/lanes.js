@@ -1,4 +1,4 @@
-// The lanes, one above the other: all share one time. A new lane is an entry of LANES and what draws it: the block on the page, its place, its
+// The lanes, one above the other: all share one time. A new lane is an entry of LANES and what draws it: the block on the page, its element, its
 // box in the tab of the view, what the cursor says and what a saved picture contains come from the entry.
 
 import { Channels } from "./channels.js";
@@ -6,7 +6,7 @@ import { make, part, themed, write } from "./dom.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
 import { Raster } from "./raster.js";
 import uPlot from "./vendor/uPlot.js";
-import { rounded, whole } from "./words.js";
+import { rounded, integer } from "./words.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 /** @typedef {{ draw: (timeline: Timeline, shown: Shown) => string, colour?: () => void }} Painter `draw` returns what the heading says;
@@ -31,23 +31,23 @@ import { rounded, whole } from "./words.js";
  * @property {string} name of its elements: `NAME-block` with a heading, and `NAME-lane`
  * @property {string} label what it is, for those who hear the page
  * @property {number} least height that it needs with its heading, CSS pixels
- * @property {string} [kind] class of its place in style.css
+ * @property {string} [kind] class of its block and of its element in style.css
  * @property {`show${string}`} setting that shows it
  * @property {string} [box] text of the setting's box; without one it shares the box of another lane
  * @property {(shown: Shown) => boolean} [fits] whether it has anything to show of this source; without it: of all
  * @property {(shown: Shown, sources: string[]) => (Node | string)[]} heading
  * @property {(shown: Shown, said: string) => string} title in a saved picture; said: by its heading
  * @property {(shown: () => Shown, sources: string[]) => Plan} [plan]
- * @property {(shown: Shown, timeline: Timeline, place: number) => (number | null)[]} [at] values of all curves in a column
- * @property {(shown: Shown, timeline: Timeline, place: number) => string[]} [says] texts of the outputs in its heading, of a column
- * @property {(place: HTMLElement) => Painter} [painter]
+ * @property {(shown: Shown, timeline: Timeline, column: number) => (number | null)[]} [at] values of all curves in a column
+ * @property {(shown: Shown, timeline: Timeline, column: number) => string[]} [says] texts of the outputs in its heading, of a column
+ * @property {(element: HTMLElement) => Painter} [painter]
  */
 
 /** Room for the numbers on either side, CSS pixels; the raster has the same. */
 const SIDE = 44;
 /** CSS pixels between two lines of the grid. */
 const GRID_PX = 96;
-/** Of so many channels at most each has a curve. */
+/** Up to this many channels have a curve each. */
 const MOST_CHANNELS = 64;
 /** Colours of the sums of several sources, by their names in style.css. */
 const COLOURS = ["more", "less", "label", "good"];
@@ -78,17 +78,17 @@ const fromZero = (least) => (_, __, greatest) => [0, Math.max(least(), (greatest
 /** @param {string[]} sources @returns {string[]} the colour of each, or of one curve for all */
 const coloured = (sources) => (sources.length ? COLOURS.slice(0, sources.length) : COLOURS.slice(0, 1)).map(themed);
 
-/** @param {Shown} shown @param {Timeline} timeline @param {number} place @returns {string[]} the sum, of several sources of each */
-const sumsAt = ({ sums: { unit, step } }, timeline, place) =>
-  timeline.sums(place).map((sum) => (Number.isNaN(sum) ? "missing" : `${step === 1 ? whole(sum) : rounded(sum * step)} ${unit}`));
+/** @param {Shown} shown @param {Timeline} timeline @param {number} column @returns {string[]} the sum, of several sources of each */
+const sumsAt = ({ sums: { unit, step } }, timeline, column) =>
+  timeline.sums(column).map((sum) => (Number.isNaN(sum) ? "missing" : `${step === 1 ? integer(sum) : rounded(sum * step)} ${unit}`));
 
-/** @param {Shown} shown @param {Timeline} timeline @param {number} place @returns {string} the number of taxels that are pressed */
-const areaAt = ({ sensor }, timeline, place) => (Number.isNaN(timeline.area[place]) ? "" : sensor.area(timeline.area[place]));
+/** @param {Shown} shown @param {Timeline} timeline @param {number} column @returns {string} the number of taxels that are pressed */
+const areaAt = ({ sensor }, timeline, column) => (Number.isNaN(timeline.area[column]) ? "" : sensor.area(timeline.area[column]));
 
-/** @param {Shown} shown @param {Timeline} timeline @param {number} place @returns {string} the centre of pressure, of several sources of each that is pressed */
-function centreAt({ sensor }, timeline, place) {
-  const [first, ...others] = timeline.centres(place);
-  if (sensor.kind === "channels" || Number.isNaN(timeline.sum[place])) return "";
+/** @param {Shown} shown @param {Timeline} timeline @param {number} column @returns {string} the centre of pressure, of several sources of each that is pressed */
+function centreAt({ sensor }, timeline, column) {
+  const [first, ...others] = timeline.centres(column);
+  if (sensor.kind === "channels" || Number.isNaN(timeline.sum[column])) return "";
   if (!others.length) return Number.isNaN(first[0]) ? "nothing pressed" : sensor.centre(...first);
   const pressed = [first, ...others].flatMap((at, k) => (Number.isNaN(at[0]) ? [] : [`${sensor.sources[k].name} ${sensor.within(k, at)}`]));
   return pressed.length ? `${pressed.join("  ")} ${sensor.unit}`.trim() : "nothing pressed";
@@ -104,7 +104,7 @@ export const LANES = [
     heading: ({ raster }) =>
       raster === "spikes" ? ["Raster spikes of ", output({ id: "spikes-info", class: "dim" })] : ["Raster ", make("span", {}, swatch("more"), " more ", swatch("less"), " less, by row")],
     title: ({ raster }) => (raster === "spikes" ? "Spikes by row" : "Changes by row"),
-    painter: (place) => new Raster(place),
+    painter: (element) => new Raster(element),
   },
   {
     name: "channels", label: "Curve of each channel over time, one above the other", kind: "raster", least: 96,
@@ -112,15 +112,15 @@ export const LANES = [
     fits: ({ sensor }) => sensor.kind === "channels" && sensor.count <= MOST_CHANNELS,
     heading: () => ["Channels ", swatch("more"), " ", output({ id: "channels-scale", class: "dim" })],
     title: (_, scale) => `Channels, ${scale}`,
-    painter: (place) => new Channels(place),
+    painter: (element) => new Channels(element),
   },
   {
     name: "taxel", label: "History of the watched taxel", least: 72,
     setting: "showTaxel", box: "Taxel",
     fits: ({ taxel }) => taxel !== null,
     heading: () => ["Taxel ", make("span", {}, "least to greatest, last"), " ", output()],
-    says: ({ values: { unit, step, zero } }, timeline, place) => {
-      const [least, greatest, last] = timeline.history.subarray(3 * place, 3 * place + 3);
+    says: ({ values: { unit, step, zero } }, timeline, column) => {
+      const [least, greatest, last] = timeline.history.subarray(3 * column, 3 * column + 3);
       if (last === UNKNOWN_VALUE) return [];
       const value = (/** @type {number} */ ticks) => rounded((ticks - zero) * step);
       return [`${value(last)} ${unit}${least === greatest ? "" : ` (${value(least)} to ${value(greatest)})`}`];
@@ -137,8 +137,8 @@ export const LANES = [
         axes: [axis("value", 3, themed("dim"))],
       };
     },
-    at: ({ values: { step, zero } }, { history }, place) =>
-      history[3 * place + 2] === UNKNOWN_VALUE ? [] : Array.from(history.subarray(3 * place, 3 * place + 3), (ticks) => (ticks - zero) * step),
+    at: ({ values: { step, zero } }, { history }, column) =>
+      history[3 * column + 2] === UNKNOWN_VALUE ? [] : Array.from(history.subarray(3 * column, 3 * column + 3), (ticks) => (ticks - zero) * step),
   },
   {
     name: "force", label: "Sum of the values, or force, and number of taxels pressed", least: 72,
@@ -150,7 +150,7 @@ export const LANES = [
       " ",
       make("span", { id: "area-legend", class: sources.length ? "apart" : "", hidden: sensor.kind === "channels" }, make("span", { class: "gap" }, "Area"), " ", swatch("less dashed"), " ", output({ id: "force-area" })),
     ],
-    says: (shown, timeline, place) => [...sumsAt(shown, timeline, place), areaAt(shown, timeline, place)],
+    says: (shown, timeline, column) => [...sumsAt(shown, timeline, column), areaAt(shown, timeline, column)],
     title: ({ sums }) => `${sums.unit === "N" ? "Force" : "Sum"} and area`,
     plan: (shown, sources) => {
       const areas = shown().sensor.kind !== "channels";
@@ -162,7 +162,7 @@ export const LANES = [
         axes: [axis("force", 3, force), { ...axis("area", 1, area), ...(areas ? {} : { values: () => [] }) }],
       };
     },
-    at: ({ sums: { step } }, timeline, place) => [...timeline.sums(place).map((sum) => (sum >= 0 ? sum * step : null)), timeline.area[place] >= 0 ? timeline.area[place] : null],
+    at: ({ sums: { step } }, timeline, column) => [...timeline.sums(column).map((sum) => (sum >= 0 ? sum * step : null)), timeline.area[column] >= 0 ? timeline.area[column] : null],
   },
   {
     name: "centre", label: "Centre of pressure", kind: "low", least: 62,
@@ -170,19 +170,19 @@ export const LANES = [
     fits: ({ sensor }) => sensor.kind !== "channels",
     heading: ({ sensor: { axes: [across, down] } }, sources) =>
       ["Centre ", make("span", { class: sources.length ? "apart" : "" }, swatch("more"), ` ${across} `, swatch("less dashed"), ` ${down}`), " ", output({ id: "centre-now" })],
-    says: (shown, timeline, place) => [centreAt(shown, timeline, place)],
+    says: (shown, timeline, column) => [centreAt(shown, timeline, column)],
     title: () => "Centre",
     plan: (shown, sources) => {
       const [low, high] = shown().sensor.limits;
       const down = themed("less");
       return {
-        scales: { place: { range: [low, high] } },
-        series: coloured(sources).flatMap((colour) => [line(colour, "place"), line(sources.length ? colour : down, "place", [5, 3])]),
-        axes: [{ ...axis("place", 3, themed("dim")), splits: () => [low, (low + high) / 2, high], values: (_, marks) => marks.map(rounded) }],
+        scales: { centre: { range: [low, high] } },
+        series: coloured(sources).flatMap((colour) => [line(colour, "centre"), line(sources.length ? colour : down, "centre", [5, 3])]),
+        axes: [{ ...axis("centre", 3, themed("dim")), splits: () => [low, (low + high) / 2, high], values: (_, marks) => marks.map(rounded) }],
       };
     },
-    at: ({ sensor }, timeline, place) =>
-      timeline.centres(place).flatMap(([x, y], k) => (Number.isNaN(x) ? [null, null] : [sensor.kind === "channels" ? x : sensor.across(k, x), y])),
+    at: ({ sensor }, timeline, column) =>
+      timeline.centres(column).flatMap(([x, y], k) => (Number.isNaN(x) ? [null, null] : [sensor.kind === "channels" ? x : sensor.across(k, x), y])),
   },
 ];
 
@@ -205,11 +205,11 @@ export class Lanes {
     this.splits = [];
     const observer = new ResizeObserver(() => this.fit());
     this.all = LANES.map((lane) => {
-      const [heading, place] = [make("h2"), make("div", { id: `${lane.name}-lane`, class: `lane ${lane.kind ?? ""}`, role: "img", "aria-label": lane.label })];
-      const block = make("section", { id: `${lane.name}-block` }, heading, place);
+      const [heading, element] = [make("h2"), make("div", { id: `${lane.name}-lane`, class: `lane ${lane.kind ?? ""}`, role: "img", "aria-label": lane.label })];
+      const block = make("section", { id: `${lane.name}-block`, class: lane.kind ?? "" }, heading, element);
       part("axis", HTMLElement).before(block);
-      observer.observe(place);
-      return { lane, block, heading, place, painter: lane.painter?.(place), plot: /** @type {uPlot | null} */ (null) };
+      observer.observe(element);
+      return { lane, block, heading, element, painter: lane.painter?.(element), plot: /** @type {uPlot | null} */ (null) };
     });
   }
 
@@ -231,14 +231,14 @@ export class Lanes {
     const { sources } = this;
     const shown = this.shown();
     const { sensor, sums, raster } = shown;
-    const made = JSON.stringify([this.settings.theme, sensor.kind, sensor.limits, sensor.axes, sums.unit, raster, sources]);
-    if (this.made === made) return;
-    this.made = made;
+    const key = JSON.stringify([this.settings.theme, sensor.kind, sensor.limits, sensor.axes, sums.unit, raster, sources]);
+    if (this.made === key) return;
+    this.made = key;
     const grid = { stroke: themed("grid"), width: 1 };
     /** @type {uPlot.Axis} */
     const time = { show: true, size: 0, values: () => [], grid, ticks: { show: false }, splits: () => this.splits };
     for (const item of this.all) {
-      const { lane, heading, place, painter } = item;
+      const { lane, heading, element, painter } = item;
       heading.replaceChildren(...lane.heading(shown, sources));
       painter?.colour?.();
       item.plot?.destroy();
@@ -247,21 +247,21 @@ export class Lanes {
       item.plot = new uPlot(
         {
           bands, series: [{}, ...series], axes: [time, ...axes],
-          width: Math.max(100, place.clientWidth), height: Math.max(40, place.clientHeight),
+          width: Math.max(100, element.clientWidth), height: Math.max(40, element.clientHeight),
           // Half of the uppermost number's height; on the right, room for numbers where there are none.
           padding: [7, axes.length > 1 ? 0 : SIDE, 4, 0],
           legend: { show: false }, cursor: { show: false },
           scales: { x: { time: false, range: () => [0, this.span_s] }, ...scales },
         },
         [[], ...series.map(() => [])],
-        place,
+        element,
       );
     }
   }
 
-  /** Fits the plots to their places. */
+  /** Fits the plots to their elements. */
   fit() {
-    for (const { plot, place: { clientWidth: width, clientHeight: height } } of this.all) {
+    for (const { plot, element: { clientWidth: width, clientHeight: height } } of this.all) {
       if (plot && width > 0 && height > 0 && (plot.width !== width || plot.height !== height)) plot.setSize({ width, height });
     }
   }
@@ -284,8 +284,8 @@ export class Lanes {
       /** @type {(number | null)[][]} */
       const curves = plot.series.slice(1).map(() => []);
       for (const number of numbers) {
-        const place = timeline.known(number);
-        const values = place < 0 ? [] : lane.at(shown, timeline, place);
+        const column = timeline.known(number);
+        const values = column < 0 ? [] : lane.at(shown, timeline, column);
         curves.forEach((curve, k) => curve.push(values[k] ?? null));
       }
       // A curve has the value at the end of its column.
@@ -296,26 +296,26 @@ export class Lanes {
   /** Writes the values at the cursor, or at the time shown. @param {Timeline | null} timeline */
   write(timeline) {
     const shown = this.shown();
-    const place = timeline?.pointed ?? -1;
+    const column = timeline?.pointed ?? -1;
     for (const { lane, heading } of this.all) {
       if (!lane.says) continue;
-      const said = timeline && place >= 0 ? lane.says(shown, timeline, place) : [];
-      heading.querySelectorAll("output").forEach((output, k) => write(output, said[k] ?? ""));
+      const texts = timeline && column >= 0 ? lane.says(shown, timeline, column) : [];
+      heading.querySelectorAll("output").forEach((output, k) => write(output, texts[k] ?? ""));
     }
-    if (!timeline || place < 0) return;
+    if (!timeline || column < 0) return;
     const { sensor } = shown;
-    const sums = sumsAt(shown, timeline, place);
+    const sums = sumsAt(shown, timeline, column);
     const sum = sums.length > 1 ? sums.map((text, k) => `${sensor.sources[k].name} ${text}`).join(", ") : sums[0];
-    const more = sensor.kind === "channels" ? "" : ` over ${areaAt(shown, timeline, place)}, centre (${sensor.axes.join(", ")}): ${centreAt(shown, timeline, place)}`;
-    write(part("shown-info", HTMLElement), Number.isNaN(timeline.sum[place]) ? "missing" : `${sum}${more}`);
+    const more = sensor.kind === "channels" ? "" : ` over ${areaAt(shown, timeline, column)}, centre (${sensor.axes.join(", ")}): ${centreAt(shown, timeline, column)}`;
+    write(part("shown-info", HTMLElement), Number.isNaN(timeline.sum[column]) ? "missing" : `${sum}${more}`);
   }
 
   /** @returns {{ title: string, canvas: HTMLCanvasElement, inset: number }[]} the lanes of a saved picture */
   saved() {
-    return this.all.flatMap(({ lane, heading, place }) => {
-      const canvas = place.querySelector("canvas");
-      const said = heading.querySelector("output")?.textContent ?? "";
-      return canvas?.clientWidth ? [{ title: lane.title(this.shown(), said), canvas, inset: lane.painter ? SIDE : 0 }] : [];
+    return this.all.flatMap(({ lane, heading, element }) => {
+      const canvas = element.querySelector("canvas");
+      const texts = heading.querySelector("output")?.textContent ?? "";
+      return canvas?.clientWidth ? [{ title: lane.title(this.shown(), texts), canvas, inset: lane.painter ? SIDE : 0 }] : [];
     });
   }
 }

@@ -18,7 +18,7 @@ const BESIDE = 0.5;
 /** A narrow page has one column, which scrolls. */
 const NARROW = "(max-width: 860px)";
 
-/** @typedef {"above" | "beside" | "column"} Place maps above lanes; two maps side by side, or in a column, beside the lanes */
+/** @typedef {"above" | "beside" | "column"} Side where the maps are: above lanes; two maps side by side, or in a column, beside the lanes */
 
 /** Chooses the arrangement in which the maps are largest. */
 export class Layout {
@@ -39,7 +39,7 @@ export class Layout {
     resized.observe(this.banner);
   }
 
-  /** @returns {{ place: Place, width: number }} of the maps, and of one map, CSS pixels */
+  /** @returns {{ side: Side, width: number }} of the maps, and of one map, CSS pixels */
   widest() {
     const { aspect, maps, lanes } = this.shown();
     const { clientWidth: wide } = this.views;
@@ -47,24 +47,24 @@ export class Layout {
     const high = this.views.clientHeight - (banner && banner + BELOW_BANNER);
     const low = FLAGS_AND_AXIS + lanes.reduce((sum, { least }) => sum + least, 0);
     const beside = Math.min(BESIDE * wide, wide - LANES_WIDE - GAP);
-    /** @type {[Place, number][]} */
+    /** @type {[Side, number][]} */
     const widths = [
       ["above", Math.min((wide - (maps - 1) * GAP) / maps, Math.max(120, high - low - UNDER.above - AROUND_MAP) * aspect)],
       ["beside", Math.min((beside - (maps - 1) * GAP) / maps, (high - UNDER.beside - AROUND_MAP) * aspect)],
       ["column", Math.min(beside, ((high - UNDER.beside) / maps - AROUND_MAP) * aspect)],
     ];
-    const [place, width] = widths.reduce((best, next) => (next[1] > best[1] * 1.05 ? next : best));
-    return { place, width };
+    const [side, width] = widths.reduce((best, next) => (next[1] > best[1] * 1.05 ? next : best));
+    return { side, width };
   }
 
   arrange() {
-    const { place, width } = matchMedia(NARROW).matches ? { place: /** @type {Place} */ ("above"), width: 0 } : this.widest();
-    const chosen = `${place} ${Math.floor(width)}`;
+    const { side, width } = matchMedia(NARROW).matches ? { side: /** @type {Side} */ ("above"), width: 0 } : this.widest();
+    const chosen = `${side} ${Math.floor(width)}`;
     if (chosen === this.done) return;
     this.done = chosen;
-    this.views.dataset.place = place;
+    this.views.dataset.place = side;
     const { maps } = this.shown();
-    const row = place === "beside" ? maps : 1;
+    const row = side === "beside" ? maps : 1;
     for (const [name, value] of [["--map", Math.floor(width)], ["--maps", row * Math.floor(width) + (row - 1) * GAP]]) {
       if (width) this.views.style.setProperty(String(name), `${value}px`);
       else this.views.style.removeProperty(String(name));

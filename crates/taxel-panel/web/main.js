@@ -183,7 +183,7 @@ function receiveFrame(buffer) {
   player.t_us = frame.t_us;
   if (frame.following && player.transport.state !== "following" && player.transport.source === null) move({ ...player.transport, source: null, state: "following" });
   mapsDue = timeDue = true;
-  // Of a window that does not follow the newest, the columns change only where the server sends all of them, or where it moves.
+  // The columns of a window that does not follow the newest change only where the server sends all of them, or where the window moves.
   if (frame.following || frame.restart) lanesDue = true;
   if (frame.following) marksDue = true;
 }
@@ -299,8 +299,8 @@ function greet(message) {
   if (maps.taxel) watch(maps.taxel);
   server.send({ type: "recordings" });
   if (message.live) server.send({ type: "overview" });
-  const asked = fragment.get("open") ?? message.open;
-  if (asked && (first || !message.live)) ask(asked, fragment.get("trial") ?? undefined);
+  const name = fragment.get("open") ?? message.open;
+  if (name && (first || !message.live)) ask(name, fragment.get("trial") ?? undefined);
   player.show();
   writeState();
 }
@@ -456,7 +456,7 @@ function drawFrame(now_ms) {
     lanesAt = now_ms;
     if (lanesDue) {
       lanes.draw(timeline);
-      labels.place();
+      labels.arrange();
       mark();
     } else cursor.draw();
     lanesDue = timeDue = false;

@@ -184,7 +184,7 @@ export interface Pace {
 
 /** A serial port. */
 export interface Port {
-  /** Path of the device, as "/dev/ttyUSB0". */
+  /** Name of the port, as "COM3" or "/dev/ttyACM0". */
   place: string;
   /** "usb", "pci", "bluetooth" or "other". */
   kind: string;
@@ -847,7 +847,7 @@ export interface PlacesRequest {
   id?: number;
 }
 
-/** The board's serial line: a device, or host:port; `null` disconnects it. */
+/** The board's serial line: a port of this machine, or host:port; `null` disconnects it. */
 export interface ControlRequest {
   type: "control";
   id?: number;

@@ -21,9 +21,9 @@ export function notify(text, bad = false, offer) {
     silence();
     offer?.action();
   };
-  const place = part("notice", HTMLElement);
-  place.hidden = false;
-  place.classList.toggle("bad", bad);
+  const notice = part("notice", HTMLElement);
+  notice.hidden = false;
+  notice.classList.toggle("bad", bad);
   write(part("notice-text", HTMLElement), ...text.split("\n"));
   clearTimeout(timer);
   // Lines to be copied stay until they are closed.

@@ -60,8 +60,8 @@ export function readFrame(buffer) {
    * @returns {T | null}
    */
   const words = (number, kind) => {
-    const place = section(number);
-    return place && new kind(buffer, place[0], place[1] / kind.BYTES_PER_ELEMENT);
+    const bounds = section(number);
+    return bounds && new kind(buffer, bounds[0], bounds[1] / kind.BYTES_PER_ELEMENT);
   };
   return {
     live: (flags & 1) !== 0,

@@ -6,11 +6,11 @@ import { fitted, ground, make, themed, write } from "./dom.js";
 
 /** The raster's canvas. Columns of time and rows are gathered, most first, where the screen has fewer pixels. */
 export class Raster {
-  /** @param {HTMLElement} place */
-  constructor(place) {
+  /** @param {HTMLElement} element */
+  constructor(element) {
     this.canvas = make("canvas", { id: "raster" });
     this.last = make("span");
-    place.append(make("span", { class: "rows", "aria-hidden": "true" }, make("span", {}, "0"), this.last), this.canvas);
+    element.append(make("span", { class: "rows", "aria-hidden": "true" }, make("span", {}, "0"), this.last), this.canvas);
     this.context = ground(this.canvas);
     this.image = new ImageData(1, 1);
     this.pixels = new Uint32Array(1);
@@ -39,7 +39,7 @@ export class Raster {
    * @param {import("./lanes.js").Shown} shown
    * @returns {string} what the spikes are of
    */
-  draw(timeline, { raster: what, spikes }) {
+  draw(timeline, { raster: kind, spikes }) {
     write(this.last, String(timeline.rows - 1));
     const { width, height } = fitted(this.canvas);
     const { columns: shown, window, column_us, span_us, rows } = timeline;
@@ -55,7 +55,7 @@ export class Raster {
       this.image = new ImageData(wide, high);
       this.pixels = new Uint32Array(this.image.data.buffer);
     }
-    const values = what === "spikes" ? timeline.spikes : timeline.raster;
+    const values = kind === "spikes" ? timeline.spikes : timeline.raster;
     this.pixels.fill(this.words[0]);
     // Groups begin at whole multiples of their width, so that what is seen moves and does not flicker.
     const group = Math.floor(begin / columns);
@@ -63,10 +63,10 @@ export class Raster {
     for (let i = 0; i < wide; i++) {
       seen.fill(0);
       for (let k = (group + i) * columns; k < (group + i + 1) * columns; k++) {
-        const place = timeline.place(k);
-        if (k < begin || k > end || timeline.number[place] !== k) continue;
+        const column = timeline.columnOf(k);
+        if (k < begin || k > end || timeline.number[column] !== k) continue;
         for (let row = 0; row < rows; row++) {
-          const value = values[place * rows + row];
+          const value = values[column * rows + row];
           if (!value) continue;
           const at = gathered === 1 ? row : Math.floor(row / gathered);
           const old = seen[at];

@@ -70,8 +70,8 @@ export class Recorder {
       return;
     }
     part("record-reason", HTMLElement).hidden = true;
-    for (const [id, what] of /** @type {const} */ ([["record-index", "index"], ["record-countdown", "countdown"], ["record-length", "length"]])) {
-      if (Number.isNaN(this.number(id))) return this.refuse(`${what}: ${part(id, HTMLInputElement).value.trim()} is no number`);
+    for (const [id, field] of /** @type {const} */ ([["record-index", "index"], ["record-countdown", "countdown"], ["record-length", "length"]])) {
+      if (Number.isNaN(this.number(id))) return this.refuse(`${field}: ${part(id, HTMLInputElement).value.trim()} is no number`);
     }
     const label = part("record-label", HTMLInputElement).value.trim();
     const format = /** @type {"mcap" | "lsa"} */ (part("record-format", HTMLSelectElement).value);
@@ -92,9 +92,9 @@ export class Recorder {
   /** @param {string} reason why nothing is recorded */
   refuse(reason) {
     this.shown();
-    const place = part("record-reason", HTMLElement);
-    place.hidden = false;
-    write(place, reason);
+    const output = part("record-reason", HTMLElement);
+    output.hidden = false;
+    write(output, reason);
   }
 
   /** @param {RecorderMessage} status */

@@ -53,7 +53,7 @@ export const PRESETS = [
 ];
 
 /**
- * 10 ns units as us, with two places.
+ * 10 ns units as us, with two decimals.
  * @param {number} units
  * @returns {string}
  */

@@ -16,7 +16,7 @@ const OTHERS = {
   tones: true,
   letters: true,
   label: "contact",
-  /** Where boards were before: a place a line, the last first. */
+  /** Where boards were before: an address a line, the last first. */
   lines: "",
   addresses: "",
 };

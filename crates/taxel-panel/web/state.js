@@ -15,15 +15,15 @@ const FIRST_WITHIN_S = 1;
 /**
  * Whether anything arrives from the live source, in words.
  * @param {Counters | null} counters
- * @param {string} place where it should arrive
+ * @param {string} address where it should arrive
  * @returns {{ word: string, text: string } | null} null: it does
  */
-function silence(counters, place) {
+function silence(counters, address) {
   if (!counters) return null;
   const { arrival, board_us, seconds: elapsed_s, taring } = counters;
   const since = `since ${seconds(board_us)} of the board, for ${short(1e6 * arrival.silent_s)}`;
   if (arrival.state === "nothing") {
-    return elapsed_s < FIRST_WITHIN_S ? null : { word: "Nothing arrives", text: `Nothing has arrived at ${place} so far. Is the board on, and does it send to this address and port?` };
+    return elapsed_s < FIRST_WITHIN_S ? null : { word: "Nothing arrives", text: `Nothing has arrived at ${address} so far. Is the board on, and does it send to this address and port?` };
   }
   if (arrival.state === "lost") return { word: "Lost", text: `The board is lost: nothing ${since}, though it sent a heartbeat every ${short(arrival.heartbeat_us ?? 0)} or sooner.` };
   if (taring) return { word: "Tare", text: "Taking a tare: leave the sensor at rest." };
@@ -35,15 +35,15 @@ function fall(opened) {
   const sources = opened?.frames?.sources ?? [];
   const falling = sources.filter(({ falls }) => falls).map(({ name }) => name);
   if (!opened || !falling.length) return "";
-  const which = falling.length < sources.length ? ` of ${falling.join(", ")}` : "";
-  return `The values${which} fall from their rest, so that no pressure is shown. If less means more pressure, write the line “falls = true” into ${opened.name.replace(/\.[^.]+$/, "")}.layout.toml beside the recording, and start taxel view again.`;
+  const names = falling.length < sources.length ? ` of ${falling.join(", ")}` : "";
+  return `The values${names} fall from their rest, so that no pressure is shown. If less means more pressure, write the line “falls = true” into ${opened.name.replace(/\.[^.]+$/, "")}.layout.toml beside the recording, and start taxel view again.`;
 }
 
 /** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */
 function preload(opened) {
   const sources = opened?.frames?.sources ?? [{ name: "", preload_at: opened?.preload_at ?? "" }];
-  const places = sources.filter((source) => source.preload_at).map(({ name, preload_at }) => (sources.length > 1 ? `${name}, ${preload_at}` : preload_at));
-  return places.length ? `In the quiet stretch that the rest is taken from, something lay on ${places.join("; ")}.` : "";
+  const loads = sources.filter((source) => source.preload_at).map(({ name, preload_at }) => (sources.length > 1 ? `${name}, ${preload_at}` : preload_at));
+  return loads.length ? `In the quiet stretch that the rest is taken from, something lay on ${loads.join("; ")}.` : "";
 }
 
 /** @param {Opened | null} opened @param {Hello | null} hello @returns {string} how many frames there are, and rows and columns of each sensor */
@@ -86,8 +86,8 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const banner = part("silence", HTMLElement);
   write(banner, [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`, nothing && refused, connected && fall(opened), connected && preload(opened)].filter(Boolean).join(" "));
   banner.hidden = !banner.textContent;
-  const place = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? source : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
-  const text = [place, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");
+  const subject = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? source : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
+  const text = [subject, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");
   write(part("source", HTMLElement), text);
   entitle(part("source", HTMLElement), "title", text);
   document.documentElement.classList.toggle("recording", recording !== null);

@@ -49,7 +49,7 @@ export class Strip {
     if (!reach || t_us === null || event.ctrlKey || event.altKey || event.metaKey) return;
     const [from, to] = reach;
     /** @type {Record<string, number>} */
-    const places = {
+    const times = {
       ArrowLeft: t_us - (event.shiftKey ? 1e6 : 1e5),
       ArrowRight: t_us + (event.shiftKey ? 1e6 : 1e5),
       PageDown: t_us - (to - from) / 10,
@@ -57,11 +57,11 @@ export class Strip {
       Home: from,
       End: to,
     };
-    const place = places[event.key];
-    if (place === undefined) return;
+    const time = times[event.key];
+    if (time === undefined) return;
     event.preventDefault();
     event.stopPropagation();
-    this.player.seek(place);
+    this.player.seek(time);
   }
 
   draw() {

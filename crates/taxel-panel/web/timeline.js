@@ -48,15 +48,15 @@ export class Timeline {
     this.number.fill(NaN);
   }
 
-  /** @param {number} number @returns {number} its place in the ring */
-  place(number) {
+  /** @param {number} number @returns {number} its column in the ring */
+  columnOf(number) {
     return ((number % SPAN) + SPAN) % SPAN;
   }
 
-  /** @param {number} number @returns {number} its place, or -1 where it is not known */
+  /** @param {number} number @returns {number} its column, or -1 where it is not known */
   known(number) {
-    const place = this.place(number);
-    return this.number[place] === number ? place : -1;
+    const column = this.columnOf(number);
+    return this.number[column] === number ? column : -1;
   }
 
   /** @param {[number, number]} window us */
@@ -88,38 +88,38 @@ export class Timeline {
       [this.sources, this.sourceCentres] = [new Uint32Array(SPAN * several), new Float32Array(SPAN * several * 2)];
     }
     for (let i = 0; i < count; i++) {
-      const place = this.place(first + i);
-      this.number[place] = first + i;
-      if (raster) this.raster.set(raster.subarray(i * this.rows, (i + 1) * this.rows), place * this.rows);
-      if (spikes) this.spikes.set(spikes.subarray(i * this.rows, (i + 1) * this.rows), place * this.rows);
-      else this.spikes.fill(0, place * this.rows, (place + 1) * this.rows);
+      const column = this.columnOf(first + i);
+      this.number[column] = first + i;
+      if (raster) this.raster.set(raster.subarray(i * this.rows, (i + 1) * this.rows), column * this.rows);
+      if (spikes) this.spikes.set(spikes.subarray(i * this.rows, (i + 1) * this.rows), column * this.rows);
+      else this.spikes.fill(0, column * this.rows, (column + 1) * this.rows);
       if (sums && centres) {
         const missing = sums[4 * i + 1] === MISSING;
-        this.sum[place] = missing ? NaN : sums[4 * i];
-        this.area[place] = missing ? NaN : sums[4 * i + 1];
-        this.x[place] = centres[4 * i + 2];
-        this.y[place] = centres[4 * i + 3];
+        this.sum[column] = missing ? NaN : sums[4 * i];
+        this.area[column] = missing ? NaN : sums[4 * i + 1];
+        this.x[column] = centres[4 * i + 2];
+        this.y[column] = centres[4 * i + 3];
       }
-      if (sources) this.sources.set(sources.subarray(i * several, (i + 1) * several), place * several);
-      if (sourceCentres) this.sourceCentres.set(sourceCentres.subarray(2 * i * several, 2 * (i + 1) * several), 2 * place * several);
-      if (channels) this.channels.set(channels.subarray(i * each, (i + 1) * each), place * each);
-      if (history) this.history.set(history.subarray(3 * i, 3 * i + 3), 3 * place);
-      else this.history.fill(UNKNOWN_VALUE, 3 * place, 3 * place + 3);
+      if (sources) this.sources.set(sources.subarray(i * several, (i + 1) * several), column * several);
+      if (sourceCentres) this.sourceCentres.set(sourceCentres.subarray(2 * i * several, 2 * (i + 1) * several), 2 * column * several);
+      if (channels) this.channels.set(channels.subarray(i * each, (i + 1) * each), column * each);
+      if (history) this.history.set(history.subarray(3 * i, 3 * i + 3), 3 * column);
+      else this.history.fill(UNKNOWN_VALUE, 3 * column, 3 * column + 3);
     }
   }
 
-  /** @param {number} place @returns {number[]} the sum of each of several sources, or of all; not a number where no taxel has a value */
-  sums(place) {
+  /** @param {number} column @returns {number[]} the sum of each of several sources, or of all; not a number where no taxel has a value */
+  sums(column) {
     const { source_count: count, sources } = this;
-    if (!count) return [this.sum[place]];
-    return Array.from(sources.subarray(place * count, (place + 1) * count), (sum) => (sum === MISSING ? NaN : sum));
+    if (!count) return [this.sum[column]];
+    return Array.from(sources.subarray(column * count, (column + 1) * count), (sum) => (sum === MISSING ? NaN : sum));
   }
 
-  /** @param {number} place @returns {[number, number][]} the centre of each of several sources, or of all; not a number where nothing is pressed */
-  centres(place) {
+  /** @param {number} column @returns {[number, number][]} the centre of each of several sources, or of all; not a number where nothing is pressed */
+  centres(column) {
     const { source_count: count, sourceCentres: all } = this;
-    if (!count) return [[this.x[place], this.y[place]]];
-    return Array.from({ length: count }, (_, k) => [all[2 * (place * count + k)], all[2 * (place * count + k) + 1]]);
+    if (!count) return [[this.x[column], this.y[column]]];
+    return Array.from({ length: count }, (_, k) => [all[2 * (column * count + k)], all[2 * (column * count + k) + 1]]);
   }
 
   /** Another taxel is watched: the values of the last one are discarded. */
@@ -144,7 +144,7 @@ export class Timeline {
     return this.window && Math.round(this.window[0] + share * this.span_us);
   }
 
-  /** @returns {number} the place of the column that the cursor points at, or of the time shown; -1: not known */
+  /** @returns {number} the column that the cursor points at, or of the time shown; -1: not known */
   get pointed() {
     const t = this.cursor_us ?? this.t_us;
     return t === null ? -1 : this.known(Math.floor(t / this.column_us));
@@ -162,11 +162,11 @@ export class Timeline {
     const least = this.span_us / Math.max(2, most);
     const power = 10 ** Math.floor(Math.log10(least));
     const step = Math.max(1, (STEPS.find((times) => times * power >= least) ?? 10) * power);
-    const places = Math.max(0, 6 - Math.floor(Math.log10(step) + 1e-9));
+    const decimals = Math.max(0, 6 - Math.floor(Math.log10(step) + 1e-9));
     const ticks = [];
     for (let k = Math.ceil((from - zero) / step); k * step + zero <= to; k++) {
       const behind = -k * step;
-      ticks.push({ share: (k * step + zero - from) / this.span_us, text: this.following ? (behind ? `−${short(behind)}` : "now") : seconds(k * step + zero, places) });
+      ticks.push({ share: (k * step + zero - from) / this.span_us, text: this.following ? (behind ? `−${short(behind)}` : "now") : seconds(k * step + zero, decimals) });
     }
     return ticks;
   }

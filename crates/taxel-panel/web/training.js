@@ -50,10 +50,10 @@ export class Training {
 
   /** @param {string} text how far the training is, or its result @param {string} [next] the command that detects @param {string[]} [options] of the command that trains */
   text(text, next = "", options = []) {
-    const place = part("train-text", HTMLElement);
-    place.hidden = !text;
-    place.classList.remove("bad");
-    write(place, ...text.split("\n"));
+    const output = part("train-text", HTMLElement);
+    output.hidden = !text;
+    output.classList.remove("bad");
+    write(output, ...text.split("\n"));
     part("train-next", HTMLElement).hidden = !next;
     write(part("train-detect", HTMLElement), next);
     // The page has no options of the command line.

@@ -167,9 +167,9 @@ export class TimeWindow {
     while (this.axis.children.length > ticks.length) this.axis.lastElementChild?.remove();
     while (this.axis.children.length < ticks.length) this.axis.append(make("span"));
     ticks.forEach(({ share, text }, i) => {
-      const place = /** @type {HTMLElement} */ (this.axis.children[i]);
-      write(place, text);
-      place.style.left = `${(100 * share).toFixed(2)}%`;
+      const mark = /** @type {HTMLElement} */ (this.axis.children[i]);
+      write(mark, text);
+      mark.style.left = `${(100 * share).toFixed(2)}%`;
     });
     write(part("span", HTMLElement), short(timeline.span_us));
     const [, most] = this.limits() ?? [0, timeline.column_us];

@@ -14,9 +14,9 @@ export const beginning = (start_us) => (start_us !== null && start_us >= SINCE_1
 /** @returns {string} date and time at 0 s; "" where times do not count from 1970 */
 export const begun = () => (numbering.begin_us ? `${new Date(numbering.begin_us / 1000).toISOString().replace("T", " ").replace("Z", "")} UTC` : "");
 
-/** @param {number} us @param {number} [places] @returns {string} the number that is written: seconds, or that of a frame */
-export const writtenTime = (us, places = 3) =>
-  numbering.number_us ? String(Math.floor(us / numbering.number_us)) : ((us - numbering.begin_us) / 1e6).toFixed(places);
+/** @param {number} us @param {number} [decimals] @returns {string} the number that is written: seconds, or that of a frame */
+export const writtenTime = (us, decimals = 3) =>
+  numbering.number_us ? String(Math.floor(us / numbering.number_us)) : ((us - numbering.begin_us) / 1e6).toFixed(decimals);
 
 /** @param {number} t_us @returns {string} to the microsecond, without zeros behind the millisecond */
 export const listedTime = (t_us) => writtenTime(t_us, 6).replace(/(\.\d{3}\d*?)0{1,3}$/, "$1");
@@ -30,15 +30,15 @@ export const readTime = (written) => {
 /** @returns {"frames" | "seconds"} what a time is a number of */
 export const timeUnit = () => (numbering.number_us ? "frames" : "seconds");
 
-/** @param {number | null} us @param {number} [places] @returns {string} seconds, or the number of a frame */
-export const seconds = (us, places = 3) =>
-  us === null ? "–" : numbering.number_us ? `frame ${whole(Math.floor(us / numbering.number_us))}` : `${writtenTime(us, places)} s`;
+/** @param {number | null} us @param {number} [decimals] @returns {string} seconds, or the number of a frame */
+export const seconds = (us, decimals = 3) =>
+  us === null ? "–" : numbering.number_us ? `frame ${integer(Math.floor(us / numbering.number_us))}` : `${writtenTime(us, decimals)} s`;
 
 /** @param {number} value @returns {string} in three digits, as many as a curve or a map shows */
-export const rounded = (value) => (Math.abs(value) >= 100 ? whole(value) : String(Number(value.toPrecision(3))));
+export const rounded = (value) => (Math.abs(value) >= 100 ? integer(value) : String(Number(value.toPrecision(3))));
 
 /** @param {number} value @returns {string} a whole number, in groups of three */
-export const whole = (value) => (Math.round(value) || 0).toLocaleString("en");
+export const integer = (value) => (Math.round(value) || 0).toLocaleString("en");
 
 /**
  * @param {number} count
@@ -46,7 +46,7 @@ export const whole = (value) => (Math.round(value) || 0).toLocaleString("en");
  * @param {string} [plural]
  * @returns {string}
  */
-export const counted = (count, singular, plural = `${singular}s`) => `${whole(count)} ${count === 1 ? singular : plural}`;
+export const counted = (count, singular, plural = `${singular}s`) => `${integer(count)} ${count === 1 ? singular : plural}`;
 
 /** @param {number} us @returns {string} a short time in the unit that suits */
 export function short(us) {

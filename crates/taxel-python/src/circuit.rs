@@ -40,7 +40,7 @@ enum Lines {
 }
 
 impl Lines {
-    fn of(kind: &str, json: &str) -> PyResult<Self> {
+    fn parsed_as(kind: &str, json: &str) -> PyResult<Self> {
         Ok(if kind == "divider" {
             Self::Divided(parsed("Divider", json)?)
         } else {
@@ -72,7 +72,7 @@ pub fn circuit_volts<'py>(
     shape: (usize, usize),
     conductance_us: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Values<'py>> {
-    let (lines, (rows, columns)) = (Lines::of(kind, json)?, shape);
+    let (lines, (rows, columns)) = (Lines::parsed_as(kind, json)?, shape);
     let frames = slice("conductance", &conductance_us)?;
     let out = enter(py, |stop| -> Result<Vec<f64>> {
         let mut out = vec![];
@@ -100,7 +100,7 @@ pub fn circuit_volts_alone<'py>(
     json: &str,
     conductance_us: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Values<'py>> {
-    let (lines, values) = (Lines::of(kind, json)?, slice("conductance", &conductance_us)?);
+    let (lines, values) = (Lines::parsed_as(kind, json)?, slice("conductance", &conductance_us)?);
     Ok(array(py, values.iter().map(|&g| lines.volts_alone(g)).collect()))
 }
 

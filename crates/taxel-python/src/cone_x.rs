@@ -25,13 +25,13 @@ fn to_row((kind, pattern, at): &Name) -> PyResult<Row> {
     let (pattern, t) = (*pattern, *at);
     match kind.as_str() {
         "silence" => Ok(Row::Silence { pattern, t }),
-        "target" => Ok(Row::Target { pattern, target: whole(t)? }),
-        "slope" => Ok(Row::Slope { pattern, target: whole(t)? }),
+        "target" => Ok(Row::Target { pattern, target: target_index(t)? }),
+        "slope" => Ok(Row::Slope { pattern, target: target_index(t)? }),
         _ => Err(core(problem!("row of kind {kind:?}: must be \"target\", \"silence\" or \"slope\""))),
     }
 }
 
-fn whole(target: f64) -> PyResult<usize> {
+fn target_index(target: f64) -> PyResult<usize> {
     if target >= 0.0 && target.fract() == 0.0 && target < 2f64.powi(53) {
         Ok(target as usize)
     } else {
@@ -78,7 +78,7 @@ pub struct ConeXFitOut {
     status: &'static str,
     weights: Column<f64>,
     objective: f64,
-    /// Of l1, l2 and B.
+    /// The parts of l1, l2 and B.
     parts: [f64; 3],
     gap: f64,
     violation: f64,

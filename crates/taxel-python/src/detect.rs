@@ -60,7 +60,7 @@ fn from_detections(py: Python<'_>, found: Vec<Detection>) -> DetectionsOut<'_> {
 #[pyclass(frozen, get_all)]
 pub struct Tally {
     label: String,
-    /// The pairs: places of detections, and of events.
+    /// The pairs: indices of detections, and of events.
     detected: Column<i64>,
     events: Column<i64>,
     missed_events: Column<i64>,
@@ -98,17 +98,17 @@ pub fn score(
     let truth: Vec<Reference> = labels.into_iter().zip(t).map(|(label, &t)| Reference { label, t }).collect();
     let windows = slice("windows", &windows)?.to_vec();
     let tallies = enter(py, |stop| score_core(&found, &truth, &windows, stop))?;
-    let places = |indices: Vec<usize>| column(py, indices.into_iter().map(|k| k as i64).collect());
+    let column_of = |indices: Vec<usize>| column(py, indices.into_iter().map(|k| k as i64).collect());
     Ok(tallies
         .into_iter()
         .map(|tally| {
             let (detected, events) = tally.pairs.into_iter().unzip();
             Tally {
                 label: tally.label,
-                detected: places(detected),
-                events: places(events),
-                missed_events: places(tally.missed),
-                false_detections: places(tally.false_),
+                detected: column_of(detected),
+                events: column_of(events),
+                missed_events: column_of(tally.missed),
+                false_detections: column_of(tally.false_),
                 false_near: tally.false_near,
                 errors_ms: column(py, tally.errors_ms),
                 delays_ms: column(py, tally.delays_ms),

@@ -2,12 +2,9 @@
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::frame_noise::FrameNoise;
+use taxel_core::health::{BIN_US, TouchCounts};
 use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
-use taxel_core::preload::{place, preload as preload_of};
-use taxel_core::rest::{Rest, Value, touched_from};
-use taxel_core::touch_counts::{BIN_US, TouchCounts};
-use taxel_core::tracked_rest::TrackedRest;
+use taxel_core::rest::{FrameNoise, Rest, TrackedRest, Value, preload as preload_of, preload_text, touched_from};
 use taxel_core::{Error, problem};
 
 use taxel_border::convert::{ArrayParts, EventsIn, EventsOut, FramesIn, array, from_events, slice, to_array};
@@ -249,6 +246,6 @@ pub fn preload<'py>(
     corner: (usize, usize),
 ) -> PyResult<(Bound<'py, PyArray1<f64>>, String)> {
     let loads = preload_of(slice("less", &less)?, columns, above);
-    let at = place(&loads, columns, corner);
+    let at = preload_text(&loads, columns, corner);
     Ok((array(py, loads), at))
 }

@@ -36,7 +36,7 @@ type MultipliersIn<'py> = (PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f64
 pub struct ConeRFitOut {
     weights: Column<f64>,
     objective: f64,
-    /// Of l1, l2, B, C and D.
+    /// The parts of l1, l2, B, C and D.
     parts: [f64; 5],
     gap: f64,
     status: &'static str,

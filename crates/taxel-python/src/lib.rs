@@ -14,6 +14,7 @@ mod circuit;
 mod cone_x;
 mod described;
 mod detect;
+mod device;
 mod encode;
 mod learn;
 mod live;
@@ -32,7 +33,8 @@ mod wire_v2;
 mod _core {
     use pyo3::prelude::*;
     use taxel_core::held::UNKNOWN;
-    use taxel_core::preload::LOADED_TICKS;
+    use taxel_core::rest::LOADED_TICKS;
+    use taxel_live::serial_line::BAUDS;
 
     #[pymodule_export]
     use crate::bridge::{Copies, ParcelFeed};
@@ -53,6 +55,8 @@ mod _core {
         make_plain_rule, make_readout, readout_run_events, readout_run_frames, score, spread,
     };
     #[pymodule_export]
+    use crate::device::{BoardLine, serial_ports};
+    #[pymodule_export]
     use crate::encode::{
         EncoderStream, check_encoder, check_tare, encode_events, encode_frames, encoder_about, encoder_names,
         local_load_of_events, local_load_of_frames, local_load_quantities, skin_afferents, tare_of_events,
@@ -66,7 +70,7 @@ mod _core {
     #[pymodule_export]
     use crate::learn::{ConeRFitOut, ConeRProblem, OnlineConeR};
     #[pymodule_export]
-    use crate::live::{Ended, Live, send, serial_ports};
+    use crate::live::{Ended, Live, send};
     #[pymodule_export]
     use crate::metrics::{distance, match_spikes, metric_names, pairwise};
     #[pymodule_export]
@@ -102,6 +106,7 @@ mod _core {
     fn begin(module: &Bound<'_, PyModule>) -> PyResult<()> {
         taxel_border::errors::register(module)?;
         taxel_border::instructions::cap()?;
+        module.add("BAUDS", (*BAUDS.start(), *BAUDS.end()))?;
         module.add("UNKNOWN", UNKNOWN)?;
         module.add("LOADED_TICKS", LOADED_TICKS)
     }

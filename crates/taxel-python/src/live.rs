@@ -16,7 +16,6 @@ use taxel_live::capture::Sender;
 use taxel_live::pipeline::{
     Handle, LineSink, Live as Pipeline, LiveOptions, LiveSummary, OutputDetection, ReadoutSetup, Record, Sink,
 };
-use taxel_live::ports;
 
 use crate::bridge::{Copies, ParcelFeed};
 use crate::thread_state;
@@ -148,7 +147,7 @@ impl Live {
 
     /// Where datagrams come from, in words.
     fn place(&self, py: Python<'_>) -> PyResult<String> {
-        self.with(py, |pipeline| Ok(pipeline.place().to_string()))
+        self.with(py, |pipeline| Ok(pipeline.origin().to_string()))
     }
 
     /// The board's registers, as far as they are known.
@@ -277,12 +276,6 @@ impl Live {
         })
         .map(Ended::from)
     }
-}
-
-/// The serial ports that the system knows.
-#[pyfunction]
-pub fn serial_ports(py: Python<'_>) -> PyResult<Plain<Vec<ports::Port>>> {
-    enter(py, |_| ports::ports()).map(Plain)
 }
 
 /// Sends datagrams over and over, `each` of them every `period_us`, for `seconds`; returns the counts.

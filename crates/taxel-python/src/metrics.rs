@@ -46,7 +46,7 @@ fn to_metric(json: &str) -> PyResult<Metric> {
     Metric::from_json(json).map_err(core)
 }
 
-/// Which spikes and targets (ms) belong together, pattern by pattern: a pair of places each.
+/// Which spikes and targets (ms) belong together, pattern by pattern: a pair of indices each.
 #[pyfunction]
 pub fn match_spikes(
     py: Python<'_>,
@@ -59,8 +59,8 @@ pub fn match_spikes(
     enter(py, |stop| {
         let each = spikes.iter().zip(&targets).enumerate();
         each.map(|(p, (spikes, targets))| {
-            let (what, wanted) = (format!("spikes[{p}]"), format!("targets[{p}]"));
-            matching::match_spikes((&what, spikes), (&wanted, targets), window_ms, stop)
+            let (name, wanted) = (format!("spikes[{p}]"), format!("targets[{p}]"));
+            matching::match_spikes((&name, spikes), (&wanted, targets), window_ms, stop)
         })
         .collect()
     })

@@ -228,10 +228,10 @@ impl RecordingWriter {
         at_ns: PyReadonlyArray1<'_, i64>,
         t_us: PyReadonlyArray1<'_, i64>,
         values: PyReadonlyArray1<'_, f32>,
-        whole: bool,
+        integers: bool,
     ) -> PyResult<()> {
         let (at_ns, t_us, values) = (slice("at_ns", &at_ns)?, slice("t_us", &t_us)?, slice("values", &values)?);
-        let encoding = if whole { FrameEncoding::Whole } else { FrameEncoding::Float };
+        let encoding = if integers { FrameEncoding::Whole } else { FrameEncoding::Float };
         self.with(py, |track| track.frames(first, at_ns, t_us, values, encoding))
     }
 

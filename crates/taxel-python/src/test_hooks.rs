@@ -9,10 +9,10 @@ use taxel_core::{Error, Hint};
 use taxel_border::enter::enter;
 use taxel_border::errors::ProblemError;
 
-/// Does what `what` names without the GIL: returns an error of a kind, panics, or waits a minute for Ctrl-C.
+/// Does what `hook` names without the GIL: returns an error of a kind, panics, or waits a minute for Ctrl-C.
 #[pyfunction]
-pub fn test_hook(py: Python<'_>, what: &str) -> PyResult<()> {
-    let error = match what {
+pub fn test_hook(py: Python<'_>, hook: &str) -> PyResult<()> {
+    let error = match hook {
         "format" => Error::format("file, byte 0: raised by a test hook").with_hint("limit", Hint::Larger),
         "problem" => Error::argument("tau", ": raised by a test hook"),
         "device" => Error::device("register: raised by a test hook"),

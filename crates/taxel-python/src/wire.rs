@@ -110,7 +110,7 @@ impl WireDecoder {
         }))
     }
 
-    /// Of the last datagram of version 2: until when nothing comes any more, us, and whether it was decoded.
+    /// Until when nothing comes after the last datagram of version 2, us, and whether that datagram was decoded.
     fn last(&self, py: Python<'_>) -> Option<(Option<i64>, bool)> {
         self.0.with(py, |decoder| match decoder {
             VersionedDecoder::One(_) => None,

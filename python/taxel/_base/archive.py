@@ -189,20 +189,20 @@ def _arrays(
         total = 0
         for name in there:
             shape, _, dtype, begin = described[name]
-            place = f"{path}, array {name}"
+            location = f"{path}, array {name}"
             if dtype.hasobject:
-                raise FormatError(f"{place}: holds Python objects; must be numbers or text")
+                raise FormatError(f"{location}: holds Python objects; must be numbers or text")
             if name in dtypes and dtype.kind not in "biuf":
-                raise FormatError(f"{place}: holds {dtype}; must hold numbers")
+                raise FormatError(f"{location}: holds {dtype}; must hold numbers")
             size = math.prod(shape) * dtype.itemsize
             kept = _kept(shape, dtype, dtypes.get(name))
             total += kept
             # NumPy stores a character in 4 bytes.
-            unpacked(place, kept, 4 * texts[name] if name in texts else UNPACKED)
-            unpacked(place, total)
+            unpacked(location, kept, 4 * texts[name] if name in texts else UNPACKED)
+            unpacked(location, total)
             stored = archive.getinfo(members[name]).file_size - begin
             if size != stored:
-                raise FormatError(f"{place}: says that it holds {size} bytes ({shape}, {dtype}); there are {stored}")
+                raise FormatError(f"{location}: says that it holds {size} bytes ({shape}, {dtype}); there are {stored}")
         for name in there:
             with archive.open(members[name]) as array:
                 columns[name] = _read(array, dtypes.get(name), f"{path}: {name}")
@@ -230,7 +230,7 @@ def _kept(shape: tuple[int, ...], stored: np.dtype[Any], dtype: DTypeLike | None
     return math.prod(shape) * (np.dtype(dtype) if dtype is not None and stored.kind in "biuf" else stored).itemsize
 
 
-def _read(file: IO[bytes], dtype: DTypeLike | None, place: str) -> NDArray[Any]:
+def _read(file: IO[bytes], dtype: DTypeLike | None, location: str) -> NDArray[Any]:
     """Read an array whose size was checked; numbers are converted piece by piece, into the order of C.
 
     Raises
@@ -254,7 +254,7 @@ def _read(file: IO[bytes], dtype: DTypeLike | None, place: str) -> NDArray[Any]:
             flat[start : start + count] = converted = piece.astype(dtype)
         if converted.dtype.kind != "f":
             try:
-                refuse_changed(place, piece, converted, begin=start)
+                refuse_changed(location, piece, converted, begin=start)
             except ProblemError as error:
                 raise FormatError(str(error)) from None
     return array

@@ -239,7 +239,7 @@ def finite(
     return real
 
 
-def whole(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1, unit: str | None = None) -> int:
+def integer(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1, unit: str | None = None) -> int:
     """Return a whole number within limits, for a quantity its value in `unit`; a float with an integer value passes."""
     if _has_unit(type(value)):
         value = _one(bare(name, value, unit))
@@ -318,10 +318,10 @@ def refuse_changed(
     """Refuse values that a conversion of `received` to `array` changed; `begin` is the place of the first in errors."""
     if received.dtype == array.dtype:
         return
-    place = _first_changed(np.atleast_1d(received), np.atleast_1d(array))
-    if place is not None:
-        where = f"[{', '.join(map(str, (begin + place[0], *place[1:])))}]" if received.ndim else ""
-        found = np.atleast_1d(received)[place]
+    index = _first_changed(np.atleast_1d(received), np.atleast_1d(array))
+    if index is not None:
+        where = f"[{', '.join(map(str, (begin + index[0], *index[1:])))}]" if received.ndim else ""
+        found = np.atleast_1d(received)[index]
         value = shown(found.item() if isinstance(found, np.generic) else found)
         expected = {"b": "True or False", "f": "a number that fits"}.get(array.dtype.kind, "a whole number that fits")
         fits = "" if array.dtype.kind == "b" else f" {array.dtype.name}"
@@ -355,8 +355,8 @@ def _first_changed(received: NDArray[Any], array: NDArray[Any]) -> tuple[int, ..
 def _refuse_others(name: str, values: NDArray[Any]) -> None:
     """Refuse entries of an array of objects that NumPy converts although they are no numbers: texts, None, spans."""
     if any(issubclass(kind, _NO_NUMBERS) for kind in set(map(type, values.flat))):
-        place, value = next((at, entry) for at, entry in np.ndenumerate(values) if isinstance(entry, _NO_NUMBERS))
-        where = f"[{', '.join(map(str, place))}]" if place else ""
+        index, value = next((at, entry) for at, entry in np.ndenumerate(values) if isinstance(entry, _NO_NUMBERS))
+        where = f"[{', '.join(map(str, index))}]" if index else ""
         raise refused(f"{name}{where}", f" is {shown(value)}: must be a number")
 
 
@@ -370,9 +370,9 @@ def finite_numbers(name: str, values: ArrayLike, unit: str | None = None) -> NDA
     """Return a contiguous float64 array of any shape; refuse other values, infinity and NaN."""
     array = numbers(name, values, np.float64, unit)
     if not np.isfinite(array).all():
-        place = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
-        where = f"[{', '.join(map(str, place))}]" if place else ""
-        raise refused(f"{name}{where}", f" is {shown(array[place].item())}: must be finite")
+        index = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+        where = f"[{', '.join(map(str, index))}]" if index else ""
+        raise refused(f"{name}{where}", f" is {shown(array[index].item())}: must be finite")
     return array
 
 
@@ -406,7 +406,7 @@ def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
     return index
 
 
-def nth(what: str, chosen: SupportsIndex, length: int) -> int:
+def nth(noun: str, chosen: SupportsIndex, length: int) -> int:
     """Return the index for a number, which counts from the end if it is negative.
 
     Raises
@@ -417,9 +417,9 @@ def nth(what: str, chosen: SupportsIndex, length: int) -> int:
     try:
         n = operator.index(chosen)
     except TypeError:
-        raise ProblemError(f"{what} {shown(chosen)}: must be a whole number") from None
+        raise ProblemError(f"{noun} {shown(chosen)}: must be a whole number") from None
     if not -length <= n < length:
-        raise IndexError(f"{what} {n} of {length}")
+        raise IndexError(f"{noun} {n} of {length}")
     return n % length
 
 
@@ -470,7 +470,7 @@ def parameters(values: Mapping[str, object]) -> str:
         if isinstance(value, str):
             return text(name, value)
         if isinstance(value, int | np.integer):
-            return whole(name, value)
+            return integer(name, value)
         return finite(name, value)
 
     named = {text("a parameter's name", name): value for name, value in values.items()}

@@ -32,7 +32,7 @@ from typing import Any
 #: How long a child may take to end by itself after its parent has ended, s.
 GRACE_S = 3.0
 #: How long its parent waits for that, s.
-_END_WITHIN_S = GRACE_S + 1.0
+_EXIT_TIMEOUT_S = GRACE_S + 1.0
 
 
 class ChildProcess(subprocess.Popen[Any]):
@@ -65,10 +65,10 @@ class ChildProcess(subprocess.Popen[Any]):
         pass_fds: Sequence[int] = (),
         **options: Any,
     ) -> None:
-        watched, held = os.pipe()
-        self._held = [held]
+        read_end, write_end = os.pipe()
+        self._write_ends = [write_end]
         order = {
-            "watched": watched,
+            "watched": read_end,
             "unfinished": [os.path.abspath(path) for path in unfinished],
             "is_file": isinstance(program, Path),
             "at_once": at_once,
@@ -79,7 +79,7 @@ class ChildProcess(subprocess.Popen[Any]):
             super().__init__(
                 [sys.executable, "-P", __file__, json.dumps(order), str(program), *map(str, arguments)],
                 env=variables,
-                pass_fds=[*pass_fds, watched],
+                pass_fds=[*pass_fds, read_end],
                 start_new_session=True,
                 **options,
             )
@@ -87,13 +87,13 @@ class ChildProcess(subprocess.Popen[Any]):
             self._let_go()
             raise
         finally:
-            os.close(watched)
+            os.close(read_end)
         _running.add(self)
 
     def _let_go(self) -> None:
         """Close this end of the pipe; several threads may do so at a time."""
         with contextlib.suppress(IndexError):
-            os.close(self._held.pop())
+            os.close(self._write_ends.pop())
 
     def wait(self, timeout: float | None = None) -> int:
         """Wait for the end of the child and return its exit code, as `subprocess.Popen` does."""
@@ -105,7 +105,7 @@ class ChildProcess(subprocess.Popen[Any]):
         """End the child as if this process had ended, wait for it, and return its exit code."""
         self._let_go()
         try:
-            return self.wait(_END_WITHIN_S)
+            return self.wait(_EXIT_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self.kill()
             return self.wait()

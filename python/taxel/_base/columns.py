@@ -12,7 +12,7 @@ from taxel._base.arguments import column, numbers
 from taxel._base.limits import unpacked
 
 
-class Columns:
+class FrozenColumns:
     """Keep arrays read-only after a copy or unpickling, which make NumPy's arrays writable."""
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -33,8 +33,8 @@ class Growing:
         The shape of a row, and its dtype, by the name of a column.
     """
 
-    def __init__(self, place: str, **columns: tuple[tuple[int, ...], type[Any]]) -> None:
-        self._place, self._columns = place, columns
+    def __init__(self, location: str, **columns: tuple[tuple[int, ...], type[Any]]) -> None:
+        self._location, self._columns = location, columns
         self._row = sum(math.prod(shape) * np.dtype(kind).itemsize for shape, kind in columns.values())
         self._blocks: dict[str, list[NDArray[Any]]] = {name: [] for name in columns}
         # How many rows there are, how many the blocks hold, and how many the last of them.
@@ -52,7 +52,7 @@ class Growing:
         """
         parts = {name: np.asarray(part) for name, part in rows.items()}
         (count,) = {len(part) for part in parts.values()}
-        unpacked(self._place, (self._rows + count) * self._row)
+        unpacked(self._location, (self._rows + count) * self._row)
         begin = 0
         while begin < count:
             if self._rows == self._room:
@@ -76,13 +76,13 @@ class Growing:
     def column(self, name: str) -> NDArray[Any]:
         """Return a column, read-only; its blocks are gone then, so that each can be taken once."""
         shape, kind = self._columns[name]
-        whole, at, blocks = np.empty((self._rows, *shape), kind), 0, self._blocks.pop(name)
+        values, at, blocks = np.empty((self._rows, *shape), kind), 0, self._blocks.pop(name)
         blocks.reverse()
         while blocks:
             block = blocks.pop()[: self._rows - at]
-            whole[at : at + len(block)] = block
+            values[at : at + len(block)] = block
             at += len(block)
-        return frozen(whole)
+        return frozen(values)
 
 
 #: Bytes of the first block of rows, and of the largest: the system takes memory of more than 32 MiB back at once.

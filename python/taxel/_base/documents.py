@@ -88,22 +88,22 @@ def text_of_json(path: str | os.PathLike[str]) -> str:
     return text
 
 
-def object_of_json(place: str, text: str) -> dict[str, Any]:
+def object_of_json(location: str, text: str) -> dict[str, Any]:
     """Return the object that taxel wrote in JSON, with numbers of each taxel; errors as of `of_json`."""
     first = text.lstrip(" \t\r\n")[:1] if text[:1].isspace() else text[:1]
     if first != "{":
         begins = f"begins with {shown(first)}" if first else "empty"
-        raise FormatError(f"{place}: not JSON of an object: {begins}; must begin with '{{'")
-    values: dict[str, Any] = of_json(place, text, BY_TAXEL, room=_ROOM)
+        raise FormatError(f"{location}: not JSON of an object: {begins}; must begin with '{{'")
+    values: dict[str, Any] = of_json(location, text, BY_TAXEL, room=_ROOM)
     return values
 
 
-def of_toml(place: str, text: str) -> dict[str, Any]:
+def of_toml(location: str, text: str) -> dict[str, Any]:
     """Return the values of a text in TOML.
 
     Parameters
     ----------
-    place : str
+    location : str
         For errors.
     text : str, at most 1 MiB
 
@@ -111,17 +111,17 @@ def of_toml(place: str, text: str) -> dict[str, Any]:
     ------
     FormatError : not TOML, too long, nested too deeply, or a key with too many dots (names the line)
     """
-    _check_length(place, text, BY_HAND)
+    _check_length(location, text, BY_HAND)
     for line, key in _between_marks(text):
         if key.count(".") > _DOTS:
-            raise FormatError(f"{place}, line {line}: a key of {key.count('.')} dots; must have at most {_DOTS}")
+            raise FormatError(f"{location}, line {line}: a key of {key.count('.')} dots; must have at most {_DOTS}")
     try:
         values = tomllib.loads(text)
     except RecursionError:
-        raise _too_deep(place) from None
+        raise _too_deep(location) from None
     except ValueError as error:
-        raise NotTomlError(f"{place}: not TOML: {_why(error)}") from None
-    _check_depth(place, values)
+        raise NotTomlError(f"{location}: not TOML: {_why(error)}") from None
+    _check_depth(location, values)
     return values
 
 
@@ -141,12 +141,12 @@ def memory_of_json(text: str) -> int:
     return characters + _PLACE * values + _NUMBER * numbers + parts
 
 
-def of_json(place: str, text: str, most: int = BY_HAND, *, room: int = UNPACKED) -> Any:
+def of_json(location: str, text: str, most: int = BY_HAND, *, room: int = UNPACKED) -> Any:
     """Return the value of a text in JSON.
 
     Parameters
     ----------
-    place : str
+    location : str
         For errors.
     text : str
     most : int, characters
@@ -158,32 +158,32 @@ def of_json(place: str, text: str, most: int = BY_HAND, *, room: int = UNPACKED)
     FormatError : not JSON, as NaN and Infinity are not, a key that stands twice in an object, too long, or nested too
         deeply
     """
-    _check_length(place, text, most)
-    unpacked(place, memory_of_json(text), room)
+    _check_length(location, text, most)
+    unpacked(location, memory_of_json(text), room)
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         values = dict(pairs)
         if len(values) < len(pairs):
             twice = next(name for name, count in Counter(name for name, _ in pairs).items() if count > 1)
-            raise FormatError(f"{place}: not JSON: {shown(twice)} stands twice in one object")
+            raise FormatError(f"{location}: not JSON: {shown(twice)} stands twice in one object")
         return values
 
     def refuse(constant: str) -> NoReturn:
-        raise FormatError(f"{place}: not JSON: {constant} is no number there")
+        raise FormatError(f"{location}: not JSON: {constant} is no number there")
 
     try:
         value = json.loads(text, object_pairs_hook=once, parse_constant=refuse)
     except RecursionError:
-        raise _too_deep(place) from None
+        raise _too_deep(location) from None
     except ValueError as error:
-        raise FormatError(f"{place}: not JSON: {_why(error)}") from None
-    _check_depth(place, value)
+        raise FormatError(f"{location}: not JSON: {_why(error)}") from None
+    _check_depth(location, value)
     return value
 
 
-def _check_length(place: str, text: str, most: int) -> None:
+def _check_length(location: str, text: str, most: int) -> None:
     if len(text) > most:
-        raise FormatError(f"{place}: {len(text)} characters; must be at most {most}")
+        raise FormatError(f"{location}: {len(text)} characters; must be at most {most}")
 
 
 def _why(error: ValueError) -> str:
@@ -193,11 +193,11 @@ def _why(error: ValueError) -> str:
     return first_line(error)
 
 
-def _too_deep(place: str) -> FormatError:
-    return FormatError(f"{place}: nested too deeply; must be at most {_DEPTH} levels")
+def _too_deep(location: str) -> FormatError:
+    return FormatError(f"{location}: nested too deeply; must be at most {_DEPTH} levels")
 
 
-def _check_depth(place: str, value: Any) -> None:
+def _check_depth(location: str, value: Any) -> None:
     """Refuse values that later steps, which call themselves for each level, could not go through."""
     level = [value]
     for _ in range(_DEPTH + 1):
@@ -210,7 +210,7 @@ def _check_depth(place: str, value: Any) -> None:
         level = inner
         if not level:
             return
-    raise _too_deep(place)
+    raise _too_deep(location)
 
 
 def _between_marks(text: str) -> Iterator[tuple[int, str]]:

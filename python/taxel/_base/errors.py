@@ -9,15 +9,29 @@ from __future__ import annotations
 from typing import TypeVar
 
 from taxel._base.messages import escaped, escaped_lines
-from taxel._core import Error, ProblemError, error_line
+from taxel._core import Error, ProblemError
 
 _Error = TypeVar("_Error", bound=Error)
+
+#: What each remedy says, with the reader's name of the argument that helps.
+_REMEDIES = {
+    "give": "give {}",
+    "larger": "a larger {} reads more",
+    "lay_out": "give {}, or rows and columns in a layout file, if they are a grid's taxels row by row",
+    "pitch": "give {} with the pitch in mm, or pitch_mm in a layout file",
+    "unfelt": (
+        "either the tare holds a touch, as it ends before the first label, which may be late (give {}), or readings "
+        "fall with pressure (falls = true in a layout file), or another source felt it (a column source in the "
+        "labels); taxel info shows what was touched"
+    ),
+}
 
 
 def _shown(error: Error) -> str:
     """Return the text of an error: one line, and below it the lines that it gives to be copied, if there are any."""
     text, *below = error.args or ("",)
-    line = error_line(escaped(str(text)), error.argument or "", error.hint)
+    line, argument = escaped(str(text)), error.argument or ""
+    line = f"{argument}{line}" if error.hint is None else f"{line}; {_REMEDIES[error.hint].format(argument)}"
     return "\n".join([line, *map(escaped_lines, below)])
 
 
@@ -38,5 +52,7 @@ def refused(name: str, text: str) -> ProblemError:
 
 def helped(error: _Error, argument: str, hint: str) -> _Error:
     """Return the same error with a remedy, of which `argument` is what helps."""
+    if hint not in _REMEDIES:
+        raise refused("hint", f" is {hint!r}: must be one of {', '.join(_REMEDIES)}")
     error.argument, error.hint = argument, hint
     return error

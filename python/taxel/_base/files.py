@@ -80,48 +80,48 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
     PermissionError : the file is there already and write-protected
     OSError : a folder, a device or a pipe has that name, the folder is missing, the disk is full ...
     """
-    place = Path(checked_path("path", path))
+    target = Path(checked_path("path", path))
     overwrite = flag("overwrite", overwrite)
-    if not overwrite and os.path.lexists(place):
-        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(place))
+    if not overwrite and os.path.lexists(target):
+        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(target))
     # A rename would replace a device by a file: /dev/null for all programs, where a superuser asks for it.
-    if place.exists() and not place.is_file():
-        raise OSError(errno.EINVAL, "is no regular file, and is not replaced", str(place))
+    if target.exists() and not target.is_file():
+        raise OSError(errno.EINVAL, "is no regular file, and is not replaced", str(target))
     # A rename checks the permissions of the folder only; a write-protected file is refused here, also for the
     # superuser.
-    if place.exists() and not (place.stat().st_mode & 0o222 and os.access(place, os.W_OK)):
-        raise PermissionError(errno.EACCES, "is write-protected", str(place))
-    if not place.parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, "no such folder", str(place.parent))
+    if target.exists() and not (target.stat().st_mode & 0o222 and os.access(target, os.W_OK)):
+        raise PermissionError(errno.EACCES, "is write-protected", str(target))
+    if not target.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "no such folder", str(target.parent))
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{place.name}.", dir=place.parent)
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     except OSError as error:
-        error.filename = str(place)
+        error.filename = str(target)
         raise
     os.close(handle)
     try:
         yield Path(name)
         os.chmod(name, 0o666 & ~_umask())
         if overwrite:
-            os.replace(name, place)
+            os.replace(name, target)
         else:
             # A link, unlike a rename, fails if another process has created the file meanwhile.
-            os.link(name, place)
+            os.link(name, target)
             os.unlink(name)
     except BaseException as error:
         Path(name).unlink(missing_ok=True)
         if isinstance(error, OSError):
-            error.filename = str(place)
+            error.filename = str(target)
             # Python shows a second name also where it is None.
             del error.filename2
         raise
 
 
-class _Enough(Exception):  # noqa: N818  no error
+class _Writable(Exception):  # noqa: N818  no error
     """Ends a test of whether a file can be written."""
 
 
-def try_whole(path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+def check_writable(path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Check that a file can be written, before the work whose result it will hold; leave no file behind.
 
     Raises
@@ -130,8 +130,8 @@ def try_whole(path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """
     try:
         with whole_file(path, overwrite=overwrite):
-            raise _Enough
-    except _Enough:
+            raise _Writable
+    except _Writable:
         return
 
 

@@ -48,7 +48,7 @@ def main() -> None:
     descriptor = int(sys.argv[1])
     sys.path[:] = json.loads(sys.stdin.readline())
     # HDF5 loads plug-ins from these folders: not from one that depends on the current folder.
-    folders = [place for place in os.environ.pop("HDF5_PLUGIN_PATH", "").split(os.pathsep) if os.path.isabs(place)]
+    folders = [folder for folder in os.environ.pop("HDF5_PLUGIN_PATH", "").split(os.pathsep) if os.path.isabs(folder)]
     if folders:
         os.environ["HDF5_PLUGIN_PATH"] = os.pathsep.join(folders)
     import h5py  # noqa: PLC0415  its path was read just now

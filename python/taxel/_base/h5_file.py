@@ -124,7 +124,7 @@ class H5File:
         FormatError : the data set is not a text, or is damaged
         """
         if self.entries[name] != Entry("text", ()):
-            raise FormatError(f"{self._place(name)}: must be a text")
+            raise FormatError(f"{self._location(name)}: must be a text")
         return str(self.texts(name, most)[()])
 
     def texts(self, name: str, most: int = DESCRIPTION) -> NDArray[np.object_]:
@@ -136,14 +136,14 @@ class H5File:
         """
         entry = self.entries[name]
         if entry.dtype != "text":
-            raise FormatError(f"{self._place(name)}: must hold texts")
+            raise FormatError(f"{self._location(name)}: must hold texts")
         size = _TEXT_BYTES * (math.prod(entry.shape) - 1)
-        unpacked(self._place(name), size, most)
+        unpacked(self._location(name), size, most)
         read: list[str] = []
         self._order({"name": name, "text": True})
         while "done" not in (answer := self._answer(PATIENCE_S)):
             size += sum(answer["lengths"])
-            unpacked(self._place(name), size, most)
+            unpacked(self._location(name), size, most)
             read += [bytes(self._bytes(length)).decode() for length in answer["lengths"]]
         texts = np.empty(len(read), object)
         texts[:] = read
@@ -183,37 +183,37 @@ class H5File:
         """
         entry = self.entries[name]
         if not entry.is_numbers:
-            what = f"holds {entry.dtype}; must hold numbers" if entry.dtype else "a group; must be a column"
-            raise FormatError(f"{self._place(name)}: {what}")
+            problem = f"holds {entry.dtype}; must hold numbers" if entry.dtype else "a group; must be a column"
+            raise FormatError(f"{self._location(name)}: {problem}")
         stored, kept = np.dtype(entry.dtype), np.dtype(dtype or entry.dtype)
         size = math.prod(entry.shape) * kept.itemsize
-        unpacked(self._place(name), size)
+        unpacked(self._location(name), size)
         self._claimed += size
         unpacked(str(self.path), self._claimed)
         try:
             array = np.empty(entry.shape, kept)
         except ValueError as error:
-            raise FormatError(f"{self._place(name)}: shape {entry.shape}: {first_line(error)}") from None
+            raise FormatError(f"{self._location(name)}: shape {entry.shape}: {first_line(error)}") from None
         self._order({"name": name, "text": False})
         while "done" not in (answer := self._answer(PATIENCE_S)):
-            place = tuple(slice(*edges) for edges in answer["block"])
-            piece = self._bytes(answer["size"]).view(stored).reshape(array[place].shape)
+            block = tuple(slice(*edges) for edges in answer["block"])
+            piece = self._bytes(answer["size"]).view(stored).reshape(array[block].shape)
             with np.errstate(over="ignore", invalid="ignore"):
-                array[place] = piece
+                array[block] = piece
             if kept.kind != "f":
                 try:
-                    begin = place[0].start if place else 0
-                    refuse_changed(f"{self.path}: {name}", piece, array[place], begin=begin)
+                    begin = block[0].start if block else 0
+                    refuse_changed(f"{self.path}: {name}", piece, array[block], begin=begin)
                 except ProblemError as error:
                     raise FormatError(str(error)) from None
         return array
 
-    def _place(self, name: str) -> str:
+    def _location(self, name: str) -> str:
         return f"{self.path}, data set {name}"
 
-    def _order(self, what: Any) -> None:
+    def _order(self, order: Any) -> None:
         try:
-            self._stdin.write(json.dumps(what).encode() + b"\n")
+            self._stdin.write(json.dumps(order).encode() + b"\n")
             self._stdin.flush()
         except BrokenPipeError:
             # The last answer of the child has the reason.
@@ -227,8 +227,8 @@ class H5File:
         del self._rest[: end + 1]
         answer: dict[str, Any] = json.loads(line)
         if "refused" in answer:
-            place = f"{self.path}, {shown(answer['entry'])}" if answer["entry"] else str(self.path)
-            raise FormatError(f"{place}: {answer['refused']}")
+            location = f"{self.path}, {shown(answer['entry'])}" if answer["entry"] else str(self.path)
+            raise FormatError(f"{location}: {answer['refused']}")
         if "error" in answer:
             raise FormatError(f"{self.path}: not a whole HDF5 file ({answer['error']})")
         return answer

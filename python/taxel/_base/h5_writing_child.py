@@ -18,7 +18,7 @@ def main() -> None:
     sys.path[:] = json.loads(sys.stdin.buffer.readline())
     try:
         write = getattr(importlib.import_module(module), function)
-        with Part(part, "r+") as file:
+        with FailFastFile(part, "r+") as file:
             write(file, sys.stdin.buffer)
             file.flush_to_disk()
     except BaseException as error:
@@ -33,7 +33,7 @@ def end(**answer: Any) -> NoReturn:
     os._exit(0)
 
 
-class Part(io.FileIO):
+class FailFastFile(io.FileIO):
     """A file at which HDF5 never sees an error: the first one ends the process."""
 
     def readinto(self, buffer: Any) -> int:

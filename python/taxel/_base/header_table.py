@@ -35,17 +35,17 @@ class HeaderTable:
         The line number of each row, counted from 1, and its unchanged cells; empty lines are not rows.
     """
 
-    place: str
+    location: str
     header: tuple[str, ...]
     lines: tuple[tuple[int, tuple[str, ...]], ...]
 
     @classmethod
-    def read(cls, place: str | Path, lines: Iterable[str]) -> HeaderTable:
+    def read(cls, location: str | Path, lines: Iterable[str]) -> HeaderTable:
         """Read a table.
 
         Parameters
         ----------
-        place : str or Path
+        location : str or Path
             The name of the file in errors.
         lines : iterable of str
 
@@ -59,11 +59,11 @@ class HeaderTable:
         >>> table.header, list(table)
         (('label', 't_us'), [(3, {'label': 'heel', 't_us': '400'})])
         """
-        rows = _rows(place, lines)
-        return replace(cls.head(place, rows), lines=tuple(rows))
+        rows = _rows(location, lines)
+        return replace(cls.head(location, rows), lines=tuple(rows))
 
     @classmethod
-    def head(cls, place: str | Path, rows: Iterator[tuple[int, tuple[str, ...]]]) -> HeaderTable:
+    def head(cls, location: str | Path, rows: Iterator[tuple[int, tuple[str, ...]]]) -> HeaderTable:
         """Read the names of a table from its first row; the others are left in the iterator.
 
         Raises
@@ -74,12 +74,12 @@ class HeaderTable:
         header = tuple(name.strip() for name in first)
         repeated = next((name for name, count in Counter(header).items() if name and count > 1), None)
         if repeated is not None:
-            raise FormatError(f"{place}, line {line}: column {shown(repeated)} stands there twice")
-        return cls(str(place), header, ())
+            raise FormatError(f"{location}, line {line}: column {shown(repeated)} stands there twice")
+        return cls(str(location), header, ())
 
     @classmethod
     def stream(
-        cls, place: str | Path, lines: Iterable[str], required: Sequence[str]
+        cls, location: str | Path, lines: Iterable[str], required: Sequence[str]
     ) -> Iterator[tuple[int, dict[str, str]]]:
         """Yield the rows of a table as iterating over one does, without holding them.
 
@@ -94,8 +94,8 @@ class HeaderTable:
         ------
         FormatError : as of `read`, `has` and iterating
         """
-        rows = _rows(place, lines)
-        table = cls.head(place, rows)
+        rows = _rows(location, lines)
+        table = cls.head(location, rows)
         table.has(required)
         for row in rows:
             yield from replace(table, lines=(row,))
@@ -114,7 +114,7 @@ class HeaderTable:
 
     def _row(self, line: int, cells: tuple[str, ...]) -> tuple[str, ...]:
         if len(cells) != len(self.header):
-            raise FormatError(f"{self.place}, line {line}: {len(cells)} cells, must have {len(self.header)}")
+            raise FormatError(f"{self.location}, line {line}: {len(cells)} cells, must have {len(self.header)}")
         return cells
 
     def has(self, required: Sequence[str]) -> None:
@@ -129,10 +129,10 @@ class HeaderTable:
             first = self.header[0] if len(self.header) == 1 else ""
             parted = next((delimiter for mark, delimiter in _PARTED.items() if mark in first), None)
             if parted:
-                raise FormatError(f"{self.place}, line 1: its cells are parted by {parted}; must be commas")
+                raise FormatError(f"{self.location}, line 1: its cells are parted by {parted}; must be commas")
             there = f"there are {', '.join(map(shown, self.header))}" if self.header else "it is empty"
             raise FormatError(
-                f"{self.place}, line 1: no column {missing[0]!r}; {there}; must be {','.join(required)} ..."
+                f"{self.location}, line 1: no column {missing[0]!r}; {there}; must be {','.join(required)} ..."
             )
 
     def __iter__(self) -> Iterator[tuple[int, dict[str, str]]]:
@@ -147,12 +147,12 @@ class HeaderTable:
             stray = next((cell for name, cell in named if not name and cell.strip()), None)
             if stray is not None:
                 raise FormatError(
-                    f"{self.place}, line {line}: {shown(stray)} stands in a column without a name; give it one"
+                    f"{self.location}, line {line}: {shown(stray)} stands in a column without a name; give it one"
                 )
             yield line, {name: cell for name, cell in named if name}
 
 
-def _rows(place: str | Path, lines: Iterable[str]) -> Iterator[tuple[int, tuple[str, ...]]]:
+def _rows(location: str | Path, lines: Iterable[str]) -> Iterator[tuple[int, tuple[str, ...]]]:
     """Yield the rows of a table that are not empty, each with the number of its line."""
     reader = csv.reader(lines, strict=True)
     line = 1
@@ -163,7 +163,7 @@ def _rows(place: str | Path, lines: Iterable[str]) -> Iterator[tuple[int, tuple[
             line = reader.line_num + 1
     except csv.Error as error:
         reason = "a quote opens and does not close" if "end of data" in str(error) else error
-        raise FormatError(f"{place}, line {line}: {reason}") from None
+        raise FormatError(f"{location}, line {line}: {reason}") from None
 
 
 def text_of(path: Path) -> list[str]:

@@ -44,7 +44,7 @@ VALUE = float(np.finfo(np.float32).max)
 #: The largest absolute time, us: 142 years, so that it also fits in 64 bits as ns.
 TIME_US = 1 << 52
 
-#: So many bytes are read without a look at what is available, which takes longer than to read them.
+#: Up to this many bytes are read without a look at the available memory, which takes longer than to read them.
 _SMALL = 1 << 24
 
 
@@ -110,12 +110,12 @@ def memory(limit: int | None) -> int:
     return min(UNPACKED, _most() if room is None else room.most)
 
 
-def unpacked(place: str, size: int, most: int = UNPACKED) -> None:
+def unpacked(location: str, size: int, most: int = UNPACKED) -> None:
     """Refuse data that would unpack to more bytes than may be read.
 
     Parameters
     ----------
-    place : str
+    location : str
         For the error.
     size : int, bytes
         What the data would take in memory.
@@ -128,17 +128,17 @@ def unpacked(place: str, size: int, most: int = UNPACKED) -> None:
         (names both sizes)
     """
     room = _room.get()
-    limit, whole = (None, size) if room is None else (room.limit, size + room.kept)
+    limit, claimed = (None, size) if room is None else (room.limit, size + room.kept)
     if limit is not None:
         bound, why = limit, ""
     elif size > most:
-        whole, bound, why = size, most, ""
-    elif whole <= _SMALL:
+        claimed, bound, why = size, most, ""
+    elif claimed <= _SMALL:
         return
     else:
         bound, why = _most() if room is None else room.most, " (3/4 of the memory that is available)"
-    if whole > bound:
-        error = FormatError(f"{place}: claims {whole} bytes, unpacked; at most {bound} are read{why}")
+    if claimed > bound:
+        error = FormatError(f"{location}: claims {claimed} bytes, unpacked; at most {bound} are read{why}")
         # What is read outside an opening has no such option.
         raise error if room is None else helped(error, "limit", "larger")
 
@@ -177,8 +177,8 @@ def _of_process(root: Path) -> int:
     return most
 
 
-#: Of each version of control groups: its folder, and the names of its limit, its usage, and what of the usage is files
-#: that the system gives up when memory is wanted.
+#: By version of control groups: the folder, and the names of the limit, the usage, and the part of the usage that is
+#: files, which the system gives up when memory is wanted.
 _GROUPS = {
     "": ("sys/fs/cgroup", "memory.max", "memory.current", "inactive_file"),
     "memory": ("sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),

@@ -124,9 +124,9 @@ class Parameters:
         values = self._values()
         if flag("deep", deep):
             for name, value in list(values.items()):
-                held: Any = self._stands_for(name) if value is None else value
-                if hasattr(held, "get_params") and not isinstance(held, type):
-                    values |= {f"{name}__{inner}": entry for inner, entry in held.get_params().items()}
+                component: Any = self._stands_for(name) if value is None else value
+                if hasattr(component, "get_params") and not isinstance(component, type):
+                    values |= {f"{name}__{inner}": entry for inner, entry in component.get_params().items()}
         return values
 
     def set_params(self, **parameters: Any) -> Self:
@@ -159,11 +159,11 @@ class Parameters:
             else:
                 changes[outer] = value
         for name, values in inner.items():
-            held: Any = changes.get(name, getattr(self, name))
-            held = self._stands_for(name) if held is None else held
-            if not hasattr(held, "set_params") or isinstance(held, type):
-                raise refused(name, f" is {shown(held)}: has no parameter {next(iter(values))!r}")
-            changes[name] = copy.copy(held).set_params(**values)
+            component: Any = changes.get(name, getattr(self, name))
+            component = self._stands_for(name) if component is None else component
+            if not hasattr(component, "set_params") or isinstance(component, type):
+                raise refused(name, f" is {shown(component)}: has no parameter {next(iter(values))!r}")
+            changes[name] = copy.copy(component).set_params(**values)
         before = self._values()
         try:
             for name, value in changes.items():

@@ -26,13 +26,13 @@ class Steps:
         self._fold: tuple[int, int, float] | None = None
         self._first_fold_s = 0.0
 
-    def update(self, step: str, done: int = 0, of: int = 0) -> None:
+    def update(self, step: str, done: int = 0, total: int = 0) -> None:
         """Take the next step, as `Progress` does."""
         self._step = step
-        if of:
+        if total:
             after_s = perf_counter() - self._begun
             self._first_fold_s = after_s if self._fold is None else self._first_fold_s
-            self._fold = done + 1, of, after_s
+            self._fold = done + 1, total, after_s
 
     def __str__(self) -> str:
         """Return the step, how long it is since the beginning, and about how long all take once that is known."""

@@ -72,14 +72,14 @@ class Saved(ABC):
     __hash__ = None  # type: ignore[assignment]
 
 
-def read(path: str | os.PathLike[str], what: str, of_text: Callable[[str], _S]) -> _S:
+def read(path: str | os.PathLike[str], noun: str, of_text: Callable[[str], _S]) -> _S:
     """Return what the text of a file stands for; errors name the file."""
-    place = Path(checked_path("path", path))
+    file = Path(checked_path("path", path))
     try:
-        text = text_of_json(place)
+        text = text_of_json(file)
     except FormatError as error:
-        raise FormatError(f"{error}; must be a {what} as taxel writes it") from None
+        raise FormatError(f"{error}; must be a {noun} as taxel writes it") from None
     try:
         return of_text(text)
     except Error as error:
-        raise FormatError(f"{place}: {error}") from None
+        raise FormatError(f"{file}: {error}") from None

@@ -58,17 +58,17 @@ def stop_on_signals() -> None:
 @contextlib.contextmanager
 def asked_to_end() -> Iterator[threading.Event]:
     """Turn the first request into a flag, so that no detection is lost before it is printed; the next raises."""
-    asked = threading.Event()
+    end_request = threading.Event()
 
     def note(number: int, frame: FrameType | None) -> None:
-        if asked.is_set():
+        if end_request.is_set():
             _stop(number, frame)
         elif _requests.is_new(number):
-            asked.set()
+            end_request.set()
 
     before = _handle(note)
     try:
-        yield asked
+        yield end_request
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)  # type: ignore[arg-type]  # what signal.signal returned

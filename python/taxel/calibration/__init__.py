@@ -23,8 +23,8 @@ from taxel._base.messages import counted, escaped, first_line
 from taxel._base.saved import Saved
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
-from taxel.calibration._curves import Curve, Law, Power, Table, Values, above_0, curve_of
-from taxel.calibration._loads import UNITS, Laid, Load, Sensor, best_exponent, gains, same
+from taxel.calibration._curves import Curve, Law, PointCurve, Power, Values, above_0, curve_of
+from taxel.calibration._loads import UNITS, CalibratedArray, Load, LoadEquations, best_exponent, gains, same
 from taxel.frames import Frames
 from taxel.tare import Tare
 
@@ -45,7 +45,7 @@ class Calibration(Saved):
     array : Array
         The sensor; frames of one with other rows, columns or taxels are refused.
     unit : {"N", "kPa"}
-    of : str
+    reading_unit : str
         What readings are in: "ticks" of a board, "counts" of a file.
     gain : float64, shape (rows, columns)
     rest : float64, shape (rows, columns), or None
@@ -76,7 +76,7 @@ class Calibration(Saved):
 
     array: Array
     unit: str
-    of: str
+    reading_unit: str
     gain: NDArray[np.float64]
     rest: NDArray[np.float64] | None
     floor: float
@@ -92,34 +92,37 @@ class Calibration(Saved):
         )
 
     @classmethod
-    def _made(cls, array: Array, curve: Curve, unit: str, of: str, how: Mapping[str, Any]) -> Calibration:
+    def _made(cls, array: Array, curve: Curve, unit: str, reading_unit: str, how: Mapping[str, Any]) -> Calibration:
         """Build a calibration from its parts, and check them."""
-        made = cls.__new__(cls)
-        made.array, made._curve = instance("array", array, Array), curve
-        made.unit, made.of = checked_text("unit", unit, UNITS), checked_text("of", of)
-        if not of or of in UNITS:
-            raise refused("of", f" is {of!r}: must say what is read: ticks, counts")
-        if isinstance(curve, Table) and curve.x.ndim == 3 and curve.x.shape[1:] != array.shape:
+        calibration = cls.__new__(cls)
+        calibration.array, calibration._curve = instance("array", array, Array), curve
+        calibration.unit, calibration.reading_unit = (
+            checked_text("unit", unit, UNITS),
+            checked_text("reading_unit", reading_unit),
+        )
+        if not reading_unit or reading_unit in UNITS:
+            raise refused("reading_unit", f" is {reading_unit!r}: must say what is read: ticks, counts")
+        if isinstance(curve, PointCurve) and curve.x.ndim == 3 and curve.x.shape[1:] != array.shape:
             raise refused("readings", f" are of {curve.x.shape[1:]} taxels: the array has {array.shape}")
-        made.gain = _by_taxel("gain", how.get("gain", 1.0), array)
-        if not (np.isfinite(made.gain) & (made.gain > 0)).all():
+        calibration.gain = _by_taxel("gain", how.get("gain", 1.0), array)
+        if not (np.isfinite(calibration.gain) & (calibration.gain > 0)).all():
             raise refused("gain", ": must be above 0 and finite at every taxel")
         rest = how.get("rest")
         if isinstance(rest, Tare):
             same(array, rest.array, "the tare")
             rest = rest.rest
-        made.rest = None if rest is None else _by_taxel("rest", rest, array)
-        made.floor = number("floor", how.get("floor", 0.0))
-        if not 0 <= made.floor < math.inf:
-            raise refused("floor", f" is {made.floor}: must be 0 or more")
-        made.date = _iso(how.get("date"))
+        calibration.rest = None if rest is None else _by_taxel("rest", rest, array)
+        calibration.floor = number("floor", how.get("floor", 0.0))
+        if not 0 <= calibration.floor < math.inf:
+            raise refused("floor", f" is {calibration.floor}: must be 0 or more")
+        calibration.date = _iso(how.get("date"))
         residual = how.get("residual")
-        made.residual = None if residual is None else number("residual", residual)
-        if made.residual is not None and not 0 <= made.residual < math.inf:
-            raise ProblemError(f"residual is {made.residual}: must be 0 or more")
-        made.loads = tuple(how.get("loads", ()))
-        made.note = checked_text("note", how.get("note", ""))
-        return made
+        calibration.residual = None if residual is None else number("residual", residual)
+        if calibration.residual is not None and not 0 <= calibration.residual < math.inf:
+            raise ProblemError(f"residual is {calibration.residual}: must be 0 or more")
+        calibration.loads = tuple(how.get("loads", ()))
+        calibration.note = checked_text("note", how.get("note", ""))
+        return calibration
 
     @classmethod
     def law(
@@ -182,7 +185,7 @@ class Calibration(Saved):
         values: ArrayLike,
         *,
         unit: str,
-        of: str = "counts",
+        reading_unit: str = "counts",
         gain: ArrayLike = 1.0,
         rest: Tare | ArrayLike | None = None,
         floor: float = 0.0,
@@ -199,12 +202,12 @@ class Calibration(Saved):
         values : float64, shape (points,), in `unit`, rising
             A first point (0, 0) is added. Beyond the last point the last value holds.
         unit : {"N", "kPa"}
-        of : str
+        reading_unit : str
             What readings are in.
         gain : float or float64, shape (rows, columns), above 0
-        rest : Tare or float64, shape (rows, columns), in the unit `of`, optional
+        rest : Tare or float64, shape (rows, columns), in the unit `reading_unit`, optional
             0 where it is left out.
-        floor : float, in the unit `of`, 0 or more
+        floor : float, in the unit `reading_unit`, 0 or more
         date : str, optional
             Today where it is left out.
         note : str
@@ -220,7 +223,7 @@ class Calibration(Saved):
         array([0.5, 3. , 5. ], dtype=float32)
         """
         how = {"gain": gain, "rest": rest, "floor": floor, "date": date, "note": note}
-        return cls._made(array, Table(readings, values), unit, of, how)
+        return cls._made(array, PointCurve(readings, values), unit, reading_unit, how)
 
     @classmethod
     def fit(
@@ -277,31 +280,33 @@ class Calibration(Saved):
         measured = [instance("loads", load, Load) for load in several("loads", loads)]
         if not measured:
             raise refused("loads", " is empty: lay at least one known load on the array")
-        array, of = instance("frames", measured[0].frames, Frames).array, measured[0].frames.unit
+        array, reading_unit = instance("frames", measured[0].frames, Frames).array, measured[0].frames.unit
         curve: Curve = Power(1.0)
         if start is not None:
             instance("start", start, Calibration)
             same(array, start.array, "start")
-            if (start.of, start.unit) != (of, unit):
-                raise ProblemError(f"start turns {start.of} into {start.unit}: must turn {of} into {unit}")
+            if (start.reading_unit, start.unit) != (reading_unit, unit):
+                raise ProblemError(
+                    f"start turns {start.reading_unit} into {start.unit}: must turn {reading_unit} into {unit}"
+                )
             curve, rest = start._curve, start.rest if rest is None else rest
-        whole_fit = cls._made(array, curve, unit, of, {"rest": rest, "floor": floor, "date": date, "note": note})
-        sensor = Sensor(array, of, unit, whole_fit._rest(None), whole_fit.floor)
-        laid = [Laid.of(load, k, sensor) for k, load in enumerate(measured, start=1)]
+        fitted = cls._made(array, curve, unit, reading_unit, {"rest": rest, "floor": floor, "date": date, "note": note})
+        sensor = CalibratedArray(array, reading_unit, unit, fitted._rest(None), fitted.floor)
+        equations = [LoadEquations.from_load(load, k, sensor) for k, load in enumerate(measured, start=1)]
         differ = len({load.load for load in measured}) > 1
         if exponent is not None:
             curve = curve.bent(above_0("exponent", exponent))
-        elif differ and not isinstance(curve, Table):
-            curve = curve.bent(best_exponent(curve, laid))
-        each_gain, gain = gains(array, curve, laid, flag("each", each))
-        whole_fit._curve, whole_fit.gain = curve, each_gain
-        made = [loading.made(curve, each_gain) for loading in laid]
-        missed = np.concatenate([loading.errors(curve, each_gain) for loading in laid])
-        unknown = 1 + (differ and exponent is None and not isinstance(curve, Table))
+        elif differ and not isinstance(curve, PointCurve):
+            curve = curve.bent(best_exponent(curve, equations))
+        each_gain, gain = gains(array, curve, equations, flag("each", each))
+        fitted._curve, fitted.gain = curve, each_gain
+        totals = [load_equations.total(curve, each_gain) for load_equations in equations]
+        missed = np.concatenate([load_equations.errors(curve, each_gain) for load_equations in equations])
+        unknown = 1 + (differ and exponent is None and not isinstance(curve, PointCurve))
         unknown += int(np.count_nonzero(each_gain[array._there()] != gain)) if each else 0
-        whole_fit.residual = float(np.sqrt(np.mean(missed**2))) if len(missed) > unknown else None
-        whole_fit.loads = tuple((load.load, load.unit, value) for load, value in zip(measured, made, strict=True))
-        return whole_fit
+        fitted.residual = float(np.sqrt(np.mean(missed**2))) if len(missed) > unknown else None
+        fitted.loads = tuple((load.load, load.unit, value) for load, value in zip(measured, totals, strict=True))
+        return fitted
 
     def apply(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
         """Return frames in N or kPa; taxels that do not read more than the floor above rest give 0.
@@ -321,7 +326,7 @@ class Calibration(Saved):
         ------
         ProblemError : frames of another array, or in another unit; a rest that is not finite
         """
-        same(self.array, instance("frames", frames, Frames).array, "the frames", frames.unit, self.of)
+        same(self.array, instance("frames", frames, Frames).array, "the frames", frames.unit, self.reading_unit)
         return Frames(self._values(frames.values, self._rest(rest)), frames.t, unit=self.unit, array=frames.array)
 
     def readings(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
@@ -344,9 +349,9 @@ class Calibration(Saved):
         ProblemError : frames of another array, or in another unit
         """
         same(self.array, instance("frames", frames, Frames).array, "the frames", frames.unit, self.unit)
-        held = np.nan_to_num(self._rest(rest))
-        values = self._curve.readings(np.maximum(frames.values, 0.0) / self.gain, held)
-        return Frames(_32_bits(values), frames.t, unit=self.of, array=frames.array)
+        rest_values = np.nan_to_num(self._rest(rest))
+        values = self._curve.readings(np.maximum(frames.values, 0.0) / self.gain, rest_values)
+        return Frames(_32_bits(values), frames.t, unit=self.reading_unit, array=frames.array)
 
     def _rest(self, rest: Tare | ArrayLike | None) -> Values:
         if isinstance(rest, Tare):
@@ -371,11 +376,11 @@ class Calibration(Saved):
         (left, right), (top, bottom) = self.array.region(columns, rows)
         small = self.array._part(columns, rows)
         curve, rest = self._curve, None if self.rest is None else self.rest[top:bottom, left:right]
-        if isinstance(curve, Table) and curve.x.ndim == 3:
-            curve = Table(curve.x[:, top:bottom, left:right], curve.y)
+        if isinstance(curve, PointCurve) and curve.x.ndim == 3:
+            curve = PointCurve(curve.x[:, top:bottom, left:right], curve.y)
         gain = self.gain[top:bottom, left:right]
         unchanged = {name: getattr(self, name) for name in ("floor", "date", "residual", "loads", "note")}
-        return self._made(small, curve, self.unit, self.of, {**unchanged, "gain": gain, "rest": rest})
+        return self._made(small, curve, self.unit, self.reading_unit, {**unchanged, "gain": gain, "rest": rest})
 
     def to_json(self) -> str:
         """Return the calibration as JSON that people can read."""
@@ -383,7 +388,7 @@ class Calibration(Saved):
         document: dict[str, Any] = {
             "taxel": "calibration",
             "unit": self.unit,
-            "of": self.of,
+            "of": self.reading_unit,
             "date": self.date,
             "residual": self.residual,
             "loads": [{"load": load, "unit": unit, "made": made} for load, unit, made in self.loads],
@@ -434,7 +439,7 @@ class Calibration(Saved):
             entry = "values"
             names = ("gain", "floor", "date", "residual", "note")
             how = {name: document[name] for name in names if name in document} | {"rest": rest, "loads": loads}
-            return cls._made(array, curve, unit, document["of"], how)
+            return cls._made(array, curve, unit, checked_text("of", document["of"]), how)
         except KeyError as error:
             raise FormatError(f"{entry}: {error.args[0]} is missing; must be as Calibration.save writes it") from None
         except (ValueError, TypeError, AttributeError, IndexError, OverflowError, ProblemError) as error:
@@ -457,9 +462,11 @@ class Calibration(Saved):
         >>> Calibration.beside("a recording that is not there.mcap") is None
         True
         """
-        place = Path(checked_path("recording", recording))
-        by_name = f"{named(place).stem}.calibration.json"
-        return next((file for name in (by_name, "calibration.json") if (file := beside(place, name)).is_file()), None)
+        recording_path = Path(checked_path("recording", recording))
+        by_name = f"{named(recording_path).stem}.calibration.json"
+        return next(
+            (file for name in (by_name, "calibration.json") if (file := beside(recording_path, name)).is_file()), None
+        )
 
     def described(self) -> str:
         """Return what it is in a line: the curve, its day, its residual."""
@@ -471,7 +478,7 @@ class Calibration(Saved):
         parts = [curve.get(kind, "law of the fabric")]
         parts += [f"fit to {counted(count, 'load')}"] * bool(count)
         parts += [] if self.residual is None else [f"residual {100 * self.residual:.1f} %"]
-        return ", ".join([f"{self.of} to {self.unit}", *parts, self.date])
+        return ", ".join([f"{self.reading_unit} to {self.unit}", *parts, self.date])
 
     def __repr__(self) -> str:
         size = f"{self.array.name}: {self.array.rows} x {self.array.columns} taxels"

@@ -16,7 +16,7 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 
-#: Of a load that uniform pressure in kPa makes on 1 mm2: N.
+#: The force of a uniform pressure of 1 kPa on 1 mm2, N.
 N_PER_KPA_MM2 = 1e-3
 
 Values = NDArray[np.float64]
@@ -61,7 +61,7 @@ class Power:
         return Power(exponent)
 
 
-class Table:
+class PointCurve:
     """Straight lines through known points, of one taxel for all or of each; the last value holds beyond its point."""
 
     def __init__(self, readings: Any, values: Any) -> None:
@@ -76,9 +76,9 @@ class Table:
             rising = np.isfinite(column) & (np.diff(column, axis=0, prepend=-np.inf) > 0) & (column >= 0)
             wrong = np.argwhere(~rising)
             if len(wrong):
-                place = tuple(wrong[0])
-                index = "".join(f"[{k}]" for k in place)
-                raise ProblemError(f"{name}{index} is {column[place]:g}: must rise from 0 or more")
+                position = tuple(wrong[0])
+                index = "".join(f"[{k}]" for k in position)
+                raise ProblemError(f"{name}{index} is {column[position]:g}: must rise from 0 or more")
         at_rest = self.x[0] == 0
         if np.any(at_rest != (self.y[0] == 0)):
             first = float(np.ravel(self.x[0])[0])
@@ -90,11 +90,11 @@ class Table:
         if self.x.ndim == 1:
             return np.asarray(np.interp(inputs, *((self.y, self.x) if back else (self.x, self.y))))
         out = np.empty(np.broadcast_shapes(inputs.shape, self.x.shape[1:]))
-        whole = np.broadcast_to(inputs, out.shape)
+        by_taxel = np.broadcast_to(inputs, out.shape)
         for row, column in np.ndindex(self.x.shape[1:]):
             known = self.x[:, row, column]
             points = (self.y, known) if back else (known, self.y)
-            out[..., row, column] = np.interp(whole[..., row, column], *points)
+            out[..., row, column] = np.interp(by_taxel[..., row, column], *points)
         return out
 
     def values(self, readings: Values, rest: Values) -> Values:
@@ -106,7 +106,7 @@ class Table:
     def to_dict(self) -> dict[str, Any]:
         return {"table": {"readings": self.x.tolist(), "values": self.y.tolist()}}
 
-    def bent(self, exponent: float) -> Table:  # noqa: ARG002  what a curve with an exponent takes
+    def bent(self, exponent: float) -> PointCurve:  # noqa: ARG002  what a curve with an exponent takes
         raise refused("exponent", ": a table has none; its gain alone is fitted")
 
 
@@ -150,7 +150,7 @@ def curve_of(document: Mapping[str, Any], unit: str) -> Curve:
     """Return the curve that a file describes."""
     kinds: dict[str, Any] = {
         "power": Power,
-        "table": Table,
+        "table": PointCurve,
         "law": lambda ramp, **sensor: Law(ramp, unit, **sensor),
     }
     if len(document) != 1 or next(iter(document)) not in kinds:

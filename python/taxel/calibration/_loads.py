@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, several, shown, whole
+from taxel._base.arguments import instance, integer, several, shown
 from taxel._base.arguments import text as checked_text
 from taxel._base.errors import refused
 from taxel._base.messages import warn
@@ -50,17 +50,17 @@ class Load(NamedTuple):
     taxel: tuple[int, int] | None = None
 
 
-class Sensor(NamedTuple):
+class CalibratedArray(NamedTuple):
     """What is calibrated: its array, the units of its readings and of the result, its rest, and the floor above it."""
 
     array: Array
-    of: str
+    reading_unit: str
     unit: str
     rest: Values
     floor: float
 
 
-class Laid(NamedTuple):
+class LoadEquations(NamedTuple):
     """The equations of a load: its taxels, their weights and the value; from mean readings above the floor."""
 
     load: float
@@ -72,32 +72,34 @@ class Laid(NamedTuple):
     """Whether each chosen taxel has to make the load by itself."""
 
     @classmethod
-    def of(cls, load: Load, number_of: int, sensor: Sensor) -> Laid:
-        frames, place = instance("frames", load.frames, Frames), f"load {number_of}"
-        same(sensor.array, frames.array, f"the frames of {place}", frames.unit, sensor.of)
-        value, unit = above_0(place, load.load), checked_text("unit", load.unit, UNITS)
+    def from_load(cls, load: Load, number_of: int, sensor: CalibratedArray) -> LoadEquations:
+        frames, location = instance("frames", load.frames, Frames), f"load {number_of}"
+        same(sensor.array, frames.array, f"the frames of {location}", frames.unit, sensor.reading_unit)
+        value, unit = above_0(location, load.load), checked_text("unit", load.unit, UNITS)
         if not len(frames):
-            raise ProblemError(f"{place}: no frame while it lies")
+            raise ProblemError(f"{location}: no frame while it lies")
         rest = sensor.rest
         readings = frames.values.mean(axis=0, dtype=np.float64)
         chosen = sensor.array._there() & ~np.isnan(rest)
         if load.taxel is not None:
-            only = several(f"{place}, taxel", load.taxel)
+            only = several(f"{location}, taxel", load.taxel)
             if len(only) != 2:
-                raise ProblemError(f"{place}, taxel is {shown(load.taxel)}: must be a column and a row")
-            x, y = (whole(f"{place}, taxel", n, 0) for n in only)
+                raise ProblemError(f"{location}, taxel is {shown(load.taxel)}: must be a column and a row")
+            x, y = (integer(f"{location}, taxel", n, 0) for n in only)
             index = int(sensor.array.index(x, y))
             chosen &= np.arange(chosen.size).reshape(chosen.shape) == index
         rest = np.nan_to_num(rest)
         loaded = chosen & (readings > rest + sensor.floor)
         if not loaded.any():
-            raise ProblemError(f"{place}: no taxel reads more than {sensor.floor:g} {sensor.of} above its rest")
+            raise ProblemError(
+                f"{location}: no taxel reads more than {sensor.floor:g} {sensor.reading_unit} above its rest"
+            )
         weight: float | Values = 1.0
         if unit != sensor.unit:
             areas = sensor.array.area_mm2
             if areas is None:
                 raise ProblemError(
-                    f"{place}: in {unit}, and the calibration in {sensor.unit}: between them stands the area of "
+                    f"{location}: in {unit}, and the calibration in {sensor.unit}: between them stands the area of "
                     f"each taxel, which is not known of {sensor.array!r}"
                 )
             weight = 1 / (areas * N_PER_KPA_MM2) if unit == "kPa" else areas * N_PER_KPA_MM2
@@ -110,34 +112,34 @@ class Laid(NamedTuple):
         values = self.weight * gain * curve.values(self.readings, self.rest)
         return np.where(self.chosen, values, 0.0)
 
-    def made(self, curve: Curve, gain: float | Values = 1.0) -> float:
+    def total(self, curve: Curve, gain: float | Values = 1.0) -> float:
         """Return the value of all chosen taxels: the sum of forces, the mean of pressures."""
-        every = self.by_taxel(curve, gain)[self.chosen]
-        return float(every.mean() if self.alone else every.sum())
+        readings = self.by_taxel(curve, gain)[self.chosen]
+        return float(readings.mean() if self.alone else readings.sum())
 
     def errors(self, curve: Curve, gain: Values) -> Values:
         """Return the error of each equation, as a share of the load."""
         if self.alone:
             return np.asarray(self.by_taxel(curve, gain)[self.chosen] / self.load - 1.0)
-        return np.array([self.made(curve, gain) / self.load - 1.0])
+        return np.array([self.total(curve, gain) / self.load - 1.0])
 
 
-def _least(made: Sequence[float], loads: Sequence[float]) -> tuple[float, float]:
+def _least(totals: Sequence[float], loads: Sequence[float]) -> tuple[float, float]:
     """Return the gain with the least squares of relative error, and their mean."""
-    share = np.array(made) / np.array(loads)
+    share = np.array(totals) / np.array(loads)
     gain = float(share.sum() / (share**2).sum()) if (share > 0).any() else 1.0
     return gain, float(np.mean((gain * share - 1.0) ** 2))
 
 
-def best_exponent(curve: Curve, laid: Sequence[Laid]) -> float:
+def best_exponent(curve: Curve, equations: Sequence[LoadEquations]) -> float:
     """Return the exponent whose best gain has the least squares of relative error."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415  loads slowly
 
-    loads = [loading.load for loading in laid]
+    loads = [load.load for load in equations]
 
     def missed(log: float) -> float:
         bent = curve.bent(math.exp(log))
-        return _least([loading.made(bent) for loading in laid], loads)[1]
+        return _least([load.total(bent) for load in equations], loads)[1]
 
     # A grid comes first, as the squares may have several minima.
     grid = np.linspace(math.log(_EXPONENTS[0]), math.log(_EXPONENTS[1]), 33)
@@ -157,24 +159,24 @@ def best_exponent(curve: Curve, laid: Sequence[Laid]) -> float:
     return best[1]
 
 
-def gains(array: Array, curve: Curve, laid: Sequence[Laid], each: bool) -> tuple[Values, float]:
+def gains(array: Array, curve: Curve, equations: Sequence[LoadEquations], each: bool) -> tuple[Values, float]:
     """Return the gain of each taxel, and the common one."""
-    common, _ = _least([loading.made(curve) for loading in laid], [loading.load for loading in laid])
-    every = np.full(array.shape, common)
+    common, _ = _least([load.total(curve) for load in equations], [load.load for load in equations])
+    by_taxel = np.full(array.shape, common)
     if not each:
-        return every, common
-    if not any(loading.alone for loading in laid):
+        return by_taxel, common
+    if not any(load.alone for load in equations):
         raise refused("each", ": no load determines a single taxel; give a uniform pressure (kPa), or its taxel")
-    share = np.array([loading.by_taxel(curve) / loading.load for loading in laid if loading.alone])
+    share = np.array([load.by_taxel(curve) / load.load for load in equations if load.alone])
     squares = (share**2).sum(axis=0)
-    np.divide(share.sum(axis=0), squares, out=every, where=squares > 0)
-    return every, common
+    np.divide(share.sum(axis=0), squares, out=by_taxel, where=squares > 0)
+    return by_taxel, common
 
 
-def same(calibrated: Array, given: Array, what: str, unit: str | None = None, expected: str | None = None) -> None:
+def same(calibrated: Array, given: Array, subject: str, unit: str | None = None, expected: str | None = None) -> None:
     """Refuse what has other taxels, or another unit; warn of another pitch."""
     if not calibrated.fits(given):
-        raise ProblemError(f"{what}: of {given!r}; the calibration is of another array, {calibrated!r}")
-    calibrated._warn_apart(given, what, stacklevel=3)
+        raise ProblemError(f"{subject}: of {given!r}; the calibration is of another array, {calibrated!r}")
+    calibrated._warn_apart(given, subject, stacklevel=3)
     if unit != expected:
-        raise ProblemError(f"{what}: in {unit}; the calibration takes {expected}")
+        raise ProblemError(f"{subject}: in {unit}; the calibration takes {expected}")

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 import typer
 
-from taxel._base.arguments import finite, shown, whole
+from taxel._base.arguments import finite, integer, shown
 from taxel._base.child_process import make_safe
 from taxel._base.number_text import float_of
 from taxel._base.stopping import leave, stop_on_signals
@@ -36,7 +36,7 @@ app = App(
 )
 
 #: What checks numbers that the parser refuses.
-_CHECKS: dict[Any, Callable[..., object]] = {int: whole, float: finite}
+_CHECKS: dict[Any, Callable[..., object]] = {int: integer, float: finite}
 
 #: typer's error for a command line that cannot be parsed; the class belongs to its own copy of click.
 _UsageError: Any = typer.BadParameter.__base__

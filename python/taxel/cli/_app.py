@@ -118,8 +118,8 @@ def _with_fields(work: Callable[..., None]) -> Callable[..., None]:
     fields = {name: inspect.signature(group, eval_str=True).parameters for name, group in groups.items()}
 
     def call(**typed: Any) -> None:
-        held = {name: group(**{field: typed.pop(field) for field in fields[name]}) for name, group in groups.items()}
-        work(**typed, **held)
+        options = {name: group(**{field: typed.pop(field) for field in fields[name]}) for name, group in groups.items()}
+        work(**typed, **options)
 
     each = [fields[name].values() if name in fields else [parameter] for name, parameter in parameters.items()]
     return as_command(call, work, chain.from_iterable(each))

@@ -26,11 +26,11 @@ def bar(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as shown:
         task, begun = shown.add_task("", total=None, left=""), time.monotonic()
 
-        def update(what: str, done: int, of: int) -> None:
+        def update(step: str, done: int, total: int) -> None:
             nonlocal begun
             begun = begun if done else time.monotonic()
-            left = f"{duration((time.monotonic() - begun) * (of - done) / done)} left" if done else ""
-            shown.update(task, description=escaped(what), completed=done, total=of or None, left=left)
+            left = f"{duration((time.monotonic() - begun) * (total - done) / done)} left" if done else ""
+            shown.update(task, description=escaped(step), completed=done, total=total or None, left=left)
 
         yield update
 

@@ -95,7 +95,7 @@ def _import(point: EntryPoint) -> Any:
     try:
         return typer.main.get_command(point.load())
     except Exception as error:  # another distribution's code may raise any error
-        of = f" of {point.dist.name} {point.dist.version}" if point.dist else ""
+        source = f" of {point.dist.name} {point.dist.version}" if point.dist else ""
         raise ProblemError(
-            f"taxel {point.name}: {point.value}{of} cannot be used: {type(error).__name__}: {first_line(error)}"
+            f"taxel {point.name}: {point.value}{source} cannot be used: {type(error).__name__}: {first_line(error)}"
         ) from error

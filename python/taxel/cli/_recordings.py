@@ -13,7 +13,7 @@ import typer
 
 from taxel._base.arguments import short
 from taxel._base.documents import NotTomlError, of_toml
-from taxel._base.files import try_whole
+from taxel._base.files import check_writable
 from taxel._base.messages import collected, escaped
 from taxel._base.progress import Steps
 from taxel._core import ProblemError
@@ -79,14 +79,14 @@ def try_report(folder: Path) -> None:
     FileExistsError : the folder holds a report already
     OSError : the folder cannot be made
     """
-    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    missing = [missing_folder for missing_folder in (folder, *folder.parents) if not missing_folder.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        try_whole(folder / "report.html")
+        check_writable(folder / "report.html")
     finally:
-        for place in missing:
+        for missing_folder in missing:
             with suppress(OSError):
-                place.rmdir()
+                missing_folder.rmdir()
 
 
 def _report(steps: Steps, ended: Event) -> None:
@@ -114,8 +114,8 @@ def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
         elif console.is_terminal:
             with console.status("") as status:
 
-                def show(step: str, done: int, of: int) -> None:
-                    steps.update(step, done, of)
+                def show(step: str, done: int, total: int) -> None:
+                    steps.update(step, done, total)
                     status.update(Text(escaped(steps)))
 
                 yield show

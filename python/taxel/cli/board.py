@@ -81,8 +81,10 @@ def with_live_options(command: str, *names: str) -> Callable[[Callable[..., None
     *names : str
         Those of its options that are taken. Default: all.
     """
-    every = {field: field.metadata["typed"].get("commands", "live").split() for field in fields(StatedOptions)}
-    chosen = [field for field, commands in every.items() if command in commands and (not names or field.name in names)]
+    commands_of = {field: field.metadata["typed"].get("commands", "live").split() for field in fields(StatedOptions)}
+    chosen = [
+        field for field, commands in commands_of.items() if command in commands and (not names or field.name in names)
+    ]
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
         def call(**typed: Any) -> None:
@@ -166,8 +168,8 @@ def outside(counters: dict[str, Any], array: Array) -> str | None:
 
 def doubts(counters: dict[str, Any]) -> Iterator[str]:
     """Yield why the drift or the delays of a board and of each other source cannot be, where they cannot."""
-    every = {"": counters, **counters["sources"]}
-    for name, counts in every.items():
+    sources = {"": counters, **counters["sources"]}
+    for name, counts in sources.items():
         if (counts.get("pace") or {}).get("doubt"):
             yield f"{name}: {counts['pace']['doubt']}" if name else counts["pace"]["doubt"]
 

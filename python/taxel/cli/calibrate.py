@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import taxel
-from taxel._base.files import beside, named, try_whole
+from taxel._base.files import beside, check_writable, named
 from taxel._core import ProblemError
 from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
@@ -75,20 +75,20 @@ def calibrate(
         raise ProblemError(f"--from {start} and --to {stop} s: --from must not be after --to")
     options = taxel.tasks.CalibrateOptions(law, assignments(set_ or []), table, unit, each, exponent, tare, date, note)
     opened = files.opener.open_one(recording)
-    place = beside(recording, f"{named(recording).stem}.calibration.json") if out is None else out
-    try_whole(place, overwrite=overwrite)
+    file = beside(recording, f"{named(recording).stem}.calibration.json") if out is None else out
+    check_writable(file, overwrite=overwrite)
     with progress(as_json):
         known = [] if loads is None else taxel.tasks.read_loads(loads)
         known += [] if load is None else [taxel.tasks.KnownLoad(load, load_unit, start, stop, place="--load")]
-        made = taxel.tasks.calibrate(opened, known, options)
-    made.calibration.save(place, overwrite=overwrite)
-    say_warnings(made.warnings)
+        result = taxel.tasks.calibrate(opened, known, options)
+    result.calibration.save(file, overwrite=overwrite)
+    say_warnings(result.warnings)
     if as_json:
-        say(json.dumps({"calibration": str(place), **made.to_dict()}))
+        say(json.dumps({"calibration": str(file), **result.to_dict()}))
         return
-    calibration = made.calibration
-    say(f"{calibration.described()}: written to {place}")
-    for number, (true, of, value) in enumerate(calibration.loads, start=1):
-        say(f"  load {number}: {true:g} {of}, calibrated {value:.4g} {of}")
+    calibration = result.calibration
+    say(f"{calibration.described()}: written to {file}")
+    for number, (true, unit_of_load, value) in enumerate(calibration.loads, start=1):
+        say(f"  load {number}: {true:g} {unit_of_load}, calibrated {value:.4g} {unit_of_load}")
     if calibration.loads and calibration.residual is None:
         say("  no residual: no more loads than unknowns, so the fit is exact; further loads show how good it is")

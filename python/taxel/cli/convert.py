@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import taxel
-from taxel._base.files import try_whole
+from taxel._base.files import check_writable
 from taxel._core import ProblemError
 from taxel.cli._app import App, JsonOption, OverwriteOption, with_out
 from taxel.cli._bar import bar
@@ -55,7 +55,7 @@ def convert(
     Example: taxel convert trials/ recordings/
     """
     if target.suffix:
-        try_whole(target, overwrite=overwrite)
+        check_writable(target, overwrite=overwrite)
     with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {source}", 0, 0)
         opened = [of_source(recording, part) for recording in files.opener.open_joined(source)]
@@ -63,29 +63,29 @@ def convert(
             raise ProblemError(
                 f"{source}: holds {len(opened)} recordings; {target} must be a folder, without an ending"
             )
-        places = [target] if target.suffix else _places(opened, target)
-        for place in places if not target.suffix else ():
-            try_whole(place, overwrite=overwrite)
+        targets = [target] if target.suffix else _targets(opened, target)
+        for file in targets if not target.suffix else ():
+            check_writable(file, overwrite=overwrite)
         written = []
-        for k, (recording, place) in enumerate(zip(opened, places, strict=True)):
-            show(f"{recording.name} to {place}", k, len(places) if k else 0)
+        for k, (recording, file) in enumerate(zip(opened, targets, strict=True)):
+            show(f"{recording.name} to {file}", k, len(targets) if k else 0)
             how: dict[str, Any] = {"frames_hz": frames, "compression": compression, "overwrite": overwrite}
             written.append(
-                {"source": recording.title, "target": str(place), "lost": taxel.convert(recording, place, **how)}
+                {"source": recording.title, "target": str(file), "lost": taxel.convert(recording, file, **how)}
             )
     if as_json:
         say(json.dumps({**written[0], "source": str(source)} if target.suffix else {"written": written}))
         return
-    for made in written:
-        say(f"written to {made['target']}", *(f"  lost: {what}" for what in made["lost"]))
+    for entry in written:
+        say(f"written to {entry['target']}", *(f"  lost: {loss}" for loss in entry["lost"]))
 
 
-def _places(opened: list[Recording], folder: Path) -> list[Path]:
+def _targets(opened: list[Recording], folder: Path) -> list[Path]:
     """Return the new files of recordings in a folder, which is created."""
     folder.mkdir(parents=True, exist_ok=True)
     stems = [Path(each.name).stem if each.path.name == each.name else each.name for each in opened]
-    places = [folder / f"{re.sub(r'[^A-Za-z0-9._-]+', '_', stem)}.mcap" for stem in stems]
-    twice = next((place for place in places if places.count(place) > 1), None)
+    targets = [folder / f"{re.sub(r'[^A-Za-z0-9._-]+', '_', stem)}.mcap" for stem in stems]
+    twice = next((target for target in targets if targets.count(target) > 1), None)
     if twice is not None:
         raise ProblemError(f"{twice}: two recordings have this name; convert them one by one")
-    return places
+    return targets

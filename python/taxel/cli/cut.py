@@ -60,9 +60,9 @@ def cut(
     """
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {plain(start)} --to {plain(stop)}: the part must not end before it begins")
-    whole = of_source(files.opener.open_one(recording), source)
+    source_recording = of_source(files.opener.open_one(recording), source)
     parts = taxel.cut(
-        whole,
+        source_recording,
         start_us=float("-inf") if start is None else start * 1e6,
         stop_us=float("inf") if stop is None else stop * 1e6,
         columns=_range("--columns", columns),
@@ -71,16 +71,16 @@ def cut(
         before_us=before * 1e6,
         after_us=after * 1e6,
     )
-    _check_time(whole, start, stop)
+    _check_time(source_recording, start, stop)
     if not parts:
         raise ProblemError(f"{recording}: no note {label!r} with a time in it; taxel info --json lists the notes")
     written = []
     for k, part in enumerate(parts, start=1):
-        place = out if label is None else Path(_core.numbered_path(out, k))
-        lost = taxel.convert(part, place, overwrite=overwrite)
-        written.append({"file": str(place), "lost": lost})
+        file = out if label is None else Path(_core.numbered_path(out, k))
+        lost = taxel.convert(part, file, overwrite=overwrite)
+        written.append({"file": str(file), "lost": lost})
         if not as_json:
-            say(f"written to {place}: {part!r}", *(f"  lost: {what}" for what in lost))
+            say(f"written to {file}: {part!r}", *(f"  lost: {loss}" for loss in lost))
     if as_json:
         say(json.dumps({"recording": str(recording), "written": written}))
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from taxel._base.files import try_whole
+from taxel._base.files import check_writable
 from taxel.cli._app import App
 from taxel.cli._say import say
 from taxel.cli.console import Console
@@ -49,7 +49,7 @@ def demo(
     """
     console = Console(quiet=as_json)
     if train_to is not None:
-        try_whole(train_to)
+        check_writable(train_to)
         _train(console, train_to)
         say(json.dumps({"readout": str(train_to)}) if as_json else f"readout: {train_to.resolve()}")
         return
@@ -68,10 +68,10 @@ def demo(
     say(json.dumps(values | {"report": str(page)}) if as_json else f"report: {page.resolve()}")
 
 
-def _train(console: Console, place: Path) -> None:
+def _train(console: Console, file: Path) -> None:
     from taxel.demo.shipped import described, trained  # noqa: PLC0415
 
     with console.status("training") as status:
         readout = trained(progress=lambda step, *_: status.update(step))
-    readout.save(place)
+    readout.save(file)
     console.print(described(readout))

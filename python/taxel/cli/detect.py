@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import taxel
-from taxel._base.files import try_whole, write_whole
+from taxel._base.files import check_writable, write_whole
 from taxel._base.times import begun
 from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
@@ -59,7 +59,7 @@ def detect(
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv --csv found.csv
     """
     if csv is not None:
-        try_whole(csv, overwrite=overwrite)
+        check_writable(csv, overwrite=overwrite)
     if report is not None:
         try_report(report)
     options = taxel.tasks.DetectOptions(tare, frame_us, window_ms)
@@ -74,9 +74,9 @@ def detect(
         taxel.report.write_detections(report, loaded, found.outcomes, title=f"Detections of {readout} in {recording}")
     say_warnings(found.warnings)
     written = {"written": csv, "report": None if report is None else report / "report.html"}
-    places = {name: str(path) for name, path in written.items() if path is not None}
+    files_written = {name: str(path) for name, path in written.items() if path is not None}
     if as_json:
-        say(json.dumps(_result(recording, readout, found.to_dict()) | places))
+        say(json.dumps(_result(recording, readout, found.to_dict()) | files_written))
         return
     for each in found.each:
         if recording.is_dir() or len(found.each) > 1:
@@ -88,7 +88,7 @@ def detect(
         say("", f"against {truth} (window {window_ms:g} ms):", *repr(found.score).split("\n"))
         if found.not_scored:
             say(f"not scored, as the readout has {', '.join(loaded.labels)}: {', '.join(found.not_scored)}")
-    for name, path in places.items():
+    for name, path in files_written.items():
         say(f"written to {path}" if name == "written" else f"{name}: {path}")
 
 

@@ -23,7 +23,7 @@ from taxel.wire.registers import QUOTED_PRESETS
 
 app = App(no_args_is_help=True, help="Find a board on its serial line, set it by name, and read back its registers.")
 
-PlaceArgument = Annotated[str, typer.Argument(help="A serial device (/dev/ttyUSB0), or host:port.")]
+PlaceArgument = Annotated[str, typer.Argument(help="A serial port (COM3, /dev/ttyACM0), or host:port.")]
 BaudOption = Annotated[int, typer.Option(help="Baud rate of the serial line.")]
 
 
@@ -53,7 +53,7 @@ def listed(as_json: JsonOption = False) -> None:
 def show(place: PlaceArgument, baud: BaudOption = 115_200, as_json: JsonOption = False) -> None:
     """Show a board's identity, and every register with its unit.
 
-    Example: taxel device show /dev/ttyUSB0
+    Example: taxel device show /dev/ttyACM0
     """
     with Device(place, baud=baud) as device:
         _print(device, device.registers, as_json)
@@ -71,7 +71,7 @@ def set_registers(
 ) -> None:
     """Set registers by name, in an order in which the board is never without a valid set, and print what changed.
 
-    Example: taxel device set /dev/ttyUSB0 noise_floor=5 wire_version=2
+    Example: taxel device set /dev/ttyACM0 noise_floor=5 wire_version=2
     """
     values = dict(_field(assignment) for assignment in fields)
     with Device(place, baud=baud) as device:
@@ -98,7 +98,7 @@ def apply(
 ) -> None:
     """Set a board to a preset, and read it back; its version of the wire stays as it is.
 
-    Example: taxel device apply /dev/ttyUSB0 "2 kHz"
+    Example: taxel device apply /dev/ttyACM0 "2 kHz"
     """
     if preset not in PRESETS:
         raise ProblemError(f"preset {preset!r}: there are {', '.join(map(repr, PRESETS))}")
@@ -109,18 +109,18 @@ def apply(
 @app.command(short_help="Make a board mark the start or stop of a recording.")
 def record(
     place: PlaceArgument,
-    what: Annotated[str, typer.Argument(help="The mark: start or stop.")],
+    mark: Annotated[str, typer.Argument(metavar="WHAT", help="The mark: start or stop.")],
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
 ) -> None:
     """Make a board mark the start or stop of a recording, in its events and on its sync pin.
 
-    Example: taxel device record /dev/ttyUSB0 start
+    Example: taxel device record /dev/ttyACM0 start
     """
-    if what not in ("start", "stop"):
-        raise ProblemError(f"{what}: must be start or stop")
+    if mark not in ("start", "stop"):
+        raise ProblemError(f"{mark}: must be start or stop")
     with Device(place, baud=baud) as device:
-        _print(device, device.record(what == "start"), as_json)
+        _print(device, device.record(mark == "start"), as_json)
 
 
 @app.command(short_help="Print the faults that a board reports, as they come.")
@@ -132,7 +132,7 @@ def watch(
 ) -> None:
     """Print the faults that a board reports, as they come; waits for a cable that was pulled.
 
-    Example: taxel device watch /dev/ttyUSB0 --seconds 60
+    Example: taxel device watch /dev/ttyACM0 --seconds 60
     """
     with Device(place, baud=baud, patience=float("inf")) as device:
         console = Console(stderr=True, quiet=as_json)

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Self
 import typer
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from taxel._base.files import try_whole
+from taxel._base.files import check_writable
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._base.options import about
@@ -38,9 +38,9 @@ from taxel.spikes import to_ms
 app = App()
 
 
-def _option(name: str, *flags: str, of: type = EmulateOptions, metavar: str | None = None) -> Any:
+def _option(name: str, *flags: str, options: type = EmulateOptions, metavar: str | None = None) -> Any:
     """Return the option of the command line that sets an option of `emulate`: its text and range."""
-    return typer.Option(*flags, metavar=metavar, **about(of, name))
+    return typer.Option(*flags, metavar=metavar, **about(options, name))
 
 
 def _in_ms(name: str) -> Any:
@@ -50,7 +50,7 @@ def _in_ms(name: str) -> Any:
 
 
 @dataclass(frozen=True)
-class _Typed:
+class _EmulateArguments:
     """Hold the options of the command."""
 
     port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port to send to.")] = PORT
@@ -85,7 +85,7 @@ class _Typed:
     ] = None
     preset: Annotated[str | None, _option("preset")] = None
     wire: Annotated[int | None, _option("wire")] = None
-    board: Annotated[int, _option("board", of=Version2)] = Version2.board
+    board: Annotated[int, _option("board", options=Version2)] = Version2.board
     session: Annotated[
         int | None,
         typer.Option(
@@ -122,7 +122,7 @@ class _Typed:
 
 
 @app.command()
-def emulate(typed: _Typed) -> None:
+def emulate(typed: _EmulateArguments) -> None:
     """Emulate a board that sends its events by UDP, in real time, until Ctrl-C.
 
     In each scene a ball is dropped on foam over 64 x 64 taxels, caught in flight, pressed by hand and lifted. The board
@@ -138,7 +138,7 @@ def emulate(typed: _Typed) -> None:
     """
     _check_options(typed)
     if typed.labels is not None:
-        try_whole(typed.labels, overwrite=typed.overwrite)
+        check_writable(typed.labels, overwrite=typed.overwrite)
     touch, text, board = _touch_of(typed)
     console = Console(stderr=True, quiet=typed.as_json)
     console.print(f"{text}, to {typed.host}:{typed.port}")
@@ -154,7 +154,7 @@ def emulate(typed: _Typed) -> None:
         _print(report, in_time=not typed.pipe)
 
 
-def _check_options(typed: _Typed) -> None:
+def _check_options(typed: _EmulateArguments) -> None:
     """Refuse options that do not go together."""
     others = typed.replay is not None or typed.pipe
     if typed.replay is not None and typed.pipe:
@@ -173,7 +173,7 @@ def _check_options(typed: _Typed) -> None:
             raise ProblemError(f"{name} without {needed}")
 
 
-def _touch_of(typed: _Typed) -> tuple[Any, str, dict[str, Any]]:
+def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
     """Return the touch that the board plays, its description, and the board as `taxel.simulate.emulate` takes it.
 
     If the array is known, a wrong preset is refused first.
@@ -217,7 +217,7 @@ def _touch_of(typed: _Typed) -> tuple[Any, str, dict[str, Any]]:
     return *_scenes(seed, typed.scenes, tare_ms, typed.rest), options
 
 
-def _run(typed: _Typed, touch: Any, board: dict[str, Any], console: Console) -> EmulatorReport:
+def _run(typed: _EmulateArguments, touch: Any, board: dict[str, Any], console: Console) -> EmulatorReport:
     """Run the board until its end or Ctrl-C, and show the progress."""
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(pulse_style="bar.complete"), TextColumn("{task.fields[status]}"),

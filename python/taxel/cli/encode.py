@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import taxel
-from taxel._base.files import try_whole
+from taxel._base.files import check_writable
 from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import App, JsonOption, OverwriteOption, with_out
 from taxel.cli._opening import FileOptions
@@ -37,7 +37,7 @@ def encode(
     """
     if out.suffix != ".npz":
         raise ProblemError(f"{out}: spikes are written to a .npz")
-    try_whole(out, overwrite=overwrite)
+    check_writable(out, overwrite=overwrite)
     options = taxel.tasks.EncodeOptions(encoder, assignments(values or []), tare)
     with progress(as_json) as update:
         update(f"reading {recording}", 0, 0)

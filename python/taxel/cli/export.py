@@ -48,4 +48,4 @@ def nir(
     if as_json:
         say(json.dumps({"readout": str(readout), "written": str(out), "lost": lost}))
         return
-    say(f"written to {out}", *(f"  NIR cannot hold: {what}" for what in lost))
+    say(f"written to {out}", *(f"  NIR cannot hold: {loss}" for loss in lost))

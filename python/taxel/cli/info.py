@@ -13,7 +13,7 @@ import numpy as np
 import typer
 
 import taxel
-from taxel._base.files import try_whole, write_whole
+from taxel._base.files import check_writable, write_whole
 from taxel._base.messages import counted
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
@@ -30,8 +30,8 @@ from taxel.spikes import SpikeTrains, to_ms
 if TYPE_CHECKING:
     from taxel.frames import Frames
     from taxel.recording import Recording
-    from taxel.recording.pressure import Series
-    from taxel.recording.rest import Rest
+    from taxel.recording.analysis.pressure import Series
+    from taxel.recording.analysis.rest import Rest
 
 app = App()
 
@@ -67,16 +67,16 @@ def info(
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
     """
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
-    from taxel.recording.pressure import above_rest  # noqa: PLC0415
-    from taxel.recording.without_layout import are_spike_trains  # noqa: PLC0415
+    from taxel.recording.analysis.pressure import above_rest  # noqa: PLC0415
+    from taxel.recording.recognition import are_spike_trains  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
     if table is not None and table.suffix.lower() != ".csv":
         raise ProblemError(f"{table}: a table ends in .csv")
-    for place in (picture, table):
-        if place is not None:
-            try_whole(place, overwrite=overwrite)
+    for target in (picture, table):
+        if target is not None:
+            check_writable(target, overwrite=overwrite)
     if are_spike_trains(file):
         say(*_spikes(file, as_json, drawn=picture is not None or table is not None))
         return
@@ -85,14 +85,14 @@ def info(
         if file.exists() and is_bag(file) and not files.opener._names_topic(file):
             say(*list_topics(file, topics(file, files.types, files.ros), as_json))
             return
-        every = files.opener.open_trials(file)
-        recording = every[0]
-        if len(every) > 1 or len(recording.sources) > 1:
+        recordings = files.opener.open_trials(file)
+        recording = recordings[0]
+        if len(recordings) > 1 or len(recording.sources) > 1:
             if picture is not None or table is not None:
-                raise ProblemError(_several(file, every))
-            infos = [taxel.tasks.info(each, tare) for each in every]
+                raise ProblemError(_several(file, recordings))
+            infos = [taxel.tasks.info(each, tare) for each in recordings]
             of_each = [found.facts for found in infos]
-            result = [json.dumps(of_each if len(every) > 1 else of_each[0])]
+            result = [json.dumps(of_each if len(recordings) > 1 else of_each[0])]
             say(*(result if as_json else chain.from_iterable(map(_pages, of_each))))
             say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
             return
@@ -151,13 +151,13 @@ def _draw(picture: Path, recording: Recording, above: tuple[Frames, float, Rest]
     write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
 
 
-def _several(file: Path, every: Sequence[Recording]) -> str:
+def _several(file: Path, recordings: Sequence[Recording]) -> str:
     """Return why there is no picture or table of several recordings, or of one with several sources."""
-    if len(every) > 1:
-        return f"{file}: holds {len(every)} recordings; a picture or a table is of one"
-    names = ", ".join(every[0].sources)
+    if len(recordings) > 1:
+        return f"{file}: holds {len(recordings)} recordings; a picture or a table is of one"
+    names = ", ".join(recordings[0].sources)
     return (
-        f"{file}: holds {len(every[0].sources)} sources ({names}); a picture or a table is of one: taxel convert "
+        f"{file}: holds {len(recordings[0].sources)} sources ({names}); a picture or a table is of one: taxel convert "
         "--source NAME writes it to a file of its own"
     )
 
@@ -166,7 +166,7 @@ def _pages(facts: dict[str, Any]) -> list[str]:
     """Return the facts of a recording, or of each source of one, as lines for people."""
     if "sources" not in facts:
         return _page(facts)
-    pages = {name: _page(of) for name, of in facts["sources"].items()}
+    pages = {name: _page(source) for name, source in facts["sources"].items()}
     return [line for name, (head, *rows) in pages.items() for line in (f"{name}: {head}", *rows)]
 
 
@@ -175,7 +175,9 @@ def _lines(pressed: Series) -> Iterator[str]:
     columns = {f"area_{pressed.area_unit}": pressed.area} if pressed.area is not None else {}
     columns |= {f"peak_{pressed.unit}": pressed.peak, f"sum_{pressed.unit}": pressed.total}
     if pressed.centre is not None:
-        columns |= {f"centre_{axis}_{pressed.centre_unit}": of for axis, of in zip("xy", pressed.centre.T, strict=True)}
+        columns |= {
+            f"centre_{axis}_{pressed.centre_unit}": centre for axis, centre in zip("xy", pressed.centre.T, strict=True)
+        }
     yield ",".join(["t_us", *columns])
     for t, *values in zip(*(column.tolist() for column in (pressed.t, *columns.values())), strict=True):
         yield ",".join([str(t), *("" if np.isnan(value) else f"{value:.10g}" for value in values)])
@@ -192,7 +194,7 @@ def _page(facts: dict[str, Any]) -> list[str]:
     # What was left out of a bag, or has other times, concerns all that follows.
     rows = [*missing, *rows] if facts["kind"] == "ros" else [*rows, *missing]
     lines = [head, *(f"  {name:<19} {value}" for name, value in rows)]
-    return [*lines, *(f"{what} written to {facts[what]}" for what in ("picture", "table") if what in facts)]
+    return [*lines, *(f"{kind} written to {facts[kind]}" for kind in ("picture", "table") if kind in facts)]
 
 
 def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -214,10 +216,13 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if "columns" in facts:
         yield "columns", ", ".join(facts["columns"])
     if "against" in facts:
-        of = facts["against"]
-        yield f"clock of {of['source']}", f"{of['offset_us']:+d} us at the beginning, {of['drift_ppm']:+.1f} ppm faster"
+        reference = facts["against"]
+        yield (
+            f"clock of {reference['source']}",
+            f"{reference['offset_us']:+d} us at the beginning, {reference['drift_ppm']:+.1f} ppm faster",
+        )
         # A source of events states its own drift, and its doubt, below.
-        if "events" not in facts and (wrong := doubt(of["drift_ppm"], 0.0)):
+        if "events" not in facts and (wrong := doubt(reference["drift_ppm"], 0.0)):
             yield "", wrong
     if facts["calibration"] is not None:
         yield "calibration", facts["calibration"]
@@ -251,12 +256,12 @@ def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield which taxels do not work; people count rows first."""
 
-    def at(places: list[tuple[int, int]], count: int) -> str:
-        shown = ", ".join(f"({y}, {x})" for x, y in places[:8]) + " ..." * (count > 8)
-        return f", at (row, column) {shown}" * bool(places)
+    def at(taxels: list[tuple[int, int]], count: int) -> str:
+        shown = ", ".join(f"({y}, {x})" for x, y in taxels[:8]) + " ..." * (count > 8)
+        return f", at (row, column) {shown}" * bool(taxels)
 
-    for name, places in facts["taxels"].items():
-        yield f"{name} taxels", f"{len(places)}{at(places, len(places))}"
+    for name, taxels in facts["taxels"].items():
+        yield f"{name} taxels", f"{len(taxels)}{at(taxels, len(taxels))}"
     if untested := facts["taxels_untested"]:
         where = at(facts["taxels_untested_at"], untested)
         yield "other taxels", f"{untested} not touched enough to say whether they work{where}"

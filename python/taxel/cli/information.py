@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 import taxel
-from taxel._base.files import try_whole
+from taxel._base.files import check_writable
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
@@ -74,7 +74,7 @@ def information(
     """
     if report.suffix != ".html":
         raise ProblemError(f"--report {report}: is one page, so its name must end in .html")
-    try_whole(report, overwrite=overwrite)
+    check_writable(report, overwrite=overwrite)
     options = taxel.tasks.InformationOptions(
         encoder,
         assignments(values or []),
@@ -89,7 +89,7 @@ def information(
         seed,
         [name for name in classifiers.split(",") if name],
     )
-    known, trials = _Known(), ""
+    known, trials = _KnownBits(), ""
     try:
         # `progress` prints the warnings; the bar shows the steps.
         with progress(quiet=True), bar(as_json) as update:
@@ -98,16 +98,16 @@ def information(
                 update(f"reading {path}", 0, 0)
                 opened += files.opener.open_sensors([path])
 
-            def show(what: str, done: int, of: int) -> None:
+            def show(step: str, done: int, total: int) -> None:
                 nonlocal trials
-                if of and not done and not as_json:
+                if total and not done and not as_json:
                     say(
-                        f"{trials}: about {duration(of / 1000)} on an idle processor; Ctrl-C prints what is known by "
-                        "then",
+                        f"{trials}: about {duration(total / 1000)} on an idle processor; Ctrl-C prints what is known "
+                        "by then",
                         err=True,
                     )
-                trials = trials if of else what
-                update(what, done, of)
+                trials = trials if total else step
+                update(step, done, total)
 
             result = taxel.tasks.information(opened, labels, options, progress=show, watch=known.add)
             update("drawing", 0, 0)
@@ -122,7 +122,7 @@ def information(
     say(*lines(result.answer), f"written to {report}")
 
 
-class _Known:
+class _KnownBits:
     """The bits of the settings of all taxels that are done, for a run that is stopped."""
 
     def __init__(self) -> None:
@@ -223,9 +223,11 @@ def _interval(estimate: Estimate) -> str:
     return f"{estimate.bits:.2f} of {estimate.most:.2f} bits [{low:.2f} {high:.2f}]"
 
 
-def _parse_numbers(option: str, text: str | None, of: Callable[[str], _Number], must: str) -> list[_Number] | None:
+def _parse_numbers(
+    option: str, text: str | None, number_of: Callable[[str], _Number], must: str
+) -> list[_Number] | None:
     """Return numbers between commas; None without any."""
     try:
-        return None if text is None else [of(cell) for cell in text.split(",")]
+        return None if text is None else [number_of(cell) for cell in text.split(",")]
     except ValueError:
         raise ProblemError(f"{option} {text}: must be {must}") from None

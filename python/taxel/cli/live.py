@@ -15,7 +15,7 @@ from rich.console import Group
 from rich.live import Live as Display
 from rich.text import Text
 
-from taxel._base.files import try_whole
+from taxel._base.files import check_writable
 from taxel._base.messages import counted, plain
 from taxel._base.stopping import asked_to_end
 from taxel._core import ProblemError
@@ -52,7 +52,7 @@ _FIRST_WITHIN_S = 1.0
 
 
 @dataclass(frozen=True)
-class _Typed:
+class _LiveArguments:
     """Hold the options of the command."""
 
     rate_hz: RateOption = None
@@ -61,8 +61,8 @@ class _Typed:
     control: Annotated[
         str | None,
         typer.Option(
-            help="The board's serial line (/dev/ttyUSB0, host:port), for the panel's registers and for a noise floor "
-            "of 0 while a tare is taken."
+            help="The board's serial line (COM3, /dev/ttyACM0, host:port), for the panel's registers and for a noise "
+            "floor of 0 while a tare is taken."
         ),
     ] = None
     save_tare: Annotated[Path | None, typer.Option(help="Save the fresh tare in a new file (JSON).")] = None
@@ -84,7 +84,7 @@ class _Typed:
 
 @app.command()
 @with_live_options("live")
-def live(options: dict[str, Any], typed: _Typed) -> None:
+def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     """Receive a board's events and print what a readout detects, live; with --panel, show them.
 
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
@@ -146,7 +146,7 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
 
 
 def _show(
-    typed: _Typed,
+    typed: _LiveArguments,
     pipeline: Live,
     console: Console,
     at_rest: contextlib.ExitStack,
@@ -210,7 +210,7 @@ def _report_unsent(summary: Summary) -> None:
             say(f"taxel: lines not sent to {line['to']}: {lost} of {line['sent'] + lost}: {why}", err=True)
 
 
-def _check_options(options: dict[str, Any], typed: _Typed) -> None:
+def _check_options(options: dict[str, Any], typed: _LiveArguments) -> None:
     """Refuse options that would have no effect."""
     readout, tare, send = (options[name] for name in ("readout", "tare", "send"))
     if readout is None and not typed.panel:
@@ -221,11 +221,11 @@ def _check_options(options: dict[str, Any], typed: _Typed) -> None:
         raise ProblemError("--folder belongs to the panel: give --panel")
 
 
-def _check_fresh_tare(typed: _Typed, rest: Tare | float | None) -> None:
+def _check_fresh_tare(typed: _LiveArguments, rest: Tare | float | None) -> None:
     """Refuse options that need a fresh tare, if none is taken."""
     if isinstance(rest, float):
         if typed.save_tare is not None:
-            try_whole(typed.save_tare)
+            check_writable(typed.save_tare)
     elif typed.save_tare is not None:
         raise ProblemError("--save-tare without a fresh tare: give --tare SECONDS")
     elif typed.control is not None and not typed.panel:
@@ -263,9 +263,9 @@ def _watch(
     echo: Callable[[str], None] = (lambda line: console.print(Text(line))) if above else say
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
     display = Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
-    with asked_to_end() as asked, display:
+    with asked_to_end() as end_request, display:
         before, warned, silence = None, False, ""
-        while not asked.is_set() and (before is None or seconds is None or before["seconds"] < seconds):
+        while not end_request.is_set() and (before is None or seconds is None or before["seconds"] < seconds):
             try:
                 if panel is not None and panel.live is not None and panel.live is not pipeline:
                     # A client of the panel chose another address.

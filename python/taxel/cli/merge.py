@@ -48,4 +48,4 @@ def merge(
     if as_json:
         say(json.dumps({"recordings": [str(path) for path in recordings], "file": str(out), "lost": lost}))
         return
-    say(f"written to {out}: {merged!r}", *(f"  lost: {what}" for what in lost))
+    say(f"written to {out}: {merged!r}", *(f"  lost: {loss}" for loss in lost))

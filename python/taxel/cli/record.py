@@ -42,7 +42,7 @@ _EMPTY = 3
 
 
 @dataclass(frozen=True)
-class _Typed:
+class _RecordArguments:
     """Hold for how long, how often and until which mark is recorded."""
 
     rate_hz: RateOption = None
@@ -70,7 +70,7 @@ class _Typed:
 def record(
     file: Annotated[Path, typer.Argument(help="A new file: .mcap (with times, registers, notes) or .lsa (raw bytes).")],
     options: dict[str, Any],
-    typed: _Typed,
+    typed: _RecordArguments,
 ) -> None:
     """Record what a board sends by UDP, and report what was lost.
 
@@ -103,7 +103,7 @@ def record(
         raise typer.Exit(code)
 
 
-def _automatic(file: Path, live: dict[str, Any], typed: _Typed, console: Console) -> int:
+def _automatic(file: Path, live: dict[str, Any], typed: _RecordArguments, console: Console) -> int:
     """Record trials from one receiver until Ctrl-C, which ends the current one regularly; return an exit code."""
     trials, how = typed.trials, {name: live.pop(name) for name in ("compression", "overwrite")}
     codes: list[int] = []
@@ -170,7 +170,7 @@ def _count_down(name: Path, seconds: int, console: Console) -> None:
     console.bell()
 
 
-def _one(file: Path, options: dict[str, Any], typed: _Typed, console: Console) -> tuple[Summary, int]:
+def _one(file: Path, options: dict[str, Any], typed: _RecordArguments, console: Console) -> tuple[Summary, int]:
     """Record one file until its time is over, the board marks a stop, or Ctrl-C; return summary and exit code."""
     with (
         remote(options["remote"], None, lossless=True) as board,
@@ -185,7 +185,7 @@ def _one(file: Path, options: dict[str, Any], typed: _Typed, console: Console) -
 
 def _takes_notes(file: Path, sources: dict[str, str]) -> bool:
     """Return whether typed lines are notes: a .lsa holds no notes, and a source may read the input itself."""
-    return file.suffix == ".mcap" and not any(what.startswith("pipe:-") for what in sources.values())
+    return file.suffix == ".mcap" and not any(address.startswith("pipe:-") for address in sources.values())
 
 
 def _watch(
@@ -221,10 +221,10 @@ def _watch(
 def _sources(texts: list[str]) -> dict[str, str]:
     """Return the sources that ``--source NAME=WHAT`` describes, by name."""
     sources: dict[str, str] = {}
-    for name, what in pairs("--source", texts, "NAME=WHAT, as imu=serial:/dev/ttyACM0"):
+    for name, address in pairs("--source", texts, "NAME=WHAT, as imu=serial:/dev/ttyACM0"):
         if name in sources:
-            raise ProblemError(f"--source {name}={what}: there are two sources of that name")
-        sources[name] = what
+            raise ProblemError(f"--source {name}={address}: there are two sources of that name")
+        sources[name] = address
     return sources
 
 

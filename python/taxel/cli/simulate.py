@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 import taxel
-from taxel._base.files import try_whole, write_whole
+from taxel._base.files import check_writable, write_whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import App, JsonOption, OverwriteOption
@@ -57,7 +57,7 @@ def simulate(
     if movie is not None:
         writer_of(movie)
     for path in targets:
-        try_whole(path, overwrite=overwrite)
+        check_writable(path, overwrite=overwrite)
     contacts, force = taxel.simulate.truth(scene_file.acts(), preset=scene_file.preset, array=scene_file.array)
     about: dict[str, Any] = {"scene": str(scene), "seed": seed, "contacts": [contact._asdict() for contact in contacts]}
     about["peak_n"] = float(force.max())
@@ -74,7 +74,7 @@ def simulate(
         if out is not None:
             lost = taxel.convert(played.events, out, overwrite=overwrite)
             lines.append(f"{counted(len(played.events), 'event')} written to {out}")
-            lines += [f"  lost: {what}" for what in lost]
+            lines += [f"  lost: {loss}" for loss in lost]
         if movie is not None:
             film(
                 played.events,

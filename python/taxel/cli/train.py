@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import taxel
-from taxel._base.files import try_whole
+from taxel._base.files import check_writable
 from taxel._base.messages import collected
 from taxel._core import ProblemError
 from taxel.cli._app import App, JsonOption, OverwriteOption
@@ -104,7 +104,7 @@ def train(
     Example: taxel train a.mcap b.mcap --labels events.csv --encoder contact_area --tare 0.05
     --set learner.refractory=15 --set neurons.contact.tau=0.5 --set neurons.contact.delay_ms=0.2 -o touch.json
     """
-    try_whole(out, overwrite=overwrite)
+    check_writable(out, overwrite=overwrite)
     if report is not None:
         try_report(report)
     changes = assignments(values or []) | {
@@ -141,35 +141,35 @@ def train(
     say(*lines, *(f"warning: {warning}" for warning in training.unreliable()))
 
 
-def _try_rules(place: Path | None, labels: str, recordings: Sequence[Recording], *, overwrite: bool) -> None:
+def _try_rules(given: Path | None, labels: str, recordings: Sequence[Recording], *, overwrite: bool) -> None:
     """Check that plain rules can be written, before the work whose result they hold."""
     from taxel.tasks.labels import references  # noqa: PLC0415
 
-    if place is None:
+    if given is None:
         return
     with collected():  # the training warns of the same
         names = {label for events in references(labels, recordings) for label in events}
-    for path in (place, *(_of_label(place, label) for label in sorted(names))):
-        try_whole(path, overwrite=overwrite)
+    for path in (given, *(_of_label(given, label) for label in sorted(names))):
+        check_writable(path, overwrite=overwrite)
 
 
-def _write_rules(plain: PlainScore | None, place: Path | None, *, overwrite: bool) -> dict[Path, list[str]]:
+def _write_rules(plain: PlainScore | None, path_given: Path | None, *, overwrite: bool) -> dict[Path, list[str]]:
     """Write the plain rules, one of kinds of touch once; return the files, and which labels each detects."""
-    if place is None or plain is None:
+    if path_given is None or plain is None:
         return {}
-    every = {label: rule for label, rule in plain.rules.items() if rule is not None}
-    rules = {rule.to_json(): rule for rule in every.values()}
+    ruled = {label: rule for label, rule in plain.rules.items() if rule is not None}
+    rules = {rule.to_json(): rule for rule in ruled.values()}
     written = {}
     for rule in rules.values():
-        labels = [label for label in every if label in rule.labels and every[label] == rule]
-        path = place if len(rules) == 1 else _of_label(place, labels[0])
+        labels = [label for label in ruled if label in rule.labels and ruled[label] == rule]
+        path = path_given if len(rules) == 1 else _of_label(path_given, labels[0])
         written[rule.save(path, overwrite=overwrite)] = labels
     return written
 
 
-def _of_label(place: Path, label: str) -> Path:
+def _of_label(path: Path, label: str) -> Path:
     """Return the file of the rule of one of several labels."""
-    return place.parent / f"{place.stem}.{re.sub('[^A-Za-z0-9_-]', '_', label)}{place.suffix}"
+    return path.parent / f"{path.stem}.{re.sub('[^A-Za-z0-9_-]', '_', label)}{path.suffix}"
 
 
 def _next(training: Training, out: Path, tare: str | None) -> str:

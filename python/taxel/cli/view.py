@@ -21,7 +21,7 @@ from taxel.cli.console import Console
 from taxel.formats.ros import is_bag, topics
 from taxel.live import Panel
 from taxel.recording import Recording
-from taxel.recording.opening import recordings_in
+from taxel.recording.recognition import is_folder, recordings_in
 from taxel.recording.sidecars import calibrate_by
 
 app = App()
@@ -73,10 +73,10 @@ def view(
 
 def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> Callable[[Path], list[Recording]] | None:
     """Return how files are opened where options say it, else None; what they do not fit is refused now."""
-    every = recordings_in(recording, files.layout) if recording.is_dir() and not is_bag(recording) else [recording]
-    if not every:
+    recordings = recordings_in(recording, files.layout) if is_folder(recording) else [recording]
+    if not recordings:
         return None
-    first = every[0]
+    first = recordings[0]
     bag = is_bag(first)
     if bag and not files.opener._names_topic(first):
         raise ProblemError(*list_topics(first, topics(first, files.types, files.ros), as_json=False))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel.demo.judging import Judged, judge
+from taxel.demo.judging import TouchMatches, judge
 from taxel.detect import PlainRule, Readout, run
 from taxel.detections import Detections
 from taxel.encode import ContactArea
@@ -35,8 +35,8 @@ class Evaluation:
     contacts: list[Contact]
     force_n: NDArray[np.float32]
     """By frame, from the board's first."""
-    judged: Judged
-    judged_plain: Judged
+    judged: TouchMatches
+    judged_plain: TouchMatches
 
     @property
     def start_us(self) -> int:

@@ -13,7 +13,7 @@ from taxel.detections import Detections
 from taxel.simulate import Contact
 from taxel.spikes import to_ms
 
-__all__ = ["CLASSES", "GOALS", "LABELS", "Judged", "Row", "judge"]
+__all__ = ["CLASSES", "GOALS", "LABELS", "ClassMatches", "TouchMatches", "judge"]
 
 LABELS = ("contact", "lift")
 
@@ -36,7 +36,7 @@ CLASSES: tuple[tuple[str, Callable[[Contact], bool]], ...] = (
 GOALS = {"contact": 1.0, "lift": 1.5}
 
 
-class Row(NamedTuple):
+class ClassMatches(NamedTuple):
     """Touches of one class, and how the detections of one label match them."""
 
     name: str
@@ -58,23 +58,23 @@ class Row(NamedTuple):
         return {
             "touches": self.touches,
             "found": self.found,
-            "error_ms": _plain(Spread.of(self.errors_ms)._asdict()),
+            "error_ms": _plain(Spread.from_values(self.errors_ms)._asdict()),
             "known_ms": _plain(
                 {f"p{q}": float(np.percentile(known, q)) if len(known) else float("nan") for q in (5, 50, 95)}
             ),
         }
 
 
-class Judged(NamedTuple):
+class TouchMatches(NamedTuple):
     """Detections by class of touch and label, and those that belong to no touch."""
 
-    rows: list[Row]
+    rows: list[ClassMatches]
     false: dict[str, NDArray[np.int64]]
     """By label: times of detections that belong to no touch, us."""
     false_within: dict[str, int]
     """How many of these lie within a touch all the same: a press that was detected more than 50 ms off."""
 
-    def row(self, name: str, label: str) -> Row:
+    def row(self, name: str, label: str) -> ClassMatches:
         """Return one row; its name may be cut short."""
         return next(row for row in self.rows if row.label == label and row.name.startswith(name))
 
@@ -106,29 +106,29 @@ class Judged(NamedTuple):
         }
 
 
-def judge(detections: Detections, contacts: Sequence[Contact]) -> Judged:
+def judge(detections: Detections, contacts: Sequence[Contact]) -> TouchMatches:
     """Match detections of "contact" (force leaves zero) and "lift" (force returns there) with touches in order.
 
     Impacts are matched within 10 ms, presses and all others within 50.
     """
     windows = [_IMPACT_MS if c.kind in ("first", "bounce") else _PRESS_MS for c in contacts]
-    rows: list[Row] = []
+    rows: list[ClassMatches] = []
     false: dict[str, NDArray[np.int64]] = {}
     within: dict[str, int] = {}
     for label, begin in (("contact", True), ("lift", False)):
         true = np.array([c.start_us if begin else c.stop_us for c in contacts], np.float64)
-        mine = detections[label]
+        of_label = detections[label]
         # Scored on whole us; errors are taken from the truth itself.
-        result = score(mine, {label: np.rint(true).astype(np.int64)}, {label: windows})
+        result = score(of_label, {label: np.rint(true).astype(np.int64)}, {label: windows})
         mine_at, touch = result.pairs[:, 0], result.pairs[:, 1]
-        errors, delays = to_ms(mine.t[mine_at] - true[touch]), to_ms(mine.known[mine_at] - true[touch])
+        errors, delays = to_ms(of_label.t[mine_at] - true[touch]), to_ms(of_label.known[mine_at] - true[touch])
         for name, belongs in CLASSES:
             of_class = np.array([belongs(c) for c in contacts], bool)
             chosen = of_class[touch] if len(touch) else np.zeros(0, bool)
-            rows.append(Row(name, label, int(of_class.sum()), errors[chosen], delays[chosen]))
-        false[label] = mine.t[result.false_detections]
+            rows.append(ClassMatches(name, label, int(of_class.sum()), errors[chosen], delays[chosen]))
+        false[label] = of_label.t[result.false_detections]
         within[label] = sum(any(c.start_us <= t <= c.stop_us for c in contacts) for t in false[label])
-    return Judged(rows, false, within)
+    return TouchMatches(rows, false, within)
 
 
 def _plain(values: dict[str, float]) -> dict[str, float | None]:

@@ -52,10 +52,10 @@ def scene_picture(evaluation: Evaluation, start_us: float, stop_us: float) -> Fi
         axis.plot(times * 1e-3, evaluation.potential(label, times), color=colour, linewidth=0.9, label="potential")
         axis.axhline(threshold, color=_QUIET, linewidth=0.8, linestyle="--", label="its threshold")
         detections = evaluation.detections[label].between(start_us, stop_us)
-        for place in (axis, top):
+        for drawing in (axis, top):
             for k, at in enumerate(detections.known):
                 name = f"{label} detected" * (k == 0)
-                place.axvline(at * 1e-6, color=colour, linewidth=0.9, alpha=0.9, label=name)
+                drawing.axvline(at * 1e-6, color=colour, linewidth=0.9, alpha=0.9, label=name)
         axis.set(ylabel="potential (mV)", title=f"Potential of the neuron for {label}")
         axis.legend()
     top.legend()
@@ -75,9 +75,9 @@ def close_up(evaluation: Evaluation, contact: Contact, reach_us: float = 5_000.0
         near = evaluation.events.between(begin, end)
         index = near.y.astype(int) * near.array.columns + near.x
         for rising, colour in ((True, "#c44e52"), (False, "#4c72b0")):
-            mine = near.p == rising
-            name = f"{'more' if rising else 'less'} pressure ({int(mine.sum())})"
-            raster.plot(to_ms(near.t[mine] - at), index[mine], ".", color=colour, markersize=2.5, label=name)
+            chosen = near.p == rising
+            name = f"{'more' if rising else 'less'} pressure ({int(chosen.sum())})"
+            raster.plot(to_ms(near.t[chosen] - at), index[chosen], ".", color=colour, markersize=2.5, label=name)
         raster.set(ylabel="taxel (row by row)")
         spikes = evaluation.area.between(to_ms(begin), to_ms(end))
         for train in range(len(spikes)):
@@ -101,11 +101,11 @@ def maps(evaluation: Evaluation, contact: Contact) -> Figure:
     moments = (-0.4, 0.4, 1.0, 3.0, 8.0, 1e-3 * (contact.stop_us - contact.start_us) + 1.0)
     figure, axes = _figure(1, len(moments), (9.5, 1.9))
     rest = np.nan_to_num(evaluation.tare.rest)
-    held = [_held(evaluation.events, contact.start_us + to_us(after), rest) for after in moments]
+    above_rest = [_held(evaluation.events, contact.start_us + to_us(after), rest) for after in moments]
     touched = evaluation.events.between(contact.start_us, contact.start_us + 3_000.0)
     middle = [float(np.median(v)) if len(v) else 31.5 for v in (touched.y, touched.x)]
     top, left = (int(np.clip(m - _CROP / 2, 0, n - _CROP)) for m, n in zip(middle, rest.shape, strict=True))
-    seen = [h[top : top + _CROP, left : left + _CROP] for h in held]
+    seen = [h[top : top + _CROP, left : left + _CROP] for h in above_rest]
     most = max(1.0, *(float(s.max()) for s in seen))
     image = None
     for axis, frame, after in zip(axes[0], seen, moments, strict=True):
@@ -119,9 +119,9 @@ def maps(evaluation: Evaluation, contact: Contact) -> Figure:
 
 def _held(events: Events, until_us: float, rest: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return ticks above rest as the host holds them; a taxel without events since the start is at rest."""
-    held = rest.copy()
+    values = rest.copy()
     before = events.t <= until_us
     if events.intensity is not None:
         # The last of equal places stays.
-        held[events.y[before], events.x[before]] = events.intensity[before]
-    return held - rest
+        values[events.y[before], events.x[before]] = events.intensity[before]
+    return values - rest

@@ -104,9 +104,11 @@ def play_live(
     again = run(readout, events, frame_us=FRAME_US, tare=tare)
     evaluation = evaluate_events(events, acts, readout, reported)
     again = again[again.t >= evaluation.start_us]
-    mine = evaluation.detections
-    agrees = len(again) == len(mine) and bool(
-        (again.t == mine.t).all() and (again.known == mine.known).all() and (again.label == mine.label).all()
+    recorded = evaluation.detections
+    agrees = len(again) == len(recorded) and bool(
+        (again.t == recorded.t).all()
+        and (again.known == recorded.known).all()
+        and (again.label == recorded.label).all()
     )
     verdicts = [emulator["verdict"], summary.verdict]
     if summary.counters["late"]:

@@ -17,7 +17,7 @@ from markupsafe import Markup
 import taxel
 from taxel.demo import pictures
 from taxel.demo.evaluation import Evaluation
-from taxel.demo.judging import Judged
+from taxel.demo.judging import TouchMatches
 from taxel.demo.playing import Playing
 from taxel.live import delays
 from taxel.report.page import render
@@ -108,7 +108,7 @@ def _pictures(evaluation: Evaluation) -> dict[str, Markup]:
     return shown
 
 
-def lines(judged: Judged) -> list[dict[str, str]]:
+def lines(judged: TouchMatches) -> list[dict[str, str]]:
     """Return the rows of a table, as text: the touches of each class, how many were found, and how soon."""
     table = []
     for row in judged.rows:

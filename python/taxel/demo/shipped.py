@@ -90,7 +90,7 @@ def _labels(area: SpikeTrains, contacts: list[Contact]) -> dict[str, NDArray[np.
         for label, t in (("contact", float(inputs[0])), ("lift", stop)):
             if not times[label] or t > times[label][-1] + refractory:
                 times[label].append(t)
-    return {label: np.rint(to_us(np.array(of))).astype(np.int64) for label, of in times.items()}
+    return {label: np.rint(to_us(np.array(seconds))).astype(np.int64) for label, seconds in times.items()}
 
 
 def described(readout: Readout) -> str:

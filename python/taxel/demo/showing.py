@@ -18,7 +18,7 @@ from rich.text import Text
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel.demo.evaluation import Evaluation, evaluate_acts
-from taxel.demo.judging import Judged
+from taxel.demo.judging import TouchMatches
 from taxel.demo.playing import play_live
 from taxel.demo.report import figures, lines, write
 from taxel.demo.screen import Screen
@@ -115,7 +115,7 @@ def _evaluate(console: Console, task: str, acts: Sequence[Act], readout: Readout
         )
 
 
-def _print_table(console: Console, judged: Judged) -> None:
+def _print_table(console: Console, judged: TouchMatches) -> None:
     table = Table(box=None, pad_edge=False)
     for name in ("touch", "label", "found", "error, ms", "known, ms"):
         table.add_column(name, justify="left" if name in ("touch", "label") else "right", no_wrap=True)

@@ -14,26 +14,26 @@ from taxel._base.messages import counted
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example, check_examples
+from taxel.detect.fitting import TWO_FOLDS, Trained
 from taxel.detect.label_times import TOUCH, Off, held_by_tare, off_by, unlabelled_us
 from taxel.detect.loads import lacks_neighbours
 from taxel.detect.plain_score import PlainScore, floor_of
 from taxel.detect.scoring import Score
-from taxel.detect.training import TWO_FOLDS, Trained
 from taxel.encode import ContactArea, Encoder, Moments
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.rest import of_frames
+from taxel.recording.analysis.rest import of_frames
 from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 
 #: From which share of the events on missed or false ones are many.
 _MANY = 0.05
-#: So long before a label the sensor is looked at, us: as long as a tare ends before the first label.
+#: How long before a label the sensor is looked at, us: as long as a tare ends before the first label.
 _BEFORE_US = 20_000
 #: How many labels at either end of a recording are looked at.
 _LABELS = 4
-#: Of fewer labels no five folds can be made.
+#: Five folds need this many labels.
 _FIVE_FOLDS = 10
 #: Into so many parts a recording is divided to see a drift, at so many frames of each.
 _PARTS, _LOOKS = 8, 40
@@ -54,7 +54,7 @@ class Advice(NamedTuple):
 
 
 def advise(
-    made: Trained,
+    trained: Trained,
     examples: Sequence[Example],
     scored: Score,
     learnt: Score,
@@ -78,7 +78,7 @@ def advise(
 
     Parameters
     ----------
-    made : Trained
+    trained : Trained
     examples : sequence of Example
         The training data.
     scored, learnt : Score
@@ -91,16 +91,16 @@ def advise(
     many = [
         label
         for label, score in scored.by_label.items()
-        if label in made.readout.labels and max(score.missed, score.false) > _MANY * score.events
+        if label in trained.readout.labels and max(score.missed, score.false) > _MANY * score.events
     ]
     if not many:
         return {}
     if fall := fallen(examples):
         return dict.fromkeys(many, Advice("falls = true in a layout file", fall))
-    sound, encoder = check_examples(examples), made.recipe.encoder
-    off, held = off_by(sound, many, floor_of(encoder)), held_by_tare(sound, floor_of(encoder))
-    known = _Known(made, sound, scored, learnt, search_s, plain, off, held, loaded_at_rest(examples, encoder))
-    recipe = _other_recipe(made, examples)
+    sound, encoder = check_examples(examples), trained.recipe.encoder
+    off, touched = off_by(sound, many, floor_of(encoder)), held_by_tare(sound, floor_of(encoder))
+    known = _Evidence(trained, sound, scored, learnt, search_s, plain, off, touched, loaded_at_rest(examples, encoder))
+    recipe = _other_recipe(trained, examples)
     return {
         label: known.of_labels(label, recipe)
         or known.of_time(label)
@@ -112,10 +112,10 @@ def advise(
 
 
 @dataclass(frozen=True)
-class _Known:
+class _Evidence:
     """Hold what is known of a training: as in `advise`, and of labels and tares what is off, held or loaded."""
 
-    made: Trained
+    trained: Trained
     examples: Sequence[Example]
     scored: Score
     learnt: Score
@@ -140,23 +140,23 @@ class _Known:
 
     def of_time(self, label: str) -> Advice | None:
         """Return that events may lack labels before the first and behind the last, where much time lies there."""
-        (outside, whole), scored = unlabelled_us(self.examples, label), self.scored[label]
+        (outside, total), scored = unlabelled_us(self.examples, label), self.scored[label]
         found = scored.false <= scored.missed and 2 * scored.found >= scored.events
-        if found or outside < _UNLABELLED * whole:
+        if found or outside < _UNLABELLED * total:
             return None
         return Advice(
             "labels of all events",
-            f"{outside / 1e6:.1f} of {whole / 1e6:.1f} s lie before the first or behind the last one, and an event "
+            f"{outside / 1e6:.1f} of {total / 1e6:.1f} s lie before the first or behind the last one, and an event "
             "without its label counts as false: label those too, or cut the recording (taxel cut) to what is labelled",
         )
 
     def of_name(self, label: str) -> Advice | None:
         """Return that a label without its name may be the end of a touch, where it was learnt as a kind of touch."""
-        alignment = self.made.alignments.get(label)
-        kinds = self.made.recipe.about == recipes.read("touch")["about"] and not recipes.knows("touch", label)
+        alignment = self.trained.alignments.get(label)
+        kinds = self.trained.recipe.about == recipes.read("touch")["about"] and not recipes.knows("touch", label)
         if not kinds or self.scored[label].found or alignment is None or alignment.train is not None:
             return None
-        ends = ", ".join(("lift", *(name for name, of in recipes.read("touch")["also"].items() if of == "lift")))
+        ends = ", ".join(("lift", *(name for name, kind in recipes.read("touch")["also"].items() if kind == "lift")))
         because = (
             f"by this one it is learnt as a kind of touch, told as one begins; names of the end of a touch are {ends}"
         )
@@ -164,7 +164,7 @@ class _Known:
 
     def of_tare(self, label: str) -> Advice | None:
         """Return what is wrong with a tare, if anything is."""
-        alignment, scored = self.made.alignments.get(label), self.scored[label]
+        alignment, scored = self.trained.alignments.get(label), self.scored[label]
         if self.held >= TOUCH:
             late_ms = 0.0 if alignment is None or alignment.train is None else -alignment.median_ms
             why = f", as labels lie {late_ms:.0f} ms after what was felt (median)" * (late_ms > to_ms(_BEFORE_US))
@@ -197,17 +197,17 @@ class _Known:
     def of_mistakes(self, label: str) -> Advice:
         """Return what helps against the mistakes of a readout whose labels and tares are right."""
         alone, chance = self.learnt[label], _chance(label, self.scored, self.plain)
-        points = len(self.made.recipe.points_of(label))
+        points = len(self.trained.recipe.points_of(label))
         wrong, learnt = self.scored[label].rank[0], alone.rank[0]
         rules = None if self.plain is None or label not in self.plain.better(self.scored) else self.plain.together
         if rules is not None and 2 * rules[label].rank[0] <= wrong:
-            return _by_rule(self.made, rules[label].rank[0], wrong)
-        if lacks_neighbours(self.examples) and (_for_touch(self.made) or chance):
-            array = self.made.readout.array
+            return _by_rule(self.trained, rules[label].rank[0], wrong)
+        if lacks_neighbours(self.examples) and (_for_touch(self.trained) or chance):
+            array = self.trained.readout.array
             size = "ROWSxCOLUMNSxMM" if array is None else f"{array.rows}x{array.columns}xMM"
             because = "channels in a row at a known distance, MM mm, have neighbours; then the recipe touch fits"
             return Advice(f"--array {size}", because, "--array")
-        if chance and any(isinstance(encoder, Moments) for encoder in self.made.recipe.encoder._each()):
+        if chance and any(isinstance(encoder, Moments) for encoder in self.trained.recipe.encoder._each()):
             return Advice(
                 "other kinds",
                 f"{chance}: the inputs of this recipe are moments of the frame, as area and load, and its centre, "
@@ -222,13 +222,13 @@ class _Known:
         return Advice("more labels", f"of those that it learnt {alone.missed} are missed, and {alone.false} are false")
 
 
-def _other_recipe(made: Trained, examples: Sequence[Example]) -> Advice | None:
+def _other_recipe(trained: Trained, examples: Sequence[Example]) -> Advice | None:
     """Return the recipe that fits recording and labels, if another named one was trained by."""
-    used = next((name for name in recipes.names() if recipes.read(name)["about"] == made.recipe.about), None)
+    used = next((name for name in recipes.names() if recipes.read(name)["about"] == trained.recipe.about), None)
     source = recorded(examples[0].source)
     if used is None or isinstance(source, SpikeTrains):
         return None
-    fits, why = recipes.chosen(source, made.readout.labels)
+    fits, why = recipes.chosen(source, trained.readout.labels)
     if fits == used:
         return None
     return Advice(f"--recipe {fits}", f"it is made for {why}; this training took {used}", "--recipe")
@@ -262,15 +262,15 @@ def _by_chance(label: str, who: str, together: Score) -> str:
     return f"{who} tells {right} of {kind.events} and takes {taken} of {others} others for {label}"
 
 
-def _for_touch(made: Trained) -> bool:
+def _for_touch(trained: Trained) -> bool:
     """Whether all labels are those of the recipe `touch`, contact and lift: not contact and foot off."""
-    return all(recipes.knows("touch", label) for label in made.readout.labels)
+    return all(recipes.knows("touch", label) for label in trained.readout.labels)
 
 
-def _by_rule(made: Trained, left: int, wrong: int) -> Advice:
+def _by_rule(trained: Trained, left: int, wrong: int) -> Advice:
     """Return the recipe that has the inputs of plain rules, if this one has not; else the rule itself."""
     because = f"leaves {left} missed and false on the same labels, the neuron {wrong}"
-    if _for_touch(made) and not any(isinstance(encoder, ContactArea) for encoder in made.recipe.encoder._each()):
+    if _for_touch(trained) and not any(isinstance(encoder, ContactArea) for encoder in trained.recipe.encoder._each()):
         return Advice("--recipe touch", f"the plain rule, which has its inputs, {because}", "--recipe")
     return Advice(
         "the plain rule", f"it {because}; taxel train --rule FILE writes it, and taxel detect runs it", "--rule"
@@ -314,8 +314,8 @@ def _at(source: Events | Frames, t_us: int) -> Frames:
     """Return the frame at a time."""
     if isinstance(source, Events):
         return Frames.from_events(source, 1, t_us, t_us + 1)
-    place = max(0, int(np.searchsorted(source.t, t_us, side="right")) - 1)
-    return source[place : place + 1]
+    index = max(0, int(np.searchsorted(source.t, t_us, side="right")) - 1)
+    return source[index : index + 1]
 
 
 def count_drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> int:

@@ -19,7 +19,7 @@ from taxel.encode import Composite, Encoder
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
-#: So long after a spike a neuron is trained to fire whose potential jumps by it, ms.
+#: How long after a spike a neuron is trained to fire if the spike makes its potential jump, ms.
 ACTS_AFTER_MS = to_ms(1.0)
 #: Times that are nearer are the same, ms: stamps are whole us, and since 1970 resolved to a quarter of one.
 _SAME_MS = 5e-4
@@ -79,8 +79,8 @@ def later_us(pattern: SpikeTrains, ages: Ages, felt_ms: NDArray[np.float64], age
         One of the ages.
     """
     after = np.append(onsets(pattern, ages), np.inf)
-    place = [round(to_us(begin)) for begin in ages.begin_ms].index(round(to_us(age_ms)))
-    fired = np.append(pattern[ages.trains[place]], np.inf)
+    age = [round(to_us(begin)) for begin in ages.begin_ms].index(round(to_us(age_ms)))
+    fired = np.append(pattern[ages.trains[age]], np.inf)
     first = fired[np.searchsorted(fired, felt_ms + age_ms - _SAME_MS)]
     same = first < after[np.searchsorted(after, felt_ms + _SAME_MS)]
     return np.rint(to_us(np.where(same, first - (felt_ms + age_ms), 0.0))).astype(np.int64)
@@ -143,28 +143,28 @@ def in_frames(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cloc
         return max(0.0, to_ms(round(to_us((frames - early) * period_ms))))
 
     def point(values: Mapping[str, Any], under: Mapping[str, Any], seen: dict[int, float]) -> dict[str, Any] | None:
-        every = {**under, **values}
-        if not _aged(recipe, every):
+        merged = {**under, **values}
+        if not _aged(recipe, merged):
             return dict(values)
-        frames = count(_delay_ms(every))
-        if seen.setdefault(frames, _delay_ms(every)) != _delay_ms(every):
+        frames = count(_delay_ms(merged))
+        if seen.setdefault(frames, _delay_ms(merged)) != _delay_ms(merged):
             return None
         used.add(frames)
-        refractory = max(float(every.get("refractory", Neuron().refractory)), _SILENT_SHARE * period_ms)
-        made = {**values, "delay_ms": begin_ms(frames), "refractory": refractory}
-        if frames_ms and float(every.get("tau", Neuron().tau)) < period_ms:
-            made |= {"kernel": "exponential", "tau": _TAU_SHARE * period_ms, "step_ms": _STEP_SHARE * period_ms}
-        return made
+        refractory = max(float(merged.get("refractory", Neuron().refractory)), _SILENT_SHARE * period_ms)
+        changed = {**values, "delay_ms": begin_ms(frames), "refractory": refractory}
+        if frames_ms and float(merged.get("tau", Neuron().tau)) < period_ms:
+            changed |= {"kernel": "exponential", "tau": _TAU_SHARE * period_ms, "step_ms": _STEP_SHARE * period_ms}
+        return changed
 
     def neuron(values: Mapping[str, Any]) -> dict[str, Any]:
         first = {name: value for name, value in values.items() if name not in LISTS}
-        made, under = dict(first), {**recipe.learner, **first}
+        changed, under = dict(first), {**recipe.learner, **first}
         for key in LISTS:
             seen: dict[int, float] = {}
-            made |= point(first, recipe.learner, seen) or {}
+            changed |= point(first, recipe.learner, seen) or {}
             tried = [point(listed, under, seen) for listed in values.get(key, ())]
-            made |= {key: [point for point in tried if point is not None]} if key in values else {}
-        return made
+            changed |= {key: [point for point in tried if point is not None]} if key in values else {}
+        return changed
 
     def encoder(part: Encoder) -> Encoder:
         ages = getattr(part, "ages_ms", None)
@@ -174,9 +174,9 @@ def in_frames(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cloc
         return copy(part).set_params(ages_ms=[begin_ms(number) for number in sorted(counts)])
 
     neurons = {label: neuron(values) for label, values in recipe.neurons.items()}
-    whole = recipe.encoder
-    parts = {name: encoder(part) for name, part in whole.parts.items()} if isinstance(whole, Composite) else {}
-    return replace(recipe, encoder=Composite(parts) if parts else encoder(whole), neurons=neurons)
+    composite = recipe.encoder
+    parts = {name: encoder(part) for name, part in composite.parts.items()} if isinstance(composite, Composite) else {}
+    return replace(recipe, encoder=Composite(parts) if parts else encoder(composite), neurons=neurons)
 
 
 def _aged(recipe: Recipe, values: Mapping[str, Any]) -> bool:

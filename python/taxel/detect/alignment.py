@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import whole
+from taxel._base.arguments import integer
 from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
 from taxel.detect.ages import Ages, onsets
@@ -24,7 +24,7 @@ WINDOW_MS = 50.0
 _MOST_A_LABEL = 4
 #: Trains are alike that have so many missed and false more than the best one, or that share of the labels.
 _ALIKE, _ALIKE_SHARE = 2, 0.05
-#: Of those alike, trains whose median distance from the labels is within this of the least, ms.
+#: Trains of those alike count whose median distance from the labels is within this of the least, ms.
 _ALIKE_MS = 2.0
 
 
@@ -83,8 +83,8 @@ class Alignment:
         ------
         ProblemError : a number that is no whole one, or below 0
         """
-        mine = (self.example == whole("example", example, 0)) & ~self.unpaired
-        felt: NDArray[np.int64] = self.given[mine] + np.rint(to_us(self.moved_ms[mine])).astype(np.int64)
+        paired = (self.example == integer("example", example, 0)) & ~self.unpaired
+        felt: NDArray[np.int64] = self.given[paired] + np.rint(to_us(self.moved_ms[paired])).astype(np.int64)
         return felt
 
     def to_dict(self) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from abc import abstractmethod
 from typing import Any, Self
 
 from taxel import _core
-from taxel._base.arguments import instance, number, parameters, shown, whole
+from taxel._base.arguments import instance, integer, number, parameters, shown
 from taxel._base.arguments import text as checked_text
 from taxel._base.errors import refused
 from taxel._base.saved import Saved
@@ -17,7 +17,7 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import unit_of
-from taxel.recording.rest import FORCE_UNITS
+from taxel.recording.analysis.rest import FORCE_UNITS
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
@@ -54,13 +54,13 @@ class _Detector(Saved):
         unit = self._parts.get("unit")
         return None if unit is None else str(unit)
 
-    def _check_unit(self, unit: str, what: str = "values") -> None:
+    def _check_unit(self, unit: str, subject: str = "values") -> None:
         """Refuse values in another unit than it was trained on, as its weights and thresholds are of that unit."""
         if self.unit not in (None, unit):
             how = ", as a calibration gives (Recording.calibrated)" if self.unit in FORCE_UNITS else ""
             raise ProblemError(
-                f"{what} in {unit}, and the {self._WHAT} was trained on {self.unit}: must be in {self.unit}{how}, or "
-                f"train anew on recordings in {unit}"
+                f"{subject} in {unit}, and the {self._WHAT} was trained on {self.unit}: must be in {self.unit}{how}, "
+                f"or train anew on recordings in {unit}"
             )
 
     def _with(self, **parts: Any) -> Self:
@@ -171,7 +171,7 @@ class ReadoutStream:
         self._detector = detector("readout", readout)
         self._frame_us = number("frame_us", frame_us, "us")
         self._tare = tare_text(tare)
-        self._version = whole("wire_version", wire_version, 1, 2)
+        self._version = integer("wire_version", wire_version, 1, 2)
         self._core: _core.ReadoutStream | None = None
         array = readout.array if array is None else array
         if array is not None:
@@ -227,7 +227,7 @@ class ReadoutStream:
         ------
         ProblemError : no whole number of us
         """
-        t = whole("t_us", t_us, -(2**52), 2**52)
+        t = integer("t_us", t_us, -(2**52), 2**52)
         return Detections([], [], []) if self._core is None else Detections._from_parts(self._core.advance(t))
 
     @property

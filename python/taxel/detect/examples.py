@@ -96,11 +96,11 @@ class Outcome(NamedTuple):
     @property
     def outside_text(self) -> str:
         """How many detections have an input outside the range that it had in training, in words."""
-        what = "with an input outside what was seen in training"
+        noun = "with an input outside what was seen in training"
         if self.outside is None:
-            return f"detections {what}: not known, as the readout's file does not hold it"
+            return f"detections {noun}: not known, as the readout's file does not hold it"
         share = f" ({self.outside / len(self.found):.0%})" if len(self.found) else ""
-        return f"detections {what}: {self.outside} of {len(self.found)}{share}"
+        return f"detections {noun}: {self.outside} of {len(self.found)}{share}"
 
 
 def check_examples(examples: Sequence[Example]) -> list[Example]:
@@ -114,8 +114,8 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
         raise refused("examples", f" is {shown(examples)}: must be one Example or more")
     sound = []
     for k, example in enumerate(examples):
-        whole = isinstance(example, tuple) and len(example) in (2, 3, 4, 5)
-        source = recorded(example[0]) if whole else None
+        is_example = isinstance(example, tuple) and len(example) in (2, 3, 4, 5)
+        source = recorded(example[0]) if is_example else None
         if not isinstance(source, Events | Frames | SpikeTrains):
             raise ProblemError(
                 f"example {k} is {shown(example)}: must be an Example of a Recording, Events, Frames or SpikeTrains, "
@@ -145,8 +145,8 @@ def array_of(examples: Sequence[Example]) -> Array | None:
     first = arrays[0]
     for k, array in enumerate(arrays):
         if (array is None) != (first is None) or (array is not None and first is not None and not first.fits(array)):
-            of = f"{name_of(k, examples[k])} is of {array!r}, {name_of(0, examples[0])} of {first!r}"
-            raise ProblemError(f"{of}: must have the same taxels")
+            difference = f"{name_of(k, examples[k])} is of {array!r}, {name_of(0, examples[0])} of {first!r}"
+            raise ProblemError(f"{difference}: must have the same taxels")
     if first is not None:
         # One line for all, as every second recording may be of the other foot.
         any(first._warn_apart(array, "examples", stacklevel=3) for array in arrays if array is not None)
@@ -163,6 +163,6 @@ def unit_of(examples: Sequence[Example]) -> str | None:
     units = [None if isinstance(example.source, SpikeTrains) else recorded_unit(example.source) for example in examples]  # type: ignore[arg-type]
     for k, unit in enumerate(units):
         if unit != units[0]:
-            of = f"{name_of(k, examples[k])} is in {unit}, {name_of(0, examples[0])} in {units[0]}"
-            raise ProblemError(f"{of}: must be in one unit, as a readout learns values of one only")
+            difference = f"{name_of(k, examples[k])} is in {unit}, {name_of(0, examples[0])} in {units[0]}"
+            raise ProblemError(f"{difference}: must be in one unit, as a readout learns values of one only")
     return units[0]

@@ -96,7 +96,7 @@ def _check_ungraded(encoder: Encoder) -> None:
 
 def lost(readout: Parts) -> list[str]:
     """Return what NIR's nodes cannot hold of a readout, one line each."""
-    neurons = [cell.neuron for cell in readout.neurons.values()]
+    neurons = [trained.neuron for trained in readout.neurons.values()]
     lines = [
         "the encoder: the graph's inputs are its spike trains",
         "labels and trained delays: outputs come in the order of the labels",
@@ -140,48 +140,48 @@ def read_nir(
     FormatError : no NIR graph, or one that no readout can stand for (names file and node)
     ProblemError : no encoder is known
     """
-    place, spike_ms = checked_path("path", path), _spike(spike_ms)
+    file, spike_ms = checked_path("path", path), _spike(spike_ms)
     encoder = None if encoder is None else instance("encoder", encoder, Encoder)
     neuron = None if neuron is None else instance("neuron", neuron, Neuron)
-    graph = _read_graph(place)
-    held = graph.metadata.get(READOUT)
+    graph = _read_graph(file)
+    document = graph.metadata.get(READOUT)
     try:
-        if held is not None and not isinstance(held, str):
+        if document is not None and not isinstance(document, str):
             raise FormatError(f"{READOUT} in the metadata: must be a text")
-        stored = None if held is None else parts_of(held)
+        stored = None if document is None else parts_of(document)
         if spike_ms is None and SPIKE in graph.metadata:
             spike_ms = _spike(1000.0 * number(SPIKE, graph.metadata[SPIKE]) or None)
         if stored is not None and encoder is None and neuron is None and _same(graph, _graph(stored, spike_ms)):
             return build(stored)
         return build(_parts(graph, stored, encoder, neuron, spike_ms))
     except (FormatError, ProblemError) as error:
-        raise type(error)(f"{place}: {error}") from None
+        raise type(error)(f"{file}: {error}") from None
 
 
-def _read_graph(place: str | os.PathLike[str]) -> NIRGraph:
+def _read_graph(file: str | os.PathLike[str]) -> NIRGraph:
     """Read the graph of a file, as `nir.read` does, by the process that reads every HDF5 file."""
     import nir  # noqa: PLC0415  an extra
 
     try:
-        tree = _tree(place)
+        tree = _tree(file)
         if "node" not in tree:
-            raise FormatError(f"{place}: holds no group 'node'; must be a file that nir.write has made")
+            raise FormatError(f"{file}: holds no group 'node'; must be a file that nir.write has made")
         graph = nir.dict2NIRNode(tree["node"])
         if not isinstance(graph, nir.NIRGraph) or not isinstance(graph.metadata, dict):
-            raise FormatError(f"{place}: a {type(graph).__name__}; must be a NIRGraph with its metadata")
+            raise FormatError(f"{file}: a {type(graph).__name__}; must be a NIRGraph with its metadata")
     except (FormatError, MemoryError, OSError):
         raise
     except Exception as error:  # nir raises many kinds of errors for what is not a graph
         raise FormatError(
-            f"{place}: no NIR graph that can be read: {type(error).__name__} {shown(str(error))}"
+            f"{file}: no NIR graph that can be read: {type(error).__name__} {shown(str(error))}"
         ) from None
     return graph
 
 
-def _tree(place: str | os.PathLike[str]) -> dict[str, Any]:
+def _tree(file: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the groups and data sets of the graph in a file, group within group."""
     root: dict[str, Any] = {}
-    with H5File(place) as h5:
+    with H5File(file) as h5:
         paths = [path for path in h5.entries if path.split("/", maxsplit=1)[0] == "node"]
         h5.check_size(paths)
         for path in paths:
@@ -234,18 +234,20 @@ def _graph(readout: Parts, spike_ms: float | None) -> NIRGraph:
     _check_ungraded(readout.encoder)
     spike_s = None if spike_ms is None else spike_ms / 1000.0
     neurons = list(readout.neurons.values())
-    for label, cell in readout.neurons.items():
-        if cell.neuron.rearm is not None:
-            raise ProblemError(f"NIR: rearm of {label!r} is {cell.neuron.rearm}: no NIR neuron has that, must be None")
-    nodes = [_gains(cell.neuron, spike_s) for cell in neurons]
+    for label, trained in readout.neurons.items():
+        if trained.neuron.rearm is not None:
+            raise ProblemError(
+                f"NIR: rearm of {label!r} is {trained.neuron.rearm}: no NIR neuron has that, must be None"
+            )
+    nodes = [_gains(trained.neuron, spike_s) for trained in neurons]
     kinds = sorted({kind for kind, _, _ in nodes})
     if len(kinds) > 1:
         raise ProblemError("NIR: exponential kernels and others need different nodes; export them as readouts apart")
     columns = {name: np.array([node[1][name] for node in nodes]) for name in nodes[0][1]}
-    threshold = np.array([cell.neuron.theta_0 * readout.run_threshold / 1000.0 for cell in neurons])
+    threshold = np.array([trained.neuron.theta_0 * readout.run_threshold / 1000.0 for trained in neurons])
     zero = np.zeros(len(neurons))
-    cells = getattr(nir, kinds[0])(v_leak=zero, v_threshold=threshold, v_reset=zero, **columns)
-    weights = np.array([cell.weights / 1000.0 * node[2] for cell, node in zip(neurons, nodes, strict=True)])
+    nir_neurons = getattr(nir, kinds[0])(v_leak=zero, v_threshold=threshold, v_reset=zero, **columns)
+    weights = np.array([trained.weights / 1000.0 * node[2] for trained, node in zip(neurons, nodes, strict=True)])
     delays = readout.delays_ms
     inputs = weights.shape[1] // len(delays)
     parts: dict[str, Any] = {"input": nir.Input({"input": np.array([inputs])})}
@@ -259,7 +261,7 @@ def _graph(readout: Parts, spike_ms: float | None) -> NIRGraph:
             parts[source] = nir.Delay(delay=np.full(inputs, delay / 1000.0))
             edges.append(("input", source))
         edges += [(source, name), (name, "neurons")]
-    parts |= {"neurons": cells, "output": nir.Output({"output": np.array([len(neurons)])})}
+    parts |= {"neurons": nir_neurons, "output": nir.Output({"output": np.array([len(neurons)])})}
     edges.append(("neurons", "output"))
     metadata = {READOUT: readout.text, SPIKE: spike_s or 0.0}
     return nir.NIRGraph(nodes=parts, edges=edges, metadata=metadata)
@@ -295,7 +297,7 @@ def _parts(
     if encoder is None:
         raise ProblemError("NIR holds no encoder: say which with encoder=")
     _check_ungraded(encoder)
-    weights, delays_ms, cells = _layers(graph)
+    weights, delays_ms, nir_neurons = _layers(graph)
     spike_s = None if spike_ms is None else spike_ms / 1000.0
     templates: list[TrainedNeuron | None] = [None] * len(weights)
     labels = [f"output {k}" for k in range(len(weights))]
@@ -304,8 +306,8 @@ def _parts(
     trained = {}
     for k, (label, template, row) in enumerate(zip(labels, templates, weights, strict=True)):
         rest = neuron or (template.neuron if template is not None else Neuron())
-        constants, factor = _kernel(cells, k, spike_s)
-        constants["theta_0"] = _threshold(cells, k)
+        constants, factor = _kernel(nir_neurons, k, spike_s)
+        constants["theta_0"] = _threshold(nir_neurons, k)
         if stored is not None and neuron is None:
             # The nodes' threshold holds the factor already.
             constants["theta_plus"] = rest.theta_plus * stored.run_threshold
@@ -316,14 +318,14 @@ def _parts(
     return Parts(encoder, trained, array, delays_ms, unit)
 
 
-def _kernel(cells: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any], float]:
+def _kernel(neurons: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any], float]:
     """Return the kernel of cell `k` with its constants in ms, and the factor from the graph's weights to V."""
 
     def value(name: str) -> float:
-        return float(getattr(cells, name)[k])
+        return float(getattr(neurons, name)[k])
 
     constants: dict[str, Any]
-    if type(cells).__name__ == "LIF":
+    if type(neurons).__name__ == "LIF":
         # Such a potential only jumps, so taxel compares it on a grid.
         tau, constants = value("tau"), {"kernel": "exponential", "tau_s": None, "time": "grid"}
     else:
@@ -344,8 +346,8 @@ def _kernel(cells: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any], 
     return constants, scale / gain
 
 
-def _threshold(cells: Any, k: int) -> float:
-    leak, threshold = float(cells.v_leak[k]), float(cells.v_threshold[k])
+def _threshold(neurons: Any, k: int) -> float:
+    leak, threshold = float(neurons.v_leak[k]), float(neurons.v_threshold[k])
     if not threshold > leak:
         raise FormatError(f"neurons[{k}]: threshold {threshold} V lies not above the rest, {leak} V")
     # Potentials count from rest.
@@ -370,11 +372,11 @@ def _layers(graph: NIRGraph) -> tuple[NDArray[np.float64], list[float], Any]:
         return into[name][0] if len(into.get(name, [])) == 1 else None
 
     source, target = only("Input"), only("Output")
-    cells = into.get(target, [])
-    if len(cells) != 1 or kinds[cells[0]] not in ("LIF", "CubaLIF"):
+    last = into.get(target, [])
+    if len(last) != 1 or kinds[last[0]] not in ("LIF", "CubaLIF"):
         raise FormatError("the output must come from one node of kind LIF or CubaLIF: a readout is a single layer")
     branches = []
-    for name in into.get(cells[0], []):
+    for name in into.get(last[0], []):
         node, kind = nodes[name], kinds[name]
         if kind not in ("Linear", "Affine") or np.ndim(node.weight) != 2:
             raise FormatError(f"{name}: {kind} before the neurons, must be Linear (or Affine without bias)")
@@ -393,7 +395,7 @@ def _layers(graph: NIRGraph) -> tuple[NDArray[np.float64], list[float], Any]:
     if not branches:
         raise FormatError("nothing leads to the neurons")
     branches.sort(key=lambda branch: branch[0])
-    cell = nodes[cells[0]]
-    if any(np.shape(w) != (np.size(cell.v_threshold), np.shape(branches[0][1])[1]) for _, w in branches):
+    neurons = nodes[last[0]]
+    if any(np.shape(w) != (np.size(neurons.v_threshold), np.shape(branches[0][1])[1]) for _, w in branches):
         raise FormatError("weights and neurons differ in number")
-    return np.hstack([w for _, w in branches]), [delay for delay, _ in branches], cell
+    return np.hstack([w for _, w in branches]), [delay for delay, _ in branches], neurons

@@ -9,7 +9,7 @@ import numpy as np
 from taxel.detect.examples import Example
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.rest import SHARE, TIMES_NOISE
+from taxel.recording.analysis.rest import SHARE, TIMES_NOISE
 
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01
@@ -35,6 +35,6 @@ def measured_floor(examples: Sequence[Example]) -> float | None:
             continue
         above = np.fmax.reduce(source.values, axis=0, initial=-np.inf) - example.tare.rest
         known = np.isfinite(above) & np.isfinite(example.tare.noise)
-        noise, reach = (float(np.quantile(of[known], SHARE)) for of in (example.tare.noise, above))
+        noise, reach = (float(np.quantile(values[known], SHARE)) for values in (example.tare.noise, above))
         floors.append(max(TIMES_NOISE * noise, _SHARE_OF_RANGE * reach))
     return float(f"{max(floors):.3g}") if max(floors, default=0.0) > 0.0 else None

@@ -14,20 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import finite, flag, instance, several, shown, whole, window
+from taxel._base.arguments import finite, flag, instance, integer, several, shown, window
 from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect.ages import in_frames
 from taxel.detect.examples import Example, array_of, check_examples, unit_of
-from taxel.detect.loads import Clock, clock_of
-from taxel.detect.plain_score import PlainScore, floor_of, plain_score
-from taxel.detect.readout import Readout, run
-from taxel.detect.recipe import Recipe
-from taxel.detect.scoring import Score, score, score_together
-from taxel.detect.training import (
-    Encoded,
+from taxel.detect.fitting import (
+    EncodedExamples,
     Fitting,
     Known,
     Trained,
@@ -37,6 +32,11 @@ from taxel.detect.training import (
     readout_of,
     rows_of,
 )
+from taxel.detect.loads import Clock, clock_of
+from taxel.detect.plain_score import PlainScore, floor_of, plain_score
+from taxel.detect.readout import Readout, run
+from taxel.detect.recipe import Recipe
+from taxel.detect.scoring import Score, score, score_together
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms
 
@@ -171,9 +171,9 @@ def judge(
     report = reporting(progress)
     search = flag("search", search)
     ways, how = _folds(examples, k)
-    whole = in_frames(instance("recipe", recipe, Recipe), examples, clocks)
-    recipe = possible(whole, examples)
-    patterns = Encoded(examples, recipe, report, search=search)
+    recipe_in_frames = in_frames(instance("recipe", recipe, Recipe), examples, clocks)
+    recipe = possible(recipe_in_frames, examples)
+    patterns = EncodedExamples(examples, recipe, report, search=search)
     array, unit = array_of(examples), unit_of(examples)
     detections: dict[int, list[Detections]] = {}
     trained = []
@@ -186,12 +186,12 @@ def judge(
             plan = replace(recipe, neurons=chosen.neurons)
         with collected():  # a readout that is only scored: the score shows what it misses
             parts_of = partial(_parts_of, fold.train)
-            made = learn(patterns.part(parts_of), plan, array, report)
-        of_fold = replace(whole, neurons=plan.neurons)._at(made.recipe.neurons)
-        trained.append(made._replace(recipe=of_fold, readout=made.readout._with(unit=unit)))
+            trained_fold = learn(patterns.part(parts_of), plan, array, report)
+        of_fold = replace(recipe_in_frames, neurons=plan.neurons)._at(trained_fold.recipe.neurons)
+        trained.append(trained_fold._replace(recipe=of_fold, readout=trained_fold.readout._with(unit=unit)))
         for part in fold.test:
             detections.setdefault(part.example, []).append(_detect(trained[-1].readout, examples, part, clocks))
-    joined = [reduce(add, detections[place]) for place in sorted(detections)]
+    joined = [reduce(add, detections[example]) for example in sorted(detections)]
     labels = recipe._labels(examples)
     truths = _truths(examples, ways, labels)
     scores = tuple(score(*compared, window) for compared in zip(joined, truths, strict=True))
@@ -263,7 +263,7 @@ def choose(
     recipe = in_frames(instance("recipe", recipe, Recipe), examples, clocks)
     report = reporting(progress)
     parts = [Part(n) for n in range(len(examples))]
-    ways = whole("k", k, 2, 2**31) if isinstance(k, int | np.integer) else _folds(examples, k)[0]
+    ways = integer("k", k, 2, 2**31) if isinstance(k, int | np.integer) else _folds(examples, k)[0]
     narrowed = recipe._narrowed(recipe._labels(examples), search=True)
     chosen = _choose(
         examples, encode_examples(examples, narrowed, report), narrowed, ways, parts, window, clocks, report
@@ -351,8 +351,8 @@ def _marks(
     return [
         (sys.maxsize, np.inf)
         if m in refused
-        else score_together([reduce(add, of[place]) for place in sorted(of)], truths, window).rank
-        for m, of in enumerate(detections)
+        else score_together([reduce(add, by_example[example]) for example in sorted(by_example)], truths, window).rank
+        for m, by_example in enumerate(detections)
     ]
 
 
@@ -405,11 +405,13 @@ def _truths(
     return [
         {
             label: np.sort(
-                np.concatenate([_inside(examples[place].labels.get(label, nothing), part) for part in tested[place]])
+                np.concatenate(
+                    [_inside(examples[example].labels.get(label, nothing), part) for part in tested[example]]
+                )
             )
             for label in labels
         }
-        for place in sorted(tested)
+        for example in sorted(tested)
     ]
 
 
@@ -446,8 +448,9 @@ def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
 
 def _lacks(examples: Sequence[Example], parts: Sequence[Part], labels: Iterable[str]) -> str | None:
     """Return a label of which no event is in any of these parts, if there is one."""
+    nothing = np.empty(0, np.int64)
     for label in labels:
-        if not any(label in (of := examples[part.example].labels) and len(_inside(of[label], part)) for part in parts):
+        if not any(len(_inside(examples[part.example].labels.get(label, nothing), part)) for part in parts):
             return label
     return None
 
@@ -456,7 +459,7 @@ def _folds(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequen
     """Return folds, made or given, and what they hold out."""
     if isinstance(k, Sequence) and not isinstance(k, str):
         return _check_folds(k, len(examples)), f"{len(k)} given folds"
-    count = whole("folds", k, 2, 2**31)
+    count = integer("folds", k, 2, 2**31)
     parts = [Part(n) for n in range(len(examples))]
     recordings = len(_group(examples, parts))
     if recordings > 1 and count > recordings:
@@ -495,7 +498,7 @@ def _check_folds(folds: Sequence[Fold], examples: int) -> list[Fold]:
 
 
 def _check_part(where: str, part: object, examples: int) -> Part:
-    if not isinstance(part, Part) or not 0 <= (example := whole(f"{where}: example", part.example)) < examples:
+    if not isinstance(part, Part) or not 0 <= (example := integer(f"{where}: example", part.example)) < examples:
         raise ProblemError(f"{where}: {shown(part)} is no Part of {examples} examples")
     start, stop = window("us", part.start, part.stop)
     if not start < stop:
@@ -514,7 +517,7 @@ def _split(examples: Sequence[Example], parts: Sequence[Part], count: int) -> li
         (group,) = groups
         events = np.sort(np.concatenate([_only_inside(examples[part.example], part) for part in group]))
         edges = (-np.inf, *_between_events(events, count), np.inf)
-        stretches = [[_within(part, *of) for part in group] for of in pairwise(edges)]
+        stretches = [[_within(part, *span) for part in group] for span in pairwise(edges)]
         groups = [filled for each in stretches if (filled := [part for part in each if part.start < part.stop])]
     return _deal(groups, count)
 

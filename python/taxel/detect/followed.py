@@ -21,9 +21,9 @@ _THRESHOLDS = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
 _SAMPLES = (1, 4, 8, 16)
 #: Onsets that are so many times as many as the labels follow other things.
 _MOST_A_LABEL = 2
-#: So long after a target no silence is required, ms, unless the quantity ends before; at least `_LEAST_MS`.
+#: How long after a target no silence is required, ms, unless the quantity ends before; at least `_LEAST_MS`.
 _AFTER_MS, _LEAST_MS = 60.0, 3.0
-#: Nor so long before a target: a quantity that rises slowly is nearly there.
+#: The same before a target: a quantity that rises slowly is nearly there.
 _BEFORE_MS = 5.0
 #: Silence is required at so many samples at most; half of them within `_NEAR_MS` of an edge, where it is hardest.
 _MOST_SAMPLES, _NEAR_MS = 8000, 60.0
@@ -108,22 +108,22 @@ def _samples(pattern: SpikeTrains, train: int) -> tuple[NDArray[np.float64], NDA
     """Return the times of all samples, ms, and a train's value at each."""
     clock = pattern[len(pattern) - 1]
     values = np.zeros(len(clock))
-    mine = slice(*pattern.offsets[train : train + 2])
+    spikes = slice(*pattern.offsets[train : train + 2])
     assert pattern.values is not None
     # In single precision, as it is: log(1 + 2) must reach the threshold 2.
-    values[np.searchsorted(clock, pattern.times[mine])] = pattern.values[mine] + 1e-6
+    values[np.searchsorted(clock, pattern.times[spikes])] = pattern.values[spikes] + 1e-6
     return clock, values
 
 
 def _edges(clock: NDArray[np.float64], above: NDArray[np.bool_], count: int) -> _Edges:
     """Return when a quantity came to stay at its threshold for some samples, and when below it; below at first."""
     starts = [_runs(above, count), _runs(~above, count)]
-    place = np.concatenate(starts)
+    steps = np.concatenate(starts)
     up = np.repeat([True, False], [len(start) for start in starts])
-    order = np.argsort(place, kind="stable")
-    place, up = place[order], up[order]
+    order = np.argsort(steps, kind="stable")
+    steps, up = steps[order], up[order]
     changed = up != np.concatenate([[False], up[:-1]])
-    return _Edges(clock[place[changed & up]], clock[place[changed & ~up]])
+    return _Edges(clock[steps[changed & up]], clock[steps[changed & ~up]])
 
 
 def _runs(true: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
@@ -160,29 +160,29 @@ def silence(
     """
     most = max(1, _MOST_SAMPLES // len(patterns))
     windows = []
-    for pattern, edges, mine, without in zip(patterns, followed.edges, targets, unpaired, strict=True):
+    for pattern, edges, times, without in zip(patterns, followed.edges, targets, unpaired, strict=True):
         clock = pattern[len(pattern) - 1]
         free = np.ones(len(clock), np.bool_)
-        for target in mine:
+        for target in times:
             after = np.append(edges.ends[edges.ends > target], np.inf)[0]
             stop = max(min(target + _AFTER_MS, after), target + _LEAST_MS)
             free[slice(*np.searchsorted(clock, [target - delay_ms - _BEFORE_MS, stop]))] = False
         for t in without:
             free[slice(*np.searchsorted(clock, [t - _BEFORE_MS, t + _AFTER_MS]))] = False
         edge = np.sort(np.concatenate([edges.onsets, edges.ends, [-np.inf, np.inf]]))
-        place = np.searchsorted(edge, clock)
-        near = np.minimum(clock - edge[np.maximum(place - 1, 0)], edge[place] - clock) < _NEAR_MS
+        after_edge = np.searchsorted(edge, clock)
+        near = np.minimum(clock - edge[np.maximum(after_edge - 1, 0)], edge[after_edge] - clock) < _NEAR_MS
         chosen = np.sort(np.concatenate([_spaced(np.flatnonzero(free & zone), most // 2) for zone in (near, ~near)]))
         # A window of a step holds one point of the grid, whatever the offset between grid and samples.
         windows.append(np.column_stack([clock[chosen], clock[chosen] + 0.99 * step_ms]))
     return windows
 
 
-def _spaced(places: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+def _spaced(indices: NDArray[np.int64], most: int) -> NDArray[np.int64]:
     """Return at most so many of the places, evenly spaced."""
-    if len(places) <= most:
-        return places
-    return places[np.linspace(0, len(places) - 1, most).astype(np.int64)]
+    if len(indices) <= most:
+        return indices
+    return indices[np.linspace(0, len(indices) - 1, most).astype(np.int64)]
 
 
 def only(trains: SpikeTrains, received: Sequence[int]) -> SpikeTrains:

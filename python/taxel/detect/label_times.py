@@ -17,7 +17,7 @@ from taxel.detect.loads import Loads, clock_of, lacks_neighbours
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 
-#: So many loaded taxels are a touch, the smallest that there is.
+#: The number of loaded taxels of the smallest touch.
 TOUCH = 2.0
 #: Distances between labels and touches are looked at up to this, ms, and are the same that differ by this.
 _FARTHEST_MS, _SAME_MS = 1000.0, 50.0
@@ -68,7 +68,7 @@ def off_by(examples: Sequence[Example], labels: Sequence[str], noise_floor: floa
     felt = [edge.t for edge in loads.edges("area", TOUCH, 1.0, 1)]
     found = {}
     for label in labels:
-        times = loads.truth(label, loads.every)
+        times = loads.truth(label, loads.whole_examples)
         steady = [felt_edge for edge in felt for felt_edge in _steady(times, edge)]
         if steady and all(abs(shift.ms) > WINDOW_MS for shift, _ in steady):
             found[label], _ = min(steady, key=lambda found_edge: (-found_edge[0].alike, found_edge[1]))
@@ -82,13 +82,13 @@ def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple
         return
     far = round(to_us(_FARTHEST_MS))
     reach = np.searchsorted(felt, [times - far, times + far])
-    which = np.repeat(np.arange(len(times)), reach[1] - reach[0])
+    label_index = np.repeat(np.arange(len(times)), reach[1] - reach[0])
     beside = np.concatenate([np.arange(*span) for span in reach.T])
-    apart = to_ms(times[which] - felt[beside])
+    apart = to_ms(times[label_index] - felt[beside])
     order = np.argsort(apart, kind="stable")
-    apart, which = apart[order], which[order]
+    apart, label_index = apart[order], label_index[order]
     for k, end in enumerate(np.searchsorted(apart, apart + _SAME_MS, side="right")):
-        if end - k >= least and (alike := len(np.unique(which[k:end]))) >= least:
+        if end - k >= least and (alike := len(np.unique(label_index[k:end]))) >= least:
             yield Off(float(np.median(apart[k:end])), alike, len(times)), float(apart[end - 1] - apart[k])
 
 
@@ -102,7 +102,7 @@ def unlabelled_us(examples: Sequence[Example], label: str) -> tuple[int, int]:
     examples : sequence of Example, checked
     label : str
     """
-    outside = whole = 0
+    outside = total = 0
     for example in examples:
         times = np.sort(example.labels.get(label, np.empty(0, np.int64)))
         if isinstance(example.source, SpikeTrains):
@@ -113,8 +113,8 @@ def unlabelled_us(examples: Sequence[Example], label: str) -> tuple[int, int]:
         if len(times):
             apart = int(np.diff(times).max(initial=0))
             outside += max(0, int(times[0]) - first - apart) + max(0, last - int(times[-1]) - apart)
-            whole += last - first
-    return outside, whole
+            total += last - first
+    return outside, total
 
 
 def held_by_tare(examples: Sequence[Example], noise_floor: float) -> int:
@@ -145,11 +145,11 @@ def _early(example: Example) -> Tare | None:
     if tare is None or isinstance(source, SpikeTrains):
         return None
     try:
-        whole = Tare.take(source, start_us=tare.start_us, stop_us=tare.stop_us)
+        tare_again = Tare.take(source, start_us=tare.start_us, stop_us=tare.stop_us)
         early = tare.start_us + round(_EARLY * (tare.stop_us - tare.start_us))
         return (
             Tare.take(source, start_us=tare.start_us, stop_us=early)
-            if np.array_equal(whole.rest, tare.rest, equal_nan=True)
+            if np.array_equal(tare_again.rest, tare.rest, equal_nan=True)
             else None
         )
     except ProblemError:

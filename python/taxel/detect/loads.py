@@ -33,8 +33,8 @@ class FoundTimes(NamedTuple):
 
     def between(self, windows: Iterable[tuple[int, int]]) -> Self:
         """Return what was found in windows, which ascend."""
-        places = [np.arange(*np.searchsorted(self.t, window)) for window in windows]
-        inside = np.concatenate(places) if places else np.empty(0, np.int64)
+        inside_windows = [np.arange(*np.searchsorted(self.t, window)) for window in windows]
+        inside = np.concatenate(inside_windows) if inside_windows else np.empty(0, np.int64)
         return type(self)(self.t[inside], self.known[inside], self.value[inside])
 
 
@@ -63,7 +63,7 @@ class Loads:
         self.noise_floor, self.unit = noise_floor, unit_of(examples)
         self.names = sorted({name for example in examples for name in example.labels})
         self._labels = [{name: np.sort(times) for name, times in example.labels.items()} for example in examples]
-        self.every: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
+        self.whole_examples: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
         self._shift = [k * APART_US - _first(example) for k, example in enumerate(examples)]
         self._frame_ms = max(map(frame_ms, examples))
         self._curves: dict[str, list[_core.LoadCurve]] = {}
@@ -120,8 +120,8 @@ class Loads:
 
     def truth(self, name: str, parts: Sequence[Stretch]) -> NDArray[np.int64]:
         """Return the labels of a name in parts of the examples, us on the one clock."""
-        every = [self._labels[k].get(name, np.empty(0, np.int64)) + shift for k, shift in enumerate(self._shift)]
-        times = np.concatenate(every)
+        by_example = [self._labels[k].get(name, np.empty(0, np.int64)) + shift for k, shift in enumerate(self._shift)]
+        times = np.concatenate(by_example)
         return FoundTimes(times, times, np.zeros(len(times))).between(self.windows(parts)).t
 
     def windows(self, parts: Iterable[Stretch]) -> list[tuple[int, int]]:

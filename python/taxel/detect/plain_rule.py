@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 
 from taxel import _core
-from taxel._base.arguments import instance, number, parameters, several, shown, text, whole
+from taxel._base.arguments import instance, integer, number, parameters, several, shown, text
 from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel.array import Array
@@ -100,7 +100,7 @@ class PlainRule(_Detector):
                         "quantity": text("quantity", quantity),
                         "threshold": number("threshold", threshold),
                         "release": number("release", release),
-                        "frames": whole("frames", frames, 1, 2**31 - 1),
+                        "frames": integer("frames", frames, 1, 2**31 - 1),
                         "age_ms": age,
                         "labels": _labels(labels, age),
                         "noise_floor": number("noise_floor", noise_floor),

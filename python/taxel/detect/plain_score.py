@@ -102,9 +102,9 @@ class PlainScore:
     def _where(self, than: Score, holds: Callable[[Score, Score], bool]) -> tuple[str, ...]:
         """Return the labels with a rule whose score, and then the other one, are as asked."""
         others = instance("than", than, Score).by_label
-        mine = {} if self.together is None else self.together.by_label
+        scores = {} if self.together is None else self.together.by_label
         ruled = [label for label in others if self.rules.get(label) is not None]
-        return tuple(label for label in ruled if holds(mine[label], others[label]))
+        return tuple(label for label in ruled if holds(scores[label], others[label]))
 
     def to_dict(self, than: Score) -> dict[str, Any]:
         """Return the rules, their score, and the labels of which they are better, as plain values.
@@ -173,15 +173,15 @@ def plain_score(
         return PlainScore(dict.fromkeys(labels), None, "plain rules need neighbours on a grid, and these are channels")
     loads = Loads(examples, clocks, noise_floor, report)
     report("tuning plain rules", 0, 0)
-    rules = best_rules(loads, labels, loads.every, window_ms)
+    rules = best_rules(loads, labels, loads.whole_examples, window_ms)
     detections: dict[int, list[Detections]] = {}
-    for n, (train, test) in enumerate(ways or [(loads.every, loads.every)]):
+    for n, (train, test) in enumerate(ways or [(loads.whole_examples, loads.whole_examples)]):
         if ways:
             report(f"tuning plain rules, fold {n + 1} of {len(ways)}", 0, 0)
-        mine = best_rules(loads, labels, train, window_ms) if ways else rules
+        fold_rules = best_rules(loads, labels, train, window_ms) if ways else rules
         for part in test:
-            detections.setdefault(part[0], []).append(_detect(loads, mine, part))
-    joined = [reduce(add, detections[place]) for place in sorted(detections)]
+            detections.setdefault(part[0], []).append(_detect(loads, fold_rules, part))
+    joined = [reduce(add, detections[index]) for index in sorted(detections)]
     return PlainScore(rules, score_together(joined, truths, window_ms))
 
 
@@ -191,14 +191,14 @@ def _detect(loads: Loads, rules: Mapping[str, PlainRule | None], part: Stretch) 
     for label, rule in rules.items():
         if rule is None:
             continue
-        which = rule._parts["labels"].index(label)
+        label_index = rule._parts["labels"].index(label)
         if rule.age_ms is None:
-            every = loads.edges(rule.quantity, rule.threshold, rule.release, rule.frames)[which]
+            edges = loads.edges(rule.quantity, rule.threshold, rule.release, rule.frames)[label_index]
         else:
-            every = loads.at_age(rule.age_ms)
-        found = loads.off(every.between(loads.windows([part])), part[0])
+            edges = loads.at_age(rule.age_ms)
+        found = loads.off(edges.between(loads.windows([part])), part[0])
         if rule.age_ms is not None:
-            mine = (found.value >= rule.threshold) == bool(which)
-            found = found._replace(t=found.t[mine], known=found.known[mine])
+            is_label = (found.value >= rule.threshold) == bool(label_index)
+            found = found._replace(t=found.t[is_label], known=found.known[is_label])
         detections += Detections([label] * len(found.t), found.t, found.known)
     return detections

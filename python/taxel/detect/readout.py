@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import floats, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._base.arguments import floats, instance, integer, mapping, number, parameters, several, shown, text
 from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel._base.saved import read
@@ -36,7 +36,7 @@ from taxel.wire import FRAME_US
 SILENCE_MS = 1000.0
 
 
-class Learner(Protocol):
+class FittedLearner(Protocol):
     """What a readout needs of a fitted learner."""
 
     neuron_: Neuron
@@ -97,7 +97,7 @@ class Readout(_Detector):
     def __init__(
         self,
         encoder: Encoder,
-        neurons: Mapping[str, Learner | TrainedNeuron | tuple[Any, ...]],
+        neurons: Mapping[str, FittedLearner | TrainedNeuron | tuple[Any, ...]],
         *,
         array: Array | None = None,
         unit: str | None = None,
@@ -114,13 +114,14 @@ class Readout(_Detector):
             if label not in neurons:
                 raise refused("inputs", f": no neuron {shown(label)}: there are {', '.join(map(str, neurons))}")
         trained = {
-            text("label", label): _neuron_of(label, cell, delay_ms, named.get(label)) for label, cell in neurons.items()
+            text("label", label): _neuron_of(label, trained_neuron, delay_ms, named.get(label))
+            for label, trained_neuron in neurons.items()
         }
         if not isinstance(delay_ms, Mapping):
             # Also where each neuron comes with its own.
             number("delay_ms", delay_ms, "ms")
         first = next(iter(trained.values())).neuron
-        made = _core.make_readout(
+        core = _core.make_readout(
             parameters(
                 {
                     "encoder": json.loads(encoder.to_json()),
@@ -132,17 +133,17 @@ class Readout(_Detector):
                     "delays_ms": floats("delays_ms", delays_ms, "ms"),
                     "neurons": {
                         label: {
-                            "neuron": json.loads(cell.neuron._json()),
-                            "delay_ms": cell.delay_ms,
-                            "inputs": list(cell.inputs),
-                            "weights": cell.weights,
+                            "neuron": json.loads(trained_neuron.neuron._json()),
+                            "delay_ms": trained_neuron.delay_ms,
+                            "inputs": list(trained_neuron.inputs),
+                            "weights": trained_neuron.weights,
                         }
-                        for label, cell in trained.items()
+                        for label, trained_neuron in trained.items()
                     },
                 }
             )
         )
-        self._hold(made)
+        self._hold(core)
 
     @staticmethod
     def _check(text: str) -> str:
@@ -164,12 +165,12 @@ class Readout(_Detector):
         """The trained neurons by label."""
         return {
             label: TrainedNeuron(
-                Neuron(**cell["neuron"]),
-                np.array(cell["weights"], np.float64),
-                cell["delay_ms"],
-                tuple(cell.get("inputs", ())),
+                Neuron(**stored["neuron"]),
+                np.array(stored["weights"], np.float64),
+                stored["delay_ms"],
+                tuple(stored.get("inputs", ())),
             )
-            for label, cell in self._parts["neurons"].items()
+            for label, stored in self._parts["neurons"].items()
         }
 
     def _neuron(self, label: str) -> TrainedNeuron:
@@ -281,21 +282,21 @@ class Readout(_Detector):
 
     def _exchanged(self) -> Parts:
         """Return the parts that the exchange format is made of; weights of trains that a neuron lacks are 0."""
-        neurons = {label: cell._replace(weights=self._spread(cell)) for label, cell in self.neurons.items()}
+        neurons = {label: trained._replace(weights=self._spread(trained)) for label, trained in self.neurons.items()}
         return Parts(
             self.encoder, neurons, self.array, self.delays_ms, self.unit, self.run_threshold, self.time,
             self.after_spike, self.to_json(),
         )  # fmt: skip
 
-    def _spread(self, cell: TrainedNeuron) -> NDArray[np.float64]:
+    def _spread(self, trained: TrainedNeuron) -> NDArray[np.float64]:
         """Return one weight a train of the whole encoder, at each delay."""
-        received = _receives(self.encoder, cell, self.array, len(self.delays_ms))
+        received = _receives(self.encoder, trained, self.array, len(self.delays_ms))
         if received is None:
-            return cell.weights
-        if np.count_nonzero(received) != len(cell.weights):
+            return trained.weights
+        if np.count_nonzero(received) != len(trained.weights):
             raise ProblemError("NIR: a readout of encoders whose trains depend on the array must state its array")
         spread = np.zeros(len(received))
-        spread[received] = cell.weights
+        spread[received] = trained.weights
         return spread
 
     @classmethod
@@ -338,7 +339,7 @@ class Readout(_Detector):
         def build(parts: Parts) -> Readout:
             if parts.text:
                 return cls.from_json(parts.text)
-            neurons = {label: _gather(parts, cell) for label, cell in parts.neurons.items()}
+            neurons = {label: _gather(parts, trained) for label, trained in parts.neurons.items()}
             return cls(parts.encoder, neurons, array=parts.array, unit=parts.unit, delays_ms=parts.delays_ms)
 
         return read_nir(
@@ -425,7 +426,7 @@ def run_counting(
     """
     text = detector("readout", readout).to_json()
     period = None if frame_us is None else number("frame_us", frame_us, "us")
-    version = None if wire_version is None else whole("wire_version", wire_version, 1, 2)
+    version = None if wire_version is None else integer("wire_version", wire_version, 1, 2)
     rest, zeroings = tare_text(tare), []
     if isinstance(source, Recording):
         if source.registers is not None:
@@ -454,36 +455,38 @@ def run_counting(
     return Detections._from_parts(columns), outside
 
 
-def _receives(encoder: Encoder, cell: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:
+def _receives(encoder: Encoder, trained: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:
     """Return which of the encoder's trains, at each delay, a neuron receives; None where it receives all."""
-    if not cell.inputs or not isinstance(encoder, Composite):
+    if not trained.inputs or not isinstance(encoder, Composite):
         return None
-    return np.tile(encoder.places(cell.inputs, array or Array(1, 1)), delays)
+    return np.tile(encoder.places(trained.inputs, array or Array(1, 1)), delays)
 
 
-def _gather(parts: Parts, cell: TrainedNeuron) -> TrainedNeuron:
+def _gather(parts: Parts, trained: TrainedNeuron) -> TrainedNeuron:
     """Return a neuron with weights of its inputs alone; with all trains as inputs where others have weights too."""
-    received = _receives(parts.encoder, cell, parts.array, len(parts.delays_ms))
+    received = _receives(parts.encoder, trained, parts.array, len(parts.delays_ms))
     if received is None:
-        return cell
-    is_gathered = len(received) == len(cell.weights) and not cell.weights[~received].any()
-    return cell._replace(weights=cell.weights[received]) if is_gathered else cell._replace(inputs=())
+        return trained
+    is_gathered = len(received) == len(trained.weights) and not trained.weights[~received].any()
+    return trained._replace(weights=trained.weights[received]) if is_gathered else trained._replace(inputs=())
 
 
 def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
     """Return what the neurons of a readout detect in the spikes that its encoder made."""
     detections = Detections([], [], [])
-    for label, cell in readout.neurons.items():
+    for label, trained in readout.neurons.items():
         inputs = readout.trains_of(label, trains)
-        spikes, slopes = cell.neuron._run(cell.weights, inputs.lasting(inputs.stop + SILENCE_MS), readout.run_threshold)
-        offset_ms = readout.encoder_of(label).latency_ms + cell.delay_ms
+        spikes, slopes = trained.neuron._run(
+            trained.weights, inputs.lasting(inputs.stop + SILENCE_MS), readout.run_threshold
+        )
+        offset_ms = readout.encoder_of(label).latency_ms + trained.delay_ms
         t, known = (np.rint(to_us(ms)).astype(np.int64) for ms in (spikes - offset_ms, spikes))
         detections += Detections([label] * len(spikes), t, known, slopes)
     return detections[np.argsort(detections.known, kind="stable")]
 
 
 def _neuron_of(
-    label: str, cell: Any, delay_ms: float | Mapping[str, float], inputs: Sequence[str] | None
+    label: str, learner: Any, delay_ms: float | Mapping[str, float], inputs: Sequence[str] | None
 ) -> TrainedNeuron:
     """Return a neuron with weights, delay and inputs, given a learner or a tuple."""
     if isinstance(delay_ms, Mapping):
@@ -491,16 +494,16 @@ def _neuron_of(
             raise refused("delay_ms", f": there is none for {label!r}")
         delay_ms = delay_ms[label]
     delay, named = delay_ms, () if inputs is None else inputs
-    if isinstance(cell, tuple) and len(cell) in (2, 3, 4):
-        neuron, weights, *others = cell
+    if isinstance(learner, tuple) and len(learner) in (2, 3, 4):
+        neuron, weights, *others = learner
         delay = others[0] if others else delay
         named = others[1] if len(others) > 1 and inputs is None else named
-    elif hasattr(cell, "weights_") and hasattr(cell, "neuron_"):
-        neuron, weights = cell.neuron_, cell.weights_
+    elif hasattr(learner, "weights_") and hasattr(learner, "neuron_"):
+        neuron, weights = learner.neuron_, learner.weights_
     else:
-        if hasattr(cell, "fit"):
-            raise NotFittedError(f"{label}: {shown(cell)} is not fitted")
-        raise ProblemError(f"{label}: {shown(cell)} must be a fitted learner, or (Neuron, weights)")
+        if hasattr(learner, "fit"):
+            raise NotFittedError(f"{label}: {shown(learner)} is not fitted")
+        raise ProblemError(f"{label}: {shown(learner)} must be a fitted learner, or (Neuron, weights)")
     instance(f"{label}: neuron", neuron, Neuron)
     return TrainedNeuron(
         neuron,

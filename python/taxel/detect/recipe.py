@@ -10,7 +10,7 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from taxel._base.arguments import finite, flag, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._base.arguments import finite, flag, instance, integer, mapping, number, parameters, several, shown, text
 from taxel._base.errors import helped, refused
 from taxel._core import ProblemError
 from taxel.detect import recipes
@@ -122,15 +122,15 @@ class Recipe:
             raise ProblemError(f"neurons.{label} is {shown(listed)}: must be parameters by name")
         return self._checked(f"neurons.{label}", self._of(label))
 
-    def _checked(self, place: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
+    def _checked(self, location: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
         """Return the learner and the delay of one point, whose inputs exist and whose delay is one of their ages."""
-        learner, delay_ms = learner_from(place, values)
+        learner, delay_ms = learner_from(location, values)
         try:
             parts = self._received(values)._each()
         except ProblemError as error:
-            raise ProblemError(f"{place}: {error}") from None
+            raise ProblemError(f"{location}: {error}") from None
         for part in parts:
-            _check_age(place, delay_ms, part)
+            _check_age(location, delay_ms, part)
         return learner, delay_ms
 
     def _received(self, values: Mapping[str, Any]) -> Encoder:
@@ -215,15 +215,15 @@ class Recipe:
 
     def _fewer_of(self, label: str) -> list[int | None]:
         """Return of each point that every training tries how many fewer mistakes make it count; None: as usual."""
-        place = f"neurons.{label}.choose: fewer"
+        location = f"neurons.{label}.choose: fewer"
         stated = [point.get("fewer") for point in self._points(label, "choose")[1:]]
-        return [None if fewer is None else whole(place, fewer, 0) for fewer in stated]
+        return [None if fewer is None else integer(location, fewer, 0) for fewer in stated]
 
     def _points(self, label: str, key: str) -> list[dict[str, Any]]:
         """Return the parameters of a label's neuron, and behind them the others that it lists under a key."""
-        whole = self.neurons.get(text("label", label), {})
-        plain = {name: value for name, value in whole.items() if name not in LISTS}
-        listed = several(f"neurons.{label}.{key}", whole.get(key, ()))
+        values = self.neurons.get(text("label", label), {})
+        plain = {name: value for name, value in values.items() if name not in LISTS}
+        listed = several(f"neurons.{label}.{key}", values.get(key, ()))
         return [plain, *({**plain, **mapping(f"neurons.{label}.{key}", point)} for point in listed)]
 
     def _at(self, points: Mapping[str, Mapping[str, Any]]) -> Recipe:
@@ -398,22 +398,22 @@ def change_values(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[st
                 neuron.pop(name, None)
     for key, value in changes.items():
         *tables, last = key.split(".")
-        place = values
+        inner = values
         for table in tables:
-            place = place.setdefault(table, {})
-            if not isinstance(place, dict):
+            inner = inner.setdefault(table, {})
+            if not isinstance(inner, dict):
                 raise ProblemError(f"{key}: {table} is a value and holds no other")
-        place[last] = value
+        inner[last] = value
     return values
 
 
-def _check_age(place: str, delay_ms: float, encoder: Encoder) -> None:
+def _check_age(location: str, delay_ms: float, encoder: Encoder) -> None:
     """Refuse a delay at which none of the encoder's trains of ages begins: such a neuron fires late, or never."""
     ages = getattr(encoder, "ages_ms", None)
     if ages is not None and round(to_us(delay_ms)) not in {round(to_us(age)) for age in ages}:
         listed = ", ".join(f"{age:g}" for age in ages)
         raise ProblemError(
-            f"{place}: delay_ms is {delay_ms:g}, and the encoder's ages_ms are {listed}: must be one of them, as a "
+            f"{location}: delay_ms is {delay_ms:g}, and the encoder's ages_ms are {listed}: must be one of them, as a "
             "neuron is trained to fire where an age begins"
         )
 

@@ -19,7 +19,7 @@ from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.spikes import to_us
 
-#: So far apart, us, no detection of one recording pairs with an event of another when all are scored together.
+#: Distance between recordings that are scored together, us: no detection pairs with an event of another recording.
 APART_US = 10**12
 
 
@@ -41,7 +41,7 @@ class Spread(NamedTuple):
     high: float
 
     @classmethod
-    def of(cls, values: ArrayLike) -> Spread:
+    def from_values(cls, values: ArrayLike) -> Spread:
         """Return the spread of values.
 
         Parameters
@@ -58,7 +58,7 @@ class Spread(NamedTuple):
 
         Examples
         --------
-        >>> Spread.of([1.0, 2.0, 3.0, 4.0])
+        >>> Spread.from_values([1.0, 2.0, 3.0, 4.0])
         2.5 ± 1.29 (median 2.5, 95 % in 1.07 to 3.92)
         """
         sample = finite_numbers("values", values)
@@ -135,12 +135,12 @@ class Score:
     @property
     def error(self) -> Spread:
         """Spread of `t` minus reference, ms."""
-        return Spread.of(self.errors_ms)
+        return Spread.from_values(self.errors_ms)
 
     @property
     def delay(self) -> Spread:
         """Spread of `known` minus reference, ms."""
-        return Spread.of(self.delays_ms)
+        return Spread.from_values(self.delays_ms)
 
     def __getitem__(self, label: str) -> Score:
         """Return the score of one label."""
@@ -161,18 +161,21 @@ class Score:
 
     def __repr__(self) -> str:
         rows = [*self.by_label.values()] if len(self.by_label) > 1 else []
-        every = [*rows, self]
-        counts = [(score.events, score.found, score.missed, score.false, score.false_near) for score in every]
+        scores = [*rows, self]
+        counts = [(score.events, score.found, score.missed, score.false, score.false_near) for score in scores]
         table: list[tuple[str, ...]] = [("", "events", "found", "missed", "false", "near")]
-        table += [(escaped(score.label), *map(str, row)) for score, row in zip(every, counts, strict=True)]
+        table += [(escaped(score.label), *map(str, row)) for score, row in zip(scores, counts, strict=True)]
         widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
         lines = [
             "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
             for row in table
         ]
         # Spreads are long: each on a line of its own, within the 80 columns of a terminal.
-        for what, of in (("t - event (ms)", "error"), ("known - event (ms)", "delay")):
-            lines += [what, *(f"{escaped(score.label).ljust(widths[0])}  {getattr(score, of)!r}" for score in every)]
+        for title, spread in (("t - event (ms)", "error"), ("known - event (ms)", "delay")):
+            lines += [
+                title,
+                *(f"{escaped(score.label).ljust(widths[0])}  {getattr(score, spread)!r}" for score in scores),
+            ]
         return "\n".join(lines)
 
 
@@ -222,14 +225,14 @@ def score(
     tallies = _core.score(found._parts(), labels, times, _windows(labels, window_ms))
     scores = {}
     for tally in tallies:
-        pairs, of = np.column_stack([tally.detected, tally.events]), (tally.missed_events, tally.false_detections)
-        scores[tally.label] = Score(tally.label, pairs, *of, tally.false_near, tally.errors_ms, tally.delays_ms)
-    whole, ms = np.empty(0, np.int64), np.empty(0)
-    every = [Score("all", np.empty((0, 2), np.int64), whole, whole, 0, ms, ms), *scores.values()]
+        pairs, lost = np.column_stack([tally.detected, tally.events]), (tally.missed_events, tally.false_detections)
+        scores[tally.label] = Score(tally.label, pairs, *lost, tally.false_near, tally.errors_ms, tally.delays_ms)
+    no_times, ms = np.empty(0, np.int64), np.empty(0)
+    parts = [Score("all", np.empty((0, 2), np.int64), no_times, no_times, 0, ms, ms), *scores.values()]
     names = ("pairs", "missed_events", "false_detections", "errors_ms", "delays_ms")
-    together: dict[str, Any] = {name: np.concatenate([getattr(score, name) for score in every]) for name in names}
-    near = sum(score.false_near for score in every)
-    return Score(every[-1].label if len(scores) == 1 else "all", false_near=near, by_label=scores, **together)
+    together: dict[str, Any] = {name: np.concatenate([getattr(score, name) for score in parts]) for name in names}
+    near = sum(score.false_near for score in parts)
+    return Score(parts[-1].label if len(scores) == 1 else "all", false_near=near, by_label=scores, **together)
 
 
 def score_together(
@@ -271,8 +274,8 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
         for label in dict.fromkeys(labels):
             if label not in window_ms:
                 raise refused("window_ms", f": there is none for {label!r}")
-            mine = np.array([name == label for name in labels])
-            windows[mine] = _windows([label] * int(mine.sum()), window_ms[label])
+            of_label = np.array([name == label for name in labels])
+            windows[of_label] = _windows([label] * int(of_label.sum()), window_ms[label])
         return windows
     widths = numbers("window_ms", window_ms, np.float64, "ms")
     if widths.ndim > 1 or (widths.ndim == 1 and len(widths) != len(labels)):

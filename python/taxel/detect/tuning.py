@@ -31,7 +31,7 @@ FRAMES = (1, 2, 5, 10, 20)
 AGES_MS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 20.0, 30.0, 50.0)
 
 
-class _Fit(NamedTuple):
+class _RuleFit(NamedTuple):
     """How a rule does: the less, the better."""
 
     wrong: int
@@ -43,7 +43,7 @@ class _Fit(NamedTuple):
 
 
 class _Best(NamedTuple):
-    fit: _Fit
+    fit: _RuleFit
     rule: PlainRule
 
 
@@ -115,7 +115,7 @@ def tune(
     if any(isinstance(example.source, SpikeTrains) for example in sound):
         return dict.fromkeys(names)
     loads = Loads(sound, clocks, floor, report)
-    return best_rules(loads, names, loads.every, width_ms)
+    return best_rules(loads, names, loads.whole_examples, width_ms)
 
 
 def best_rules(
@@ -152,13 +152,13 @@ def _at_edges(
     loads: Loads, parts: Sequence[Stretch], truth: Mapping[str, NDArray[np.int64]], width_us: int
 ) -> dict[str, tuple[_Best, _Best]]:
     """Return for each label the best rule at onsets and the best at ends."""
-    worst = _Fit(2**62, np.inf, np.inf)
+    worst = _RuleFit(2**62, np.inf, np.inf)
     fits = {name: [worst, worst] for name in truth}
     points: dict[str, list[tuple[str, float, float, int]]] = {name: [("area", 1.0, 1.0, 1)] * 2 for name in truth}
     windows = loads.windows(parts)
     for point in _points(loads, parts):
-        for edge, every in enumerate(loads.edges(*point)):
-            found = every.between(windows)
+        for edge, edges in enumerate(loads.edges(*point)):
+            found = edges.between(windows)
             for name, true in truth.items():
                 fit = _fit(found, true, width_us, fits[name][edge].wrong)
                 if fit is not None and fit[:2] < fits[name][edge][:2]:
@@ -173,7 +173,7 @@ def _at_edges(
     return {name: (rule(name, 0), rule(name, 1)) for name in truth}
 
 
-def _fit(found: FoundTimes, true: NDArray[np.int64], width_us: int, most: int = 2**62) -> _Fit | None:
+def _fit(found: FoundTimes, true: NDArray[np.int64], width_us: int, most: int = 2**62) -> _RuleFit | None:
     """Return how detections fit labels; None where more are wrong than `most`, which their number alone may show."""
     t, known, _ = found
     if abs(len(t) - len(true)) > most:
@@ -182,12 +182,12 @@ def _fit(found: FoundTimes, true: NDArray[np.int64], width_us: int, most: int = 
     parts = (label, t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
     tallies = _core.score(parts, [""] * len(true), true, np.full(len(true), width_us, np.int64))
     if not tallies:
-        return _Fit(0, np.inf, np.inf)
+        return _RuleFit(0, np.inf, np.inf)
     tally = tallies[0]
     wrong = len(tally.missed_events) + len(tally.false_detections)
     if not len(tally.delays_ms):
-        return _Fit(wrong, np.inf, np.inf)
-    return _Fit(wrong, float(np.median(np.abs(tally.delays_ms))), float(np.median(np.abs(tally.errors_ms))))
+        return _RuleFit(wrong, np.inf, np.inf)
+    return _RuleFit(wrong, float(np.median(np.abs(tally.delays_ms))), float(np.median(np.abs(tally.errors_ms))))
 
 
 def _for_kinds(
@@ -199,13 +199,13 @@ def _for_kinds(
     unit: str | None,
 ) -> list[_Best] | None:
     """Return the best rule that decides between two kinds by the area at an age, once for each; None without any."""
-    every = np.concatenate([truth[name] for name in kinds])
-    order = np.argsort(every, kind="stable")
-    is_second = (np.arange(len(every)) >= len(truth[kinds[0]]))[order]
+    times = np.concatenate([truth[name] for name in kinds])
+    order = np.argsort(times, kind="stable")
+    is_second = (np.arange(len(times)) >= len(truth[kinds[0]]))[order]
     chosen: tuple[tuple[int, float], list[_Best]] | None = None
     for age, (t, known, areas) in touches.items():
         parts = ([""] * len(t), t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
-        tallies = _core.score(parts, [""] * len(every), every[order], np.full(len(every), width_us, np.int64))
+        tallies = _core.score(parts, [""] * len(times), times[order], np.full(len(times), width_us, np.int64))
         pairs = (tallies[0].detected, tallies[0].events) if tallies else (np.empty(0, np.int64), np.empty(0, np.int64))
         second = is_second[pairs[1]]
         if second.all() or not second.any():
@@ -213,8 +213,8 @@ def _for_kinds(
         threshold, flipped = _between(areas[pairs[0]], second)
         below, above = reversed(kinds) if flipped else kinds
         fits = {}
-        for name, mine in ((below, areas < threshold), (above, areas >= threshold)):
-            fits[name] = _fit(FoundTimes(t[mine], known[mine], areas[mine]), truth[name], width_us)
+        for name, is_kind in ((below, areas < threshold), (above, areas >= threshold)):
+            fits[name] = _fit(FoundTimes(t[is_kind], known[is_kind], areas[is_kind]), truth[name], width_us)
         rule = PlainRule("area", threshold, age_ms=age, labels=(below, above), noise_floor=floor, unit=unit)
         best = [_Best(fit, rule) for name in kinds if (fit := fits[name]) is not None]
         rank = (sum(tuned.fit.wrong for tuned in best), max(tuned.fit.delay_ms for tuned in best))

@@ -72,9 +72,11 @@ class Composite(Encoder):
         return type(self)({name: part.with_tare(tare) for name, part in self.parts.items()})
 
     def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
-        held = recorded(x)
-        parts = {n: part._with_rest_of(held)[0] if isinstance(part, Tared) else part for n, part in self.parts.items()}
-        return super(Composite, type(self)(parts)).encode(held)
+        source = recorded(x)
+        parts = {
+            n: part._with_rest_of(source)[0] if isinstance(part, Tared) else part for n, part in self.parts.items()
+        }
+        return super(Composite, type(self)(parts)).encode(source)
 
     def only(self, names: Sequence[str]) -> Encoder:
         """Return some of the parts side by side; of one alone the part itself.

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 from taxel import _core
-from taxel._base.arguments import instance, several, shown, whole
+from taxel._base.arguments import instance, integer, several, shown
 from taxel._base.arguments import text as checked_text
 from taxel._base.errors import refused
 from taxel._base.parameters import Value
@@ -367,7 +367,7 @@ class EncoderStream:
         >>> len(stream.push(values).times), stream.advance(2000).times
         (0, array([0.5]))
         """
-        t = whole("t_us", t_us, -(2**60), 2**60, "us")
+        t = integer("t_us", t_us, -(2**60), 2**60, "us")
         return self._spikes(None if self._core is None else self._core.advance(t))
 
     def finish(self) -> SpikeTrains:

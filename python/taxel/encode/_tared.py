@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Self
 
-from taxel._base.arguments import finite, parameters, shown, whole
+from taxel._base.arguments import finite, integer, parameters, shown
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.encode._encoder import Encoder
@@ -51,27 +51,27 @@ class Tared(Encoder):
         return {name: value for name, value in super()._plain().items() if name not in rest} | rest
 
     def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
-        encoder, held = self._with_rest_of(x)
-        return super(Tared, encoder).encode(held)
+        encoder, source = self._with_rest_of(x)
+        return super(Tared, encoder).encode(source)
 
     def _with_rest_of(self, x: Events | Frames | Recorded) -> tuple[Self, Events | Frames | Recorded]:
         """Return the encoder with its tare, measured at the beginning of `x` if it is a number of seconds, and `x`."""
         if self.tare is None:
             return self, x
         if isinstance(self.tare, Tare):
-            held = recorded(x)
-            if isinstance(held, Events | Frames):
-                self.tare.array._warn_apart(held.array, "the recording", stacklevel=4)
-            return self, held
-        held = recorded(x)
-        if not isinstance(held, Events | Frames) or not len(held.t):
-            return self, held
-        first, last = int(held.t[0]), int(held.t[-1])
-        rest_us = whole("tare, us", round(1e6 * finite("tare", self.tare, "s")), 1, 2**53)
+            source = recorded(x)
+            if isinstance(source, Events | Frames):
+                self.tare.array._warn_apart(source.array, "the recording", stacklevel=4)
+            return self, source
+        source = recorded(x)
+        if not isinstance(source, Events | Frames) or not len(source.t):
+            return self, source
+        first, last = int(source.t[0]), int(source.t[-1])
+        rest_us = integer("tare, us", round(1e6 * finite("tare", self.tare, "s")), 1, 2**53)
         if 2 * rest_us > last - first:
             lasts = f"the recording lasts {(last - first) / 1e6:g} s"
             raise refused("tare", f" is {self.tare} s: more than half of it would be rest, {lasts}")
-        return self.with_tare(Tare.take(held, stop_us=first + rest_us)), held
+        return self.with_tare(Tare.take(source, stop_us=first + rest_us)), source
 
     def __eq__(self, other: object) -> bool:
         same = super().__eq__(other)

@@ -156,9 +156,9 @@ class LocalLoad(Tared):
         >>> LocalLoad(tare=tare).values(Frames([[[50.0, 55]]], [0], **two)).shape
         (1, 21)
         """
-        encoder, held = self._with_rest_of(recorded(x))
-        if isinstance(held, Events):
-            values = _core.local_load_of_events(encoder._json(), held._parts())
+        encoder, source = self._with_rest_of(recorded(x))
+        if isinstance(source, Events):
+            values = _core.local_load_of_events(encoder._json(), source._parts())
         else:
-            values = _core.local_load_of_frames(encoder._json(), frames_of(held)._parts())
+            values = _core.local_load_of_frames(encoder._json(), frames_of(source)._parts())
         return values.reshape(-1, len(self.quantities))

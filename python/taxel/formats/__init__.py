@@ -91,16 +91,16 @@ def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # n
     ...
     FileNotFoundError: [Errno 2] No such file or directory: 'a folder that is not there'
     """
-    place = Path(checked_path("path", path))
-    if not place.exists():
-        raise FileNotFoundError(2, "No such file or directory", str(place))
+    source = Path(checked_path("path", path))
+    if not source.exists():
+        raise FileNotFoundError(2, "No such file or directory", str(source))
     if format is not None:
         checked_text("format", format, FORMATS)
-    names = [format] if format else [name for name, kind in FORMATS.items() if kind.files(place)]
+    names = [format] if format else [name for name, kind in FORMATS.items() if kind.files(source)]
     if len(names) != 1:
         problem = "no known format" if not names else "several formats (" + ", ".join(names) + ")"
-        raise FormatError(f"{place}: holds {problem}; say format= one of {', '.join(FORMATS)}")
+        raise FormatError(f"{source}: holds {problem}; say format= one of {', '.join(FORMATS)}")
     try:
-        yield from FORMATS[names[0]].trials(place)
+        yield from FORMATS[names[0]].trials(source)
     except MemoryError as error:
-        raise FormatError(f"{place}: needs more memory than there is ({error})") from None
+        raise FormatError(f"{source}: needs more memory than there is ({error})") from None

@@ -26,22 +26,22 @@ def candidates(path: Path, *patterns: str) -> list[Path]:
     return sorted(file for pattern in patterns for file in path.glob(pattern)) if path.is_dir() else [path]
 
 
-def files_at(path: str | Path, files: Callable[[Path], list[Path]], what: str) -> list[Path]:
+def files_at(path: str | Path, files: Callable[[Path], list[Path]], noun: str) -> list[Path]:
     """Return the files of a format at a path, of which there must be one or more.
 
     Raises
     ------
-    FormatError : there is none (says `what` they are)
+    FormatError : there is none (says `noun` they are)
     ProblemError : `path` is no path
     """
-    place = Path(checked_path("path", path))
-    found = files(place)
+    file = Path(checked_path("path", path))
+    found = files(file)
     if not found:
-        raise FormatError(f"{place}: no {what} in it")
+        raise FormatError(f"{file}: no {noun} in it")
     return found
 
 
-def sensor(place: str, array: Array) -> Array:
+def sensor(location: str, array: Array) -> Array:
     """Return the sensor that a file describes, if it is within the limits.
 
     Raises
@@ -49,26 +49,26 @@ def sensor(place: str, array: Array) -> Array:
     FormatError : more taxels than a file's sensor may have
     """
     if array.rows * array.columns > TAXELS:
-        raise FormatError(f"{place}: a sensor of {array.rows} x {array.columns} taxels; at most {TAXELS} are read")
+        raise FormatError(f"{location}: a sensor of {array.rows} x {array.columns} taxels; at most {TAXELS} are read")
     return array
 
 
-def table(place: Path | str, held: Events | Frames) -> Events | Frames:
+def table(location: Path | str, data: Events | Frames) -> Events | Frames:
     """Return events or frames of a file, if their sensor and their times are within the limits.
 
     Raises
     ------
     FormatError : too many taxels, or a time farther from 0 than 142 years
     """
-    sensor(str(place), held.array)
-    far = np.flatnonzero((held.t < -TIME_US) | (held.t > TIME_US))
+    sensor(str(location), data.array)
+    far = np.flatnonzero((data.t < -TIME_US) | (data.t > TIME_US))
     if len(far):
         k = int(far[0])
-        raise FormatError(f"{place}, time {k}: {held.t[k]} us; times must lie within {TIME_US} us (142 years) of 0")
-    return held
+        raise FormatError(f"{location}, time {k}: {data.t[k]} us; times must lie within {TIME_US} us (142 years) of 0")
+    return data
 
 
-def whole_us(place: str, seconds: NDArray[np.float64], first_line: int = 1) -> NDArray[np.int64]:
+def whole_us(location: str, seconds: NDArray[np.float64], first_line: int = 1) -> NDArray[np.int64]:
     """Return a file's times in s as whole us.
 
     Raises
@@ -81,12 +81,14 @@ def whole_us(place: str, seconds: NDArray[np.float64], first_line: int = 1) -> N
         wrong = np.flatnonzero(~(np.abs(seconds[part]) <= TIME_US * 1e-6))
         if len(wrong):
             k = begin + int(wrong[0])
-            raise FormatError(f"{place}, line {first_line + k}: time {seconds[k]:g} s; must lie within 142 years of 0")
+            raise FormatError(
+                f"{location}, line {first_line + k}: time {seconds[k]:g} s; must lie within 142 years of 0"
+            )
         t[part] = np.rint(seconds[part] * 1e6)
     return t
 
 
-def ascending(place: str, t: NDArray[np.int64], first_line: int = 1) -> NDArray[np.int64]:
+def ascending(location: str, t: NDArray[np.int64], first_line: int = 1) -> NDArray[np.int64]:
     """Return a file's times in us, which must ascend.
 
     Raises
@@ -96,5 +98,5 @@ def ascending(place: str, t: NDArray[np.int64], first_line: int = 1) -> NDArray[
     back = np.flatnonzero(t[1:] <= t[:-1])
     if len(back):
         k = int(back[0]) + 1
-        raise FormatError(f"{place}, line {first_line + k}: time {t[k] / 1e6:g} s does not ascend")
+        raise FormatError(f"{location}, line {first_line + k}: time {t[k] / 1e6:g} s does not ascend")
     return t

@@ -109,11 +109,11 @@ def _read(file: Path) -> Trial:
     area, pages = size[0] * size[1], list[_Page]()
     read = Growing(file.name, values=(shape, np.float32))
     for first, lines in _pages(len(above) + 1, begin, content):
-        page, places, cells = _page(file, lines, first, shape)
+        page, indices, cells = _page(file, lines, first, shape)
         if pages and page.number <= pages[-1].number:
             raise FormatError(f"{file.name}, line {page.line}: frame {page.number} after frame {pages[-1].number}")
         frame = np.zeros((1, *shape), np.float32)
-        frame[0][np.ix_(*places)] = cells
+        frame[0][np.ix_(*indices)] = cells
         read.add(values=frame)
         pages.append(page)
     t = np.rint(to_us((np.array([page.number for page in pages], np.float64) - 1) * period))
@@ -173,17 +173,17 @@ def _page(
     if len(margin) != len(names) + 1:
         raise FormatError(f"{file.name}, line {before + last + 1}: {len(margin) - 1} forces, must have {len(names)}")
     numbers = np.array([text.number(n, file, before + head + 1, "column number") for n in names[:-1]])
-    places = (
-        _places(file, before + head + 2, "row", read[:, 0], shape[0], step=1),
-        _places(file, before + head + 1, "column", numbers, shape[1], step=0),
+    indices = (
+        _indices(file, before + head + 2, "row", read[:, 0], shape[0], step=1),
+        _indices(file, before + head + 1, "column", numbers, shape[1], step=0),
     )
     cells, force = read[:, 1:-1], text.number(margin[-1], file, before + last + 1, _MARGIN)
     page = _Page(int(match[1]), line, float(cells.sum()), int(np.count_nonzero(cells)), force, before + last + 1)
-    return page, places, cells
+    return page, indices, cells
 
 
-def _places(
-    file: Path, line: int, what: str, numbers: NDArray[np.float64], most: int, *, step: int
+def _indices(
+    file: Path, line: int, noun: str, numbers: NDArray[np.float64], most: int, *, step: int
 ) -> NDArray[np.int64]:
     """Convert numbers that count from 1 to indices; they must ascend and lie on the plate."""
     wrong = (numbers != np.rint(numbers)) | (numbers < 1) | (numbers > most)
@@ -191,7 +191,7 @@ def _places(
     if wrong.any():
         k = int(np.flatnonzero(wrong)[0])
         raise FormatError(
-            f"{file.name}, line {line + step * k}: {what} {numbers[k]:g}; must ascend, whole numbers of 1 to {most}"
+            f"{file.name}, line {line + step * k}: {noun} {numbers[k]:g}; must ascend, whole numbers of 1 to {most}"
         )
     return np.asarray(numbers.astype(np.int64) - 1)
 
@@ -208,9 +208,9 @@ def _unit(file: Path, pages: Sequence[_Page], area_cm2: float) -> str:
     unit = max(fits, key=lambda name: int(fits[name].sum()))
     wrong = np.flatnonzero(~fits[unit])
     if len(wrong):
-        page, made = pages[int(wrong[0])], _NEWTON[unit] * sums[wrong[0]]
+        page, found_force = pages[int(wrong[0])], _NEWTON[unit] * sums[wrong[0]]
         raise FormatError(
             f"{file.name}, line {page.force_line}: {_MARGIN} is {page.force:g} N; the cells of frame {page.number} "
-            f"make {made:g} N ({unit} on {area_cm2:g} cm2)"
+            f"make {found_force:g} N ({unit} on {area_cm2:g} cm2)"
         )
     return unit

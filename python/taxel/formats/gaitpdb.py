@@ -57,7 +57,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that breaks the format (names file, line and column)
     """
     paths = files_at(path, files, "file such as GaCo02_01.txt")
-    places, foot_of = load_packaged("gaitpdb"), Array(1, 8, name="gaitpdb foot")
+    layout, foot_of = load_packaged("gaitpdb"), Array(1, 8, name="gaitpdb foot")
     known = _events_table(paths[0].parent / "events.csv")
     for file in paths:
         match = _NAME.fullmatch(file.name)
@@ -82,7 +82,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
             yield Trial(
                 name=f"{file.name.split('.')[0]} {foot}",
                 person=person,
-                recorded=Frames(read.column(foot).reshape(-1, 1, 8), t, unit="N", array=places.array(8, foot_of, foot)),
+                recorded=Frames(read.column(foot).reshape(-1, 1, 8), t, unit="N", array=layout.array(8, foot_of, foot)),
                 truth=truth,
                 source=_SOURCE,
                 foot=foot,
@@ -118,8 +118,8 @@ def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
     turns = np.flatnonzero(loaded[1:] != loaded[:-1]) + 1
     if len(known) and known[0] > 0 and loaded[0]:
         turns = np.append(0, turns)
-    every = stances(known[turns[loaded[turns]]], known[turns[~loaded[turns]]])
-    return every[every[:, 1] - every[:, 0] >= 20]
+    stance_times = stances(known[turns[loaded[turns]]], known[turns[~loaded[turns]]])
+    return stance_times[stance_times[:, 1] - stance_times[:, 0] >= 20]
 
 
 def _events_table(path: Path) -> dict[tuple[str, str], NDArray[np.int64]]:

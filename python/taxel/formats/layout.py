@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from taxel._base.arguments import finite, flag, mapping, several, shown, text, whole
+from taxel._base.arguments import finite, flag, integer, mapping, several, shown, text
 from taxel._base.documents import read_toml
 from taxel._base.errors import refused
 from taxel._base.files import beside, named
@@ -65,7 +65,7 @@ class Table:
     def __post_init__(self) -> None:
         if len(text("separator", self.separator)) != 1:
             raise refused("separator", f" is {shown(self.separator)}: must be one character")
-        whole("skip_lines", self.skip_lines, 0)
+        integer("skip_lines", self.skip_lines, 0)
         if self.time_column is not None:
             _column("time_column", self.time_column)
         if isinstance(self.leave_out, str):
@@ -82,7 +82,7 @@ def _column(name: str, value: object) -> None:
     if isinstance(value, str):
         text(name, value)
     else:
-        whole(name, value, 1)
+        integer(name, value, 1)
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class Layout:
 
     Parameters
     ----------
-    place : Path
+    path : Path
         The file, for errors.
     rows, columns : int, 1 or more, optional
         Both or neither.
@@ -148,7 +148,7 @@ class Layout:
     ProblemError : a value of another kind, or values that contradict each other
     """
 
-    place: Path
+    path: Path
     rows: int | None = None
     columns: int | None = None
     pitch_mm: float | tuple[float, float] | None = None
@@ -194,7 +194,7 @@ class Layout:
         """
         document = read_toml(path)
         try:
-            return cls(place=path, **_values(document))
+            return cls(path=path, **_values(document))
         except (ProblemError, TypeError) as error:
             raise FormatError(f"{path}: {first_line(error)}") from None
 
@@ -244,7 +244,7 @@ class Layout:
         ProblemError : another number of taxels than the recording holds
         """
         shape = (self.rows, self.columns) if self.rows is not None else (1, taxels) if stated is None else stated.shape
-        rows, columns = (whole(name, n, 1, 65_535) for name, n in zip(("rows", "columns"), shape, strict=True))
+        rows, columns = (integer(name, n, 1, 65_535) for name, n in zip(("rows", "columns"), shape, strict=True))
         if stated is not None and rows * columns != stated.rows * stated.columns:
             raise ProblemError(f"says {rows} x {columns} taxels; the recording holds {stated.rows} x {stated.columns}")
         places, is_mirrored = self.places, bool(self.side and side and self.side != side)
@@ -278,7 +278,7 @@ def _name(path: Path) -> str:
 
 def _values(document: dict[str, Any]) -> dict[str, Any]:
     """Return the values of a file by the names of the fields of `Layout`."""
-    _known("", document, [field.name for field in fields(Layout) if field.name != "place"])
+    _known("", document, [field.name for field in fields(Layout) if field.name != "path"])
     values: dict[str, Any] = {}
     for name, value in document.items():
         if name in _TABLES:
@@ -307,7 +307,9 @@ def _keys(table: type[Any]) -> list[str]:
 def _known(before: str, values: Mapping[str, Any], names: list[str]) -> None:
     unknown = next((name for name in values if name not in names), None)
     if unknown is not None:
-        inner = next((f" in [{table}]" for table, of in _TABLES.items() if not before and unknown in _keys(of)), "")
+        inner = next(
+            (f" in [{table}]" for table, group in _TABLES.items() if not before and unknown in _keys(group)), ""
+        )
         of_size = as_size(values[unknown])
         hint = f"; a size is said by {of_size}" if of_size else f"; it stands{inner}" if inner else ""
         raise ProblemError(f"unknown key {before}{unknown}{hint}; there are {', '.join(names)}")

@@ -83,7 +83,7 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
         foot: Growing(file.name, t=((), np.int64), values=((len(columns) - 1,), np.float32), total=((), np.float64))
         for foot, columns in chosen.items()
     }
-    marked: dict[tuple[str, str], list[int]] = {place: [] for place in MARKERS.values()}
+    marked: dict[tuple[str, str], list[int]] = {marker: [] for marker in MARKERS.values()}
     table = (line.split("\t") for line in chain([begin], content))
     for line, rows in text.group_rows(table, file, first, len(names)):
         seconds = text.numbers([[row[at]] for row in rows], file, line, ["time"])[:, 0]
@@ -96,11 +96,11 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             values = _numbers(cells, file, [line + k for k in there], labels)
             read[foot].add(t=times[there], values=values[:, :-1], total=values[:, -1])
     ascending(file.name, t.column("t"), first)
-    table_place = f"steps.csv, {file.stem}"
+    steps_location = f"steps.csv, {file.stem}"
     for foot, columns in chosen.items():
         readings = read[foot]
         truth = {
-            event: ascending(table_place, whole_us(table_place, np.array(steps[foot, event])))
+            event: ascending(steps_location, whole_us(steps_location, np.array(steps[foot, event])))
             if steps
             else np.array(marked[foot, event], np.int64)
             for event in ("contact", "foot_off")
@@ -177,9 +177,9 @@ def _mark(
 def _steps_table(path: Path) -> dict[str, dict[tuple[str, str], list[float]]]:
     recordings: dict[str, dict[tuple[str, str], list[float]]] = {}
     for row in text.table(path, ["recording", "foot", "contact_s", "toe_off_s"], optional=True):
-        places = recordings.setdefault(row["recording"], {(f, e): [] for f, e in MARKERS.values()})
+        times = recordings.setdefault(row["recording"], {(f, e): [] for f, e in MARKERS.values()})
         if row["foot"] not in {"left", "right"}:
             raise FormatError(f"{path.name}, line {row['line']}: foot {row['foot']!r}; must be left or right")
         for column, event in (("contact_s", "contact"), ("toe_off_s", "foot_off")):
-            places[row["foot"], event].append(text.number(row[column], path, int(row["line"]), column))
+            times[row["foot"], event].append(text.number(row[column], path, int(row["line"]), column))
     return recordings

@@ -136,10 +136,10 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
     linearly interpolated to S[2k+1] and from there to S[2k+2], rounded down to whole counts. The phase is the one of
     three under which the fewest cells violate |3 (b - c) - (a - d)| <= 3, over the whole trial.
     """
-    whole = _check_image(image)
+    frames = _check_image(image)
     # Cells outside of the box of all loaded columns and frames are 0 and lie on every line.
-    box = tuple(_span(np.flatnonzero(whole.any(axis=axes))) for axes in ((0, 2), (0, 1)))
-    y = whole[:, *box]
+    box = tuple(_span(np.flatnonzero(frames.any(axis=axes))) for axes in ((0, 2), (0, 1)))
+    y = frames[:, *box]
     rows = y.shape[0]
     padded = np.concatenate([y, np.zeros((6, *y.shape[1:]), np.int32)])
     breaks = []
@@ -158,7 +158,7 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
         raise FormatError(f"rows are not interpolated three from two ({off} cells off the line)")
     between = np.maximum(np.rint((3 * (b + c) - a - d + 2) / 4), 0).astype(np.int32)
     between[(b == 0) | (c == 0)] = 0
-    sensors = np.zeros((2 * count, *whole.shape[1:]), np.int32)
+    sensors = np.zeros((2 * count, *frames.shape[1:]), np.int32)
     sensors[0::2, *box], sensors[1::2, *box] = a, between
     return sensors
 
@@ -216,12 +216,12 @@ def _check_image(image: NDArray[np.int32]) -> NDArray[np.int32]:
 def _events_table(path: Path) -> dict[tuple[str, int], dict[str, int]]:
     columns = {e: f"{e}_frame" for e in ("contact", "heel_off", "foot_off")}
     rows = text.table(path, ["subject", "trial", *columns.values()], optional=True)
-    whole = [
+    numbers = [
         {c: int(text.number(row[c], path, int(row["line"]), c)) for c in ("trial", *columns.values())} for row in rows
     ]
     return {
         (row["subject"], cells["trial"]): {event: cells[c] for event, c in columns.items()}
-        for row, cells in zip(rows, whole, strict=True)
+        for row, cells in zip(rows, numbers, strict=True)
     }
 
 

@@ -48,8 +48,8 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that breaks the format
     """
     for file in files_at(path, files, ".npz with readings and pose"):
-        held = read_arrays(file, ("readings", "pose"))
-        readings, names = held["readings"], held["pose"]
+        arrays = read_arrays(file, ("readings", "pose"))
+        readings, names = arrays["readings"], arrays["pose"]
         if readings.ndim != 4 or readings.dtype.kind not in "ui" or names.shape != readings.shape[:1]:
             raise FormatError(f"{file.name}: readings must be poses x snapshots x rows x columns, with a name a pose")
         array = Array(readings.shape[2], readings.shape[3], name="bed mat")

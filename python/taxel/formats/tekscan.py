@@ -87,7 +87,7 @@ def _read(file: Path) -> Trial:
             f"{file.name}, line {header.line('DATA_TYPE')}: DATA_TYPE is "
             f"{arguments.shown(header.text('DATA_TYPE'))}; only a MOVIE is read"
         )
-    rows, columns = header.whole("ROWS"), header.whole("COLS")
+    rows, columns = header.size("ROWS"), header.size("COLS")
     down, across = header.length_mm("ROW_SPACING"), header.length_mm("COL_SPACING")
     period, unit = header.positive("SECONDS_PER_FRAME"), header.text("UNITS")
     unit = _UNITS.get(unit.lower(), unit)
@@ -112,9 +112,9 @@ def _read(file: Path) -> Trial:
         match = _RAW_SUM.search(frame.text)
         if match is not None:
             raw_sum = text.number(match[1], file, frame.line, "Raw Sum")
-        made = values.sum(dtype=np.float64)
-        if unit == "counts" and not np.isnan(raw_sum) and raw_sum != made:
-            raise FormatError(f"{file.name}, line {frame.line}: Raw Sum is {raw_sum:g}; the cells make {made:g}")
+        cell_sum = values.sum(dtype=np.float64)
+        if unit == "counts" and not np.isnan(raw_sum) and raw_sum != cell_sum:
+            raise FormatError(f"{file.name}, line {frame.line}: Raw Sum is {raw_sum:g}; the cells make {cell_sum:g}")
         frames.append(replace(frame, text=""))
         read.add(values=values[None], sums=[raw_sum])
     if not frames:
@@ -169,7 +169,7 @@ class _Header:
             raise FormatError(f"{self.file.name}, line {self.line(key)}: {key} is {value:g}; must be above 0")
         return value
 
-    def whole(self, key: str) -> int:
+    def size(self, key: str) -> int:
         value = self.positive(key)
         if value != int(value) or value > 65_535:
             raise FormatError(f"{self.file.name}, line {self.line(key)}: {key} is {value:g}; must be 1 to 65535")
@@ -205,8 +205,8 @@ class _Frame:
 def _frames(file: Path, content: Iterator[str], begin: int, rows: int) -> Iterator[tuple[_Frame, list[str]]]:
     """Yield each frame with its lines of cells; `begin` is the number of the first line."""
     at, before = begin, 0
-    for whole in content:
-        line = whole.strip()
+    for row_text in content:
+        line = row_text.strip()
         if not line.strip(","):
             at += 1
             continue
@@ -223,7 +223,7 @@ def _frames(file: Path, content: Iterator[str], begin: int, rows: int) -> Iterat
             raise FormatError(
                 f"{file.name}, line {at + len(lines)}: ends within frame {number}; the file was cut short"
             )
-        yield _Frame(at, whole, number, match[2] or ""), lines
+        yield _Frame(at, row_text, number, match[2] or ""), lines
         at, before = at + 1 + rows, number
     raise FormatError(f"{file.name}, line {at - 1}: ends without @@; the file was cut short")
 

@@ -201,7 +201,7 @@ def _decode(line: bytes) -> str:
         return line.decode("latin-1")
 
 
-def number(cell: str, path: Path, line: int, what: str, *, unmarked: bool = False) -> float:
+def number(cell: str, path: Path, line: int, noun: str, *, unmarked: bool = False) -> float:
     """Read one finite number; `line` counts from 1, as editors do.
 
     `unmarked`: a layout could say what marks a missing cell, and does not; the error then names that.
@@ -210,7 +210,7 @@ def number(cell: str, path: Path, line: int, what: str, *, unmarked: bool = Fals
     ------
     FormatError : no finite number (names file, line and column)
     """
-    text, what = cell.strip(), short(what)
+    text, noun = cell.strip(), short(noun)
     remedy = f"; if it marks a missing value, say in a layout file: [table] missing = {shown(text)}" if unmarked else ""
     try:
         value = float_of(text)
@@ -220,10 +220,10 @@ def number(cell: str, path: Path, line: int, what: str, *, unmarked: bool = Fals
         else:
             problem = f"is {shown(text)}, not a number" if text else "is empty, not a number"
             problem += remedy
-        raise FormatError(f"{path.name}, line {line}: {what} {problem}") from None
+        raise FormatError(f"{path.name}, line {line}: {noun} {problem}") from None
     # Values of frames have 32 bits.
     if not abs(value) <= VALUE:
-        raise FormatError(f"{path.name}, line {line}: {what} is {shown(text)}, not a finite number{remedy}")
+        raise FormatError(f"{path.name}, line {line}: {noun} is {shown(text)}, not a finite number{remedy}")
     return value
 
 

@@ -106,7 +106,7 @@ class Trial:
             ends = arguments.several("scored", self.scored)
             if len(ends) != 2:
                 raise refused("scored", f" is {arguments.shown(self.scored)}: must be two times, us")
-            first, last = (arguments.whole("scored", end, unit="us") for end in ends)
+            first, last = (arguments.integer("scored", end, unit="us") for end in ends)
             if first > last:
                 raise refused("scored", f" is {first} to {last} us: must not end before it begins")
             object.__setattr__(self, "scored", (first, last))

@@ -13,7 +13,7 @@ from taxel.information.bits import (
 )
 from taxel.information.estimate import Estimate, ZeroTest, estimate, zero_test
 from taxel.information.folds import folds
-from taxel.information.keeping import Verdict, keeps
+from taxel.information.keeping import Keeping, keeps
 from taxel.information.nested import Nested, nested_predictions, training_curve
 from taxel.information.spiking import ConeRReadout
 from taxel.information.trials import LabelledTrial, notes_as_trials, read_trials, recordings_as_trials
@@ -23,10 +23,10 @@ __all__ = [
     "ConeRReadout",
     "Control",
     "Estimate",
+    "Keeping",
     "LabelledTrial",
     "Nested",
     "Point",
-    "Verdict",
     "ZeroTest",
     "answer",
     "confusion_matrix",

@@ -35,11 +35,11 @@ def distinct(column: NDArray[np.generic]) -> NDArray[np.generic]:
 
 def numbered(classes: NDArray[np.generic], column: NDArray[np.generic]) -> NDArray[np.int64]:
     """Return the place of each label among the classes, which are in ascending order and hold all of them."""
-    flat, places = column.ravel(), np.empty(column.shape, np.int64)
+    flat, ranks = column.ravel(), np.empty(column.shape, np.int64)
     for first in range(0, len(flat), _AT_ONCE):
         piece = slice(first, first + _AT_ONCE)
-        places.ravel()[piece] = np.searchsorted(classes, flat[piece])
-    return places
+        ranks.ravel()[piece] = np.searchsorted(classes, flat[piece])
+    return ranks
 
 
 def belonging(groups: ArrayLike, trials: int) -> NDArray[np.int64]:

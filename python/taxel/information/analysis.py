@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import callback, instance, several, text, whole
+from taxel._base.arguments import callback, instance, integer, several, text
 from taxel.encode import ChangeEvents, Encoder
 from taxel.information._threads import threads
 from taxel.information.answers import Answer, Point, is_above_chance
 from taxel.information.controls import controls
 from taxel.information.estimate import Estimate, bits_of, estimate, zero_test
-from taxel.information.keeping import Verdict, keeps
+from taxel.information.keeping import Keeping, keeps
 from taxel.information.nested import WORTH_THREADS, Matrices, Nested, predictions, training_curve
 from taxel.information.pace import Pace, Work
 from taxel.information.question import Question
 from taxel.information.rasters import frame_grams
 from taxel.information.sampling import (
-    Spikes,
+    SampledEvents,
     frames_of,
 )
 from taxel.information.spiking import readout_names, readout_responses
@@ -103,7 +103,7 @@ def answer(
         if function is not None:
             callback(name, function)
     for name, value, least in (("draws", draws, 1), ("folds", folds, 2), ("shuffles", shuffles, 1), ("seed", seed, 0)):
-        whole(name, value, least)
+        integer(name, value, least)
     names = ("neighbours", *readout_names())
     also = [text("classifiers", classifier, names) for classifier in several("classifiers", classifiers)]
     answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed))
@@ -131,7 +131,7 @@ class _Answering(Question):
         about: dict[tuple[int, float], list[tuple[float, float, float]]] = {}
         frames: dict[int, list[Any]] = {}
         by_column: dict[tuple[str, int], list[Any]] = {}
-        reference: tuple[Spikes, Matrices, Nested] | None = None
+        reference: tuple[SampledEvents, Matrices, Nested] | None = None
         missing: set[str] = set()
         for draw in range(self.draws):
             for period in self.periods:
@@ -207,7 +207,7 @@ class _Answering(Question):
         self.pace.begin("labels shuffled", self.work.prediction(self.periods[0]))
         return predictions(matrices, self.split(labels)).responses
 
-    def _frames(self, spikes: Spikes) -> Matrices | None:
+    def _frames(self, spikes: SampledEvents) -> Matrices | None:
         """Return the frames' inner products to the whole window; None without values, or where they are too many."""
         bins = int(spikes.bins_to(self.window_us).max(initial=0))
         active = len(np.unique(spikes.taxel))
@@ -225,13 +225,13 @@ class _Answering(Question):
         about: dict[tuple[str, int], list[Any]] = {setting: [] for setting in settings}
         taxels = {setting: setting[1] for setting in settings}
         for draw in range(self.draws):
-            every = self.spikes(period, draw)
+            all_spikes = self.spikes(period, draw)
             for kind, size in settings:
-                what = f"{size} taxels at random" if kind == "random" else f"taxels of {size} x {size}"
-                self.pace.begin(what, self.work.taxels(kind, size))
+                step = f"{size} taxels at random" if kind == "random" else f"taxels of {size} x {size}"
+                self.pace.begin(step, self.work.taxels(kind, size))
                 if kind == "random":
                     random = np.random.default_rng([self.seed, draw, size, 1])
-                    spikes = every.of(np.sort(random.choice(self.active, size, replace=False)))
+                    spikes = all_spikes.select(np.sort(random.choice(self.active, size, replace=False)))
                 else:
                     spikes = self.spikes(period, draw, size)
                     taxels[kind, size] = spikes.taxels
@@ -240,9 +240,9 @@ class _Answering(Question):
                 about[kind, size].append(_about(spikes, window, values))
         points = []
         for kind, size in settings:
-            bits, mine = self.estimate(responses[kind, size]), (kind, size)
+            bits, point = self.estimate(responses[kind, size]), (kind, size)
             verdict = keeps(bits, full.found, groups=self.groups)
-            points.append(_point(period, window, taxels[mine], kind, bits, about[mine], verdict))
+            points.append(_point(period, window, taxels[point], kind, bits, about[point], verdict))
         return tuple(points)
 
     def _training(self, matrices: Matrices, first: Nested) -> tuple[tuple[int, float], ...]:
@@ -255,7 +255,7 @@ class _Answering(Question):
         curve = [(n, estimate(self.labels, counts, redraws=2).bits) for n, counts in zip(steps, responses, strict=True)]
         return (*curve, (most, estimate(self.labels, first.responses, redraws=2).bits))
 
-    def _classified(self, name: str, spikes: Spikes, matrices: Matrices) -> Estimate:
+    def _classified(self, name: str, spikes: SampledEvents, matrices: Matrices) -> Estimate:
         self.pace.begin(name, self.work.classifier(name))
         if name == "neighbours":
             return self.estimate(self.nested(matrices, neighbours=NEIGHBOURS).responses)
@@ -288,13 +288,13 @@ class _Answering(Question):
             self.notes.append("trials have no end of their own: how long a touch lasts is known within the window only")
 
 
-def _about(spikes: Spikes, window: float, values: bool) -> tuple[float, float, float]:
+def _about(spikes: SampledEvents, window: float, values: bool) -> tuple[float, float, float]:
     counts = spikes.counts(window)
     return float(counts.mean()), float(np.mean(counts == 0)), kilobits_per_second(spikes, window, values=values)
 
 
 def _point(
-    period: int, window: float, taxels: int, kind: str, estimated: Estimate, about: list[Any], verdict: Verdict | None
+    period: int, window: float, taxels: int, kind: str, estimated: Estimate, about: list[Any], verdict: Keeping | None
 ) -> Point:
     events, silent, kbps = np.mean(about, axis=0)
     return Point(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from taxel.information.estimate import Estimate, ZeroTest
-from taxel.information.keeping import Verdict
+from taxel.information.keeping import Keeping
 from taxel.information.wire_rate import WIRE
 
 __all__ = ["Answer", "Control", "Point", "is_above_chance"]
@@ -34,7 +34,7 @@ class Point:
         The share of trials without any event.
     kbps : float, 0 or more
         Kilobits a second on the wire while touched.
-    verdict : Verdict, optional
+    verdict : Keeping, optional
         Against the finest period with all taxels, to the same window; None where it is that.
     """
 
@@ -46,7 +46,7 @@ class Point:
     events: float
     silent: float
     kbps: float
-    verdict: Verdict | None = None
+    verdict: Keeping | None = None
 
     @property
     def millibits_per_event(self) -> float:

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import numbers, shown, whole
+from taxel._base.arguments import integer, numbers, shown
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.information._labels import words
@@ -65,17 +65,17 @@ def confusion_matrix(
     if not len(truth):
         raise refused("labels", " is []: must hold a trial at least")
     try:
-        every = np.unique(np.concatenate([truth, answered]))
-        order = every if classes is None else words("classes", classes)
+        known = np.unique(np.concatenate([truth, answered]))
+        order = known if classes is None else words("classes", classes)
     except TypeError:
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers") from None
     if len(np.unique(order)) != len(order):
         raise refused("classes", " names one twice")
-    missing = np.setdiff1d(every, order)
+    missing = np.setdiff1d(known, order)
     if len(missing):
         raise refused("classes", f" does not name {shown(missing[0].item())}")
-    place = np.argsort(order)
-    row, column = (place[np.searchsorted(order[place], x)] for x in (truth, answered))
+    rank = np.argsort(order)
+    row, column = (rank[np.searchsorted(order[rank], x)] for x in (truth, answered))
     counts = np.zeros((len(order), len(order)), np.int64)
     np.add.at(counts, (row, column), 1)
     return counts, order
@@ -166,8 +166,8 @@ def relevant_responses(counts: ArrayLike) -> NDArray[np.int64]:
     table = _counts(counts)
     rows = table.reshape(-1, table.shape[-1])
     relevant = np.empty(len(rows), np.int64)
-    for mine in _blocks(*rows.shape):
-        relevant[mine] = _relevant(rows[mine])
+    for block in _blocks(*rows.shape):
+        relevant[block] = _relevant(rows[block])
     return np.asarray(relevant.reshape(table.shape[:-1]))
 
 
@@ -279,7 +279,7 @@ def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: i
     table = _table(counts)
     if table.ndim != 2:
         raise refused("counts", f" has shape {table.shape}: must be (labels, responses)")
-    rounds, random = whole("repetitions", repetitions, 1), np.random.default_rng(whole("seed", seed, 0))
+    rounds, random = integer("repetitions", repetitions, 1), np.random.default_rng(integer("seed", seed, 0))
     trials = int(table.sum())
     if trials < 4:
         raise refused("counts", f" holds {trials} trials: must be 4 at least, to be dealt out in four parts")
@@ -322,10 +322,10 @@ def local_information(counts: ArrayLike) -> NDArray[np.float64]:
     expected = table.sum(-1, keepdims=True) * table.sum(-2, keepdims=True)
     bits = np.zeros_like(table)
     flat = [np.broadcast_to(x, table.shape).reshape(-1, table.shape[-1]) for x in (table, total, expected)]
-    for mine in _blocks(*flat[0].shape):
-        here, every, even = (x[mine] for x in flat)
-        ratio = np.divide(here * every, even, out=np.ones_like(here), where=here > 0)
-        bits.reshape(-1, table.shape[-1])[mine] = np.log2(ratio)
+    for block in _blocks(*flat[0].shape):
+        here, block_total, even = (x[block] for x in flat)
+        ratio = np.divide(here * block_total, even, out=np.ones_like(here), where=here > 0)
+        bits.reshape(-1, table.shape[-1])[block] = np.log2(ratio)
     return np.asarray(bits)
 
 
@@ -338,10 +338,10 @@ def _once(p: NDArray[np.float64], trials: NDArray[np.int64]) -> NDArray[np.float
 def _entropy(counts: NDArray[np.int64]) -> NDArray[np.float64]:
     rows = counts.reshape(-1, counts.shape[-1])
     total, entropy = np.maximum(rows.sum(-1, keepdims=True), 1), np.zeros(len(rows))
-    for mine in _blocks(*rows.shape):
+    for block in _blocks(*rows.shape):
         for part in _blocks(rows.shape[1], 1):
-            p = rows[mine, part] / total[mine]
-            entropy[mine] -= (p * np.log2(np.where(p > 0, p, 1.0))).sum(-1)
+            p = rows[block, part] / total[block]
+            entropy[block] -= (p * np.log2(np.where(p > 0, p, 1.0))).sum(-1)
     return np.asarray(entropy.reshape(counts.shape[:-1]) + 0.0)
 
 

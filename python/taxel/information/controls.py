@@ -62,9 +62,9 @@ def _before(question: Question) -> Control:
     assert question.encoder is not None  # the question has set the default
     begin = np.array([float(trial.source.t.min()) for trial in question.trials])
     for source in {id(trial.source) for trial in question.trials}:
-        mine = [k for k, trial in enumerate(question.trials) if id(trial.source) == source]
-        mine.sort(key=lambda k: question.trials[k].start_us)
-        for before, k in pairwise(mine):
+        neighbours = [k for k, trial in enumerate(question.trials) if id(trial.source) == source]
+        neighbours.sort(key=lambda k: question.trials[k].start_us)
+        for before, k in pairwise(neighbours):
             trial = question.trials[before]
             end = question.contact[before] + question.window_us if trial.stop_us is None else trial.stop_us
             begin[k] = max(begin[k], np.nan_to_num(end, nan=trial.start_us))

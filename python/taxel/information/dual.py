@@ -70,10 +70,10 @@ class Regressions:
     J. Am. Stat. Assoc. 89:1255). Leaving trials out is a small solve with their part of the residual matrix.
     """
 
-    def __init__(self, residuals: NDArray[np.float64], which: NDArray[np.float64]) -> None:
-        self._residuals, self._which = residuals, which
-        self._left: NDArray[np.float64] = residuals @ which
-        self._sums: NDArray[np.float64] = which.T @ self._left
+    def __init__(self, residuals: NDArray[np.float64], is_class: NDArray[np.float64]) -> None:
+        self._residuals, self._is_class = residuals, is_class
+        self._left: NDArray[np.float64] = residuals @ is_class
+        self._sums: NDArray[np.float64] = is_class.T @ self._left
 
     def left_out(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the classes that all other trials' discriminants predict for trials that are left out.
@@ -97,15 +97,15 @@ class Regressions:
         return predicted
 
     def _some_left_out(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
-        which, left = self._which[out], self._left[number, out]
+        is_class, left = self._is_class[out], self._left[number, out]
         off = np.linalg.solve(self._residuals[number[:, :, None], out[:, :, None], out[:, None, :]], left)
-        counts = self._which.sum(0) - which.sum(1)
+        counts = self._is_class.sum(0) - is_class.sum(1)
         share = counts / counts.sum(1, keepdims=True)
         # Predictions of the regression on the other trials, summed by class, less the classes' shares.
         sums = counts[:, :, None] * np.eye(counts.shape[1]) - self._sums[number[:, 0]] + np.swapaxes(left, 1, 2) @ off
         turn, offset = discriminant(sums - counts[:, :, None] * share[:, None, :], counts)
         # Rounding errors depend on the trial's own label, so without this they would decide ties correctly.
-        predicted = np.round(which - off - share[:, None, :], _DIGITS)
+        predicted = np.round(is_class - off - share[:, None, :], _DIGITS)
         with np.errstate(divide="ignore"):
             scores = predicted @ turn + (offset + np.log(share))[:, None, :]
         return np.asarray(np.round(scores, _DIGITS).argmax(-1))

@@ -10,7 +10,7 @@ import numpy as np
 import scipy  # its modules load when they are first used
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import callback, finite, number, shown, whole
+from taxel._base.arguments import callback, finite, integer, number, shown
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.information._labels import belonging, distinct, numbered, one_label_a_group, words
@@ -178,7 +178,7 @@ def estimate(
     share = number("confidence", confidence)
     if not 0 < share < 1:
         raise refused("confidence", f" is {shown(confidence)}: must lie between 0 and 1")
-    rounds, random = whole("redraws", redraws, 2), np.random.default_rng(whole("seed", seed, 0))
+    rounds, random = integer("redraws", redraws, 2), np.random.default_rng(integer("seed", seed, 0))
     if (truth.dtype.kind == "U") != (answered.dtype.kind == "U"):
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers")
     classes = np.unique(np.concatenate([distinct(truth), distinct(answered.ravel())]))
@@ -266,14 +266,14 @@ def zero_test(
     3
     """
     callback("answer", answer)
-    truth, random = words("labels", labels), np.random.default_rng(whole("seed", seed, 0))
+    truth, random = words("labels", labels), np.random.default_rng(integer("seed", seed, 0))
     belongs = None if groups is None else belonging(groups, len(truth))
     there = finite("found", found)
     if not len(truth):
         raise refused("labels", " is []: must hold a trial at least")
     classes, row = np.unique(truth, return_inverse=True)
     bits = []
-    for _ in range(whole("shuffles", shuffles, 1)):
+    for _ in range(integer("shuffles", shuffles, 1)):
         mixed = _shuffled(row, belongs, random)
         answered = np.searchsorted(classes, words("responses", answer(classes[mixed])))
         if answered.shape != row.shape or answered.max() >= len(classes):
@@ -296,8 +296,8 @@ def _shuffled(row: NDArray[np.int64], belongs: NDArray[np.int64] | None, random:
         return np.asarray(random.permutation(row[first])[belongs])
     mixed = row.copy()
     for group in range(belongs.max() + 1):
-        mine = np.flatnonzero(belongs == group)
-        mixed[mine] = random.permutation(row[mine])
+        members = np.flatnonzero(belongs == group)
+        mixed[members] = random.permutation(row[members])
     return mixed
 
 
@@ -310,8 +310,8 @@ def _tables(cells: NDArray[np.int64], weights: NDArray[Any], classes: int) -> ND
     for d, cell in enumerate(draws):
         for first in range(0, len(cell), step):
             piece = slice(first, first + step)
-            place = np.arange(len(weights))[:, None] * classes**2 + cell[piece]
-            tables[d] += np.bincount(place.ravel(), weights[:, piece].ravel(), tables.shape[1])
+            flat = np.arange(len(weights))[:, None] * classes**2 + cell[piece]
+            tables[d] += np.bincount(flat.ravel(), weights[:, piece].ravel(), tables.shape[1])
     shaped = np.rint(tables).astype(np.int64).reshape(len(draws), len(weights), classes, classes).swapaxes(0, 1)
     return np.ascontiguousarray(shaped if cells.ndim == 2 else shaped[:, 0])
 
@@ -351,8 +351,8 @@ def _interval(
     for first in range(0, redraws, at_once):
         count = min(at_once, redraws - first)
         weights = np.zeros((count, len(owner)), np.int64)
-        for mine in members:
-            weights[:, mine] = _redrawn(random, len(mine), count)
+        for group in members:
+            weights[:, group] = _redrawn(random, len(group), count)
         estimates.append(_held(_tables(cells, weights[:, units], classes)))
     redrawn = np.concatenate(estimates)
     ends = np.quantile(redrawn, [(1 - confidence) / 2, (1 + confidence) / 2]) - redrawn.mean()

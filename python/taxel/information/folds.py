@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import shown, whole
+from taxel._base.arguments import integer, shown
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.information._labels import belonging, labelled, words
 
-__all__ = ["Part", "Split", "folds", "split"]
+__all__ = ["Split", "TrialFold", "folds", "split"]
 
 
 def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None, seed: int = 0) -> NDArray[np.int64]:
@@ -45,7 +45,7 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
     [0, 1, 0, 0, 1, 0, 1, 1]
     """
     truth = words("labels", labels)
-    parts, random = whole("count", count, 2), np.random.default_rng(whole("seed", seed, 0))
+    parts, random = integer("count", count, 2), np.random.default_rng(integer("seed", seed, 0))
     classes, row = np.unique(truth, return_inverse=True)
     if len(classes) < 2:
         values = f"all {shown(truth[0].item())}" if len(truth) else "[]"
@@ -63,9 +63,9 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
         return _dealt(row, parts, random)
     belongs = belonging(groups, len(truth))
     for k, name in enumerate(classes):
-        mine = np.unique(belongs[row == k])
-        if len(mine) < 2:
-            group = words("groups", groups)[np.flatnonzero(belongs == mine[0])[0]].item()
+        group_numbers = np.unique(belongs[row == k])
+        if len(group_numbers) < 2:
+            group = words("groups", groups)[np.flatnonzero(belongs == group_numbers[0])[0]].item()
             raise ProblemError(
                 f"label {shown(name.item())}: all its trials lie in group {shown(group)}, so it could never be both "
                 f"trained and tested; must be two groups at least"
@@ -74,7 +74,7 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class TrialFold:
     """Trials that are tested together, those that train for them, and test sets among the latter.
 
     Attributes
@@ -99,16 +99,16 @@ class Split:
     row : int64, shape (trials,)
         The number of each trial's class.
     fold : int64, shape (trials,)
-    parts : tuple of Part, one a fold
+    parts : tuple of TrialFold, one a fold
     """
 
     classes: NDArray[np.generic]
     row: NDArray[np.int64]
     fold: NDArray[np.int64]
-    parts: tuple[Part, ...]
+    parts: tuple[TrialFold, ...]
 
     @property
-    def which(self) -> NDArray[np.float64]:
+    def is_class(self) -> NDArray[np.float64]:
         """1 where a trial is of a class, else 0; shape (trials, classes)."""
         return np.asarray(self.row[:, None] == np.arange(len(self.classes)), np.float64)
 
@@ -128,8 +128,8 @@ def split(
     parts = []
     for name in range(int(fold.max()) + 1):
         train = np.flatnonzero(fold != name)
-        mine = _inside(row[train], None if belongs is None else belongs[train], inner, seed)
-        parts.append(Part(np.flatnonzero(fold == name), train, tuple(train[group] for group in mine)))
+        inner_groups = _inside(row[train], None if belongs is None else belongs[train], inner, seed)
+        parts.append(TrialFold(np.flatnonzero(fold == name), train, tuple(train[group] for group in inner_groups)))
     return Split(classes, row, fold, tuple(parts))
 
 
@@ -162,9 +162,9 @@ def _whole_groups(
     np.add.at(table, (belongs, row), 1.0)
     order = random.permutation(number)
     order = order[np.argsort(-table[order].sum(1), kind="stable")]
-    held, fold = np.zeros((min(count, number), table.shape[1])), np.empty(number, np.int64)
+    counts, fold = np.zeros((min(count, number), table.shape[1])), np.empty(number, np.int64)
     for group in order:
-        crowd = ((held + table[group]) ** 2).sum(1) - (held**2).sum(1)
-        fold[group] = int(np.lexsort((held.sum(1), crowd))[0])
-        held[fold[group]] += table[group]
+        crowd = ((counts + table[group]) ** 2).sum(1) - (counts**2).sum(1)
+        fold[group] = int(np.lexsort((counts.sum(1), crowd))[0])
+        counts[fold[group]] += table[group]
     return fold[belongs]

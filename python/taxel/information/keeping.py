@@ -14,14 +14,14 @@ from taxel._core import ProblemError
 from taxel.information._labels import belonging
 from taxel.information.estimate import Estimate
 
-__all__ = ["Verdict", "keeps"]
+__all__ = ["Keeping", "keeps"]
 
 #: Confidence of each verdict's one-sided bound.
 CONFIDENCE = 0.9
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Keeping:
     """Hold whether a setting keeps a share of another's bits.
 
     Attributes
@@ -49,7 +49,7 @@ class Verdict:
         return "open" if self.trials_to_settle is None else f"open ({self.trials_to_settle} trials)"
 
 
-def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: ArrayLike | None = None) -> Verdict:
+def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: ArrayLike | None = None) -> Keeping:
     """Judge whether a setting keeps a share of another's bits, on the same trials.
 
     Parameters
@@ -62,7 +62,7 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
 
     Returns
     -------
-    Verdict
+    Keeping
 
     Raises
     ------
@@ -99,10 +99,10 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
     reach = float(scipy.special.stdtrit(max(1, len(np.unique(belongs)) - 1), CONFIDENCE))
     above = reach * error_of(b)
     if np.isfinite(above) and dear.bits <= above:
-        return Verdict("nothing", margin, error)
+        return Keeping("nothing", margin, error)
     if margin > reach * error:
-        return Verdict("keeps", margin, error)
+        return Keeping("keeps", margin, error)
     if margin < -reach * error:
-        return Verdict("loses", margin, error)
+        return Keeping("loses", margin, error)
     needed = (reach * error / margin) ** 2 * len(a) if margin else np.inf
-    return Verdict("open", margin, error, int(np.ceil(needed)) if needed < 1e6 else None)
+    return Keeping("open", margin, error, int(np.ceil(needed)) if needed < 1e6 else None)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import instance, numbers, several, shown, whole
+from taxel._base.arguments import instance, integer, numbers, several, shown
 from taxel._base.errors import refused
 from taxel.information._labels import labelled
 from taxel.information._threads import threads
@@ -105,8 +105,8 @@ def nested_predictions(
     levels = numbers("ridges", ridges, np.float64)
     if levels.ndim != 1 or not len(levels) or not ((levels > 0) & (levels <= LARGEST_RIDGE)).all():
         raise refused("ridges", f" is {shown(ridges)}: must be numbers above 0, at most {LARGEST_RIDGE:g}")
-    nearest = tuple(whole("neighbours", k, 1) for k in several("neighbours", neighbours))
-    parts = whole("inner", inner, 2)
+    nearest = tuple(integer("neighbours", k, 1) for k in several("neighbours", neighbours))
+    parts = integer("inner", inner, 2)
     dealt = split(y, matrices.trials, count=count, inner=parts, groups=groups, seed=seed)
     with threads(several=matrices.trials >= WORTH_THREADS):
         return predictions(matrices, dealt, ridges=tuple(levels.tolist()), neighbours=nearest)
@@ -121,7 +121,7 @@ def predictions(
     if neighbours:
         ways = _Neighbours(matrices, row, classes, neighbours)
     else:
-        ways = _Discriminants(matrices, dealt.which, ridges)
+        ways = _Discriminants(matrices, dealt.is_class, ridges)
     best = _best(ways, dealt) if ways.count > 1 else np.zeros(len(dealt.parts), np.int64)
     predicted = np.empty(len(row), np.int64)
     for folds, out in _of_one_size([part.test for part in dealt.parts]):
@@ -138,13 +138,13 @@ def predictions(
 def _best(ways: _Ways, dealt: Split) -> NDArray[np.int64]:
     """Return for each fold the way that classifies most of its training trials correctly, in folds among themselves."""
     right = np.zeros((len(dealt.parts), ways.count), np.int64)
-    inner = [(name, held) for name, part in enumerate(dealt.parts) for held in part.inner]
-    tested = [np.concatenate([dealt.parts[name].test, held]) for name, held in inner]
+    inner = [(name, test) for name, part in enumerate(dealt.parts) for test in part.inner]
+    tested = [np.concatenate([dealt.parts[name].test, test]) for name, test in inner]
     for cases, out in _of_one_size(tested):
         correct = ways.predict_all(out) == dealt.row[out]
         for case, here in zip(cases, np.swapaxes(correct, 0, 1), strict=True):
-            name, held = inner[case]
-            right[name] += here[:, -len(held) :].sum(1)
+            name, test = inner[case]
+            right[name] += here[:, -len(test) :].sum(1)
     return np.asarray(right.argmax(1))
 
 
@@ -187,18 +187,18 @@ def training_curve(
     """
     matrices = Matrices(grams, features)
     classes, row = labelled(y, matrices.trials)
-    random, curve = np.random.default_rng(whole("seed", seed, 0)), []
+    random, curve = np.random.default_rng(integer("seed", seed, 0)), []
     used = sorted(set(instance("nested", nested, Nested).chosen.values()))
     if len(nested.folds) != len(row) or any(matrix >= len(matrices.squares) for matrix, _ in used):
         raise refused("nested", " is of other trials or matrices")
-    which = np.asarray(row[:, None] == np.arange(len(classes)), np.float64)
-    regressions = Regressions(np.stack([matrices.residual(*way) for way in used]), which)
+    is_class = np.asarray(row[:, None] == np.arange(len(classes)), np.float64)
+    regressions = Regressions(np.stack([matrices.residual(*way) for way in used]), is_class)
     for size in several("sizes", sizes):
         predicted = np.empty(len(row), np.int64)
         for name, way in nested.chosen.items():
             test, train = np.flatnonzero(nested.folds == name), np.flatnonzero(nested.folds != name)
             mixed = random.permutation(train)
-            sample = np.concatenate([mixed[row[mixed] == k][: whole("sizes", size, 1)] for k in range(len(classes))])
+            sample = np.concatenate([mixed[row[mixed] == k][: integer("sizes", size, 1)] for k in range(len(classes))])
             out = np.concatenate([test, np.setdiff1d(train, sample)])
             predicted[test] = regressions.left_out(np.array([used.index(way)]), out[None])[0, : len(test)]
         curve.append(classes[predicted])
@@ -225,7 +225,7 @@ class Matrices:
         self.trials = len(self.squares[0])
         if any(len(gram) != self.trials for gram in self.squares):
             raise refused("grams", f" are of {[len(gram) for gram in self.squares]} trials: must all be of the same")
-        self.features = [whole("features", count, 1) for count in several("features", features)]
+        self.features = [integer("features", count, 1) for count in several("features", features)]
         if len(self.features) != len(self.squares):
             raise refused("features", f" has {len(self.features)} entries: must be {len(self.squares)}, one a matrix")
         self._residuals: dict[tuple[float, ...], NDArray[np.float64]] = {}
@@ -269,8 +269,8 @@ class _Ways(ABC):
 
 
 class _Discriminants(_Ways):
-    def __init__(self, matrices: Matrices, which: NDArray[np.float64], ridges: tuple[float, ...]) -> None:
-        self._ridges, self._regressions = ridges, Regressions(matrices.residuals(ridges), which)
+    def __init__(self, matrices: Matrices, is_class: NDArray[np.float64], ridges: tuple[float, ...]) -> None:
+        self._ridges, self._regressions = ridges, Regressions(matrices.residuals(ridges), is_class)
         self.count = len(matrices.squares) * len(ridges)
 
     def way(self, number: int) -> tuple[int, float]:
@@ -291,12 +291,12 @@ class _Neighbours(_Ways):
 
     def predict(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
         predicted = np.empty(out.shape, np.int64)
-        for case, (way, mine) in enumerate(zip(number, out, strict=True)):
+        for case, (way, tested) in enumerate(zip(number, out, strict=True)):
             matrix, neighbours = self.way(int(way))
             training = np.ones(len(self._row), bool)
-            training[mine] = False
-            order = self._order[matrix][mine]
-            near = order[training[order]].reshape(len(mine), -1)[:, : int(neighbours)]
+            training[tested] = False
+            order = self._order[matrix][tested]
+            near = order[training[order]].reshape(len(tested), -1)[:, : int(neighbours)]
             predicted[case] = majority(self._row[near], self._classes)
         return predicted
 
@@ -313,6 +313,6 @@ def majority(near: NDArray[np.int64], classes: int) -> NDArray[np.int64]:
     rows = np.repeat(np.arange(len(near)), near.shape[1])
     np.add.at(votes, (rows, near.ravel()), 1.0)
     # One vote outweighs all differences in place.
-    place = np.tile(np.linspace(0, 1, near.shape[1]) / (near.shape[1] + 1), len(near))
-    np.add.at(votes, (rows, near.ravel()), -place / near.shape[1])
+    tie = np.tile(np.linspace(0, 1, near.shape[1]) / (near.shape[1] + 1), len(near))
+    np.add.at(votes, (rows, near.ravel()), -tie / near.shape[1])
     return np.asarray(votes.argmax(1))

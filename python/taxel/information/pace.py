@@ -62,15 +62,15 @@ class Work:
 
     def all(self, classifiers: list[str], shuffles: int) -> float:
         """Return the time of all."""
-        asked = self._question
-        columns, windows = len(asked.columns), len(asked.windows)
-        settings = [*(("random", n) for n in asked.random_taxels), *(("pooled", n) for n in asked.pools)]
+        question = self._question
+        columns, windows = len(question.columns), len(question.windows)
+        settings = [*(("random", n) for n in question.random_taxels), *(("pooled", n) for n in question.pools)]
         draw = sum(self.taxels(*setting) for setting in settings)
-        for period in asked.periods:
+        for period in question.periods:
             draw += self.rasters(period) + (windows + columns) * self.prediction(period) + self.frames(period)
-        estimates = len(asked.periods) * (windows + columns) * self.estimate()
+        estimates = len(question.periods) * (windows + columns) * self.estimate()
         further = self.controls() + sum(map(self.classifier, classifiers))
-        return asked.draws * draw + estimates + (shuffles + 1) * self.prediction(asked.periods[0]) + further
+        return question.draws * draw + estimates + (shuffles + 1) * self.prediction(question.periods[0]) + further
 
     def _sampling(self, period: int) -> float:
         taxels = int(np.prod(self._question.trials[0].array.shape))
@@ -102,9 +102,9 @@ class Pace:
         """Set how much there is to do."""
         self._all = ms
 
-    def begin(self, what: str, ms: float) -> None:
+    def begin(self, step: str, ms: float) -> None:
         """Begin a piece of work; the one before is done."""
         self._done += self._running
         self._running = ms
         if self._report is not None:
-            self._report(what, round(min(self._done, self._all)), max(1, round(self._all)))
+            self._report(step, round(min(self._done, self._all)), max(1, round(self._all)))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import number, several, shown, whole
+from taxel._base.arguments import integer, number, several, shown
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
@@ -23,7 +23,7 @@ from taxel.information.rasters import event_grams, features
 from taxel.information.sampling import (
     STEP_US,
     HeldValues,
-    Spikes,
+    SampledEvents,
     checked_periods,
     contacts,
     finest_us,
@@ -145,18 +145,18 @@ class Question:
         spikes = self.spikes(self.taxels_at, 0)
         self.active, self.events = np.unique(spikes.taxel), len(spikes.taxel)
         there = len(self.active)
-        numbers = [whole("taxels", n, 1) for n in several("taxels", (10, 30, 100, 300) if taxels is None else taxels)]
+        numbers = [integer("taxels", n, 1) for n in several("taxels", (10, 30, 100, 300) if taxels is None else taxels)]
         if taxels is not None and any(n > there for n in numbers):
             raise refused("taxels", f" is {shown(taxels)}: {there} of the array's ever send an event")
         self.random_taxels = [n for n in numbers if n < there]
-        sides = [whole("pools", n, 2) for n in several("pools", (2, 4, 7) if pools is None else pools)]
+        sides = [integer("pools", n, 2) for n in several("pools", (2, 4, 7) if pools is None else pools)]
         rows, columns = self.trials[0].array.shape
         if pools is not None and any(n > max(rows, columns) for n in sides):
             raise refused("pools", f" is {shown(pools)}: the array is {rows} x {columns}")
         self.pools = [n for n in sides if n <= max(rows, columns)]
         self.columns = self._parameter_columns()
 
-    def spikes(self, period: int, draw: int, pool: int = 1) -> Spikes:
+    def spikes(self, period: int, draw: int, pool: int = 1) -> SampledEvents:
         """Return the spikes of all trials at a period (us), in one draw of the sampling phases."""
         assert self.encoder is not None  # the constructor has set the default
         return spikes_of(
@@ -190,7 +190,7 @@ class Question:
         taus = [to_ms(share * self.window_us) for share in SMOOTHINGS]
         return [tau for tau in taus if tau == 0 or to_us(tau) > period / 2]
 
-    def matrices(self, spikes: Spikes, windows: Sequence[float]) -> list[Matrices]:
+    def matrices(self, spikes: SampledEvents, windows: Sequence[float]) -> list[Matrices]:
         """Return by window the matrices of all smoothings that a period can tell apart."""
         taus = self.smoothings(spikes.period_us)
         by_tau = [event_grams(spikes, windows, tau) for tau in taus]

@@ -7,20 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel.information.sampling import Spikes
+from taxel.information.sampling import SampledEvents
 from taxel.spikes import to_ms
 
 __all__ = ["event_grams", "features", "frame_grams"]
 
 
-def event_grams(spikes: Spikes, windows_us: Sequence[float], tau_ms: float) -> list[NDArray[np.float64]]:
+def event_grams(spikes: SampledEvents, windows_us: Sequence[float], tau_ms: float) -> list[NDArray[np.float64]]:
     """Return the inner products of all trials' rasters, a matrix for each window after the contact.
 
     A raster has a value a taxel and bin; with `tau_ms` each event lasts to the window's end, falling by e in this time.
 
     Parameters
     ----------
-    spikes : Spikes
+    spikes : SampledEvents
     windows_us : sequence of float, us, ascending
     tau_ms : float, ms, 0 or more
         0: no smoothing.
@@ -39,24 +39,26 @@ def event_grams(spikes: Spikes, windows_us: Sequence[float], tau_ms: float) -> l
     decay = np.float32(np.exp(to_ms(-spikes.period_us) / tau_ms)) if tau_ms > 0 else np.float32(0)
     there = np.bincount(spikes.taxel, minlength=1) > 0
     state = np.zeros((spikes.trials, int(there.sum())), np.float32)
-    place = spikes.trial * state.shape[1] + (np.cumsum(there) - 1)[spikes.taxel]
+    flat = spikes.trial * state.shape[1] + (np.cumsum(there) - 1)[spikes.taxel]
     begins = np.searchsorted(spikes.bin, np.arange(sums.bins + 1))
     for b in range(sums.bins):
         state *= decay
         here = slice(begins[b], begins[b + 1])
-        np.add.at(state.ravel(), place[here], spikes.value[here])
+        np.add.at(state.ravel(), flat[here], spikes.value[here])
         sums.add(state)
     return sums.finish()
 
 
-def frame_grams(values: NDArray[np.float32], spikes: Spikes, windows_us: Sequence[float]) -> list[NDArray[np.float64]]:
+def frame_grams(
+    values: NDArray[np.float32], spikes: SampledEvents, windows_us: Sequence[float]
+) -> list[NDArray[np.float64]]:
     """Return the inner products of frames instead of events, at the same period, aligned in the same way.
 
     Parameters
     ----------
     values : float32, shape (bins, trials, taxels)
         The change of each taxel since before the touch; bin 0 is that of the first event.
-    spikes : Spikes
+    spikes : SampledEvents
     windows_us : sequence of float, us, ascending
 
     Returns
@@ -69,7 +71,7 @@ def frame_grams(values: NDArray[np.float32], spikes: Spikes, windows_us: Sequenc
     return sums.finish()
 
 
-def features(spikes: Spikes, windows_us: Sequence[float]) -> list[int]:
+def features(spikes: SampledEvents, windows_us: Sequence[float]) -> list[int]:
     """Return by window how many pairs of taxel and bin hold an event in any trial, one at least."""
     bins = int(spikes.bin.max(initial=0)) + 1
     pairs, pair = np.unique(spikes.taxel * bins + spikes.bin, return_inverse=True)
@@ -84,7 +86,7 @@ def features(spikes: Spikes, windows_us: Sequence[float]) -> list[int]:
 class _Sums:
     """Sum up the inner products of all trials, bin by bin, to several windows at once."""
 
-    def __init__(self, spikes: Spikes, windows_us: Sequence[float]) -> None:
+    def __init__(self, spikes: SampledEvents, windows_us: Sequence[float]) -> None:
         # A silent trial adds nothing, so its end may be the last of all.
         silent = ~np.isfinite(spikes.first_us)
         ends = [spikes.bins_to(window) for window in windows_us]
@@ -106,8 +108,8 @@ class _Sums:
             matrix = self._own[k]
             if matrix is not None and inside.any():
                 product = state @ state.T if product is None else product
-                mine = np.flatnonzero(inside)
-                matrix[np.ix_(mine, mine)] += product[np.ix_(mine, mine)]
+                chosen = np.flatnonzero(inside)
+                matrix[np.ix_(chosen, chosen)] += product[np.ix_(chosen, chosen)]
         if any(matrix is None for matrix in self._own):
             self._common += state @ state.T if product is None else product
         self._bin += 1

@@ -19,7 +19,16 @@ from taxel.frames import Frames
 from taxel.information.trials import LabelledTrial
 from taxel.spikes import to_ms, to_us
 
-__all__ = ["STEP_US", "HeldValues", "Spikes", "checked_periods", "contacts", "finest_us", "frames_of", "spikes_of"]
+__all__ = [
+    "STEP_US",
+    "HeldValues",
+    "SampledEvents",
+    "checked_periods",
+    "contacts",
+    "finest_us",
+    "frames_of",
+    "spikes_of",
+]
 
 #: The finest grid on which a touch's beginning is searched, us.
 STEP_US = 100
@@ -64,7 +73,7 @@ class HeldValues:
 
 
 @dataclass(frozen=True, eq=False)
-class Spikes:
+class SampledEvents:
     """Hold the events of all trials, sampled at one period and one draw of its phases.
 
     Attributes
@@ -110,21 +119,21 @@ class Spikes:
         inside = self.bin < self.bins_to(window_us)[self.trial]
         return np.bincount(self.trial[inside], minlength=self.trials)
 
-    def of(self, taxels: NDArray[np.int64]) -> Spikes:
+    def select(self, taxels: NDArray[np.int64]) -> SampledEvents:
         """Return the events of some taxels alone, aligned on the first of theirs."""
-        place = np.full(self.taxels, -1)
-        place[taxels] = np.arange(len(taxels))
-        chosen = np.flatnonzero(place[self.taxel] >= 0)
+        number = np.full(self.taxels, -1)
+        number[taxels] = np.arange(len(taxels))
+        chosen = np.flatnonzero(number[self.taxel] >= 0)
         trial, bins = self.trial[chosen], self.bin[chosen]
         begin = np.full(self.trials, np.iinfo(np.int64).max)
         np.minimum.at(begin, trial, bins)
         silent = begin == np.iinfo(np.int64).max
         first = np.where(silent, np.inf, self.first_us + np.where(silent, 0, begin) * float(self.period_us))
-        return Spikes(
+        return SampledEvents(
             self.period_us,
             len(taxels),
             trial,
-            place[self.taxel[chosen]],
+            number[self.taxel[chosen]],
             bins - begin[trial],
             self.value[chosen],
             first,
@@ -141,20 +150,22 @@ class _Pools(NamedTuple):
 
 def finest_us(sources: Sequence[Events | Frames]) -> int:
     """Return the finest period that recordings can show, us: between frames, or what all stamps are multiples of."""
-    periods = [int(np.median(np.diff(of.t))) for of in sources if isinstance(of, Frames) and len(of) > 1]
-    stamps = [int(np.gcd.reduce(np.append(of.t, 0))) for of in sources if not isinstance(of, Frames)]
+    periods = [
+        int(np.median(np.diff(source.t))) for source in sources if isinstance(source, Frames) and len(source) > 1
+    ]
+    stamps = [int(np.gcd.reduce(np.append(source.t, 0))) for source in sources if not isinstance(source, Frames)]
     return max(1, int(np.gcd.reduce([0, *stamps])), *periods)
 
 
 def contacts(
-    trials: Sequence[LabelledTrial], held: Sequence[HeldValues], encoder: Encoder, period_us: int, window_us: float
+    trials: Sequence[LabelledTrial], values_of: Sequence[HeldValues], encoder: Encoder, period_us: int, window_us: float
 ) -> NDArray[np.float64]:
     """Return when each touch begins, us: the first event at or after its start at the finest period; NaN without one.
 
     The search ends at the trial's end, or after the length of a window; events are searched at their own times.
     """
     onsets = np.full(len(trials), np.nan)
-    for k, (trial, values) in enumerate(zip(trials, held, strict=True)):
+    for k, (trial, values) in enumerate(zip(trials, values_of, strict=True)):
         stop = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
         t, step = trial.source.t, max(period_us, STEP_US)
         if isinstance(trial.source, Events) and isinstance(encoder, ChangeEvents):
@@ -177,7 +188,7 @@ def spikes_of(
     window_us: float,
     random: np.random.Generator,
     pool: int = 1,
-) -> Spikes:
+) -> SampledEvents:
     """Sample all trials at one period, each at a phase that is drawn, and encode the samples.
 
     Parameters
@@ -199,7 +210,7 @@ def spikes_of(
 
     Returns
     -------
-    Spikes
+    SampledEvents
     """
     several("trials", trials)
     parts: list[tuple[Any, ...]] = []
@@ -233,13 +244,13 @@ def spikes_of(
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)] if parts else [np.empty(0, np.int64)] * 4
     order = np.argsort(columns[2], kind="stable")
     trial_, taxel_, bin_, value_ = (column[order] for column in columns)
-    return Spikes(period_us, taxels, trial_, taxel_, bin_, value_.astype(np.float32), first, length)
+    return SampledEvents(period_us, taxels, trial_, taxel_, bin_, value_.astype(np.float32), first, length)
 
 
 def frames_of(
     trials: Sequence[LabelledTrial],
     held: Sequence[HeldValues],
-    spikes: Spikes,
+    spikes: SampledEvents,
     contact_us: NDArray[np.float64],
     bins: int,
 ) -> NDArray[np.float32]:
@@ -249,7 +260,7 @@ def frames_of(
     ----------
     trials, held, contact_us
         As given to `spikes_of`.
-    spikes : Spikes
+    spikes : SampledEvents
     bins : int
 
     Returns

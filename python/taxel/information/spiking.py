@@ -16,7 +16,7 @@ from taxel._base.errors import refused
 from taxel._base.parameters import Parameters
 from taxel._core import NotFittedError
 from taxel.information._labels import labelled, words
-from taxel.information.sampling import Spikes
+from taxel.information.sampling import SampledEvents
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms
@@ -184,7 +184,7 @@ class ConeRReadout(NeuronPerClass):
                 raise refused(name, f" is {shown(getattr(self, name))}: must be above 0, and finite")
 
     def _trained(self, trains: list[SpikeTrains], is_of_class: NDArray[np.bool_]) -> ConeR:
-        targets = [[train.stop] if mine else [] for train, mine in zip(trains, is_of_class, strict=True)]
+        targets = [[train.stop] if fires else [] for train, fires in zip(trains, is_of_class, strict=True)]
         neuron = Neuron(tau=self.tau, after_spike="keep", step_ms=1.0)
         learner = ConeR(neuron=neuron, lb=-self.bound, ub=self.bound, max_seconds=self.max_seconds)
         return learner.fit(trains, targets)
@@ -193,12 +193,12 @@ class ConeRReadout(NeuronPerClass):
         return float(learner.neuron_.potential(learner.weights_, trains, [trains.stop])[0])
 
 
-def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
+def patterns_of(spikes: SampledEvents, window_us: float) -> list[SpikeTrains]:
     """Return each trial's events as spike trains, ON and OFF of each taxel that ever sends one.
 
     Parameters
     ----------
-    spikes : Spikes
+    spikes : SampledEvents
     window_us : float, us
 
     Returns
@@ -229,7 +229,7 @@ def readout_names() -> tuple[str, ...]:
 
 
 def readout_responses(
-    name: str, spikes: Spikes, window_us: float, labels: NDArray[np.generic], folds: NDArray[np.int64]
+    name: str, spikes: SampledEvents, window_us: float, labels: NDArray[np.generic], folds: NDArray[np.int64]
 ) -> NDArray[np.generic]:
     """Predict each trial's label by neurons that were trained on the other folds.
 
@@ -237,7 +237,7 @@ def readout_responses(
     ----------
     name : str
         One of `readout_names`.
-    spikes : Spikes
+    spikes : SampledEvents
     window_us : float, us
     labels : labels, shape (trials,)
     folds : int64, shape (trials,), from 0 on

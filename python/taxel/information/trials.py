@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from taxel._base.arguments import checked_path, instance, mapping, number, several, shown, text, whole
+from taxel._base.arguments import checked_path, instance, integer, mapping, number, several, shown, text
 from taxel._base.errors import helped, refused
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.number_text import float_of, int_of
@@ -80,9 +80,9 @@ class LabelledTrial:
             raise ProblemError(f"{self.name}: label is empty")
         text("group", self.group)
         mapping("parameters", self.parameters)
-        object.__setattr__(self, "start_us", whole("start_us", self.start_us))
+        object.__setattr__(self, "start_us", integer("start_us", self.start_us))
         if self.stop_us is not None:
-            object.__setattr__(self, "stop_us", whole("stop_us", self.stop_us))
+            object.__setattr__(self, "stop_us", integer("stop_us", self.stop_us))
             if not self.stop_us > self.start_us:
                 raise ProblemError(f"{self.name}: stop {self.stop_us} us does not lie after start {self.start_us} us")
 
@@ -118,11 +118,11 @@ def read_trials(
     ProblemError : recordings and table do not match, a recording is there twice or has no times, a start outside its
         recording, trials without an end, trials that overlap, or the host's time of another run
     """
-    place = Path(checked_path("table", table))
+    file = Path(checked_path("table", table))
     opened = _once(recordings)
     window_us = 0 if window_ms is None else _window_us(window_ms)
     by_name = _by_unique_name(opened)
-    rows = _rows(place, opened)
+    rows = _rows(file, opened)
     names = {row["recording"] for _, row in rows}
     strange = sorted(names - set(by_name))
     if strange:
@@ -130,16 +130,16 @@ def read_trials(
         alike = [str(recording.path) for recording in opened if strange[0] in (recording.name, _stem(recording))]
         if len(alike) > 1:
             raise ProblemError(
-                f"{place}, line {line}: recording {strange[0]!r} may be {' or '.join(alike[:3])}; write the path"
+                f"{file}, line {line}: recording {strange[0]!r} may be {' or '.join(alike[:3])}; write the path"
             )
         there = sorted({recording.name for recording in opened})
         listed = ", ".join(there[:5]) + (" ..." if len(there) > 5 else "")
-        raise ProblemError(f"{place}, line {line}: recording {strange[0]!r} is not among those given: {listed}")
+        raise ProblemError(f"{file}, line {line}: recording {strange[0]!r} is not among those given: {listed}")
     unnamed = [
         recording.path for recording in opened if not {str(recording.path), recording.name, _stem(recording)} & names
     ]
     if unnamed:
-        raise ProblemError(f"{place}: says nothing of {unnamed[0]}; name it, or leave the recording out")
+        raise ProblemError(f"{file}: says nothing of {unnamed[0]}; name it, or leave the recording out")
     sources = {id(recording): _source(recording) for recording in opened}
     spans = {key: _span(source) for key, source in sources.items()}
     clocks = (
@@ -149,10 +149,10 @@ def read_trials(
     for line, row in rows:
         recording = by_name[row["recording"]]
         source = sources[id(recording)]
-        where = f"{place}, line {line}"
+        where = f"{file}, line {line}"
         end, host_ns = (_whole(where, name, row[name]) if row.get(name) else None for name in ("stop_us", "host_ns"))
         start = _whole(where, "t_us", row["t_us"])
-        ahead = ahead_us(Note(row["label"], start, host_ns or 0), recording.path, clocks.get(id(recording)), place)
+        ahead = ahead_us(Note(row["label"], start, host_ns or 0), recording.path, clocks.get(id(recording)), file)
         start, stop = start - ahead, None if end is None else end - ahead
         if stop is None and window_ms is None:
             error = ProblemError(f"{where}: has no stop_us, and the length of trials is not known")
@@ -274,17 +274,17 @@ def _inside(trial: LabelledTrial, recording: str, span: tuple[int, int] | None, 
     """Refuse a trial outside its recording; silence before its first event may belong to a touch."""
     end = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
     if span is None or trial.start_us > span[1] or end < span[0]:
-        held = "nothing" if span is None else f"{span[0]} to {span[1]} us"
-        raise ProblemError(f"{trial.name}: t_us {trial.start_us} lies outside {recording}, which holds {held}")
+        content = "nothing" if span is None else f"{span[0]} to {span[1]} us"
+        raise ProblemError(f"{trial.name}: t_us {trial.start_us} lies outside {recording}, which holds {content}")
 
 
 def _apart(trials: list[LabelledTrial], window_us: int) -> None:
     """Refuse a trial that holds the start of another: what both hold would be trained on and tested."""
-    of: dict[int, list[LabelledTrial]] = {}
+    by_source: dict[int, list[LabelledTrial]] = {}
     for trial in trials:
-        of.setdefault(id(trial.source), []).append(trial)
-    for mine in of.values():
-        for trial, after in pairwise(sorted(mine, key=lambda trial: trial.start_us)):
+        by_source.setdefault(id(trial.source), []).append(trial)
+    for trials_of_source in by_source.values():
+        for trial, after in pairwise(sorted(trials_of_source, key=lambda trial: trial.start_us)):
             before, apart = trial.name.split(", ")[-1], after.start_us - trial.start_us
             if apart == 0:
                 raise ProblemError(f"{after.name}: begins where {before} does; a touch must stand there once")
@@ -313,12 +313,12 @@ def _stem(recording: Recording) -> str:
     return Path(recording.name).stem
 
 
-def _rows(place: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[str, str]]]:
-    if place.is_dir():
-        raise FormatError(f"{place}: is a directory; must be a .csv {','.join(_COLUMNS)}")
-    table = HeaderTable.read(place, text_of(place))
+def _rows(file: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[str, str]]]:
+    if file.is_dir():
+        raise FormatError(f"{file}: is a directory; must be a .csv {','.join(_COLUMNS)}")
+    table = HeaderTable.read(file, text_of(file))
     if not table.header:
-        raise FormatError(f"{place}: holds nothing; must be {','.join(_COLUMNS)} ...")
+        raise FormatError(f"{file}: holds nothing; must be {','.join(_COLUMNS)} ...")
     alone = len(recordings) == 1 and "recording" not in table.header
     only = {"recording": str(recordings[0].path)} if alone else {}
     table.has([name for name in _COLUMNS if name not in only])
@@ -326,7 +326,7 @@ def _rows(place: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[
     for line, cells in table:
         rows.append((line, only | {name: cell.strip() for name, cell in cells.items()}))
     if not rows:
-        raise FormatError(f"{place}: names no trial")
+        raise FormatError(f"{file}: names no trial")
     return rows
 
 

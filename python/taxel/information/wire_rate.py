@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel.information.sampling import Spikes
+from taxel.information.sampling import SampledEvents
 
 __all__ = ["WIRE", "kilobits_per_second"]
 
@@ -19,12 +19,12 @@ WIRE = (
 _OWN_BYTES, _MOST_BYTES = 24, 1400
 
 
-def kilobits_per_second(spikes: Spikes, window_us: float, *, values: bool) -> float:
+def kilobits_per_second(spikes: SampledEvents, window_us: float, *, values: bool) -> float:
     """Return the rate on version 2 of the wire from the contact to a window's or the trial's end, the mean over trials.
 
     Parameters
     ----------
-    spikes : Spikes
+    spikes : SampledEvents
     window_us : float, us, above 0
     values : bool
         Whether the setting needs a value an event.

@@ -15,4 +15,4 @@ from taxel.learn.solution import Checked as Checked
 from taxel.learn.solution import check_solution as check_solution
 
 # The imports above are the registry of learners.
-__all__ = [name for name, held in sorted(globals().items()) if callable(held)]
+__all__ = [name for name, value in sorted(globals().items()) if callable(value)]

@@ -36,12 +36,12 @@ def checked_examples(
     _, times = examples(patterns, targets)
     cone._check()
     each = [None] * len(times) if silence is None else several("silence", silence)
-    asked = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
+    silences = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
     trained = several("patterns", patterns)
-    if not len(trained) == len(times) == len(asked) or not trained:
+    if not len(trained) == len(times) == len(silences) or not trained:
         raise ProblemError(
             f"{counted(len(trained), 'pattern')}, {counted(len(times), 'list')} of targets"
-            + f" and {len(asked)} of silence" * (silence is not None)
+            + f" and {len(silences)} of silence" * (silence is not None)
             + ": must be one of each a pattern, and one pattern or more"
         )
     for p, pattern in enumerate(trained):
@@ -62,4 +62,4 @@ def checked_examples(
     horizon = np.asarray(0.0 if cone.horizon is None else cone.horizon)
     if horizon.ndim and horizon.size != len(trained):
         raise refused("horizon", f": {horizon.size} values, must be one, or one a pattern, {len(trained)}")
-    return trained, times, asked
+    return trained, times, silences

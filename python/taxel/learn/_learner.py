@@ -38,13 +38,17 @@ class Learner(Parameters):
 
     def __repr__(self) -> str:
         """Return the parameters, and of a fit with a proven gap how it ended."""
-        made, fit = super().__repr__(), vars(self)
+        parameters, fit = super().__repr__(), vars(self)
         if "gap_" not in fit:
-            return made
-        # Of weights that miss rows the gap says nothing.
+            return parameters
+        # The gap says nothing about weights that miss rows.
         if fit["status_"] == "stopped" and "violation_" in fit:
-            return f"<{made}: stopped, violation_ {fit['violation_']:.1e} mV>"
-        return f"<{made}: {fit['status_']}" + f", gap_ {fit['gap_']:.1e}" * bool(fit["status_"] != "infeasible") + ">"
+            return f"<{parameters}: stopped, violation_ {fit['violation_']:.1e} mV>"
+        return (
+            f"<{parameters}: {fit['status_']}"
+            + f", gap_ {fit['gap_']:.1e}" * bool(fit["status_"] != "infeasible")
+            + ">"
+        )
 
     def _fitted(self) -> NDArray[float64]:
         """Return the weights; raise NotFittedError before `fit`."""

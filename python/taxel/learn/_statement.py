@@ -34,8 +34,8 @@ def pattern_rows(
     """Return the rows of each pattern, up to the learner's horizon."""
     count = len(patterns)
     horizons = [None] * count if cone.horizon is None else np.broadcast_to(np.asarray(cone.horizon, float), count)
-    asked = [None] * count if windows is None else windows
-    given = zip(patterns, targets, horizons, asked, strict=True)
+    silences = [None] * count if windows is None else windows
+    given = zip(patterns, targets, horizons, silences, strict=True)
     return [PatternRows(neuron, *example, margin=margin) for example in given]
 
 

@@ -161,9 +161,9 @@ def check_gap(
     hard = isinstance(cone, ConeX)
     if hard and silence is not None:
         raise refused("silence", ": ConeX requires it everywhere and has no windows")
-    trained, times, asked = checked_examples(cone, len(w), patterns, targets, silence)
+    trained, times, silences = checked_examples(cone, len(w), patterns, targets, silence)
     margin = cone.problem_.margin if isinstance(cone, ConeX) else Margin(cone.margin, 0.0)
-    stated = Stated(cone, pattern_rows(cone, cone.neuron_, trained, times, margin=margin, windows=asked), len(w))
+    stated = Stated(cone, pattern_rows(cone, cone.neuron_, trained, times, margin=margin, windows=silences), len(w))
     sides_b, sides_c = stated.sides
     if not ((stated.lb <= w) & (w <= stated.ub)).all():
         return np.inf

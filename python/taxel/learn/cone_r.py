@@ -284,13 +284,13 @@ class ConeRProblem:
     ) -> None:
         trains, times = examples(patterns, targets)
         each = [None] * len(trains) if silence is None else several("silence", silence)
-        asked = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
+        silences = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
         self._trains = len(trains[0][1]) - 1 if trains else 0
         self._counted = _counted(instance("cone", cone, ConeR), trains)
         if self._counted is not None:
             trains = [(parts[0], np.append(parts[1][self._counted], parts[1][-1]), *parts[2:]) for parts in trains]
         _weighed("patterns", self._trains if self._counted is None else len(self._counted), "trains have spikes")
-        self._problem = _core.ConeRProblem(self._handed(cone)[0], trains, times, asked)
+        self._problem = _core.ConeRProblem(self._handed(cone)[0], trains, times, silences)
         self.silent_rows: int = self._problem.silent_rows
 
     def _handed(self, cone: ConeR) -> tuple[str, NDArray[np.float64]]:
@@ -354,17 +354,17 @@ class ConeRProblem:
             return self._weighed(floats("start", start)), None
         if not hasattr(start, "weights_"):
             raise NotFittedError("start: not fitted yet, call fit first")
-        what, multipliers = start._multipliers
-        same = what == (self._problem.rows, instance("cone", cone, ConeR).sides_c)
+        start_rows, multipliers = start._multipliers
+        same = start_rows == (self._problem.rows, instance("cone", cone, ConeR).sides_c)
         return self._weighed(start.weights_), multipliers if same else None
 
     def _for_all(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values of the trains in the fit with a 0 for each of the others."""
         if self._counted is None:
             return values
-        every = np.zeros(self._trains)
-        every[self._counted] = values
-        return every
+        all_values = np.zeros(self._trains)
+        all_values[self._counted] = values
+        return all_values
 
     def _weighed(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
         if self._counted is None:
@@ -374,12 +374,12 @@ class ConeRProblem:
         return weights[self._counted]
 
 
-def _weighed(name: str, count: int, what: str) -> None:
+def _weighed(name: str, count: int, trains: str) -> None:
     """Refuse more trains than a fit can have."""
     if count > _MOST_TRAINS:
         raise refused(
             name,
-            f": {count} {what}, at most {_MOST_TRAINS} can be weighed, as memory goes with the square and time "
+            f": {count} {trains}, at most {_MOST_TRAINS} can be weighed, as memory goes with the square and time "
             "with the cube of them; take an encoder that pools taxels (taxel train --recipe touch, or --encoder "
             "contact_area), fewer levels, or a part of the array",
         )

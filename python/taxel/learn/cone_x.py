@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, flag, floats, instance, number, optional, several, shown, whole
+from taxel._base.arguments import callback, flag, floats, instance, integer, number, optional, several, shown
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._base.parameters import defaults
@@ -354,11 +354,11 @@ class ConeX(SpikeLearner):
         ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
-        held = [] if start is None else _held(instance("start", start, ConeX))
+        known_rows = [] if start is None else _held(instance("start", start, ConeX))
         neuron = Neuron() if self.neuron is None else copy.copy(self.neuron)
         problem = ConeXProblem(self, patterns, targets)
-        multipliers = np.array([multiplier for _, multiplier in held], dtype=np.float64)
-        first = [tuple(row) for row, _ in held]
+        multipliers = np.array([multiplier for _, multiplier in known_rows], dtype=np.float64)
+        first = [tuple(row) for row, _ in known_rows]
         fit = problem._problem.fit(first, multipliers, optional(callback, "progress", progress))
         for name in ("weights", "status", "objective", "gap", "violation", "reason", "engine", "rounds"):
             setattr(self, f"{name}_", getattr(fit, name))
@@ -477,7 +477,7 @@ class ConeXProblem:
         ------
         ProblemError : no such target
         """
-        return self.row(("target", pattern, whole("target", target, 0)))
+        return self.row(("target", pattern, integer("target", target, 0)))
 
     def silence(self, pattern: int, t: float, *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
         """Return the row of silence at a time (6.9b): coefficients of the potential, and its limit.
@@ -528,7 +528,7 @@ class ConeXProblem:
         ------
         ProblemError : no such target, or a grid
         """
-        return self.row(("slope", pattern, whole("target", target, 0)), margin=margin)
+        return self.row(("slope", pattern, integer("target", target, 0)), margin=margin)
 
     def behind(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]:
         """Return the row of B after a target (6.10): the coefficients of the potential, and the required value.
@@ -547,7 +547,7 @@ class ConeXProblem:
         ------
         ProblemError : no such target
         """
-        return self._problem.behind(whole("pattern", pattern, 0), whole("target", target, 0))
+        return self._problem.behind(integer("pattern", pattern, 0), integer("target", target, 0))
 
 
 def _name(row: object) -> tuple[str, int, float]:
@@ -559,7 +559,7 @@ def _name(row: object) -> tuple[str, int, float]:
         raise refused("row", f" is {shown(row)}: must be kind, pattern and target or time") from None
     if not isinstance(kind, str):
         raise refused("row", f" is {shown(row)}: its kind must be a text")
-    return kind, whole("pattern", pattern, 0), number("target or time", at, "ms")
+    return kind, integer("pattern", pattern, 0), number("target or time", at, "ms")
 
 
 def _multipliers(proof: Any) -> Multipliers:
@@ -575,7 +575,7 @@ def _row(name: tuple[str, int, float]) -> Row:
 
 
 def _held(start: ConeX) -> list[tuple[Row, float]]:
-    held: Any = getattr(start, "held_", None)
-    if held is None:
+    rows: Any = getattr(start, "held_", None)
+    if rows is None:
         raise NotFittedError("start: not fitted yet, call fit first")
-    return list(held)
+    return list(rows)

@@ -174,10 +174,10 @@ class OnlineConeR(ConeR):
         each = [None] * len(trains) if silence is None else several("silence", silence)
         if len(each) != len(trains):
             raise refused("silence", f": {len(each)} lists for {len(trains)} patterns, must be one a pattern")
-        asked = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
+        silences = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
         with self._locked():
             self._begin()
-            for p, (pattern, target, here) in enumerate(zip(trains, times, asked, strict=True)):
+            for p, (pattern, target, here) in enumerate(zip(trains, times, silences, strict=True)):
                 self._add(pattern, target, here, f"pattern {p}", f"targets of pattern {p}")
             return self._fit()
 
@@ -186,8 +186,8 @@ class OnlineConeR(ConeR):
         lock: Lock = vars(self).setdefault("_lock", Lock())
         return lock
 
-    def _add(self, pattern: SpikeTrains, targets: ArrayLike, asked: Any, name: str, targets_name: str) -> None:
-        example = instance(name, pattern, SpikeTrains)._parts(), floats(targets_name, targets, "ms"), asked
+    def _add(self, pattern: SpikeTrains, targets: ArrayLike, silence: Any, name: str, targets_name: str) -> None:
+        example = instance(name, pattern, SpikeTrains)._parts(), floats(targets_name, targets, "ms"), silence
         # A train that is silent in this window may have spikes in the next.
         _weighed(name, len(pattern), "trains")
         self._stream.add(*example)

@@ -269,10 +269,10 @@ def _room(rows: PatternRows, w: _Floats, exact: ExactPotential, touch: float) ->
     edges: _Floats = np.unique(np.clip(marks, rows.start, rows.end))
     begin, end = (edges[:-1], edges[1:]) if len(edges) > 1 else (edges, edges)
     # A target within an interval, or at its beginning, has fired; silence is required if both its ends ask for it.
-    asked = (rows.last(end) + rows.neuron.refractory <= begin) & (end <= rows.until(end))
+    allowed = (rows.last(end) + rows.neuron.refractory <= begin) & (end <= rows.until(end))
     if rows.neuron.first_threshold == "printed":
-        asked &= ~((end == rises) & ~np.isfinite(rows.last(end)))
-    begin, end = begin[asked], end[asked]
+        allowed &= ~((end == rises) & ~np.isfinite(rows.last(end)))
+    begin, end = begin[allowed], end[allowed]
     least, found = _Least(np.inf, rows.start, True), np.inf
     for first in range(0, len(begin), BLOCK):
         here = slice(first, first + BLOCK)
@@ -340,8 +340,8 @@ class _Curves:
             kept = (bound >= _PROVEN * found) | settled
             if kept.any():
                 near = kept & (bound <= np.where(left < 1.0, 0.0, touch))
-                of = near if near.any() else kept
-                j = int(np.flatnonzero(of)[bound[of].argmin()])
+                candidates = near if near.any() else kept
+                j = int(np.flatnonzero(candidates)[bound[candidates].argmin()])
                 if bound[j] < least.room or (near.any() and least.silent):
                     silent = None if near.any() else least.silent
                     least = _Least(min(least.room, float(bound[j])), float(begin[j] + low[j]), silent)

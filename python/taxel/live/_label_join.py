@@ -110,13 +110,13 @@ def _common(rows: Sequence[Note], others: Iterable[Note]) -> tuple[Note, ...]:
     return minus(rows, minus(rows, others))
 
 
-def conflict_of(known: Acknowledged, theirs: Sequence[Note]) -> Conflict:
+def conflict_of(known: Acknowledged, rows: Sequence[Note]) -> Conflict:
     """Return where a table lacks what was acknowledged."""
-    missing = minus(known.labels, theirs)
-    added = () if known.table is None else minus(theirs, known.table)
+    missing = minus(known.labels, rows)
+    added = () if known.table is None else minus(rows, known.table)
     deleted = set(map(_key, known.deleted))
-    # Of equal rows one may be deleted and another acknowledged, which is missed where it is not there.
-    returned = tuple(row for row in _common(added, minus(theirs, known.labels)) if _key(row) in deleted)
+    # One of several equal rows may be deleted and another acknowledged, which is missing where it is not there.
+    returned = tuple(row for row in _common(added, minus(rows, known.labels)) if _key(row) in deleted)
     return Conflict(missing, returned, minus(added, returned) if missing or returned else ())
 
 
@@ -218,14 +218,14 @@ class _State:
         self.deleted.pop(_key(row), None)
 
 
-def join(base: Acknowledged, theirs: Sequence[Note], change: Sequence[Sequence[Edit]]) -> Joined:
+def join(base: Acknowledged, file_rows: Sequence[Note], change: Sequence[Sequence[Edit]]) -> Joined:
     """Carry out requests on a table as it is.
 
     Parameters
     ----------
     base : Acknowledged
         What was acknowledged before.
-    theirs : sequence of Note
+    file_rows : sequence of Note
         The rows of the table now.
     change : sequence of sequence of Edit
         Requests, each carried out whole or not at all.
@@ -235,7 +235,7 @@ def join(base: Acknowledged, theirs: Sequence[Note], change: Sequence[Sequence[E
     Joined
         Each row of `base` that was not deleted by `change` is in `rows` or in the conflict of the result.
     """
-    state = _State(theirs, base.labels, base.deleted, theirs if base.table is None else base.table)
+    state = _State(file_rows, base.labels, base.deleted, file_rows if base.table is None else base.table)
     outcomes: list[tuple[Note | None, ...] | str] = []
     for request in change:
         # Only an edit of a row that must be there can fail.
@@ -256,22 +256,22 @@ def _known_after(known: Acknowledged, rows: tuple[Note, ...]) -> Acknowledged:
     return known if conflict_of(known, rows) else replace(known, table=rows)
 
 
-def fold(base: Acknowledged, theirs: Sequence[Note], before: Sequence[Note], after: Sequence[Note]) -> Joined:
+def fold(base: Acknowledged, file_rows: Sequence[Note], before: Sequence[Note], after: Sequence[Note]) -> Joined:
     """Make the changes of another program, from `before` to `after`, on a table as it is.
 
     Another program may still write to a table that taxel has replaced.
     """
-    rows = (*minus(theirs, minus(before, after)), *minus(after, before))
-    return Joined(rows, _known_after(base, rows))
+    merged = (*minus(file_rows, minus(before, after)), *minus(after, before))
+    return Joined(merged, _known_after(base, merged))
 
 
-def settled(base: Acknowledged, theirs: Sequence[Note], conflict: Conflict, *, restore: bool) -> Joined:
+def settled(base: Acknowledged, file_rows: Sequence[Note], conflict: Conflict, *, restore: bool) -> Joined:
     """End a conflict that a person has seen, in the table as it is; other rows stay in conflict.
 
     Parameters
     ----------
     base : Acknowledged
-    theirs : sequence of Note
+    file_rows : sequence of Note
     conflict : Conflict
     restore : bool
         Whether the table gets what was acknowledged; otherwise what it lacks is acknowledged no more.
@@ -280,11 +280,11 @@ def settled(base: Acknowledged, theirs: Sequence[Note], conflict: Conflict, *, r
     ------
     ProblemError : nothing is left of the conflict
     """
-    now = conflict_of(base, theirs)
+    now = conflict_of(base, file_rows)
     missing, returned = _common(now.missing, conflict.missing), _common(now.returned, conflict.returned)
     if conflict and not (missing or returned):
         raise ProblemError("this conflict is over: another window settled it, or the file has changed since")
-    rows, known = tuple(theirs), base
+    rows, known = tuple(file_rows), base
     if restore:
         rows = (*minus(rows, returned), *missing)
     else:

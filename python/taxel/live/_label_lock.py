@@ -89,20 +89,20 @@ def locked_at_once(folder: Path) -> Iterator[bool]:
 
 
 @contextlib.contextmanager
-def _file(place: Path) -> Iterator[bool]:
+def _file(path: Path) -> Iterator[bool]:
     """Lock a file unless another process has locked it; yield whether it is locked."""
     # A named pipe would be waited for.
     how = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
     try:
-        lock = os.open(place, os.O_RDWR | os.O_CREAT | how, 0o666)
+        lock = os.open(path, os.O_RDWR | os.O_CREAT | how, 0o666)
     except PermissionError:
         # That of another user.
-        if not place.exists():
+        if not path.exists():
             raise
-        lock = os.open(place, os.O_RDONLY | how)
+        lock = os.open(path, os.O_RDONLY | how)
     try:
         if not stat.S_ISREG(os.fstat(lock).st_mode):
-            raise ProblemError(f"{place}: is no regular file, as the lock of tables must be; nothing was saved")
+            raise ProblemError(f"{path}: is no regular file, as the lock of tables must be; nothing was saved")
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -110,7 +110,7 @@ def _file(place: Path) -> Iterator[bool]:
             return
         try:
             # A lock file that was deleted in between locks nothing.
-            is_there = os.path.samestat(os.fstat(lock), os.stat(place))
+            is_there = os.path.samestat(os.fstat(lock), os.stat(path))
         except FileNotFoundError:
             is_there = False
         yield is_there

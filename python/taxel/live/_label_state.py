@@ -28,8 +28,8 @@ def bytes_of(descriptor: int) -> bytes:
     return b"".join(parts)
 
 
-def state_place(place: Path) -> Path:
-    return place.with_name(f".{place.name}.acknowledged")
+def state_path(path: Path) -> Path:
+    return path.with_name(f".{path.name}.acknowledged")
 
 
 def to_json(known: Acknowledged) -> dict[str, Any]:
@@ -44,14 +44,14 @@ def to_json(known: Acknowledged) -> dict[str, Any]:
     return {"labels": rows(known.labels), "deleted": rows(known.deleted), "table": rows(known.table)}
 
 
-def whole(value: object, least: int, most: int) -> int:
+def integer(value: object, least: int, most: int) -> int:
     if type(value) is not int or not least <= value <= most:
         raise ValueError("a time that no table has")
     return value
 
 
 def _time(t: object) -> int:
-    return whole(t, -(2**52), 2**52)
+    return integer(t, -(2**52), 2**52)
 
 
 def _text(text: object) -> str:
@@ -68,7 +68,7 @@ def from_json(saved: dict[str, Any]) -> Acknowledged:
             Note(
                 _text(text),
                 _time(t),
-                whole(at_ns, 0, 2**63 - 1),
+                integer(at_ns, 0, 2**63 - 1),
                 _text(recording),
                 _text(source),
                 None if replaces is None else _time(replaces),
@@ -80,27 +80,27 @@ def from_json(saved: dict[str, Any]) -> Acknowledged:
     return Acknowledged(rows("labels"), rows("deleted"), None if saved["table"] is None else rows("table"))
 
 
-def not_saved(place: Path, error: Exception) -> FormatError:
+def not_saved(path: Path, error: Exception) -> FormatError:
     reason = f"not what taxel saved of the labels that it acknowledged ({error})"
-    return FormatError(f"{state_place(place)}: {reason}; delete it to go on without")
+    return FormatError(f"{state_path(path)}: {reason}; delete it to go on without")
 
 
-def newest_of(place: Path, link: Path | None) -> Path:
+def newest_of(path: Path, link: Path | None) -> Path:
     """Return the table by whose name the newest state is saved: the file itself, or a link to it."""
     times = []
-    for name in (place, link):
+    for name in (path, link):
         try:
-            times.append(-1 if name is None else os.stat(state_place(name)).st_mtime_ns)
+            times.append(-1 if name is None else os.stat(state_path(name)).st_mtime_ns)
         except FileNotFoundError:
             times.append(-1)
     # A state that is saved by the link's name is saved beside the file just before.
-    return link if link is not None and times[1] > times[0] else place
+    return link if link is not None and times[1] > times[0] else path
 
 
-def saved_of(place: Path) -> dict[str, Any] | None:
+def saved_of(path: Path) -> dict[str, Any] | None:
     """Return what was saved beside a table; None if nothing was."""
     try:
-        descriptor = open_regular(state_place(place))
+        descriptor = open_regular(state_path(path))
     except FileNotFoundError:
         return None
     try:
@@ -110,7 +110,7 @@ def saved_of(place: Path) -> dict[str, Any] | None:
         if not isinstance(saved, dict):
             raise TypeError("no object")
     except NOT_SAVED as error:
-        raise not_saved(place, error) from None
+        raise not_saved(path, error) from None
     finally:
         os.close(descriptor)
     return saved

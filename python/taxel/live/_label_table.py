@@ -31,7 +31,7 @@ from typing import Any
 
 from taxel._base.arguments import shown
 from taxel._base.documents import decoded
-from taxel._base.files import try_whole
+from taxel._base.files import check_writable
 from taxel._base.header_table import lines_of
 from taxel._core import FormatError, ProblemError, open_regular
 from taxel.labels import Note, rows_of, text_with
@@ -42,12 +42,12 @@ from taxel.live._label_state import (
     NOT_SAVED,
     bytes_of,
     from_json,
+    integer,
     newest_of,
     not_saved,
     saved_of,
-    state_place,
+    state_path,
     to_json,
-    whole,
 )
 
 #: A table that does not end, or cannot be read, and was written within this time is being written, s.
@@ -100,7 +100,7 @@ class TableRead:
 class _File:
     """Hold an open file of a table, without a descriptor if there is none; `link` is its name where that is a link."""
 
-    place: Path
+    path: Path
     link: Path | None
     names: frozenset[str]
     recording: Path | None
@@ -112,14 +112,14 @@ class _File:
     @classmethod
     def read(cls, table: Path, names: frozenset[str], *, final: bool) -> _File:
         """Read a table; `final` if it is not waited for any longer."""
-        place, link = _places(table)
+        path, link = _paths(table)
         recording = _recording_of(table, names)
         try:
-            descriptor = open_regular(place)
+            descriptor = open_regular(path)
         except FileNotFoundError:
-            return cls(place, link, names, recording, None, None, (), ())
+            return cls(path, link, names, recording, None, None, (), ())
         try:
-            return cls(place, link, names, recording, descriptor, None, (), ()).again(final=final)
+            return cls(path, link, names, recording, descriptor, None, (), ()).again(final=final)
         except BaseException:
             os.close(descriptor)
             raise
@@ -131,7 +131,7 @@ class _File:
         # A time in the future is none at which it was written.
         is_new = 0 <= time.time() - os.fstat(self.descriptor).st_mtime <= _WRITTEN_S
         try:
-            rows, columns = _parsed(self.place, self.names, text)
+            rows, columns = _parsed(self.path, self.names, text)
         except FormatError as error:
             if final or not is_new:
                 raise
@@ -143,12 +143,12 @@ class _File:
     @property
     def table(self) -> Path:
         """The name by which the table was read."""
-        return self.link or self.place
+        return self.link or self.path
 
     def text_with(self, rows: Sequence[Note]) -> bytes:
         """Return the text of a table with these rows, with the columns, the ends of lines and the BOM of this one."""
         text = self.text or b""
-        lines = lines_of(decoded(self.place, text))
+        lines = lines_of(decoded(self.path, text))
         end = next((end for end in ("\r\n", "\r") if lines and lines[0].endswith(end)), "\n")
         bom = codecs.BOM_UTF8 if text.startswith(codecs.BOM_UTF8) else b""
         return bom + text_with(rows, self.columns, end).encode()
@@ -156,7 +156,7 @@ class _File:
     def is_current(self) -> bool:
         """Return whether the table is still the file that was read, with the same text."""
         try:
-            there = os.stat(self.place)
+            there = os.stat(self.path)
         except FileNotFoundError:
             return self.descriptor is None
         if self.descriptor is None:
@@ -170,21 +170,21 @@ class _File:
             os.close(self.descriptor)
 
 
-def _places(table: Path) -> tuple[Path, Path | None]:
+def _paths(table: Path) -> tuple[Path, Path | None]:
     """Return the file of a table, and its own name where that is a link to the file."""
-    place, named = Path(os.path.realpath(table)), Path(os.path.realpath(table.parent), table.name)
-    return place, None if named == place else named
+    path, named = Path(os.path.realpath(table)), Path(os.path.realpath(table.parent), table.name)
+    return path, None if named == path else named
 
 
-def _parsed(place: Path, names: frozenset[str], text: bytes) -> tuple[tuple[Note, ...], tuple[str, ...]]:
-    rows, columns = rows_of(place, lines_of(decoded(place, text)))
+def _parsed(path: Path, names: frozenset[str], text: bytes) -> tuple[tuple[Note, ...], tuple[str, ...]]:
+    rows, columns = rows_of(path, lines_of(decoded(path, text)))
     return tuple(replace(row, recording="") if row.recording in names else row for row in rows), columns
 
 
 def _recording_of(table: Path, names: frozenset[str]) -> Path | None:
     """Return the recording beside a table, where it is a file."""
-    places = (table.with_name(name) for name in sorted(names, key=len, reverse=True) if name)
-    return next((place for place in places if place.is_file()), None)
+    candidates = (table.with_name(name) for name in sorted(names, key=len, reverse=True) if name)
+    return next((path for path in candidates if path.is_file()), None)
 
 
 def _digest(text: bytes | None) -> str:
@@ -216,24 +216,24 @@ def _exchange(first: str, second: Path) -> bool:
 # ---------------------------------------------------------------------------------------------- what was acknowledged
 
 
-def _clean(place: Path) -> None:
+def _clean(path: Path) -> None:
     """Remove the new files of a writer that was killed. Only who holds the lock makes such files.
 
     What came out of the table for a new one may be the text of another program, which is put back.
     """
-    beside = state_place(place)
-    names = re.compile(f"\\.({re.escape(beside.name)}|{re.escape(place.name)})\\.[0-9a-f]{{8}}\\.new")
-    for left, found in [(name, found) for name in os.listdir(place.parent) if (found := names.fullmatch(name))]:
-        path = place.with_name(left)
-        if found[1] == place.name:
-            saved = saved_of(place) or {}
-            now, out = _digest_at(place), _digest_at(path)
+    beside = state_path(path)
+    names = re.compile(f"\\.({re.escape(beside.name)}|{re.escape(path.name)})\\.[0-9a-f]{{8}}\\.new")
+    for left, found in [(name, found) for name in os.listdir(path.parent) if (found := names.fullmatch(name))]:
+        left_over = path.with_name(left)
+        if found[1] == path.name:
+            saved = saved_of(path) or {}
+            now, out = _digest_at(path), _digest_at(left_over)
             if now == saved.get("after") and out != saved.get("before"):
-                _exchange(str(path), place)
+                _exchange(str(left_over), path)
             elif now not in (saved.get("before"), out) and out not in (saved.get("before"), saved.get("after")):
                 # Nothing tells whose text it is: a person may look at it.
                 continue
-        path.unlink(missing_ok=True)
+        left_over.unlink(missing_ok=True)
 
 
 def _digest_at(path: Path) -> str:
@@ -256,8 +256,8 @@ def _acknowledged(file: _File) -> Acknowledged:
     ------
     FormatError : what was saved cannot be read
     """
-    place = newest_of(file.place, file.link)
-    saved = saved_of(place)
+    path = newest_of(file.path, file.link)
+    saved = saved_of(path)
     if saved is None:
         return Acknowledged()
     try:
@@ -268,14 +268,14 @@ def _acknowledged(file: _File) -> Acknowledged:
         # another ending shares the table.
         same = file.recording is not None and file.recording.name == saved.get("file")
         if file.descriptor is None and recording is not None and same:
-            now = _beginning(file.recording, whole(recording[0], 0, _BEGINNING))
+            now = _beginning(file.recording, integer(recording[0], 0, _BEGINNING))
             if now not in (None, recording):
                 return Acknowledged()
         if saved["next"] is None or _digest(file.text) == saved["before"]:
             return known
         after = from_json(saved["next"])
     except NOT_SAVED as error:
-        raise not_saved(place, error) from None
+        raise not_saved(path, error) from None
     if _digest(file.text) == saved["after"]:
         return after
     # The writer was killed, and another program has written the table since: what either text may lack is in conflict,
@@ -292,22 +292,22 @@ def _save(file: _File, saved: dict[str, Any]) -> None:
     }
     text = json.dumps({**about, **saved}, ensure_ascii=False).encode()
     if len(text) > MOST_SAVED:
-        raise ProblemError(f"{file.place}: more labels than the {MOST_SAVED} bytes of what taxel saves beside it hold")
-    beside = state_place(file.place)
-    with _new_file(beside, _about(file), text) as (_, name):
-        os.replace(name, beside)
+        raise ProblemError(f"{file.path}: more labels than the {MOST_SAVED} bytes of what taxel saves beside it hold")
+    state = state_path(file.path)
+    with _new_file(state, _about(file), text) as (_, name):
+        os.replace(name, state)
     if file.link is None:
         return
     # The link may become a file again.
-    with contextlib.suppress(OSError), _new_file(beside := state_place(file.link), _about(file), text) as (_, name):
-        os.replace(name, beside)
+    with contextlib.suppress(OSError), _new_file(state := state_path(file.link), _about(file), text) as (_, name):
+        os.replace(name, state)
 
 
 def _about(file: _File) -> os.stat_result | None:
     """Return who may read a table, which holds for what is saved beside it too; None where neither is there."""
-    for place in (file.place, state_place(file.place)):
+    for path in (file.path, state_path(file.path)):
         with contextlib.suppress(FileNotFoundError):
-            return os.stat(place)
+            return os.stat(path)
     return None
 
 
@@ -353,20 +353,20 @@ class LabelTables:
         """Take in what other programs wrote to replaced tables, and close them."""
         self._merge_written()
         with self._watched_lock:
-            every, self._watched = self._watched, []
-        for watched in every:
+            watched_files, self._watched = self._watched, []
+        for watched in watched_files:
             watched.file.close()
 
     def stamp(self, table: Path) -> str:
         """Return a text that changes when a table, or what was acknowledged of it, may have changed."""
-        place, link = _places(table)
-        self._merge_written(link or place)
+        path, link = _paths(table)
+        self._merge_written(link or path)
         while self._close_oldest():
             pass
         parts = []
-        for path in (place, state_place(place), state_place(link or place)):
+        for file in (path, state_path(path), state_path(link or path)):
             try:
-                about = os.stat(path)
+                about = os.stat(file)
                 parts.append(f"{about.st_ino}.{about.st_size}.{about.st_mtime_ns}.{about.st_ctime_ns}")
             except FileNotFoundError:
                 parts.append("-")
@@ -386,13 +386,13 @@ class LabelTables:
         FormatError : no table of labels (names the line)
         OSError : it cannot be read
         """
-        place, _ = _places(table)
+        path, _ = _paths(table)
         for final in _attempts():
             # Where there is no lock, no window has written; a folder that is only looked at gets none.
-            if (place.parent / LOCK).exists():
-                with contextlib.suppress(OSError), locked_at_once(place.parent) as is_mine:
+            if (path.parent / LOCK).exists():
+                with contextlib.suppress(OSError), locked_at_once(path.parent) as is_mine:
                     if is_mine:
-                        _clean(place)
+                        _clean(path)
             try:
                 file = _File.read(table, names, final=final)
             except _BeingWritten:
@@ -417,7 +417,7 @@ class LabelTables:
         ------
         ProblemError : the table is no table of labels or cannot be written, or another program holds the lock
         """
-        joined = self._write(table, names, lambda known, theirs: join(known, theirs, requests))
+        joined = self._write(table, names, lambda known, file_rows: join(known, file_rows, requests))
         return joined.outcomes, TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
 
     def settle(self, table: Path, names: frozenset[str], conflict: Conflict, *, restore: bool) -> TableRead:
@@ -427,7 +427,9 @@ class LabelTables:
         ------
         ProblemError : as of `change`, or nothing is left of the conflict
         """
-        joined = self._write(table, names, lambda known, theirs: settled(known, theirs, conflict, restore=restore))
+        joined = self._write(
+            table, names, lambda known, file_rows: settled(known, file_rows, conflict, restore=restore)
+        )
         return TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
 
     def _write(self, table: Path, names: frozenset[str], action: _Action) -> Joined:
@@ -437,20 +439,20 @@ class LabelTables:
             except OSError as error:
                 if error.errno in _FULL and self._close_oldest(most=0):
                     continue
-                place, _ = _places(table)
+                path, _ = _paths(table)
                 reason = (error.strerror or str(error)).removeprefix("is ").lower()
-                beside = state_place(place)
+                beside = state_path(path)
                 where = f"{beside.name}: " if error.filename == str(beside) else ""
-                raise ProblemError(f"{place.name} cannot be saved: {where}{reason}") from error
+                raise ProblemError(f"{path.name} cannot be saved: {where}{reason}") from error
             while self._close_oldest():
                 pass
             return joined
 
     def _try_write(self, table: Path, names: frozenset[str], action: _Action) -> Joined:
         for final in _attempts():
-            place, _ = _places(table)
-            with locked(place.parent):
-                _clean(place)
+            path, _ = _paths(table)
+            with locked(path.parent):
+                _clean(path)
                 try:
                     file = _File.read(table, names, final=final)
                 except _BeingWritten:
@@ -459,7 +461,7 @@ class LabelTables:
                     raise ProblemError(f"{error}; nothing was saved: mend the table, then try again") from None
                 kept = False
                 try:
-                    if file.place != place:
+                    if file.path != path:
                         # A link that leads elsewhere by now.
                         continue
                     known = _acknowledged(file)
@@ -471,10 +473,10 @@ class LabelTables:
                     elif file.descriptor is not None:
                         os.fsync(file.descriptor)
                     if joined.acknowledged != known or kept:
-                        # Of a table that was replaced, what was saved before tells the same.
+                        # What was saved before tells the same about a table that was replaced.
                         with contextlib.suppress(OSError) if kept else contextlib.nullcontext():
                             _save(file, {"acknowledged": to_json(joined.acknowledged), "next": None})
-                    _sync_folder(place.parent)
+                    _sync_folder(path.parent)
                     return joined
                 finally:
                     if not kept:
@@ -483,24 +485,24 @@ class LabelTables:
 
     def _replace(self, file: _File, known: Acknowledged, joined: Joined) -> bool:
         """Replace a table; return False if another program has written it since it was read."""
-        place = file.place
-        try_whole(place, overwrite=True)
+        path = file.path
+        check_writable(path, overwrite=True)
         text = file.text_with(joined.rows)
         try:
-            again, _ = _parsed(place, file.names, text)
+            again, _ = _parsed(path, file.names, text)
         except FormatError as error:
             raise ProblemError(f"{error}; nothing was saved") from None
         if unlike := minus(joined.rows, again):
-            raise ProblemError(f"{place}: a table cannot hold {shown(unlike[0].text)} as it is; nothing was saved")
+            raise ProblemError(f"{path}: a table cannot hold {shown(unlike[0].text)} as it is; nothing was saved")
         states = {"acknowledged": to_json(known), "next": to_json(joined.acknowledged)}
         _save(file, {**states, "before": _digest(file.text), "after": _digest(text)})
         replaced = False
         try:
-            with _new_file(place, None if file.descriptor is None else _about(file), text) as (descriptor, name):
+            with _new_file(path, None if file.descriptor is None else _about(file), text) as (descriptor, name):
                 replaced = file.is_current() and _put(name, file)
                 if replaced and not _is_old(name, file):
                     # Another program was quicker: its file comes back. It may have written to ours in the meantime.
-                    _exchange(name, place)
+                    _exchange(name, path)
                     self._watch(replace(file, descriptor=os.dup(descriptor), text=text, rows=joined.rows))
                     replaced = False
         finally:
@@ -541,9 +543,9 @@ class LabelTables:
     def _merge_written(self, table: Path | None = None) -> None:
         """Take in what programs wrote to a table that they had opened before it was replaced; `None`: to any table."""
         with self._watched_lock:
-            mine = [watched for watched in self._watched if table in (None, watched.file.table)]
-            self._watched = [watched for watched in self._watched if watched not in mine]
-        found = [(watched.file, self._merge_watched(watched)) for watched in mine]
+            of_table = [watched for watched in self._watched if table in (None, watched.file.table)]
+            self._watched = [watched for watched in self._watched if watched not in of_table]
+        found = [(watched.file, self._merge_watched(watched)) for watched in of_table]
         written = [now for file, now in found if now.file is not file]
         with self._watched_lock:
             # That of a program that holds its table open stays the newest.
@@ -566,7 +568,7 @@ class LabelTables:
         if now is file:
             return replace(watched, seen=seen)
         try:
-            before, _ = _parsed(file.place, file.names, file.text or b"")
+            before, _ = _parsed(file.path, file.names, file.text or b"")
             action = functools.partial(fold, before=before, after=now.rows)
             self._try_write(file.table, file.names, action)
         except (FormatError, ProblemError, OSError):
@@ -597,9 +599,9 @@ def _is_old(name: str, file: _File) -> bool:
 
 
 @contextlib.contextmanager
-def _new_file(place: Path, about: os.stat_result | None, text: bytes) -> Iterator[tuple[int, str]]:
+def _new_file(path: Path, about: os.stat_result | None, text: bytes) -> Iterator[tuple[int, str]]:
     """Write a new text to a file beside that which it will replace, on the disk; remove what is there afterwards."""
-    name = str(place.with_name(f".{place.name}.{secrets.token_hex(4)}.new"))
+    name = str(path.with_name(f".{path.name}.{secrets.token_hex(4)}.new"))
     try:
         how = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
         mode = 0o666 if about is None else stat.S_IMODE(about.st_mode)
@@ -626,17 +628,17 @@ def _put(name: str, file: _File) -> bool:
     """Put a new file in the place of a table, the old one in its own; return False if there is a table by now."""
     if file.descriptor is None:
         try:
-            os.link(name, file.place)
+            os.link(name, file.path)
         except FileExistsError:
             return False
         except OSError as error:
             if error.errno not in _NO_LINK:
                 raise
             try:
-                os.close(os.open(file.place, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666))
+                os.close(os.open(file.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666))
             except FileExistsError:
                 return False
-            os.replace(name, file.place)
-    elif not _exchange(name, file.place):
-        os.replace(name, file.place)
+            os.replace(name, file.path)
+    elif not _exchange(name, file.path):
+        os.replace(name, file.path)
     return True

@@ -20,13 +20,13 @@ from taxel.array import Array
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside
 from taxel.recording import Recording
+from taxel.recording.analysis.health import health
+from taxel.recording.analysis.rest import flickering, loaded_from, of_frames, ticks_by_unit
 from taxel.recording.convert import convert
-from taxel.recording.health import health
-from taxel.recording.opening import is_recording
-from taxel.recording.rest import flickering, loaded_from, of_frames, ticks_by_unit
+from taxel.recording.recognition import is_recording
 from taxel.recording.text_options import TextOptions
 
-#: Of a text table of more bytes than this the beginning is shown first, of so many bytes.
+#: A text table of more bytes than the first number is shown by its beginning first, of as many bytes as the second.
 _LARGE, _BEGINNING = 8 << 20, 1 << 19
 _TEXTS = {".csv", ".txt", ".asc", ".asf", ".lst"}
 
@@ -177,21 +177,21 @@ class ShownFiles:
         key = path, path.stat().st_mtime_ns
         with self._lock:
             known = self._trials
-        every = known[1] if known is not None and known[0] == key else list(self._opening.open(path))
-        if not every:
+        recordings = known[1] if known is not None and known[0] == key else list(self._opening.open(path))
+        if not recordings:
             raise FormatError(f"{path.name}: holds no recording")
-        if len(every) == 1:
-            return every[0], []
+        if len(recordings) == 1:
+            return recordings[0], []
         with self._lock:
-            self._trials = key, every
-        names = [recording.name for recording in every]
+            self._trials = key, recordings
+        names = [recording.name for recording in recordings]
         if trial is not None and trial not in names:
             raise ProblemError(f"{path.name}: holds no trial {trial}")
-        return every[0 if trial is None else names.index(trial)], names
+        return recordings[0 if trial is None else names.index(trial)], names
 
-    def read(self, path: Path, trial: str | None, *, whole: bool) -> tuple[Path | None, ReadFrames | None]:
+    def read(self, path: Path, trial: str | None, *, entire: bool) -> tuple[Path | None, ReadFrames | None]:
         """Return events as a .mcap, or frames; arguments are those of `FileRequests.read`."""
-        beginning = None if whole else self._beginning(path)
+        beginning = None if entire else self._beginning(path)
         if beginning is not None:
             recording, names, left_s = beginning
         else:
@@ -211,9 +211,9 @@ class ShownFiles:
         for left, sensor in zip(lefts, frames.values(), strict=True):
             judged = health(sensor)
             untested += int(np.count_nonzero(judged.untested))
-            for kind, places in judged.named().items():
+            for kind, taxels in judged.named().items():
                 if kind in found:
-                    found[kind] += [(x + left, y) for x, y in places]
+                    found[kind] += [(x + left, y) for x, y in taxels]
         return found["dead"], found["stuck"], found["noisy"], untested
 
     def _temporary(self) -> Path:
@@ -223,9 +223,9 @@ class ShownFiles:
             return Path(tempfile.mkdtemp(dir=self._folder.name))
 
     def _converted(self, recording: Recording) -> Path:
-        place = self._temporary() / f"{recording.path.stem}.mcap"
-        convert(recording, place)
-        return place
+        target = self._temporary() / f"{recording.path.stem}.mcap"
+        convert(recording, target)
+        return target
 
     def _beginning(self, path: Path) -> tuple[Recording, list[str], float] | None:
         """Return the beginning of a large text table, and how long the rest takes to read (s); None of any other file.
@@ -237,30 +237,30 @@ class ShownFiles:
             return None
         with open_file(path) as file:
             head = file.read(_BEGINNING)
-        place = self._temporary() / path.name
-        place.write_bytes(head[: head.rfind(b"\n") + 1])
+        part = self._temporary() / path.name
+        part.write_bytes(head[: head.rfind(b"\n") + 1])
         begun = time.perf_counter()
         try:
-            every = self._opening.opens(place)
+            recordings = self._opening.opens(part)
         except (FormatError, ProblemError, OSError):
             # A format whose files have no beginning of their own, or options that are of the whole file.
             return None
         finally:
-            os.unlink(place)
-        if len(every) != 1:
+            os.unlink(part)
+        if len(recordings) != 1:
             return None
         taken = time.perf_counter() - begun
-        return every[0], [], taken * size / max(1, len(head))
+        return recordings[0], [], taken * size / max(1, len(head))
 
 
 def _sources(recording: Recording) -> dict[str, Recording]:
     """Return the sensors of a recording of frames: its sources, or itself."""
     several = recording.is_several
-    every = recording.sources if several else {recording.label or "board": recording}
+    sensors = recording.sources if several else {recording.label or "board": recording}
     return (
-        {n: sensor for n, sensor in every.items() if not sensor.has_events and not sensor.is_stream}
+        {n: sensor for n, sensor in sensors.items() if not sensor.has_events and not sensor.is_stream}
         if several
-        else every
+        else sensors
     )
 
 

@@ -66,7 +66,7 @@ class StatedOptions:
     sources: Mapping[str, str] | None = option(
         None,
         "Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU "
-        "(serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay).",
+        "(serial:PLACE@BAUD or pipe:PATH, columns=t_us:ax:ay).",
         commands="record",
         flag="--source",
         metavar="NAME=WHAT",
@@ -83,7 +83,7 @@ class StatedOptions:
     lines: bool = option(False, "Print one line of JSON for each detection, and nothing else.", flag="--json")
     send: str | Sequence[str] = option(
         (),
-        "Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD.",
+        "Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD.",
         metavar="WHERE",
         typed="May be repeated.",
     )

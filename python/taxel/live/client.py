@@ -308,7 +308,7 @@ class PanelClient:
     def _frame(self, message: bytes) -> Iterator[tuple[Subject, Item]]:
         flags, _, rows, columns, t = struct.unpack_from("<HIHHq", message, 6)
         column_us, first, count = struct.unpack_from("<IqI", message, 44)
-        pressure, change, curves, rest = (_section(message, *which) for which in _SECTIONS)
+        pressure, change, curves, rest = (_section(message, *section) for section in _SECTIONS)
         if len(rest):
             self._rest = rest
         subject = self._subject
@@ -326,8 +326,8 @@ class PanelClient:
             above = np.zeros(len(pressure), np.int32)
         above[above <= self._noise_floor] = 0
         shape = rows, columns
-        full = self._full.of(t, int(above.max(initial=0)))
-        full_change = self._full_change.of(t, int(np.abs(change.astype(np.int16)).max(initial=0)))
+        full = self._full.update(t, int(above.max(initial=0)))
+        full_change = self._full_change.update(t, int(np.abs(change.astype(np.int16)).max(initial=0)))
         drawn = above.astype(np.uint16).reshape(shape)
         yield subject, Frame(t, drawn, known.reshape(shape), change.reshape(shape), full, full_change)
         self._columns = (np.arange(first + 1, first + count + 1, dtype=np.int64) * column_us, curves)
@@ -373,7 +373,7 @@ class _Scale:
         # Falling values, so that the first is the largest of all.
         self._peaks: deque[tuple[int, int]] = deque()
 
-    def of(self, t: int, value: int) -> int:
+    def update(self, t: int, value: int) -> int:
         """Return it, with the value of this time."""
         while self._peaks and self._peaks[0][0] < t - _SCALE_US:
             self._peaks.popleft()

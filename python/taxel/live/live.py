@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import checked_path, finite, flag, numbers, shown, text, whole
+from taxel._base.arguments import checked_path, finite, flag, integer, numbers, shown, text
 from taxel._base.errors import refused
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted, escaped
@@ -32,7 +32,7 @@ from taxel.tare import Tare
 _LSL = "lsl:"
 
 #: The largest column or row of any taxel.
-_MOST_PLACE = 2**16 - 1
+_MOST_INDEX = 2**16 - 1
 
 #: How long an iteration waits at a time, s.
 _WAIT_S = 0.5
@@ -77,9 +77,9 @@ class Live:
         The board's name among the sources of the recording.
     sources : mapping of str to str, optional
         Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU
-        (serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). By name, in a `.mcap`, each with its own clock:
+        (serial:PLACE@BAUD or pipe:PATH, columns=t_us:ax:ay). By name, in a `.mcap`, each with its own clock:
         "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which sends to that address of this machine;
-        "serial:PATH@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard input); "given" are numbers that a
+        "serial:PLACE@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard input); "given" are numbers that a
         program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of a line (default: those of the
         first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called `t_us`, `time_ms` ...;
         "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its arrival.
@@ -94,7 +94,7 @@ class Live:
     lines : bool
         Print one line of JSON for each detection, and nothing else.
     send : str or sequence of str
-        Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD. UDP sends a datagram
+        Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD. UDP sends a datagram
         each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab streaming layer.
         Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and counted.
     kernel_buffer_bytes : int, 0 to 2147483647
@@ -145,13 +145,13 @@ class Live:
         self._options = replace(options, array=self.array)
         destinations, sources = options.destinations(), options.named_sources()
         outlets = [LslOutlet(to.removeprefix(_LSL)) for to in destinations if to.startswith(_LSL)]
-        inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in sources if how.startswith(_LSL)}
+        inlets = {name: LslInlet(address.removeprefix(_LSL)) for name, address in sources if address.startswith(_LSL)}
         self._inlets = list(inlets.values())
         receivers: list[Callable[[Detection], object]] = [*outlets, *([] if say is None else [say])]
         self._summary: Summary | None = None
         stated = options.for_rust(
             send=[to for to in destinations if not to.startswith(_LSL)],
-            sources=[(what, _source_of(inlets[what]) if what in inlets else how) for what, how in sources],
+            sources=[(name, _source_of(inlets[name]) if name in inlets else address) for name, address in sources],
         )
         feed = None if remote is None else _core.ParcelFeed(remote.place, options.queue_bytes)
         self._core = _core.Live(
@@ -163,8 +163,8 @@ class Live:
         self._remote, self._place = remote, self._core.place()
         if remote is not None and feed is not None:
             remote.begin(feed)
-        for what, inlet in inlets.items():
-            inlet.begin(partial(self._core.sample, what))
+        for name, inlet in inlets.items():
+            inlet.begin(partial(self._core.sample, name))
 
     def _again(self, port: int, host: str, **changed: Any) -> Live:
         """Return another one that works alike, of a board that sends to this address."""
@@ -306,7 +306,7 @@ class Live:
         >>> with Live(0, host="127.0.0.1") as live:
         ...     live.expect_version(2)
         """
-        self._core.expect_version(whole("version", version, 1, 2))
+        self._core.expect_version(integer("version", version, 1, 2))
 
     def source_address(self, name: str) -> tuple[str, int]:
         """Return host and port that another board of the recording sends to.
@@ -349,7 +349,7 @@ class Live:
         ProblemError : no such source, or other columns
         OSError : the disk is full
         """
-        arrival = None if arrived_ns is None else whole("arrived_ns", arrived_ns, 0)
+        arrival = None if arrived_ns is None else integer("arrived_ns", arrived_ns, 0)
         row = numbers("values", values, np.float64).reshape(-1)
         for k in np.flatnonzero(np.abs(row) > VALUE)[:1]:
             raise refused("values", f"[{k}] is {shown(row[k].item())}: must fit 32 bits, or be NaN where it is missing")
@@ -378,9 +378,9 @@ class Live:
             raise refused(
                 "x", f" has {counted(len(columns), 'column')}, y {counted(len(rows), 'row')}: must be as many"
             )
-        for name, places in (("x", columns), ("y", rows)):
-            if len(places) and (places.min() < 0 or places.max() > _MOST_PLACE):
-                wrong = places.min() if places.min() < 0 else places.max()
+        for name, indices in (("x", columns), ("y", rows)):
+            if len(indices) and (indices.min() < 0 or indices.max() > _MOST_INDEX):
+                wrong = indices.min() if indices.min() < 0 else indices.max()
                 raise ProblemError(f"{name}: holds {wrong}, must be a taxel's")
         return tuple(
             Zeroing(**zeroing) for zeroing in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True)))
@@ -440,8 +440,8 @@ class Live:
         OSError : the file cannot be created; the disk was full before the end of the previous one
         ProblemError : `record_later` was not given
         """
-        place = checked_path("path", path)
-        ended = self._core.record(place, text("compression", compression), flag("overwrite", overwrite))
+        file = checked_path("path", path)
+        ended = self._core.record(file, text("compression", compression), flag("overwrite", overwrite))
         return None if ended is None else summary_of(ended)
 
     def record_again(self) -> bool:

@@ -82,8 +82,8 @@ class LslInlet:
                     continue
                 try:
                     # Infinity, and what does not fit 32 bits, is a missing value, and counted as one.
-                    held = [value if abs(value) <= VALUE else math.nan for value in map(float, values)]
-                    receive([stamp, *held], time.time_ns())
+                    finite = [value if abs(value) <= VALUE else math.nan for value in map(float, values)]
+                    receive([stamp, *finite], time.time_ns())
                 except (Error, OSError):
                     # The recording has ended; its own end reports why.
                     return

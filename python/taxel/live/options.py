@@ -8,7 +8,7 @@ from dataclasses import Field, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from taxel import _core
-from taxel._base.arguments import flag, instance, number, parameters, several, shown, text, whole
+from taxel._base.arguments import flag, instance, integer, number, parameters, several, shown, text
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -69,7 +69,9 @@ class LiveOptions(StatedOptions):
             raise ProblemError(
                 f'sources is {shown(self.sources)}: must be a mapping, as {{"imu": "serial:/dev/ttyACM0"}}'
             )
-        return [(text("name of a source", name), text(f"source {name}", what)) for name, what in self.sources.items()]
+        return [
+            (text("name of a source", name), text(f"source {name}", address)) for name, address in self.sources.items()
+        ]
 
     def for_rust(self, *, send: list[str], sources: list[tuple[str, str]]) -> str:
         """Return the options as the compiled part reads them; it opens `send` and `sources` itself."""
@@ -96,7 +98,7 @@ def _plain(option: Field[Any], value: object) -> object:
         return None
     checks: dict[Any, Callable[[], object]] = {
         "bool": lambda: flag(option.name, value),
-        "int": lambda: whole(option.name, value, option.metadata["min"], option.metadata["max"]),
+        "int": lambda: integer(option.name, value, option.metadata["min"], option.metadata["max"]),
         "str": lambda: text(option.name, value),
     }
     return checks.get(option.type, lambda: number(option.name, value))()

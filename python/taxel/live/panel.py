@@ -9,12 +9,11 @@ from pathlib import Path
 from types import TracebackType
 
 from taxel import _core
-from taxel._base.arguments import callback, checked_path, flag, instance, text, whole
+from taxel._base.arguments import callback, checked_path, flag, instance, integer, text
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.detect import load
 from taxel.device import Cable
-from taxel.formats.ros import is_bag
 from taxel.frames import Frames
 from taxel.live._requests import Requests
 from taxel.live._requests.board import BoardRequests
@@ -22,7 +21,7 @@ from taxel.live._shown_files import Opening
 from taxel.live.live import Live
 from taxel.recording import Recording
 from taxel.recording.frames import period_us
-from taxel.recording.opening import check_recording, recordings_in
+from taxel.recording.recognition import check_recording, is_folder, recordings_in
 from taxel.recording.text_options import TextOptions
 from taxel.tare import Tare
 
@@ -39,7 +38,7 @@ class Panel:
         A live board; or a recording to show first, any file or folder that `taxel.open` reads: of a folder its first
         recording. Others of the folder can be opened too.
     control : str, optional
-        The board's serial line ("/dev/ttyUSB0", host:port), with which the page reads and sets registers.
+        The board's serial line ("COM3", "/dev/ttyACM0", host:port), with which the page reads and sets registers.
     folder : path, optional
         The folder of recordings, also of new ones. Default: that of the recording, or the current one.
     port : int, 0 to 65535
@@ -83,14 +82,14 @@ class Panel:
         opened, shown = None, None
         how = TextOptions() if options is None else instance("options", options, TextOptions)
         if self._live is None:
-            place = Path(checked_path("shows", shows))
+            shown_path = Path(checked_path("shows", shows))
             if control is not None:
                 raise refused("control", ": a recording has no board; give a taxel.live.Live")
             if folder is not None:
                 raise refused("folder", ": is the recording's own")
-            folder, opened = _folder_and_name(place, how.layout)
+            folder, opened = _folder_and_name(shown_path, how.layout)
             opens = how.open_joined if opens is None and how.given() else opens
-            shown = None if place.is_dir() and not is_bag(place) else folder / opened
+            shown = None if is_folder(shown_path) else folder / opened
         if how.rate_hz is not None:
             period_us("rate_hz", how.rate_hz)
         opening = Opening() if opens is None else Opening(callback("opens", opens), shown, how)
@@ -101,7 +100,7 @@ class Panel:
         try:
             self._core = _core.Panel(
                 text("host", host),
-                whole("port", port, 0, 65_535),
+                integer("port", port, 0, 65_535),
                 Path.cwd() if folder is None else Path(checked_path("folder", folder)),
                 opened,
                 opens is not None,
@@ -230,14 +229,14 @@ class Panel:
         self._requests.board.connect(control)
         self._core.connected(control)
 
-    def _restartable(self, what: str) -> Live:
+    def _restartable(self, action: str) -> Live:
         if self._live is None:
-            raise ProblemError(f"{what}: this panel shows recordings only")
+            raise ProblemError(f"{action}: this panel shows recordings only")
         if self._live._options.record is not None:
-            raise ProblemError(f"{what}: a recording was begun with this address; end it first")
+            raise ProblemError(f"{action}: a recording was begun with this address; end it first")
         if self._live._remote is not None:
             raise ProblemError(
-                f"{what}: the board is another computer's, which sets its address and the meaning of its intensities"
+                f"{action}: the board is another computer's, which sets its address and the meaning of its intensities"
             )
         return self._live
 
@@ -264,30 +263,32 @@ class Panel:
         return f"Panel({'ended' if self._stopped else self._url.partition('#')[0]})"
 
 
-def _folder_and_name(place: Path, layout: str | os.PathLike[str] | None) -> tuple[Path, str]:
+def _folder_and_name(path: Path, layout: str | os.PathLike[str] | None) -> tuple[Path, str]:
     """Return the folder of a recording and its name there; of a folder its first recording.
 
     The server indexes it when a client opens it; what is no recording is refused now.
     """
-    if place.is_dir() and not is_bag(place):
-        files = recordings_in(place, layout)
+    if is_folder(path):
+        files = recordings_in(path, layout)
         if not files:
-            raise ProblemError(f"{place}: holds no recording; name a file, or one of its folders")
-        place = files[0]
-    if not place.exists():
-        raise FileNotFoundError(2, "no such recording", str(place))
-    check_recording(place, layout)
-    place = place.resolve()
+            raise ProblemError(f"{path}: holds no recording; name a file, or one of its folders")
+        path = files[0]
+    if not path.exists():
+        raise FileNotFoundError(2, "no such recording", str(path))
+    check_recording(path, layout)
+    path = path.resolve()
     try:
-        place.name.encode()
+        path.name.encode()
     except UnicodeEncodeError:
-        raise ProblemError(f"{place}: its name is no UTF-8, which the page cannot hold; rename it") from None
-    return place.parent, place.name
+        raise ProblemError(f"{path}: its name is no UTF-8, which the page cannot hold; rename it") from None
+    return path.parent, path.name
 
 
 def _rest_of_held(live: Live) -> Tare:
     """Return the values that the taxels of a board hold now as their rest."""
-    held = live.frame.astype(float)
-    if not held.any():
+    values = live.frame.astype(float)
+    if not values.any():
         raise ProblemError("read_out: no value has arrived yet that could be the taxels' rest; wait for the board")
-    return Tare.take(Frames([held, held], [0, 1], unit="ticks", array=live.array), note="held when the readout began")
+    return Tare.take(
+        Frames([values, values], [0, 1], unit="ticks", array=live.array), note="held when the readout began"
+    )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from taxel import _core
-from taxel._base.arguments import flag, number, several, shown, text, whole
+from taxel._base.arguments import flag, integer, number, several, shown, text
 from taxel._core import ProblemError
 from taxel.wire import FRAME_US
 
@@ -61,9 +61,9 @@ def send(
     """
     return _core.send(
         text("host", host),
-        whole("port", port, 1, 65_535),
+        integer("port", port, 1, 65_535),
         [_datagram(n, d) for n, d in enumerate(several("datagrams", datagrams))],
-        whole("each", each, 1, 2**31 - 1),
+        integer("each", each, 1, 2**31 - 1),
         number("period_us", period_us),
         number("seconds", seconds),
         flag("segment", segment),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import instance, number, numbers, parameters, text, whole
+from taxel._base.arguments import instance, integer, number, numbers, parameters, text
 from taxel._base.errors import refused
 from taxel._base.messages import counted, plain
 from taxel.array import Array
@@ -65,11 +65,11 @@ class Source:
         board: int = 0,
     ) -> None:
         self.array = instance("array", array, Array)
-        held, self.shift = Registers._of_source(self.array, number("rate", rate), whole("bits", bits, 1, 16))
+        registers, self.shift = Registers._of_source(self.array, number("rate", rate), integer("bits", bits, 1, 16))
         self.bits = int(bits)
-        self.registers = held.replace(noise_floor=whole("noise_floor", noise_floor, 0, 255))
+        self.registers = registers.replace(noise_floor=integer("noise_floor", noise_floor, 0, 255))
         options = parameters(
-            {"board": whole("board", board, 0, 65_535), "seed": int.from_bytes(os.urandom(2), "little")}
+            {"board": integer("board", board, 0, 65_535), "seed": int.from_bytes(os.urandom(2), "little")}
         )
         self._core = _core.SendingBoard(text("to", to), array._parts(), self.registers._json(), options)
 

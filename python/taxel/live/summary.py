@@ -8,7 +8,7 @@ from typing import Any
 
 from taxel import _core
 from taxel.recording import open_one
-from taxel.recording.read_mcap import DOUBTS, STEPS
+from taxel.recording.readers.mcap import DOUBTS, STEPS
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
 
@@ -68,7 +68,7 @@ def summary_of(ended: _core.Ended) -> Summary:
     path = ended.path
     tare = None if ended.tare is None else Tare.from_json(ended.tare)
     verdict = Verdict._from(ended.verdict)
-    # Of these the file has its own times.
+    # The file has its own times of these.
     if {*DOUBTS, *STEPS} & {*verdict.damaged, *verdict.noted} and path is not None and path.suffix == ".mcap":
         verdict = open_one(path).verdict
     return Summary(ended.counters, verdict, path, tare)

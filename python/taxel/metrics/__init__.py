@@ -14,4 +14,4 @@ from taxel.metrics.victor_purpura import victor_purpura as victor_purpura
 from taxel.metrics.victor_purpura_multi_unit import victor_purpura_multi_unit as victor_purpura_multi_unit
 
 # The imports above are the registry of metrics.
-__all__ = [name for name, held in sorted(globals().items()) if callable(held)]
+__all__ = [name for name, value in sorted(globals().items()) if callable(value)]

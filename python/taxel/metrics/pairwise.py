@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, whole
+from taxel._base.arguments import callback, integer
 from taxel.metrics._metric import Pattern, listed, stated
 from taxel.spikes import SpikeTrains
 
@@ -57,7 +57,7 @@ def pairwise(
     """
     stating = stated(metric, parameters)
     rows, columns = listed(metric, "a", a), None if b is None else listed(metric, "b", b)
-    count = None if threads is None else whole("threads", threads, 1, 4096)
+    count = None if threads is None else integer("threads", threads, 1, 4096)
     if progress is not None:
         callback("progress", progress)
     distances = _core.pairwise(stating, rows, columns, count, None, progress)

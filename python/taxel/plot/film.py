@@ -22,7 +22,7 @@ from taxel._base.files import write_whole
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.recording.pressure import above_rest_at
+from taxel.recording.analysis.pressure import above_rest_at
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 
@@ -66,10 +66,10 @@ def film(
     ProblemError : no event, no intensities, a file ending without a writer, or a film of more than 2000 frames
     FileExistsError : the file is there already
     """
-    place = Path(path)
+    target = Path(path)
     if not finite("slower", slower) > 0:
         raise refused("slower", f" is {slower:g}: must be above 0")
-    writer = writer_of(place)
+    writer = writer_of(target)
     if not len(events) or events.intensity is None:
         raise refused("events", ": nothing to draw; a film is of events with intensities")
     begin = events.markers[0][0] if events.markers else int(events.t[0])
@@ -99,7 +99,7 @@ def film(
         # Writers require a file name with an ending, so they write to a temporary file, whose bytes are copied to
         # `file`.
         with tempfile.TemporaryDirectory() as folder:
-            film = Path(folder) / f"film{place.suffix.lower()}"
+            film = Path(folder) / f"film{target.suffix.lower()}"
             with writer.saving(figure, str(film), dpi=80):
                 for n, (t, frame) in enumerate(zip(times, over, strict=True)):
                     image.set_data(frame)
@@ -108,21 +108,21 @@ def film(
                     watch((n + 1) / len(times))
             file.write(film.read_bytes())
 
-    return write_whole(place, write, overwrite=overwrite)  # type: ignore[arg-type]
+    return write_whole(target, write, overwrite=overwrite)  # type: ignore[arg-type]
 
 
-def writer_of(place: Path) -> animation.AbstractMovieWriter:
+def writer_of(file: Path) -> animation.AbstractMovieWriter:
     """Return matplotlib's writer for a film of that name.
 
     Raises
     ------
     ProblemError : no writer supports the ending
     """
-    if place.suffix.lower() == ".gif":
+    if file.suffix.lower() == ".gif":
         return animation.PillowWriter(fps=_RATE_HZ)
-    if place.suffix.lower() in (".mp4", ".webm", ".mkv", ".mov") and animation.writers.is_available("ffmpeg"):
+    if file.suffix.lower() in (".mp4", ".webm", ".mkv", ".mov") and animation.writers.is_available("ffmpeg"):
         return animation.FFMpegWriter(fps=_RATE_HZ)
-    raise ProblemError(f"{place}: must end in .gif; .mp4, .webm, .mkv and .mov need the program ffmpeg")
+    raise ProblemError(f"{file}: must end in .gif; .mp4, .webm, .mkv and .mov need the program ffmpeg")
 
 
 def _stage(array: Array, times: NDArray[np.float64], most: float) -> tuple[Figure, AxesImage, Axes]:

@@ -16,7 +16,7 @@ from taxel.frames import Frames
 from taxel.plot.nouns import detections, event_picture, pressure_map, raster
 from taxel.plot.recordings import health_map, overview
 from taxel.recording import Recording
-from taxel.recording.health import Health
+from taxel.recording.analysis.health import Health
 from taxel.spikes import SpikeTrains
 
 Drawn = Events | Frames | SpikeTrains | Detections | Recording | Health

@@ -16,8 +16,8 @@ from taxel._base.times import beginning_us, begun
 from taxel.frames import Frames
 from taxel.plot.nouns import axes
 from taxel.recording import Health, Recording, health
-from taxel.recording.pressure import Series, above_rest
-from taxel.recording.rest import Rest
+from taxel.recording.analysis.pressure import Series, above_rest
+from taxel.recording.analysis.rest import Rest
 
 F = TypeVar("F", bound=FigureBase)
 
@@ -131,23 +131,23 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
     ['contact area (mm2)', 'peak (kPa)', 'sum (kPa)', 'centre (mm)']
     """
     nowhere = np.full(instance("frames", frames, Frames).array.rows * frames.array.columns, np.nan)
-    of = Series.of(frames, above, Rest("none", nowhere))
+    series = Series.from_frames(frames, above, Rest("none", nowhere))
     if figure is None:
         figure = plt.figure(figsize=(11, 6), layout="constrained")
-    curves = [(f"peak ({of.unit})", of.peak), (f"sum ({of.unit})", of.total)]
-    if of.area is not None:
-        curves.insert(0, (f"contact area ({of.area_unit})", of.area))
-    rows = instance("figure", figure, FigureBase).subplots(len(curves) + (of.centre is not None), 1, sharex=True)
+    curves = [(f"peak ({series.unit})", series.peak), (f"sum ({series.unit})", series.total)]
+    if series.area is not None:
+        curves.insert(0, (f"contact area ({series.area_unit})", series.area))
+    rows = instance("figure", figure, FigureBase).subplots(len(curves) + (series.centre is not None), 1, sharex=True)
     begin_us = beginning_us(frames.t)
     t = (frames.t - begin_us) / 1e6
     for ax, (name, values) in zip(rows, curves, strict=False):
         ax.plot(t, values, color="black", linewidth=0.8)
         ax.set_ylabel(escaped(name))
-    if of.centre is not None:
-        names = ("column", "row") if of.centre_unit == "taxels" else ("x", "y")
-        for axis, colour, name in zip(of.centre.T, ("#c44e52", "#4c72b0"), names, strict=True):
+    if series.centre is not None:
+        names = ("column", "row") if series.centre_unit == "taxels" else ("x", "y")
+        for axis, colour, name in zip(series.centre.T, ("#c44e52", "#4c72b0"), names, strict=True):
             rows[-1].plot(t, axis, color=colour, linewidth=0.8, label=name)
-        rows[-1].set_ylabel(escaped(f"centre ({of.centre_unit})"))
+        rows[-1].set_ylabel(escaped(f"centre ({series.centre_unit})"))
         rows[-1].legend(loc="upper right")
     rows[-1].set_xlabel(_time(begin_us))
     return figure
@@ -193,9 +193,9 @@ def _map(values: NDArray[np.floating], label: str, health: Health, ax: Axes) -> 
     """Draw a value of each taxel, with those marked that are dead, stuck or noisy."""
     image = ax.imshow(values, origin="upper", cmap="Greys", interpolation="nearest")
     ax.figure.colorbar(image, ax=ax, label=escaped(label))
-    for name, places in health.named().items():
-        if places:
-            x, y = np.array(places).T
+    for name, taxels in health.named().items():
+        if taxels:
+            x, y = np.array(taxels).T
             ax.scatter(x, y, marker="s", s=14, facecolors="none", edgecolors=_COLOURS[name], label=f"{name} ({len(x)})")
     if ax.get_legend_handles_labels()[0]:
         ax.legend(loc="upper right", fontsize="small")

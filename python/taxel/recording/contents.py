@@ -10,57 +10,58 @@ from typing import Any, NoReturn, TypeVar
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.once import Once, known
 from taxel.recording.verdict import Verdict
 
 __all__ = [
-    "Board",
+    "BoardSource",
     "Contents",
     "Drawn",
     "FrameSource",
+    "RecordedSource",
     "S",
     "Several",
-    "Source",
     "Stream",
     "alone",
     "apply_rule",
     "name_remarks",
-    "parts_of",
+    "refuse_several",
+    "sections_of",
     "several",
     "share_clock",
     "source_from",
     "with_losses",
 ]  # fmt: skip
 
-P = TypeVar("P", parts.Wire, parts.Columns)
-S = TypeVar("S", bound="Source")
+P = TypeVar("P", sections.Wire, sections.SampleColumns)
+S = TypeVar("S", bound="RecordedSource")
 
 
 @dataclass(frozen=True, eq=False)
-class Source(ABC):
+class RecordedSource(ABC):
     """Hold what all sources have: the header of a board, of frames, and of a stream of numbers."""
 
-    origin: parts.Origin
-    sensor: parts.Sensor
-    settings: parts.Settings = field(default_factory=parts.Settings, kw_only=True)
-    marks: parts.Marks = field(default_factory=parts.Marks, kw_only=True)
-    timing: parts.Timing = field(default_factory=parts.Timing, kw_only=True)
-    losses: parts.Losses = field(default_factory=parts.Losses, kw_only=True)
+    origin: sections.Origin
+    sensor: sections.Sensor
+    settings: sections.Settings = field(default_factory=sections.Settings, kw_only=True)
+    marks: sections.Marks = field(default_factory=sections.Marks, kw_only=True)
+    timing: sections.Timing = field(default_factory=sections.Timing, kw_only=True)
+    losses: sections.Losses = field(default_factory=sections.Losses, kw_only=True)
 
     @property
     def has_events(self) -> bool:
         """Whether it holds events (else frames)."""
-        return isinstance(self, Board)
+        return isinstance(self, BoardSource)
 
     @property
     @abstractmethod
     def table(self) -> Events | Frames:
         """The events or the frames."""
 
-    def part(self, kind: type[P]) -> P:
-        """Return its part of a type, of which there need not be one; else an empty one."""
-        return next((part for part in parts_of(self).values() if isinstance(part, kind)), None) or kind()
+    def section(self, kind: type[P]) -> P:
+        """Return its section of a type; an empty one where it has none."""
+        return next((found for found in sections_of(self).values() if isinstance(found, kind)), None) or kind()
 
     @property
     def columns(self) -> tuple[str, ...] | None:
@@ -74,11 +75,11 @@ class Source(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Board(Source):
+class BoardSource(RecordedSource):
     """Hold what a board sent."""
 
-    event_table: parts.EventTable
-    wire: parts.Wire = field(default_factory=parts.Wire)
+    event_table: sections.EventTable
+    wire: sections.Wire = field(default_factory=sections.Wire)
 
     @property
     def table(self) -> Events:
@@ -87,10 +88,10 @@ class Board(Source):
 
 
 @dataclass(frozen=True, eq=False)
-class FrameSource(Source):
+class FrameSource(RecordedSource):
     """Hold frames."""
 
-    frame_table: parts.FrameTable
+    frame_table: sections.FrameTable
 
     @property
     def table(self) -> Frames:
@@ -102,23 +103,23 @@ class FrameSource(Source):
 class Drawn(FrameSource):
     """Hold frames that were drawn of a board's events, whose bytes are still there."""
 
-    wire: parts.Wire = field(default_factory=parts.Wire)
+    wire: sections.Wire = field(default_factory=sections.Wire)
 
 
 @dataclass(frozen=True, eq=False)
 class Stream(FrameSource):
     """Hold a stream of numbers, whose lines are frames of one row."""
 
-    stream: parts.Columns
+    stream: sections.SampleColumns
 
 
 @dataclass(frozen=True, eq=False)
-class Several(Source):
+class Several(RecordedSource):
     """Hold what a file of several sensors says as a whole; all that is of a single one refuses to be read."""
 
-    refuse: Callable[[], NoReturn] = field(metadata={"is_part": False})
-    first: Source = field(metadata={"is_part": False})
-    are_frames: bool = field(metadata={"is_part": False})
+    refuse: Callable[[], NoReturn] = field(metadata={"is_section": False})
+    first: RecordedSource = field(metadata={"is_section": False})
+    are_frames: bool = field(metadata={"is_section": False})
 
     @property
     def has_events(self) -> bool:
@@ -136,46 +137,58 @@ class Several(Source):
         self.refuse()
 
 
-def parts_of(of: Source) -> dict[str, parts.Part]:
-    """Return the parts of a source by the names of its fields."""
-    return {field.name: getattr(of, field.name) for field in fields(of) if field.metadata.get("is_part", True)}
+def refuse_several(source: RecordedSource) -> None:
+    """Refuse a file of several sensors as a whole, by an error that lists its sources."""
+    if isinstance(source, Several):
+        source.refuse()
 
 
-def apply_rule(of: S, rule: Callable[[parts.Part], parts.Part | None], lines: Callable[[], Iterable[str]] = tuple) -> S:
-    """Return a source with a rule applied to each of its parts.
+def sections_of(source: RecordedSource) -> dict[str, sections.Section]:
+    """Return the sections of a source by the names of its fields."""
+    return {
+        field.name: getattr(source, field.name) for field in fields(source) if field.metadata.get("is_section", True)
+    }
+
+
+def apply_rule(
+    source: S, rule: Callable[[sections.Section], sections.Section | None], losses: Callable[[], Iterable[str]] = tuple
+) -> S:
+    """Return a source with a rule applied to each of its sections.
 
     Parameters
     ----------
-    of : Source
+    source : Source
     rule : function
-        Returns the part's successor, of the same type, or None if it is lost, which `Losses.lost` then says.
-    lines : function that returns lines, optional
+        Returns the section's successor, of the same type, or None if it is lost, which `Losses.lost` then says.
+    losses : function that returns lines, optional
         What else is lost.
     """
-    old_parts = parts_of(of)
-    after = {name: rule(part) for name, part in old_parts.items()}
-    gone = [old_parts[name] for name, part in after.items() if part is None]
-    # Only a part whose fields have defaults may be lost.
-    none: Callable[[str], Any] = lambda name: type(old_parts[name])()  # type: ignore[call-arg]  # noqa: E731
-    changed: dict[str, Any] = {name: none(name) if part is None else part for name, part in after.items()}
-    return with_losses(replace(of, **changed), lambda: [*(line for part in gone for line in part.lines()), *lines()])
+    sections_before = sections_of(source)
+    after = {name: rule(section) for name, section in sections_before.items()}
+    left_out = [sections_before[name] for name, section in after.items() if section is None]
+    # Only a section whose fields have defaults may be lost.
+    none: Callable[[str], Any] = lambda name: type(sections_before[name])()  # type: ignore[call-arg]  # noqa: E731
+    changed: dict[str, Any] = {name: none(name) if section is None else section for name, section in after.items()}
+    return with_losses(
+        replace(source, **changed), lambda: [*(line for section in left_out for line in section.losses()), *losses()]
+    )
 
 
-def with_losses(of: S, lines: Callable[[], Iterable[str]]) -> S:
+def with_losses(source: S, lines: Callable[[], Iterable[str]]) -> S:
     """Return a source with further lines of what is lost, without duplicates."""
-    lost = Once(lambda: tuple(dict.fromkeys((*of.losses.lost(), *lines()))))
-    return replace(of, losses=replace(of.losses, lost=lost))
+    lost = Once(lambda: tuple(dict.fromkeys((*source.losses.lost(), *lines()))))
+    return replace(source, losses=replace(source.losses, lost=lost))
 
 
 def source_from(
     table: Events | Frames,
-    origin: parts.Origin | None = None,
+    origin: sections.Origin | None = None,
     *,
     untimed: bool = False,
     turned: float | None = None,
     columns: Sequence[str] = (),
     **header: Any,
-) -> Board | FrameSource:
+) -> BoardSource | FrameSource:
     """Return a source of a table.
 
     Parameters
@@ -185,17 +198,17 @@ def source_from(
     untimed, turned : bool, float
         As of `FrameTable`.
     columns : sequence of str
-        Columns of a stream of numbers, as those of `Columns`.
+        Columns of a stream of numbers, as those of `SampleColumns`.
     **header
-        Its other parts; default: a sensor of the table's array alone.
+        Its other sections; default: a sensor of the table's array alone.
     """
-    origin = parts.Origin() if origin is None else origin
-    sensor = header.pop("sensor", None) or parts.Sensor(table.array)
+    origin = sections.Origin() if origin is None else origin
+    sensor = header.pop("sensor", None) or sections.Sensor(table.array)
     if isinstance(table, Events):
-        return Board(origin, sensor, parts.EventTable(known(table)), **header)
-    frame_table = parts.FrameTable(known(table), untimed, turned)
+        return BoardSource(origin, sensor, sections.EventTable(known(table)), **header)
+    frame_table = sections.FrameTable(known(table), untimed, turned)
     if columns:
-        return Stream(origin, sensor, frame_table, parts.Columns(tuple(columns)), **header)
+        return Stream(origin, sensor, frame_table, sections.SampleColumns(tuple(columns)), **header)
     return FrameSource(origin, sensor, frame_table, **header)
 
 
@@ -211,11 +224,11 @@ class Contents:
         All sources of the file by their names.
     """
 
-    main: Source
-    sources: Mapping[str, Source]
+    main: RecordedSource
+    sources: Mapping[str, RecordedSource]
 
     @classmethod
-    def of(cls, source: Source) -> Contents:
+    def single(cls, source: RecordedSource) -> Contents:
         """Return a recording of one source."""
         return cls(source, {source.origin.label: source})
 
@@ -229,7 +242,7 @@ class Contents:
         return isinstance(self.main, Several)
 
 
-def alone(sources: Mapping[str, Source]) -> Contents:
+def alone(sources: Mapping[str, RecordedSource]) -> Contents:
     """Return the contents of a file: those of its only source or its only sensor; else those of `several`.
 
     The verdict is that of all sources.
@@ -243,8 +256,8 @@ def alone(sources: Mapping[str, Source]) -> Contents:
     return Contents(replace(boards[0], losses=losses), sources)
 
 
-def several(sources: Mapping[str, Source]) -> Several:
-    """Return the contents of a file of several sensors as a whole; parts of a single one raise an error."""
+def several(sources: Mapping[str, RecordedSource]) -> Several:
+    """Return the contents of a file of several sensors as a whole; sections of a single one raise an error."""
     first = next(iter(sources.values()))
     path, names = first.origin.path, ", ".join(sources)
 
@@ -254,29 +267,29 @@ def several(sources: Mapping[str, Source]) -> Several:
             f"{next(iter(sources))!r}]; taxel convert --source NAME writes one to a file of its own"
         )
 
-    no: Once[Any] = Once(refuse)
-    every = [source.losses for source in sources.values()]
+    refused: Once[Any] = Once(refuse)
+    losses_of_each = [source.losses for source in sources.values()]
     return Several(
         # A source is named after its file and itself.
         replace(first.origin, name=first.origin.name.removesuffix(f" {first.origin.label}"), label=""),
-        parts.Sensor(first.sensor.array, calibration=no),
+        sections.Sensor(first.sensor.array, calibration=refused),
         refuse,
         first,
         are_frames=share_clock(sources),
-        settings=parts.Settings(held=no, registers=no, register_changes=no),
-        marks=replace(first.marks, board_changes=no, zeroings=no),
-        timing=parts.Timing(no, first.timing.clock_of),
-        losses=parts.Losses(
+        settings=sections.Settings(held=refused, registers=refused, register_changes=refused),
+        marks=replace(first.marks, board_changes=refused, zeroings=refused),
+        timing=sections.Timing(refused, first.timing.clock_of),
+        losses=sections.Losses(
             counts=Once(lambda: {name: source.losses.counts() for name, source in sources.items()}),
             verdict=Once(lambda: _verdict(sources)),
             remarks=name_remarks([(name, source.losses.remarks) for name, source in sources.items()]),
-            truncated=any(losses.truncated for losses in every),
-            lost=Once(lambda: tuple(dict.fromkeys(line for losses in every for line in losses.lost()))),
+            truncated=any(losses.truncated for losses in losses_of_each),
+            lost=Once(lambda: tuple(dict.fromkeys(line for losses in losses_of_each for line in losses.lost()))),
         ),
     )
 
 
-def _verdict(sources: Mapping[str, Source]) -> Verdict | None:
+def _verdict(sources: Mapping[str, RecordedSource]) -> Verdict | None:
     """Return what several sources lost, as far as they say it."""
     verdicts = [(name, source.losses.verdict()) for name, source in sources.items()]
     known_verdicts = [(name, verdict) for name, verdict in verdicts if verdict is not None]
@@ -290,7 +303,7 @@ def name_remarks(remarks: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[str, .
     return tuple(dict.fromkeys(f"{name}: {line}" for name, lines in remarks for line in lines))
 
 
-def share_clock(sources: Mapping[str, Source]) -> bool:
+def share_clock(sources: Mapping[str, RecordedSource]) -> bool:
     """Return whether sources share one clock: frames without arrival times, as those of two feet."""
     return all(
         not source.has_events

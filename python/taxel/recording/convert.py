@@ -20,17 +20,17 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Board, Contents, Source, Stream, alone, share_clock, source_from
+from taxel.recording.contents import BoardSource, Contents, RecordedSource, Stream, alone, share_clock, source_from
 from taxel.recording.frames import as_frames, period_us
 from taxel.recording.kinds import ENDINGS
-from taxel.recording.opening import OpenOptions, open_file
-from taxel.recording.parts import Wire
+from taxel.recording.opening import open_one
 from taxel.recording.recording import Recording
-from taxel.recording.stored import is_made, storable
-from taxel.recording.write_csv import write_csv
-from taxel.recording.write_h5 import write_h5
-from taxel.recording.write_mcap import write_mcap
-from taxel.recording.write_npz import write_npz
+from taxel.recording.sections import Wire
+from taxel.recording.writers.csv import write_csv
+from taxel.recording.writers.h5 import write_h5
+from taxel.recording.writers.mcap import write_mcap
+from taxel.recording.writers.npz import write_npz
+from taxel.recording.writers.stored import needs_new_bytes, storable
 
 __all__ = ["KINDS", "convert"]
 
@@ -83,99 +83,97 @@ def convert(
     >>> taxel.convert(folder / "two.npz", folder / "two.lsa")
     ['the sensor (8 x 8 taxels, of unknown pitch, "array")', 'times finer than 100 us']
     """
-    place = Path(checked_path("target", target))
-    kind = place.suffix.lower()
+    path = Path(checked_path("target", target))
+    kind = path.suffix.lower()
     if kind not in KINDS:
-        raise ProblemError(f"{place}: ends in {kind or 'nothing'!r}; must be {', '.join(KINDS)}")
+        raise ProblemError(f"{path}: ends in {kind or 'nothing'!r}; must be {', '.join(KINDS)}")
     text("compression", compression, ("none", "lz4", "zstd"))
-    if not flag("overwrite", overwrite) and os.path.lexists(place):
-        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(place))
+    if not flag("overwrite", overwrite) and os.path.lexists(path):
+        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(path))
     if frames_hz is not None:
         period_us("frames_hz", frames_hz)
-    whole = _contents(source)
+    contents = _contents(source)
     if frames_hz is not None:
         if isinstance(source, Frames):
             raise refused("frames_hz", ": frames keep their own times; open the file and ask it for frames(rate_hz)")
-        if whole.is_several and share_clock(whole.sources):
-            whole = alone(
-                {name: as_frames(source, frames_hz, name="frames_hz") for name, source in whole.sources.items()}
+        if contents.is_several and share_clock(contents.sources):
+            contents = alone(
+                {name: as_frames(source, frames_hz, name="frames_hz") for name, source in contents.sources.items()}
             )
         else:
-            whole = Contents(as_frames(whole.main, frames_hz, name="frames_hz"), whole.sources)
-    written = storable(whole, place)
-    made, lost = written.main, list(written.main.losses.lost())
+            contents = Contents(as_frames(contents.main, frames_hz, name="frames_hz"), contents.sources)
+    written = storable(contents, path)
+    main, lost = written.main, list(written.main.losses.lost())
     match kind:
         case ".lsa":
-            _write_lsa(place, made, overwrite)
+            _write_lsa(path, main, overwrite)
         case ".npz":
-            write_whole(place, lambda file: write_npz(file, made), overwrite=overwrite)
+            write_whole(path, lambda file: write_npz(file, main), overwrite=overwrite)
         case ".csv":
-            write_whole(place, lambda file: write_csv(file, made.table), overwrite=overwrite)
+            write_whole(path, lambda file: write_csv(file, main.table), overwrite=overwrite)
         case ".h5":
-            write_h5(place, made, overwrite=overwrite)
+            write_h5(path, main, overwrite=overwrite)
         case _:
-            with whole_file(place, overwrite=overwrite) as part:
-                sources_before = whole.sources if written.is_several else {made.origin.label: whole.main}
+            with whole_file(path, overwrite=overwrite) as temporary:
+                sources_before = contents.sources if written.is_several else {main.origin.label: contents.main}
                 counts = {name: _counts(sources_before[name], source) for name, source in written.sources.items()}
-                write_mcap(part, written, compression, counts)
-                lost += _read_otherwise(part, whole.main)
+                write_mcap(temporary, written, compression, counts)
+                lost += _read_otherwise(temporary, contents.main)
     return lost
 
 
-def _write_lsa(place: Path, of: Source, overwrite: bool) -> None:
+def _write_lsa(path: Path, source: RecordedSource, overwrite: bool) -> None:
     """Write a `.lsa` and its `.lss` whole; until then an older pair stays as it is."""
-    done = place.with_suffix(".lss")
-    if not overwrite and os.path.lexists(done):
-        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(done))
+    marker = path.with_suffix(".lss")
+    if not overwrite and os.path.lexists(marker):
+        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(marker))
     with (
-        whole_file(place, overwrite=overwrite) as part,
-        tempfile.TemporaryDirectory(dir=place.parent, prefix=f".{place.name}.") as folder,
+        whole_file(path, overwrite=overwrite) as temporary,
+        tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder,
     ):
-        made = Path(folder) / "made.lsa"
-        payload = of.part(Wire).payload
+        new = Path(folder) / "made.lsa"
+        payload = source.section(Wire).payload
         assert payload is not None  # `storable` sets it
-        _core.write_lsa(made, payload.tobytes())
-        os.replace(made, part)
-    write_whole(done, lambda _: None, overwrite=True)
+        _core.write_lsa(new, payload.tobytes())
+        os.replace(new, temporary)
+    write_whole(marker, lambda _: None, overwrite=True)
 
 
 def _contents(source: object) -> Contents:
     if isinstance(source, str | os.PathLike):
-        options = OpenOptions()
-        with options.within():
-            source = open_file(Path(checked_path("source", source)), options)
+        source = open_one(checked_path("source", source))
     if isinstance(source, Recording):
         return source._contents
     if not isinstance(source, Events | Frames):
         raise refused("source", f" is {shown(source)}: must be a Recording, Events, Frames or the name of a file")
-    return Contents.of(source_from(source))
+    return Contents.single(source_from(source))
 
 
-def _counts(of: Source, written: Source) -> dict[str, Any]:
+def _counts(source: RecordedSource, written: RecordedSource) -> dict[str, Any]:
     """Return the counts of a recording under the names of the live format."""
-    samples = of.stream.samples() if isinstance(of, Stream) else None
+    samples = source.stream.samples() if isinstance(source, Stream) else None
     if samples is not None:
         return {"received": len(samples)}
-    received = len(written.wire.datagrams() or ()) if isinstance(written, Board) else len(written.table)
-    if of.origin.kind == "events":
+    received = len(written.wire.datagrams() or ()) if isinstance(written, BoardSource) else len(written.table)
+    if source.origin.kind == "events":
         # Nothing is missing of what was made here.
         return {"received": received, "missing": 0}
-    if not isinstance(written, Board):
+    if not isinstance(written, BoardSource):
         return {"received": received}
-    counts = of.losses.counts()
+    counts = source.losses.counts()
     known = {name: counts.get(name) or 0 for name in ("dropped_by_kernel", "dropped_by_queue", "received")}
     decoder = counts.get("decoder")
     damage = _core.recording_damage(json.dumps(decoder)) if decoder else {}
     return {**known, "decoder": damage}
 
 
-def _read_otherwise(part: Path, of: Source) -> list[str]:
+def _read_otherwise(path: Path, source: RecordedSource) -> list[str]:
     """Return a line if copied datagrams decode to other events than the recording's."""
-    if not isinstance(of, Board) or is_made(of):
+    if not isinstance(source, BoardSource) or needs_new_bytes(source):
         return []
-    events = of.table
+    events = source.table
     again = Events._from_parts(
-        _core.RecordingReader(part, limits.memory(None), False).decode("direct").events, events.array
+        _core.RecordingReader(path, limits.memory(None), False).decode("direct").events, events.array
     )
     if (len(again), again.intensity is None) != (len(events), events.intensity is None):
         return [f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)"]

@@ -1,4 +1,4 @@
-"""Parts of a recording: by time, by region, and around each note of a label."""
+"""Cuts recordings: by time, by region, and around each note of a label."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from taxel._base.arguments import finite, instance, text, window
 from taxel._core import ProblemError
 from taxel.events import Events
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.changes import Zeroing
-from taxel.recording.contents import Contents, apply_rule
+from taxel.recording.contents import Contents, apply_rule, refuse_several
 from taxel.recording.once import Once
 from taxel.recording.recording import Recording
 
@@ -68,85 +68,89 @@ def cut(
     around = [
         finite(name, value, "us", least=0.0) for name, value in (("before_us", before_us), ("after_us", after_us))
     ]
-    whole = (start_us, stop_us) == (-np.inf, np.inf)
-    stretch = recording if whole else recording.between(start_us, stop_us)
+    is_whole = (start_us, stop_us) == (-np.inf, np.inf)
+    time_slice = recording if is_whole else recording.between(start_us, stop_us)
     if label is None:
-        pieces = [stretch]
+        slices = [time_slice]
     else:
         text("label", label)
-        times = [note.t for note in stretch.notes if note.text == label and note.t is not None]
-        pieces = [stretch.between(t - around[0], t + around[1]) for t in times]
+        times = [note.t for note in time_slice.notes if note.text == label and note.t is not None]
+        slices = [time_slice.between(t - around[0], t + around[1]) for t in times]
     if columns is None and rows is None:
-        return pieces
+        return slices
     across, down = (slice(None) if chosen is None else chosen for chosen in (columns, rows))
-    return [Recording(region(part._contents, across, down)) for part in pieces]
+    return [Recording(region(time_slice._contents, across, down)) for time_slice in slices]
 
 
-def _asked(chosen: slice) -> str:
+def _bounds(chosen: slice) -> str:
     return f"{chosen.start or 0} to {'the last' if chosen.stop is None else chosen.stop}"
 
 
-def region(of: Contents, columns: slice, rows: slice) -> Contents:
+def region(contents: Contents, columns: slice, rows: slice) -> Contents:
     """Return the part of a recording within a rectangle, as a sensor of its own; unchanged if that is all.
 
     Raises
     ------
     ProblemError : an end beyond the array, no taxel in the rectangle, or the file holds several boards
     """
-    array = of.main.sensor.array
+    array = contents.main.sensor.array
     (left, right), (top, bottom) = array.region(columns, rows)
     for name, chosen, count in (("columns", columns, array.columns), ("rows", rows, array.rows)):
         if any(not -count <= end <= count for end in (chosen.start, chosen.stop) if end is not None):
-            raise ProblemError(f"{name} {_asked(chosen)}: there are {count} {name}, 0 to {count - 1}")
+            raise ProblemError(f"{name} {_bounds(chosen)}: there are {count} {name}, 0 to {count - 1}")
     if right <= left or bottom <= top:
-        asked = " and ".join(
-            f"{name} {_asked(chosen)}"
+        bounds = " and ".join(
+            f"{name} {_bounds(chosen)}"
             for name, chosen in (("columns", columns), ("rows", rows))
             if chosen != slice(None)
         )
-        raise ProblemError(f"{asked}: no taxel lies there; there are {array.columns} columns and {array.rows} rows")
+        raise ProblemError(f"{bounds}: no taxel lies there; there are {array.columns} columns and {array.rows} rows")
     if (bottom - top, right - left) == array.shape:
-        return of
-    if of.is_several:
-        # Reading the events raises the error that lists the sources.
-        _ = of.main.table
+        return contents
+    refuse_several(contents.main)
     small = array._part(columns, rows)
 
-    def events(whole: Events) -> Events:
-        inside = whole.region(columns, rows)
+    def events(before: Events) -> Events:
+        inside = before.region(columns, rows)
         x, y = (inside.x - np.uint16(left)), (inside.y - np.uint16(top))
         ticks, present, repaired = inside.intensity, inside.present, inside.repaired
-        return Events._unchecked(inside.t, x, y, inside.p, small, ticks, present, repaired, whole.markers)
+        return Events._unchecked(inside.t, x, y, inside.p, small, ticks, present, repaired, before.markers)
 
-    def zeroings(every: tuple[Zeroing, ...]) -> tuple[Zeroing, ...]:
-        inside = (z for z in every if left <= z.x < right and top <= z.y < bottom)
+    def zeroings(before: tuple[Zeroing, ...]) -> tuple[Zeroing, ...]:
+        inside = (z for z in before if left <= z.x < right and top <= z.y < bottom)
         return tuple(Zeroing(z.t, z.x - left, z.y - top, z.rest, z.before) for z in inside)
 
-    def rule(part: parts.Part) -> parts.Part | None:  # noqa: PLR0911  one a type
-        match part:
-            case parts.Origin() | parts.Timing() | parts.Losses():
-                return part
-            case parts.Sensor():
-                calibration = part.calibration.to(lambda whole: None if whole is None else whole._region(columns, rows))
-                return parts.Sensor(small, part.side, part.heel, calibration)
-            case parts.Settings():
+    def rule(section: sections.Section) -> sections.Section | None:  # noqa: PLR0911  one a type
+        match section:
+            case sections.Origin() | sections.Timing() | sections.Losses():
+                return section
+            case sections.Sensor():
+                calibration = section.calibration.to(
+                    lambda before: None if before is None else before._region(columns, rows)
+                )
+                return sections.Sensor(small, section.side, section.heel, calibration)
+            case sections.Settings():
                 inside = np.s_[top:bottom, left:right]
-                held = part.held.to(lambda held: None if held is None else np.ascontiguousarray(held[inside]))
-                return parts.Settings(held, part.registers, part.register_changes)
-            case parts.Marks():
-                return replace(part, zeroings=Once(lambda: zeroings(part.zeroings())))
-            case parts.EventTable():
-                return parts.EventTable(Once(lambda: events(part.events())))
-            case parts.FrameTable():
-                return replace(part, frames=Once(lambda: part.frames().region(columns, rows)))
-            case parts.Columns():
-                return parts.Columns(part.columns[left:right])
-            case parts.Wire():
+                held = section.held.to(lambda held: None if held is None else np.ascontiguousarray(held[inside]))
+                return sections.Settings(held, section.registers, section.register_changes)
+            case sections.Marks():
+                return replace(section, zeroings=Once(lambda: zeroings(section.zeroings())))
+            case sections.EventTable():
+                return sections.EventTable(Once(lambda: events(section.events())))
+            case sections.FrameTable():
+                return replace(section, frames=Once(lambda: section.frames().region(columns, rows)))
+            case sections.SampleColumns():
+                return sections.SampleColumns(section.columns[left:right])
+            case sections.Wire():
                 return None
             case _:
-                assert_never(part)
+                assert_never(section)
 
-    return Contents.of(apply_rule(of.main, rule, lambda: [*of.main.part(parts.Columns).received(), *of.others()]))
+    return Contents.single(
+        apply_rule(
+            contents.main, rule, lambda: [*contents.main.section(sections.SampleColumns).received(), *contents.others()]
+        )
+    )
 
 
 def span_us(recording: Recording) -> tuple[int, int]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import limits
-from taxel._base.arguments import finite, flag, number, text, whole
+from taxel._base.arguments import finite, flag, integer, number, text
 from taxel._base.documents import memory_of_json, of_json
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
@@ -21,46 +21,48 @@ from taxel.events import Events
 from taxel.formats.checks import sensor as checked
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import FrameSource, Source, source_from
+from taxel.recording.contents import FrameSource, RecordedSource, source_from
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import known
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 
-def json_of(of: Source) -> str:
+def json_of(source: RecordedSource) -> str:
     """Return all fields that are not columns of the table, as the JSON in files.
 
     Raises
     ------
     ProblemError : a description that would not be read again, as it takes too much memory
     """
-    sensor, losses = of.sensor, of.losses
-    registers, changes = of.settings.registers(), of.settings.register_changes()
+    sensor, losses = source.sensor, source.losses
+    registers, changes = source.settings.registers(), source.settings.register_changes()
     driven = registers.array if registers is not None else changes[0][1].array if changes else sensor.array
     document: dict[str, Any] = {
         "array": sensor.array._geometry(),
-        "source": of.origin.source,
+        "source": source.origin.source,
         "side": sensor.side,
         "heel": sensor.heel,
         "registers": None if registers is None else registers._held,
         "registers_array": None if driven == sensor.array else driven._geometry(),
-        "register_changes": [[at, held._held] for at, held in changes],
-        "board_changes": [[change.at_ns, change._described()] for change in of.marks.board_changes()],
-        "notes": [{"text": n.text, "t_us": n.t, "at_ns": n.at_ns} for n in of.marks.notes()],
+        "register_changes": [[at, registers._held] for at, registers in changes],
+        "board_changes": [[change.at_ns, change._described()] for change in source.marks.board_changes()],
+        "notes": [{"text": n.text, "t_us": n.t, "at_ns": n.at_ns} for n in source.marks.notes()],
         "detections": [
             [0, d.label, d.t, d.known, None if np.isnan(d.slope) else d.slope, d.repaired]
-            for d in of.marks.detections()
+            for d in source.marks.detections()
         ],
         "counts": dict(losses.counts()),
-        "verdict": None if losses.verdict() is None else verdict_of(of).to_dict(),
+        "verdict": None if losses.verdict() is None else verdict_of(source).to_dict(),
         "remarks": losses.remarks,
-        "zeroings": [{"t": z.t, "x": z.x, "y": z.y, "rest": z.rest, "before": z.before} for z in of.marks.zeroings()],
-        "columns": of.columns,
-        "untimed": of.untimed,
-        "turned": of.frame_table.turned if isinstance(of, FrameSource) else None,
+        "zeroings": [
+            {"t": z.t, "x": z.x, "y": z.y, "rest": z.rest, "before": z.before} for z in source.marks.zeroings()
+        ],
+        "columns": source.columns,
+        "untimed": source.untimed,
+        "turned": source.frame_table.turned if isinstance(source, FrameSource) else None,
         "truncated": losses.truncated,
         "rebuilt": dict(losses.rebuilt()),
         "lost": losses.lost(),
@@ -68,13 +70,13 @@ def json_of(of: Source) -> str:
     described = json.dumps({name: value for name, value in document.items() if value or isinstance(value, float)})
     if (size := memory_of_json(described)) > limits.ABOUT:
         raise ProblemError(
-            f"{of.origin.name}: its description (sensor, notes, registers, detections) takes {size} bytes of memory; a "
-            f".npz and a .h5 hold at most {limits.ABOUT}"
+            f"{source.origin.name}: its description (sensor, notes, registers, detections) takes {size} bytes of "
+            f"memory; a .npz and a .h5 hold at most {limits.ABOUT}"
         )
     return described
 
 
-def about_of(place: str, document: str) -> dict[str, Any]:
+def about_of(location: str, document: str) -> dict[str, Any]:
     """Return what a file's ``about`` holds by its entries, checked.
 
     Raises
@@ -84,12 +86,12 @@ def about_of(place: str, document: str) -> dict[str, Any]:
     entry = "the whole"
     fields: dict[str, Any] = {}
     try:
-        about = of_json(place, document, limits.ABOUT, room=limits.ABOUT)
+        about = of_json(location, document, limits.ABOUT, room=limits.ABOUT)
         if not isinstance(about, dict):
             raise ProblemError("no object")
         for entry, read in _ENTRIES.items():
             if about.get(entry) is not None:
-                fields[entry] = read(about[entry], place)
+                fields[entry] = read(about[entry], location)
         driven = fields.pop("registers_array", None) or fields.get("array") or Array.thesis()
         for entry in ("registers", "register_changes"):
             if entry in fields:
@@ -97,13 +99,13 @@ def about_of(place: str, document: str) -> dict[str, Any]:
     except FormatError:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, ProblemError) as error:
-        raise FormatError(f"{place}, {entry}: {first_line(error)}; must be JSON as taxel writes it") from None
+        raise FormatError(f"{location}, {entry}: {first_line(error)}; must be JSON as taxel writes it") from None
     return fields
 
 
 def described_source(
-    table: Events | Frames, held: NDArray[np.uint16] | None, origin: parts.Origin, about: Mapping[str, Any]
-) -> Source:
+    table: Events | Frames, held: NDArray[np.uint16] | None, origin: sections.Origin, about: Mapping[str, Any]
+) -> RecordedSource:
     """Return a source of a table and of what `about_of` read; its sensor is that of the table."""
     get = about.get
     none = Detections([], [], [])
@@ -113,15 +115,15 @@ def described_source(
         untimed=get("untimed", False),
         turned=get("turned"),
         columns=get("columns", ()),
-        sensor=parts.Sensor(table.array, get("side", ""), get("heel", "")),
-        settings=parts.Settings(known(held), known(get("registers")), known(get("register_changes", ()))),
-        marks=parts.Marks(
+        sensor=sections.Sensor(table.array, get("side", ""), get("heel", "")),
+        settings=sections.Settings(known(held), known(get("registers")), known(get("register_changes", ()))),
+        marks=sections.Marks(
             board_changes=known(get("board_changes", ())),
             notes=known(get("notes", ())),
             detections=known(get("detections", none)),
             zeroings=known(get("zeroings", ())),
         ),
-        losses=parts.Losses(
+        losses=sections.Losses(
             counts=known(get("counts", {})),
             verdict=known(get("verdict")),
             remarks=get("remarks", ()),
@@ -141,7 +143,7 @@ def array_of(geometry: Mapping[str, Any]) -> Array:
 
 def notes_of(records: Any) -> tuple[Note, ...]:
     """Return notes from records of text, t_us and at_ns."""
-    return tuple(Note(text("text", n["text"]), _time("t_us", n["t_us"]), whole("at_ns", n["at_ns"])) for n in records)
+    return tuple(Note(text("text", n["text"]), _time("t_us", n["t_us"]), integer("at_ns", n["at_ns"])) for n in records)
 
 
 def detections_of(records: Any) -> Detections:
@@ -156,9 +158,9 @@ def zeroings_of(records: Any) -> tuple[Zeroing, ...]:
     """Return zeroed taxels, in order of time, from records of t, x, y, rest and before."""
     zeroings = (
         Zeroing(
-            whole("t", record["t"], -limits.TIME_US, limits.TIME_US),
-            whole("x", record["x"], 0, 65_535),
-            whole("y", record["y"], 0, 65_535),
+            integer("t", record["t"], -limits.TIME_US, limits.TIME_US),
+            integer("x", record["x"], 0, 65_535),
+            integer("y", record["y"], 0, 65_535),
             number("rest", record["rest"]),
             None if record["before"] is None else number("before", record["before"]),
         )
@@ -172,9 +174,9 @@ def board_changes_of(records: Any) -> tuple[BoardChange, ...]:
     return tuple(
         BoardChange(
             _time("t_us", record["t_us"]),
-            whole("at_ns", at),
+            integer("at_ns", at),
             text("change", record["change"]),
-            None if record.get("version") is None else whole("version", record["version"], 0, 255),
+            None if record.get("version") is None else integer("version", record["version"], 0, 255),
             flag("asked", record.get("asked", False)),
         )
         for at, record in records
@@ -182,13 +184,13 @@ def board_changes_of(records: Any) -> tuple[BoardChange, ...]:
 
 
 def _time(name: str, value: Any) -> int | None:
-    return None if value is None else whole(name, value, -limits.TIME_US, limits.TIME_US)
+    return None if value is None else integer(name, value, -limits.TIME_US, limits.TIME_US)
 
 
 def _registers(values: Any, driven: Array) -> Any:
     """Return a set of registers, or a list of times and sets, checked against the array that they drive."""
     if isinstance(values, list):
-        return tuple((whole("at_ns", at), Registers._of(held, driven)) for at, held in values)
+        return tuple((integer("at_ns", at), Registers._of(registers, driven)) for at, registers in values)
     return Registers._of(values, driven)
 
 
@@ -197,7 +199,7 @@ def counts_of(counts: Any, depth: int = 0) -> dict[str, Any]:
     if not isinstance(counts, dict):
         raise ProblemError("no object")
     return {
-        name: n if n is None else counts_of(n, 1) if isinstance(n, dict) and depth == 0 else whole(name, n, 0)
+        name: n if n is None else counts_of(n, 1) if isinstance(n, dict) and depth == 0 else integer(name, n, 0)
         for name, n in ((_OLD_KEYS.get(name, str(name)), n) for name, n in counts.items())
     }
 
@@ -218,12 +220,12 @@ _OLD_KEYS = {"pictures": "frames", "pictures_that_could_not_be_read": "frames_th
 
 #: The reader of each entry by name; registers are checked later, as the array that they drive is another entry.
 _ENTRIES: dict[str, Any] = {
-    "array": lambda value, place: checked(place, array_of(value)),
+    "array": lambda value, location: checked(location, array_of(value)),
     "source": lambda value, _: text("source", value),
     "side": lambda value, _: text("side", value, ("left", "right")),
     "heel": lambda value, _: text("heel", value, ("top", "bottom")),
     "registers": lambda value, _: value,
-    "registers_array": lambda value, place: checked(place, array_of(value)),
+    "registers_array": lambda value, location: checked(location, array_of(value)),
     "register_changes": lambda value, _: value,
     "board_changes": lambda value, _: board_changes_of(value),
     "notes": lambda value, _: notes_of(value),

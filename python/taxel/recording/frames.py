@@ -15,8 +15,17 @@ from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording import parts
-from taxel.recording.contents import Board, Contents, Drawn, FrameSource, Source, Stream, several, with_losses
+from taxel.recording import sections
+from taxel.recording.contents import (
+    Contents,
+    Drawn,
+    FrameSource,
+    RecordedSource,
+    Stream,
+    refuse_several,
+    several,
+    with_losses,
+)
 from taxel.recording.once import UNKNOWN, Once, known
 from taxel.tare import Tare
 
@@ -55,12 +64,12 @@ def times_at(number: NDArray[np.int64], rate_hz: float) -> NDArray[np.int64]:
     return t
 
 
-def as_frames(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz") -> FrameSource:
+def as_frames(source: RecordedSource, rate_hz: float | None = None, *, name: str = "rate_hz") -> FrameSource:
     """Return the same recording as frames.
 
     Parameters
     ----------
-    of : Source
+    source : Source
     rate_hz : float, above 0, optional
         Frames a second, with a period rounded to whole us; default: frames are unchanged, events have 100 a second.
     name : str
@@ -77,27 +86,29 @@ def as_frames(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz"
     ProblemError : an invalid rate; when the frames are read, events without intensities
     """
     period = None if rate_hz is None else period_us(name, rate_hz)
-    if period is not None and of.untimed:
-        raise ProblemError(f"{of.origin.path}: its frames have no times, so they have no rate; see recording.at_rate")
-    if isinstance(of, FrameSource):
-        return replace(of, frame_table=replace(of.frame_table, frames=Once(lambda: _resample(of.table, period))))
-    if not isinstance(of, Board):
-        # Reading the events raises the error that lists the sources.
-        _ = of.table
-    header = {part: getattr(of, part) for part in ("marks", "timing", "losses")}
+    if period is not None and source.untimed:
+        raise ProblemError(
+            f"{source.origin.path}: its frames have no times, so they have no rate; see recording.at_rate"
+        )
+    if isinstance(source, FrameSource):
+        return replace(
+            source, frame_table=replace(source.frame_table, frames=Once(lambda: _resample(source.table, period)))
+        )
+    refuse_several(source)
+    header = {section: getattr(source, section) for section in ("marks", "timing", "losses")}
     # The first frame includes the held values.
-    header["settings"] = parts.Settings(known(None), of.settings.registers, of.settings.register_changes)
-    frames = Once(lambda: _draw(of, period))
-    return Drawn(of.origin, of.sensor, parts.FrameTable(frames), of.part(parts.Wire), **header)
+    header["settings"] = sections.Settings(known(None), source.settings.registers, source.settings.register_changes)
+    frames = Once(lambda: _draw(source, period))
+    return Drawn(source.origin, source.sensor, sections.FrameTable(frames), source.section(sections.Wire), **header)
 
 
-def _draw(of: Source, period: int | None) -> Frames:
-    events, held, stretch = of.table, of.settings.held(), of.timing.stretch
+def _draw(source: RecordedSource, period: int | None) -> Frames:
+    events, held, interval = source.table, source.settings.held(), source.timing.interval
     assert isinstance(events, Events)  # the caller checked
     # A value of 65 535 stands for an unknown one.
     begins = None if held is None else np.where(held == UNKNOWN, 0, held)
     period = round(1e6 / FRAMES_HZ) if period is None else period
-    return Frames.from_events(events, period, *(() if stretch is None else stretch()), held=begins)
+    return Frames.from_events(events, period, *(() if interval is None else interval()), held=begins)
 
 
 def _resample(frames: Frames, period: int | None) -> Frames:
@@ -109,7 +120,7 @@ def _resample(frames: Frames, period: int | None) -> Frames:
     )
 
 
-def at_rate(of: Contents, rate_hz: float) -> Contents:
+def at_rate(contents: Contents, rate_hz: float) -> Contents:
     """Return numbered frames with times: frame k at k / rate.
 
     Raises
@@ -117,15 +128,15 @@ def at_rate(of: Contents, rate_hz: float) -> Contents:
     ProblemError : frames that have times, or an invalid rate
     """
     period_us("rate_hz", rate_hz)
-    if not of.main.untimed:
-        raise ProblemError(f"{of.main.origin.path}: has times of its own; a rate is of frames without times")
-    sources = {name: _at_rate(source, rate_hz) for name, source in of.sources.items()}
-    return Contents(several(sources) if of.is_several else _at_rate(of.main, rate_hz), sources)
+    if not contents.main.untimed:
+        raise ProblemError(f"{contents.main.origin.path}: has times of its own; a rate is of frames without times")
+    sources = {name: _at_rate(source, rate_hz) for name, source in contents.sources.items()}
+    return Contents(several(sources) if contents.is_several else _at_rate(contents.main, rate_hz), sources)
 
 
-def _at_rate(of: Source, rate_hz: float) -> Source:
-    if not isinstance(of, FrameSource) or not of.untimed:
-        return of
+def _at_rate(source: RecordedSource, rate_hz: float) -> RecordedSource:
+    if not isinstance(source, FrameSource) or not source.untimed:
+        return source
 
     def frames(table: Frames) -> Frames:
         return Frames(table.values, frozen(times_at(table.t, rate_hz)), unit=table.unit, array=table.array)
@@ -133,16 +144,18 @@ def _at_rate(of: Source, rate_hz: float) -> Source:
     def notes(before: tuple[Note, ...]) -> tuple[Note, ...]:
         return tuple(replace(n, t=None if n.t is None else round(n.t * 1e6 / rate_hz)) for n in before)
 
-    frame_table = parts.FrameTable(of.frame_table.frames.to(frames), untimed=False, turned=of.frame_table.turned)
-    return replace(of, frame_table=frame_table, marks=replace(of.marks, notes=of.marks.notes.to(notes)))
+    frame_table = sections.FrameTable(
+        source.frame_table.frames.to(frames), untimed=False, turned=source.frame_table.turned
+    )
+    return replace(source, frame_table=frame_table, marks=replace(source.marks, notes=source.marks.notes.to(notes)))
 
 
-def calibrate(of: Source, rate_hz: float | None = None, rest: Tare | None = None) -> FrameSource:
+def calibrate(source: RecordedSource, rate_hz: float | None = None, rest: Tare | None = None) -> FrameSource:
     """Return the same recording as frames in N or kPa, by its calibration.
 
     Parameters
     ----------
-    of : Source
+    source : Source
     rate_hz : float, above 0, optional
         As of `as_frames`.
     rest : Tare, optional
@@ -152,19 +165,21 @@ def calibrate(of: Source, rate_hz: float | None = None, rest: Tare | None = None
     ------
     ProblemError : no calibration, or one of another array
     """
-    calibration = of.sensor.calibration()
+    calibration = source.sensor.calibration()
     if calibration is None:
         raise ProblemError(
-            f"{of.origin.path}: no calibration lies beside it; taxel calibrate makes one, and without one nothing is N "
-            "or kPa"
+            f"{source.origin.path}: no calibration lies beside it; taxel calibrate makes one, and without one nothing "
+            "is N or kPa"
         )
-    drawn = as_frames(of, rate_hz)
-    made = replace(
+    drawn = as_frames(source, rate_hz)
+    calibrated = replace(
         drawn,
         frame_table=replace(drawn.frame_table, frames=known(calibration.apply(drawn.table, rest))),
         settings=replace(drawn.settings, held=known(None)),
         sensor=replace(drawn.sensor, calibration=known(None)),
     )
-    if not isinstance(made, Stream):
-        return made
-    return with_losses(replace(made, stream=parts.Columns(made.stream.columns)), made.stream.received)
+    if not isinstance(calibrated, Stream):
+        return calibrated
+    return with_losses(
+        replace(calibrated, stream=sections.SampleColumns(calibrated.stream.columns)), calibrated.stream.received
+    )

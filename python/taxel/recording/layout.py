@@ -19,10 +19,10 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.layout import Layout, load_packaged
 from taxel.frames import Frames
-from taxel.recording.contents import Board, Contents, FrameSource, S, Source, Stream, alone
+from taxel.recording.contents import BoardSource, Contents, FrameSource, RecordedSource, S, Stream, alone
 from taxel.recording.frames import times_at
 from taxel.recording.once import known
-from taxel.recording.parts import EventTable, FrameTable
+from taxel.recording.sections import EventTable, FrameTable
 
 #: Units that say nothing: what a table or a stream of numbers holds.
 _UNSAID = ("counts", "as sent")
@@ -36,14 +36,14 @@ def check_size(path: Path, size: tuple[int, ...], array: Array) -> None:
     ProblemError : other rows or columns
     """
     if size != array.shape:
-        held = " x ".join(map(str, size))
-        raise refused("array", f": {array.rows} x {array.columns} taxels; {path} holds frames of {held}")
+        shape = " x ".join(map(str, size))
+        raise refused("array", f": {array.rows} x {array.columns} taxels; {path} holds frames of {shape}")
 
 
-def on_array(of: S, array: Array) -> S:
+def on_array(source: S, array: Array) -> S:
     """Return the same source on another description of its sensor, of as many taxels; their names stay."""
-    if array.names is None and of.sensor.array.names is not None:
-        array = replace(array, names=of.sensor.array.names)
+    if array.names is None and source.sensor.array.names is not None:
+        array = replace(array, names=source.sensor.array.names)
 
     def events(table: Events) -> Events:
         same = table[:]
@@ -53,20 +53,20 @@ def on_array(of: S, array: Array) -> S:
     def frames(table: Frames) -> Frames:
         return Frames(table.values.reshape(-1, *array.shape), table.t, unit=table.unit, array=array)
 
-    same = replace(of, sensor=replace(of.sensor, array=array))
-    if isinstance(same, Board):
+    same = replace(source, sensor=replace(source.sensor, array=array))
+    if isinstance(same, BoardSource):
         return replace(same, event_table=EventTable(same.event_table.events.to(events)))
     if isinstance(same, FrameSource):
         return replace(same, frame_table=replace(same.frame_table, frames=same.frame_table.frames.to(frames)))
     return same
 
 
-def apply_layout(of: Contents, layout: Layout, *, given: bool) -> Contents:
+def apply_layout(contents: Contents, layout: Layout, *, given: bool) -> Contents:
     """Return a recording with what its layout says of it; it says nothing of streams of numbers.
 
     Parameters
     ----------
-    of : Contents
+    contents : Contents
     layout : Layout
     given : bool
         Whether it was named for this recording; else it lies beside it, and fills only what a file that states its
@@ -79,35 +79,33 @@ def apply_layout(of: Contents, layout: Layout, *, given: bool) -> Contents:
     return alone(
         {
             name: source if isinstance(source, Stream) else _apply_layout(source, layout, given=given)
-            for name, source in of.sources.items()
+            for name, source in contents.sources.items()
         }
     )
 
 
-def _apply_layout(of: Source, layout: Layout, *, given: bool) -> Source:
+def _apply_layout(source: RecordedSource, layout: Layout, *, given: bool) -> RecordedSource:
     """Return a source with what its layout says of it."""
-    kind, name, sensor = of.origin.kind, of.origin.name, of.sensor
+    kind, name, sensor = source.origin.kind, source.origin.name, source.sensor
     strict = given or kind not in _STATING
     try:
-        array = _array(of, layout)
+        array = _array(source, layout)
     except ProblemError as error:
         if strict:
-            raise FormatError(f"{layout.place}: {name}: {first_line(error)}") from None
+            raise FormatError(f"{layout.path}: {name}: {first_line(error)}") from None
         array = sensor.array
     if strict and sensor.heel and layout.heel not in ("", sensor.heel):
-        raise FormatError(f"{layout.place}: says heel {layout.heel}; {name} says {sensor.heel}")
-    same = of if array == sensor.array else on_array(of, array)
+        raise FormatError(f"{layout.path}: says heel {layout.heel}; {name} says {sensor.heel}")
+    same = source if array == sensor.array else on_array(source, array)
     same = replace(same, sensor=replace(same.sensor, side=sensor.side or layout.side, heel=sensor.heel or layout.heel))
     if not isinstance(same, FrameSource):
         if strict and (layout.turned is not None or layout.unit or layout.rate_hz):
-            raise FormatError(f"{layout.place}: {name} holds events; falls, unit and rate_hz are of frames")
+            raise FormatError(f"{layout.path}: {name} holds events; falls, unit and rate_hz are of frames")
         return same
     was = same.frame_table.turned
     if strict and was is not None and layout.falls is not None and layout.turned != was:
         falls = "false" if layout.turned is None else f"{layout.turned:g}"
-        raise FormatError(
-            f"{layout.place}: says falls = {falls}; the readings of {name} were turned by falls = {was:g}"
-        )
+        raise FormatError(f"{layout.path}: says falls = {falls}; the readings of {name} were turned by falls = {was:g}")
     full = layout.turned if was is None else None
     # Read at once, so that a layout that contradicts the file is refused where the file is opened.
     frames = _read(same.table, layout, full, name, is_alone=kind in _ALONE, strict=strict)
@@ -115,22 +113,28 @@ def _apply_layout(of: Source, layout: Layout, *, given: bool) -> Source:
     return replace(same, frame_table=FrameTable(known(frames), untimed, was if full is None else full))
 
 
-def _array(of: Source, layout: Layout) -> Array:
+def _array(source: RecordedSource, layout: Layout) -> Array:
     """Return the sensor of a recording as its layout says, which may not contradict the file."""
-    held, kind = of.sensor.array, of.origin.kind
-    array = layout.array(held.rows * held.columns, held, of.sensor.side)
-    if of.has_events and array.shape != held.shape:
+    stated, kind = source.sensor.array, source.origin.kind
+    array = layout.array(stated.rows * stated.columns, stated, source.sensor.side)
+    if source.has_events and array.shape != stated.shape:
         raise ProblemError(
-            f"says {array.rows} x {array.columns} taxels; its events are of {held.rows} x {held.columns}"
+            f"says {array.rows} x {array.columns} taxels; its events are of {stated.rows} x {stated.columns}"
         )
-    if min(held.shape) > 1 and array.shape != held.shape:
-        raise ProblemError(f"says {array.rows} x {array.columns} taxels; the file says {held.rows} x {held.columns}")
+    if min(stated.shape) > 1 and array.shape != stated.shape:
+        raise ProblemError(
+            f"says {array.rows} x {array.columns} taxels; the file says {stated.rows} x {stated.columns}"
+        )
     if not array._is_measured:
-        with_names = held if array.shape == held.shape else replace(array, pitch_mm=held.pitch_mm, name=held.name)
-        return with_names if held.places is None or array.shape == held.shape else array
-    along = kind in _ALONG and held.places == load_packaged(kind).array(held.columns, held, of.sensor.side).places
-    if held._is_measured and not along and (held.pitch_mm, held.places) != (array.pitch_mm, array.places):
-        raise ProblemError(f"says taxels {array._apart()}; the file says {held._apart()}")
+        with_names = (
+            stated if array.shape == stated.shape else replace(array, pitch_mm=stated.pitch_mm, name=stated.name)
+        )
+        return with_names if stated.places is None or array.shape == stated.shape else array
+    along = (
+        kind in _ALONG and stated.places == load_packaged(kind).array(stated.columns, stated, source.sensor.side).places
+    )
+    if stated._is_measured and not along and (stated.pitch_mm, stated.places) != (array.pitch_mm, array.places):
+        raise ProblemError(f"says taxels {array._apart()}; the file says {stated._apart()}")
     return array
 
 
@@ -157,68 +161,68 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_al
         if unit in _UNSAID:
             unit = layout.unit
         elif strict and unit != layout.unit:
-            raise FormatError(f"{layout.place}: says unit {layout.unit}; {name} is in {unit}")
+            raise FormatError(f"{layout.path}: says unit {layout.unit}; {name} is in {unit}")
     if layout.rate_hz is not None:
         if _are_numbers(t):
             try:
                 t = _times_at(layout.rate_hz, _writable(t) if is_alone else np.empty_like(t))
             except ProblemError as error:
-                raise FormatError(f"{layout.place}: {name}: {error}") from None
+                raise FormatError(f"{layout.path}: {name}: {error}") from None
         elif strict and len(t) > 1 and abs(layout.rate_hz * (step := _median_step(t)) / 1e6 - 1) > _SLACK:
-            raise FormatError(f"{layout.place}: says {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz")
+            raise FormatError(f"{layout.path}: says {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz")
     if full is not None:
         values = _writable(values)
         step = max(1, _PIECE // max(1, values[:1].size))
         for begin in range(0, len(values), step):
-            part = values[begin : begin + step]
+            block = values[begin : begin + step]
             with np.errstate(over="ignore"):
-                risen = np.float32(full) - part
+                risen = np.float32(full) - block
             if (large := np.isinf(risen)).any():
                 raise FormatError(
-                    f"{layout.place}: falls is {layout.falls}; {name} reads {shown(part[large][0].item())}, and the "
+                    f"{layout.path}: falls is {layout.falls}; {name} reads {shown(block[large][0].item())}, and the "
                     "difference does not fit 32 bits"
                 )
-            part[...] = risen
+            block[...] = risen
         frozen_whole(values)
     return Frames(values, t, unit=unit, array=table.array)
 
 
-def _parts(length: int) -> Iterator[slice]:
-    """Yield the parts of a column that are computed one after the other, beside which little memory is taken."""
+def _blocks(length: int) -> Iterator[slice]:
+    """Yield the blocks of a column that are computed one after the other, beside which little memory is taken."""
     return (slice(begin, min(begin + _PIECE, length)) for begin in range(0, length, _PIECE))
 
 
 def _are_numbers(t: NDArray[np.int64]) -> bool:
     """Return whether times only number the frames: 0, 1, 2 ..."""
-    return all(np.array_equal(t[part], np.arange(part.start, part.stop)) for part in _parts(len(t)))
+    return all(np.array_equal(t[block], np.arange(block.start, block.stop)) for block in _blocks(len(t)))
 
 
 def _times_at(rate_hz: float, t: NDArray[np.int64]) -> NDArray[np.int64]:
     """Fill a column with the times of frames at a rate (`times_at`)."""
     # The last is refused before the others change.
     times_at(np.array([len(t) - 1]), rate_hz)
-    for part in _parts(len(t)):
-        t[part] = times_at(np.arange(part.start, part.stop), rate_hz)
+    for block in _blocks(len(t)):
+        t[block] = times_at(np.arange(block.start, block.stop), rate_hz)
     return frozen_whole(t)
 
 
 def _median_step(t: NDArray[np.int64]) -> float:
     """Return the median of the steps between times, us, as exact as 32 bits."""
     steps = np.empty(len(t) - 1, np.float32)
-    for part in _parts(len(steps)):
-        steps[part] = np.diff(t[part.start : part.stop + 1])
+    for block in _blocks(len(steps)):
+        steps[block] = np.diff(t[block.start : block.stop + 1])
     return float(np.median(steps, overwrite_input=True))
 
 
 def _writable(array: NDArray[Any]) -> NDArray[Any]:
     """Return an array that nobody else has, made writable again; a copy if its memory is not NumPy's."""
-    parts, part = list[NDArray[Any]](), array.base
-    while isinstance(part, np.ndarray):
-        parts.append(part)
-        part = part.base
-    if part is not None:
+    bases, base = list[NDArray[Any]](), array.base
+    while isinstance(base, np.ndarray):
+        bases.append(base)
+        base = base.base
+    if base is not None:
         return array.copy()
-    for level in (*reversed(parts), array):
+    for level in (*reversed(bases), array):
         level.setflags(write=True)
     return array
 

@@ -20,9 +20,17 @@ from taxel.detections import Detections
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, name_remarks, with_losses
+from taxel.recording.contents import (
+    BoardSource,
+    Contents,
+    FrameSource,
+    RecordedSource,
+    Stream,
+    name_remarks,
+    with_losses,
+)
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import UNKNOWN, anything, known
 from taxel.recording.recording import Recording
@@ -69,26 +77,26 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
     >>> both.events == events, [note.t for note in both.notes], both.lost
     (True, [0, 200], ())
     """
-    sources = [instance("recordings", part, Recording) for part in several("recordings", recordings)]
+    sources = [instance("recordings", recording, Recording) for recording in several("recordings", recordings)]
     flag("beside", beside)
     gap = None if gap_us is None else number("gap_us", gap_us)
     if gap is not None and not 0 <= gap < 2**52:
         raise refused("gap_us", f" is {shown(gap_us)}: must be 0 or more")
     if not sources:
         raise ProblemError("recordings: there must be one or more")
-    return Recording(merge_contents([part._contents for part in sources], gap, beside=beside))
+    return Recording(merge_contents([recording._contents for recording in sources], gap, beside=beside))
 
 
 def merge_contents(recordings: Sequence[Contents], gap: float | None = None, *, beside: bool = False) -> Contents:
     """Return the contents of several recordings as those of one; arguments and errors are those of `merge`."""
     sources = [recording.main for recording in recordings]
-    if len({part.has_events for part in sources}) > 1:
-        differing = next(part for part in sources if part.has_events != sources[0].has_events)
+    if len({source.has_events for source in sources}) > 1:
+        differing = next(source for source in sources if source.has_events != sources[0].has_events)
         events, frames = (sources[0], differing) if sources[0].has_events else (differing, sources[0])
         raise ProblemError(
             f"recordings: {events.origin.name} holds events, {frames.origin.name} frames; convert one of them first"
         )
-    tables = [part.table for part in sources]
+    tables = [source.table for source in sources]
     shifts = _shifts(tables, gap)
     if beside:
         array, lefts = Array._beside([table.array for table in tables])
@@ -97,17 +105,21 @@ def merge_contents(recordings: Sequence[Contents], gap: float | None = None, *, 
     merging = _Merging(sources, tables, shifts, lefts, array, beside)
     lost = [line for source in sources for line in source.losses.lost()]
     for recording, source in zip(recordings, sources, strict=True):
-        lost += [*source.part(parts.Wire).lines(), *source.part(parts.Columns).received(), *recording.others()]
+        lost += [
+            *source.section(sections.Wire).losses(),
+            *source.section(sections.SampleColumns).received(),
+            *recording.others(),
+        ]
     merged = merging.source()
     # `lost` is stored as a value, not as a function of the parts, so that the parts can be freed.
-    return Contents.of(with_losses(merged, known((*lost, *merging.lost))))
+    return Contents.single(with_losses(merged, known((*lost, *merging.lost))))
 
 
 @dataclass
 class _Merging:
-    """Merges sources, a type of part after the other; `lost` lists what they do not agree in."""
+    """Merges sources, a type of section after the other; `lost` lists what they do not agree in."""
 
-    sources: Sequence[Source]
+    sources: Sequence[RecordedSource]
     tables: Sequence[Events | Frames]
     shifts: list[int]
     lefts: list[int]
@@ -115,11 +127,11 @@ class _Merging:
     beside: bool
     lost: list[str] = field(default_factory=list)
 
-    def source(self) -> Source:
+    def source(self) -> RecordedSource:
         """Return the sources as one."""
         names = ", ".join(source.origin.name for source in self.sources)
         header: dict[str, Any] = {
-            "origin": parts.Origin(Path("merged"), "merged", "merged", source=f"merged of {names}"),
+            "origin": sections.Origin(Path("merged"), "merged", "merged", source=f"merged of {names}"),
             "sensor": self.sensor(),
             "settings": self.settings(),
             "marks": self.marks(),
@@ -128,26 +140,26 @@ class _Merging:
         }
         if self.sources[0].has_events:
             tables = [table for table in self.tables if isinstance(table, Events)]
-            return Board(
-                event_table=parts.EventTable(known(_events(tables, self.shifts, self.array, self.lefts))), **header
+            return BoardSource(
+                event_table=sections.EventTable(known(_events(tables, self.shifts, self.array, self.lefts))), **header
             )
         columns = self.columns()
         if columns is None:
             return FrameSource(frame_table=self.frame_table(), **header)
-        return Stream(frame_table=self.frame_table(), stream=parts.Columns(columns), **header)
+        return Stream(frame_table=self.frame_table(), stream=sections.SampleColumns(columns), **header)
 
     def agreed(self, values: Iterable[T], empty: T, line: str, key: Callable[[T], object] = lambda value: value) -> T:
         """Return the common value if all recordings agree, else the empty value; then a line says so."""
-        first, *others = every = list(values)
-        if all(value is first or key(value) == key(first) for value in others):
+        first, *later = all_values = list(values)
+        if all(value is first or key(value) == key(first) for value in later):
             return first
-        if any(map(anything, every)):
+        if any(map(anything, all_values)):
             self.lost.append(f"{line} (the recordings differ)")
         return empty
 
     def columns(self) -> tuple[str, ...] | None:
         """Return the names of the columns."""
-        columns = [part.columns for part in self.sources]
+        columns = [source.columns for source in self.sources]
         if not self.beside:
             return self.agreed(columns, None, "the names of the columns")
         return (
@@ -156,11 +168,11 @@ class _Merging:
             else None
         )
 
-    def sensor(self) -> parts.Sensor:
+    def sensor(self) -> sections.Sensor:
         """Merge what describes the sensors; what one of them says of its taxels may be lost."""
-        array, sensors = self.array, [part.sensor for part in self.sources]
-        for part in self.sources:
-            stated, name = part.sensor.array, part.origin.name
+        array, sensors = self.array, [source.sensor for source in self.sources]
+        for source in self.sources:
+            stated, name = source.sensor.array, source.origin.name
             if stated._is_measured and (stated.pitch_mm, stated.places) != (array.pitch_mm, array.places):
                 self.lost.append(f"the pitch or places of {name} ({stated._apart()})")
             if not self.beside and stated.names not in (None, array.names):
@@ -170,20 +182,20 @@ class _Merging:
         if self.beside and calibration is not None and len(sensors) > 1:
             self.lost.append("the calibration (it is of one of the sensors)")
             calibration = None
-        return parts.Sensor(
+        return sections.Sensor(
             array,
             self.agreed((sensor.side for sensor in sensors), "", "the side"),
             self.agreed((sensor.heel for sensor in sensors), "", "where the heel lies"),
             known(calibration),
         )
 
-    def settings(self) -> parts.Settings:
+    def settings(self) -> sections.Settings:
         """Merge registers that are equal, and the values that the taxels held at the beginning."""
         settings = [source.settings for source in self.sources]
-        registers = [part.registers() for part in settings]
+        registers = [state.registers() for state in settings]
         held = self.held_beside() if self.beside else self.held()
-        changes = self.agreed((part.register_changes() for part in settings), (), "the settings of the registers")
-        return parts.Settings(
+        changes = self.agreed((state.register_changes() for state in settings), (), "the settings of the registers")
+        return sections.Settings(
             held=known(held),
             registers=known(
                 self.agreed(registers, None, "the board's registers", lambda held: held and (held, held.array))
@@ -191,69 +203,73 @@ class _Merging:
             register_changes=known(changes),
         )
 
-    def marks(self) -> parts.Marks:
+    def marks(self) -> sections.Marks:
         """Merge what happened at a time; a note with its name stands at the beginning of each recording."""
         changes, notes, found = list[tuple[BoardChange, ...]](), list[Note](), list[Any]()
-        for part, table, shift in zip(self.sources, self.tables, self.shifts, strict=True):
-            marks, d = part.marks, part.marks.detections()
+        for source, table, shift in zip(self.sources, self.tables, self.shifts, strict=True):
+            marks, d = source.marks, source.marks.detections()
             changes.append(tuple(_later(change, shift) for change in marks.board_changes()))
-            notes.append(Note(part.origin.name, int(table.t.min()) + shift if len(table) else shift, 0))
+            notes.append(Note(source.origin.name, int(table.t.min()) + shift if len(table) else shift, 0))
             notes += [_later(note, shift) for note in marks.notes()]
             found += zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True)
         found.sort(key=lambda row: int(row[2]))
         label, t, when, slope, repaired = ([row[k] for row in found] for k in range(5))
-        return parts.Marks(
+        return sections.Marks(
             board_changes=known(self.agreed(changes, (), "the changes of the board")),
             notes=known(tuple(sorted(notes, key=lambda note: (note.t is None, note.t or 0)))),
             detections=known(Detections._of(label, t, when, slope, repaired=repaired)),
             zeroings=known(self.zeroings()),
         )
 
-    def timing(self) -> parts.Timing:
+    def timing(self) -> sections.Timing:
         """Merge clocks that are equal."""
-        clocks = [part.timing.clock() for part in self.sources]
+        clocks = [source.timing.clock() for source in self.sources]
         clock = clocks[0]
         if len(set(self.shifts)) > 1 or not all(c is clock or _same_clock(clock, c) for c in clocks[1:]):
             self.lost += ["arrival times"] * any(map(anything, clocks))
             clock = None
-        return parts.Timing(
+        return sections.Timing(
             known(clock), self.agreed((p.timing.clock_of for p in self.sources), None, "by whose clock times are")
         )
 
-    def losses(self) -> parts.Losses:
+    def losses(self) -> sections.Losses:
         """Merge what was lost; counts only if they are equal."""
         losses = [source.losses for source in self.sources]
         verdict = None
-        if any(part.verdict() is not None for part in losses):
+        if any(source.verdict() is not None for source in losses):
             verdict = Verdict._together(_of_files(self.sources, self.shifts))
-        return parts.Losses(
-            counts=known(self.agreed((part.counts() for part in losses), {}, "what each received and lost, by cause")),
+        return sections.Losses(
+            counts=known(
+                self.agreed((source.counts() for source in losses), {}, "what each received and lost, by cause")
+            ),
             verdict=known(verdict),
-            remarks=name_remarks([(part.origin.name, part.losses.remarks) for part in self.sources]),
-            truncated=any(part.truncated for part in losses),
-            rebuilt=known(self.agreed((part.rebuilt() for part in losses), {}, "what reading each had to put up with")),
+            remarks=name_remarks([(source.origin.name, source.losses.remarks) for source in self.sources]),
+            truncated=any(source.truncated for source in losses),
+            rebuilt=known(
+                self.agreed((source.rebuilt() for source in losses), {}, "what reading each had to put up with")
+            ),
         )
 
-    def frame_table(self) -> parts.FrameTable:
+    def frame_table(self) -> sections.FrameTable:
         """Merge frames."""
         tables = [table for table in self.tables if isinstance(table, Frames)]
         frames = [source.frame_table for source in self.sources if isinstance(source, FrameSource)]
-        return parts.FrameTable(
+        return sections.FrameTable(
             known(_frames(tables, self.shifts, self.array, self.lefts if self.beside else None)),
-            all(part.untimed for part in frames),
-            self.agreed((part.turned for part in frames), None, "whether readings were turned"),
+            all(table.untimed for table in frames),
+            self.agreed((table.turned for table in frames), None, "whether readings were turned"),
         )
 
     def zeroings(self) -> tuple[Zeroing, ...]:
         """Return the zeroed taxels of all recordings, unless one of them would change a rest in another recording."""
-        every = [
-            [replace(z, t=z.t + shift, x=z.x + left) for z in part.marks.zeroings()]
-            for part, shift, left in zip(self.sources, self.shifts, self.lefts, strict=True)
+        of_sources = [
+            [replace(z, t=z.t + shift, x=z.x + left) for z in source.marks.zeroings()]
+            for source, shift, left in zip(self.sources, self.shifts, self.lefts, strict=True)
         ]
-        together = tuple(sorted({z for zeroings in every for z in zeroings}, key=lambda z: (z.t, z.x, z.y)))
+        together = tuple(sorted({z for zeroings in of_sources for z in zeroings}, key=lambda z: (z.t, z.x, z.y)))
         # Sensors side by side have no taxels in common.
-        for part, zeroings, shift in zip(self.sources, every, self.shifts, strict=True):
-            stop = _end(part) + shift
+        for source, zeroings, shift in zip(self.sources, of_sources, self.shifts, strict=True):
+            stop = _end(source) + shift
             if not self.beside and {z for z in together if z.t < stop} != {z for z in zeroings if z.t < stop}:
                 self.lost.append(f"{len(together)} zeroed taxels (the recordings differ)")
                 return ()
@@ -261,18 +277,18 @@ class _Merging:
 
     def held_beside(self) -> NDArray[np.uint16] | None:
         """Return the values that the taxels of all sensors held at the beginning."""
-        every = [part.settings.held() for part in self.sources]
-        known_lefts = [(values, left) for values, left in zip(every, self.lefts, strict=True) if values is not None]
+        held = [source.settings.held() for source in self.sources]
+        known_lefts = [(values, left) for values, left in zip(held, self.lefts, strict=True) if values is not None]
         return _side_by_side(np.full(self.array.shape, UNKNOWN, np.uint16), known_lefts) if known_lefts else None
 
     def held(self) -> NDArray[np.uint16] | None:
         """Return the values held at the beginning, if they and the events since imply those held in later parts."""
-        every = list(zip(self.sources, self.tables, self.shifts, strict=True))
-        every.sort(key=lambda entry: _begin(entry[0]) + entry[2])
-        first = every[0][0].settings.held()
+        entries = list(zip(self.sources, self.tables, self.shifts, strict=True))
+        entries.sort(key=lambda entry: _begin(entry[0]) + entry[2])
+        first = entries[0][0].settings.held()
         now = np.full(self.array.shape, UNKNOWN, np.uint16) if first is None else first.copy()
         # All events by time determine the values that the taxels hold at the beginning of each recording.
-        changes = [(t.t + shift, t) for _, t, shift in every if isinstance(t, Events) and t.intensity is not None]
+        changes = [(t.t + shift, t) for _, t, shift in entries if isinstance(t, Events) and t.intensity is not None]
         at = np.concatenate([t[e.present] for t, e in changes]) if changes else np.zeros(0, np.int64)
         x, y, ticks = (
             np.concatenate([getattr(e, name)[e.present] for _, e in changes]) if changes else np.zeros(0, np.uint16)
@@ -280,17 +296,17 @@ class _Merging:
         )
         order = np.argsort(at, kind="stable")
         done = 0
-        for part, _, shift in every[1:]:
-            held = part.settings.held()
+        for source, _, shift in entries[1:]:
+            held = source.settings.held()
             if held is None:
                 continue
-            upto = int(np.searchsorted(at[order], _begin(part) + shift, side="left"))
+            upto = int(np.searchsorted(at[order], _begin(source) + shift, side="left"))
             new = order[done:upto]
             now[y[new], x[new]] = ticks[new]
             done = upto
             known = held != UNKNOWN
             if (now[known] != held[known]).any():
-                self.lost.append(f"what {counted(int(known.sum()), 'taxel')} held where {part.origin.name} begins")
+                self.lost.append(f"what {counted(int(known.sum()), 'taxel')} held where {source.origin.name} begins")
         return first
 
 
@@ -305,7 +321,7 @@ def _same_clock(a: Clock | None, b: Clock | None) -> bool:
     return np.array_equal(a.board_us, b.board_us) and np.array_equal(a.arrived_ns, b.arrived_ns)
 
 
-def _of_files(sources: Sequence[Source], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
+def _of_files(sources: Sequence[RecordedSource], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
     """Return name and verdict of each file or merged recording of which there are parts.
 
     Stretches of one recording, in memory or in files of their own, have the losses of the whole, which count once;
@@ -313,14 +329,14 @@ def _of_files(sources: Sequence[Source], shifts: Sequence[int]) -> list[tuple[st
     """
     files: dict[str, Any] = {}
     verdicts: dict[Any, dict[Any, dict[Verdict, tuple[str, Verdict]]]] = {}
-    for part, shift in zip(sources, shifts, strict=True):
-        verdict = verdict_of(part)
-        file = id(verdict) if part.origin.kind == "merged" else part.origin.path
+    for merged, shift in zip(sources, shifts, strict=True):
+        verdict = verdict_of(merged)
+        file = id(verdict) if merged.origin.kind == "merged" else merged.origin.path
         if verdict.stretch_of is not None:
-            file = files.setdefault(verdict.stretch_of, verdict.stretch_of if part.origin.kind == "merged" else file)
-        source = part.origin.label if verdict.stretch_of is not None else (part.origin.name, part.origin.label)
-        verdicts.setdefault(file, {}).setdefault(source, {}).setdefault(
-            verdict, (part.origin.name, verdict._later(shift))
+            file = files.setdefault(verdict.stretch_of, verdict.stretch_of if merged.origin.kind == "merged" else file)
+        label = merged.origin.label if verdict.stretch_of is not None else (merged.origin.name, merged.origin.label)
+        verdicts.setdefault(file, {}).setdefault(label, {}).setdefault(
+            verdict, (merged.origin.name, verdict._later(shift))
         )
     of_files = []
     for of_file in verdicts.values():
@@ -331,18 +347,18 @@ def _of_files(sources: Sequence[Source], shifts: Sequence[int]) -> list[tuple[st
     return of_files
 
 
-def _end(part: Source) -> int:
+def _end(source: RecordedSource) -> int:
     """Return the first time after everything in a recording."""
-    if part.timing.stretch is not None:
-        return part.timing.stretch()[1]
-    t = part.table.t
-    return max([int(t.max()) if len(t) else 0, *(z.t for z in part.marks.zeroings())]) + 1
+    if source.timing.interval is not None:
+        return source.timing.interval()[1]
+    t = source.table.t
+    return max([int(t.max()) if len(t) else 0, *(z.t for z in source.marks.zeroings())]) + 1
 
 
-def _begin(part: Source) -> int:
-    if part.timing.stretch is not None:
-        return part.timing.stretch()[0]
-    t = part.table.t
+def _begin(source: RecordedSource) -> int:
+    if source.timing.interval is not None:
+        return source.timing.interval()[0]
+    t = source.table.t
     return int(t.min()) if len(t) else 0
 
 
@@ -361,12 +377,12 @@ def _shifts(tables: Sequence[Events | Frames], gap: float | None) -> list[int]:
     return shifts
 
 
-def _common(sources: Sequence[Source], tables: Sequence[Events | Frames]) -> Array:
+def _common(sources: Sequence[RecordedSource], tables: Sequence[Events | Frames]) -> Array:
     array = tables[0].array
-    for part, table in zip(sources, tables, strict=True):
+    for source, table in zip(sources, tables, strict=True):
         if not array.fits(table.array):
             raise ProblemError(
-                f"{part.origin.name}: {table.array!r}, {sources[0].origin.name}: {array!r}; different sensors are "
+                f"{source.origin.name}: {table.array!r}, {sources[0].origin.name}: {array!r}; different sensors are "
                 "merged beside one another only"
             )
     return array
@@ -395,11 +411,11 @@ def _events(tables: list[Events], shifts: list[int], array: Array, lefts: list[i
     return Events(t[order], x[order], y[order], p[order], array=array, markers=markers, **more)
 
 
-def _side_by_side(whole: NDArray[Any], parts: Iterable[tuple[NDArray[Any], int]]) -> NDArray[Any]:
+def _side_by_side(filled: NDArray[Any], columns: Iterable[tuple[NDArray[Any], int]]) -> NDArray[Any]:
     """Fill values of a whole sensor with those of its parts, each from a column on; return them."""
-    for values, left in parts:
-        whole[..., : values.shape[-2], left : left + values.shape[-1]] = values
-    return whole
+    for values, left in columns:
+        filled[..., : values.shape[-2], left : left + values.shape[-1]] = values
+    return filled
 
 
 def _frames(tables: list[Frames], shifts: list[int], array: Array, lefts: list[int] | None) -> Frames:

@@ -15,12 +15,12 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording import parts
+from taxel.recording import sections
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Contents, Source, alone, apply_rule
+from taxel.recording.contents import Contents, RecordedSource, alone, apply_rule
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import Once
-from taxel.recording.read_mcap import ascending
+from taxel.recording.readers.mcap import ascending
 from taxel.recording.verdict import Verdict
 
 #: The name of the host's clock, us since 1970.
@@ -31,43 +31,43 @@ M = TypeVar("M", Note, Zeroing, BoardChange)
 Times = Callable[[NDArray[np.int64]], NDArray[np.int64]]
 
 
-def on_clock(of: Contents, name: str) -> Contents:
+def on_clock(contents: Contents, name: str) -> Contents:
     """Return the same recording with the times of all sources by the clock of one of them, or of the host.
 
     Raises
     ------
-    ProblemError : no such source, one without arrival times, or a part by another clock
+    ProblemError : no such source, one without arrival times, or a slice by another clock
     """
-    whole, sources = of.main, of.sources
-    path, label = whole.origin.path, whole.origin.label
-    if whole.timing.stretch is not None and whole.timing.clock_of is None:
+    main, sources = contents.main, contents.sources
+    path, label = main.origin.path, main.origin.label
+    if main.timing.interval is not None and main.timing.clock_of is None:
         raise ProblemError(f"{path}: a slice by its own clock; say on_clock({name!r}) before between")
     if name not in (*sources, HOST):
         raise ProblemError(f"{path}: has no clock {name!r}; there are {', '.join((*sources, HOST))}")
-    if whole.timing.clock_of is not None:
-        raise ProblemError(f"{path}: is on the clock of {whole.timing.clock_of} already")
+    if main.timing.clock_of is not None:
+        raise ProblemError(f"{path}: is on the clock of {main.timing.clock_of} already")
     to = None if name == HOST else _clock(sources[name])
     moved = {
         of_source: _move(source, name, None if of_source == name else _times(_clock(source), to))
         for of_source, source in sources.items()
     }
-    if of.is_several:
+    if contents.is_several:
         return alone(moved)
     named = moved[label]
 
     def verdict() -> Verdict | None:
         # It may be that of all sources.
-        is_own = whole.losses.verdict() == sources[label].losses.verdict()
+        is_own = main.losses.verdict() == sources[label].losses.verdict()
         return (named if is_own else alone(moved).main).losses.verdict()
 
     return Contents(replace(named, losses=replace(named.losses, verdict=Once(verdict))), moved)
 
 
-def _clock(of: Source) -> Clock:
-    clock = of.timing.usable()
+def _clock(source: RecordedSource) -> Clock:
+    clock = source.timing.usable()
     if clock is None:
         raise ProblemError(
-            f"{of.origin.path}: source {of.origin.label!r} has no arrival times, so its clock is not known"
+            f"{source.origin.path}: source {source.origin.label!r} has no arrival times, so its clock is not known"
         )
     return clock
 
@@ -82,16 +82,16 @@ def _times(clock: Clock, to: Clock | None) -> Times:
     return times
 
 
-def _move(of: Source, name: str, times: Times | None) -> Source:
+def _move(source: RecordedSource, name: str, times: Times | None) -> RecordedSource:
     """Return a source with its times converted to another clock; None leaves them unchanged."""
     if times is None:
-        return replace(of, timing=replace(of.timing, clock_of=name))
+        return replace(source, timing=replace(source.timing, clock_of=name))
 
     def time(t: int) -> int:
         return int(times(np.array([t]))[0])
 
-    def at(every: tuple[M, ...]) -> tuple[M, ...]:
-        return tuple(replace(mark, t=None if mark.t is None else time(mark.t)) for mark in every)
+    def move_marks(marks: tuple[M, ...]) -> tuple[M, ...]:
+        return tuple(replace(mark, t=None if mark.t is None else time(mark.t)) for mark in marks)
 
     def events(table: Events) -> Events:
         more: dict[str, Any] = {"array": table.array, "repaired": table.repaired}
@@ -111,31 +111,34 @@ def _move(of: Source, name: str, times: Times | None) -> Source:
         return None if before is None else Clock(times(before.board_us), before.arrived_ns)
 
     def verdict(before: Verdict | None) -> Verdict | None:
-        own_verdict = verdict_of(of)
+        own_verdict = verdict_of(source)
         doubtful, steps = own_verdict.doubtful_after_us, own_verdict.steps_back
         after = steps[0]["after_us"] if doubtful is None and steps else doubtful
         return before if after is None else own_verdict._later(time(after) - after)
 
-    def rule(part: parts.Part) -> parts.Part:  # noqa: PLR0911  one a type
-        match part:
+    def rule(section: sections.Section) -> sections.Section:  # noqa: PLR0911  one a type
+        match section:
             # The times in the datagrams stay by the source's own clock.
-            case parts.Origin() | parts.Sensor() | parts.Settings() | parts.Wire():
-                return part
-            case parts.Marks():
-                return parts.Marks(
-                    part.board_changes.to(at), part.notes.to(at), part.detections.to(detections), part.zeroings.to(at)
+            case sections.Origin() | sections.Sensor() | sections.Settings() | sections.Wire():
+                return section
+            case sections.Marks():
+                return sections.Marks(
+                    section.board_changes.to(move_marks),
+                    section.notes.to(move_marks),
+                    section.detections.to(detections),
+                    section.zeroings.to(move_marks),
                 )
-            case parts.Timing():
-                return parts.Timing(part.clock.to(clock), name, part.stretch)
-            case parts.Losses():
-                return replace(part, verdict=part.verdict.to(verdict))
-            case parts.EventTable():
-                return parts.EventTable(part.events.to(events))
-            case parts.FrameTable():
-                return replace(part, frames=part.frames.to(frames))
-            case parts.Columns():
-                return parts.Columns(part.columns)
+            case sections.Timing():
+                return sections.Timing(section.clock.to(clock), name, section.interval)
+            case sections.Losses():
+                return replace(section, verdict=section.verdict.to(verdict))
+            case sections.EventTable():
+                return sections.EventTable(section.events.to(events))
+            case sections.FrameTable():
+                return replace(section, frames=section.frames.to(frames))
+            case sections.SampleColumns():
+                return sections.SampleColumns(section.columns)
             case _:
-                assert_never(part)
+                assert_never(section)
 
-    return apply_rule(of, rule, of.part(parts.Columns).received)
+    return apply_rule(source, rule, source.section(sections.SampleColumns).received)

@@ -60,9 +60,9 @@ class Once(Generic[T]):
 
 def known(value: T) -> Once[T]:
     """Return a value that needs no reading."""
-    held = Once(lambda: value)
-    held()
-    return held
+    once = Once(lambda: value)
+    once()
+    return once
 
 
 def anything(value: object) -> bool:

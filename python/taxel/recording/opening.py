@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
-from taxel import _core, formats
+from taxel import formats
 from taxel._base import arguments, limits
-from taxel._base.arguments import flag, instance, text, whole
+from taxel._base.arguments import flag, instance, integer, text
 from taxel._base.errors import helped, refused
 from taxel._base.limits import opening
 from taxel._base.messages import warn
@@ -23,24 +23,22 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import Trial
 from taxel.formats.layout import Layout
-from taxel.formats.ros import is_bag
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording import parts
-from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, several, source_from
-from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_table_of_taxel, kind_of
+from taxel.recording import recognition, sections
+from taxel.recording.contents import BoardSource, Contents, FrameSource, RecordedSource, Stream, several, source_from
+from taxel.recording.kinds import ENDINGS, LABELS
 from taxel.recording.layout import apply_layout, check_size, on_array
 from taxel.recording.once import known
-from taxel.recording.read_csv import check_head, read_csv
-from taxel.recording.read_foreign import is_of_another_program, read_foreign
-from taxel.recording.read_h5 import is_h5_of_taxel, read_h5
-from taxel.recording.read_lsa import read_lsa
-from taxel.recording.read_mcap import read_mcap
-from taxel.recording.read_npz import read_npz
-from taxel.recording.read_ros import Topics, read_ros
+from taxel.recording.readers.csv import read_csv
+from taxel.recording.readers.foreign import read_foreign
+from taxel.recording.readers.h5 import read_h5
+from taxel.recording.readers.lsa import read_lsa
+from taxel.recording.readers.mcap import read_mcap
+from taxel.recording.readers.npz import read_npz
+from taxel.recording.readers.ros import Topics, read_ros
 from taxel.recording.recording import Recording, add_notes
 from taxel.recording.sidecars import labels_of, with_sidecars
-from taxel.recording.without_layout import refuse_without_layout
 
 #: The sources of a trial of both feet.
 FEET = ("left", "right")
@@ -69,7 +67,7 @@ class OpenOptions(SharedOptions):
 
     def within(self) -> AbstractContextManager[None]:
         """Return a context in which no more is read than may be."""
-        return opening(None if self.limit is None else whole("limit", self.limit, 1, unit="bytes"))
+        return opening(None if self.limit is None else integer("limit", self.limit, 1, unit="bytes"))
 
     @property
     def topics(self) -> Topics:
@@ -125,7 +123,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     first used.
 
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
-    is described in `taxel.recording.write_h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`)
+    is described in `taxel.recording.writers.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`)
     become notes of a file of frames that it names.
 
     Examples
@@ -137,14 +135,14 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     >>> taxel.open(place)
     Recording(step.npz: 2 events, 0 to 200 us, 8 x 8 taxels)
     """
-    place = Path(arguments.checked_path("path", path))
-    if place.is_dir() and not is_bag(place):
-        raise ProblemError(f"{place}: a folder; taxel.open_all opens its recordings")
-    every = _open_place(place, options)
-    if len(every) != 1:
-        names = ", ".join(recording.name for recording in every[:3]) + ", ..." * (len(every) > 3)
-        raise ProblemError(f"{place}: holds {len(every)} recordings ({names}); taxel.open_all opens each")
-    return every[0]
+    file = Path(arguments.checked_path("path", path))
+    if recognition.is_folder(file):
+        raise ProblemError(f"{file}: a folder; taxel.open_all opens its recordings")
+    recordings = _open(file, options)
+    if len(recordings) != 1:
+        names = ", ".join(recording.name for recording in recordings[:3]) + ", ..." * (len(recordings) > 3)
+        raise ProblemError(f"{file}: holds {len(recordings)} recordings ({names}); taxel.open_all opens each")
+    return recordings[0]
 
 
 @with_fields_of(OpenOptions)
@@ -192,51 +190,47 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     [Recording(step2.npz: 2 events, 0 to 200 us, 8 x 8 taxels, 1 note),
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
-    return _open_place(Path(arguments.checked_path("path", path)), options)
+    return _open(Path(arguments.checked_path("path", path)), options)
 
 
-def _open_place(place: Path, options: OpenOptions) -> list[Recording]:
+def _open(path: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, or all trials of a file."""
     with options.within():
-        if place.is_dir() and not is_bag(place):
-            return _open_folder(place, options)
-        # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
-        if place.exists() and (names := _formats_of(place)) and not _is_written_by_taxel(place):
-            trials = _counting_memory(formats.trials(place, names[0]))
-            return [
-                _named_beside(place, Path(trial.name), _recording_of(trial, place, names[0], options.layout))
-                for trial in trials
-            ]
-        return [_named_beside(place, Path(place.name), open_file(place, options))]
+        if recognition.is_folder(path):
+            return _open_folder(path, options)
+        return [_named_beside(path, recording) for recording in _open_file(path, options)]
 
 
-def open_file(place: Path, options: OpenOptions) -> Recording:
-    """Open one file as taxel writes it, a table of another program with a layout, or a ROS bag."""
+def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
+    """Open a file, or a ROS bag: of a file of another format all trials."""
     text("pairing", options.pairing, ("direct", "taxel"))
     flag("differences", options.differences)
-    layout = _layout(place, options.layout)
-    of_layout = {} if layout is None else layout.ros
+    layout = recognition.layout_of(path, options.layout)
     try:
-        if layout is None:
-            refuse_without_layout(place)
-        if layout is not None and is_of_another_program(place, layout):
-            if options.topics.are_given:
-                raise ProblemError(f"{place}: no ROS bag; topic, field, types and ros are of one")
-            contents = Contents.of(read_foreign(place, layout))
-            if options.array is not None:
-                contents = Contents.of(_on_given(contents.main, instance("array", options.array, Array)))
-        elif (kind := kind_of(place)) == "ros":
-            grid = layout.grid() if options.array is None and layout is not None else options.array
-            contents = read_ros(place, options.topics.but(of_layout), grid)
-        elif options.topics.are_given:
-            raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
-        else:
-            array = None if options.array is None else instance("array", options.array, Array)
-            contents = _read(place, kind, array, options.pairing, options.differences)
-        return _with_layout(contents, layout, given=options.layout is not None)
+        match recognition.recognise_recording(path, layout):
+            case recognition.FormatFile(name):
+                trials = _counting_memory(formats.trials(path, name))
+                return [_recording_of(trial, path, name, options.layout) for trial in trials]
+            case recognition.RosBag():
+                topics = options.topics.but({} if layout is None else layout.ros)
+                grid = layout.grid() if options.array is None and layout is not None else options.array
+                contents = read_ros(path, topics, grid)
+            case recognition.ForeignFile():
+                assert layout is not None  # one without is refused
+                if options.topics.are_given:
+                    raise ProblemError(f"{path}: no ROS bag; topic, field, types and ros are of one")
+                contents = Contents.single(read_foreign(path, layout))
+                if options.array is not None:
+                    contents = Contents.single(_on_given(contents.main, instance("array", options.array, Array)))
+            case recognition.TaxelFile(kind):
+                if options.topics.are_given:
+                    raise ProblemError(f"{path}: a .{kind}; topic, field, types and ros are of a ROS bag")
+                array = None if options.array is None else instance("array", options.array, Array)
+                contents = _read(path, kind, array, options.pairing, options.differences)
+        return [_with_layout(contents, layout, given=options.layout is not None)]
     except MemoryError:
         raise helped(
-            FormatError(f"{place}: needs more memory than there is ({limits.available()} bytes are available)"),
+            FormatError(f"{path}: needs more memory than there is ({limits.available()} bytes are available)"),
             "limit",
             "larger",
         ) from None
@@ -247,57 +241,69 @@ def _with_layout(contents: Contents, layout: Layout | None, *, given: bool) -> R
     return Recording(with_sidecars(contents if layout is None else apply_layout(contents, layout, given=given)))
 
 
-def _on_given(of: Source, array: Array) -> Source:
+def _on_given(source: RecordedSource, array: Array) -> RecordedSource:
     """Return frames of another program on the given sensor: as many rows and columns, or a row of as many channels.
 
     Raises
     ------
     ProblemError : another number of taxels, rows or columns
     """
-    stated = of.sensor.array
+    stated = source.sensor.array
     if stated.shape != (1, array.rows * array.columns):
-        check_size(of.origin.path, stated.shape, array)
+        check_size(source.origin.path, stated.shape, array)
     says_more = array.shape != stated.shape or (array._is_measured and not stated._is_measured)
-    return on_array(of, array) if says_more else of
+    return on_array(source, array) if says_more else source
 
 
-def _read(place: Path, kind: str, array: Array | None, pairing: str, differences: bool) -> Contents:
+def _read(path: Path, kind: str, array: Array | None, pairing: str, differences: bool) -> Contents:
     """Read a file by the reader of its kind."""
     if kind == "mcap":
-        return read_mcap(place, pairing)
+        return read_mcap(path, pairing)
     if kind == "lsa":
-        return Contents.of(read_lsa(place, array or Array.thesis(), pairing, differences))
-    return Contents.of({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array))
+        return Contents.single(read_lsa(path, array or Array.thesis(), pairing, differences))
+    return Contents.single({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](path, array))
 
 
 def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
-    inside = (file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir()))
-    files = sorted(inside, key=_order)
-    recorded = [file for file in files if _is_written_by_taxel(file)]
+    files = recognition.files_in(folder)
+    recorded = recognition.recorded_by_taxel(files, options.layout)
     if options.topic or not recorded:
-        recorded = [file for file in files if file in recorded or is_bag(file)]
+        bags = recognition.bags_of(files)
+        recorded = [file for file in files if file in recorded or file in bags]
+    names = [] if recorded else [*recognition.formats_of(folder)]
+    if len(names) == 1:
+        trials = sorted(
+            _counting_memory(formats.trials(folder, names[0])), key=lambda t: recognition.natural_order(Path(t.name))
+        )
+        pairs = [(Path(trial.name), _recording_of(trial, folder, names[0], options.layout)) for trial in trials]
+        return _add_labels(folder / LABELS, pairs)
     if recorded:
         _warn_of_tables(folder, recorded, files, options)
-        opened = [_count_memory(open_file(file, options)) for file in recorded]
-        pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
-    elif not (names := _formats_of(folder)) and (foreign := _with_layouts(files, options.layout)):
-        pairs = [(file.relative_to(folder), _count_memory(open_file(file, options))) for file in foreign]
-    else:
-        if len(names) != 1:
-            for file in files if not names else ():
-                refuse_without_layout(file)
-            problem = "no recording" if not names else f"several formats ({', '.join(names)}): name one file"
-            deeper = sorted(inner.name for inner in folder.iterdir() if _holds_files_of_taxel(inner))
-            hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
-            known_kinds = (
-                f"there are {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and by a "
-                "layout file .npy, .txt and other arrays and tables (docs/files.md)"
-            )
-            raise FormatError(f"{folder}: holds {problem}; {hint or known_kinds}")
-        trials = sorted(_counting_memory(formats.trials(folder, names[0])), key=lambda trial: _order(Path(trial.name)))
-        pairs = [(Path(trial.name), _recording_of(trial, folder, names[0], options.layout)) for trial in trials]
-    return _add_labels(folder / LABELS, pairs)
+    found = recorded or ([] if names else recognition.described_tables(files, options.layout))
+    if not found:
+        _refuse_folder(folder, files, names)
+    opened = [(file, _count_memory(recording)) for file in found for recording in _open_file(file, options)]
+    return _add_labels(folder / LABELS, [(file.relative_to(folder), recording) for file, recording in opened])
+
+
+def _refuse_folder(folder: Path, files: Sequence[Path], names: Sequence[str]) -> NoReturn:
+    """Refuse a folder without a recording, or with files of several formats, by what there is in it."""
+    for file in files if not names else ():
+        if file.is_file():
+            recognition.refuse_undescribed(file)
+    problem = "no recording" if not names else f"several formats ({', '.join(names)}): name one file"
+    deeper = sorted(
+        inner.name
+        for inner in folder.iterdir()
+        if inner.is_dir() and os.access(inner, os.R_OK | os.X_OK) and recognition.recorded_by_taxel(inner.iterdir())
+    )
+    hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
+    known_kinds = (
+        f"there are {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and by a "
+        "layout file .npy, .txt and other arrays and tables (docs/files.md)"
+    )
+    raise FormatError(f"{folder}: holds {problem}; {hint or known_kinds}")
 
 
 def _counting_memory(trials: Iterable[Trial]) -> Iterator[Trial]:
@@ -311,7 +317,7 @@ def _count_memory(recording: Recording) -> Recording:
     """Count the arrays of a recording as far as they are read already."""
     for source in recording._contents.sources.values():
         for table in (
-            source.event_table.events if isinstance(source, Board) else None,
+            source.event_table.events if isinstance(source, BoardSource) else None,
             source.frame_table.frames if isinstance(source, FrameSource) else None,
         ):
             limits.keep(0 if table is None or not table.is_read else _size(table()))
@@ -328,7 +334,9 @@ def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path
     """Warn of tables and arrays with a layout that are left out beside recordings, but for those converted to one."""
     stems = {file.stem for file in recorded}
     left = [
-        file.name for file in _with_layouts(files, options.layout) if file not in recorded and file.stem not in stems
+        file.name
+        for file in recognition.described_tables(files, options.layout)
+        if file not in recorded and file.stem not in stems
     ]
     if left:
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
@@ -357,14 +365,14 @@ def _add_labels(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Record
     return [_with_labels(labels, name, recording) for name, recording in pairs]
 
 
-def _named_beside(place: Path, name: Path, recording: Recording) -> Recording:
+def _named_beside(path: Path, recording: Recording) -> Recording:
     """Add the reference events of the folder to the notes of frames that it names; the page opens them one by one."""
-    table, contents = place.parent / LABELS, recording._contents
+    table, contents = path.parent / LABELS, recording._contents
     if any(source.has_events for source in contents.sources.values()):
         return recording
-    if not (table.is_file() and is_label_table(table)):
+    if not (table.is_file() and recognition.is_label_table(table)):
         return recording
-    labels = Labels(table)
+    labels, name = Labels(table), Path(recording.name if recording.kind in formats.FORMATS else path.name)
     return recording if labels.named(name) in (None, "") else _with_labels(labels, name, recording)
 
 
@@ -380,57 +388,43 @@ def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     return Recording(Contents(several(sources), sources))
 
 
-def _notes(labels: Labels, name: Path, of: Source) -> list[Note]:
+def _notes(labels: Labels, name: Path, source: RecordedSource) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
-    clock = of.timing.usable()
-    times = labels._of(name, lambda: clock, of.origin.label)
-    which, replaced, labelled = labels_of(of.origin), set[int | None](), set[object]()
-    if beside(of.origin.path).is_file():
-        set_here = Labels(beside(of.origin.path))
-        replaced, labelled = set_here._replaced(*which), {(row.text, row.t) for row in set_here._rows(*which)}
+    clock = source.timing.usable()
+    times = labels._times(name, lambda: clock, source.origin.label)
+    names, replaced, labelled = labels_of(source.origin), set[int | None](), set[object]()
+    if beside(source.origin.path).is_file():
+        set_here = Labels(beside(source.origin.path))
+        replaced, labelled = set_here._replaced(*names), {(row.text, row.t) for row in set_here._rows(*names)}
     return sorted(
         (
             Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))))
-            for label, every in times.items()
-            for t in every
+            for label, label_times in times.items()
+            for t in label_times
             if t not in replaced and (label, int(t)) not in labelled
         ),
         key=lambda note: note.t or 0,
     )
 
 
-def _with_layouts(files: Sequence[Path], given_layout: str | os.PathLike[str] | None) -> list[Path]:
-    """Return the files of a folder that are of another program, and of which a layout says how to read them."""
-    foreign = (file for file in files if not file.name.endswith(".notes.csv") and is_of_another_program(file))
-    return [file for file in foreign if given_layout is not None or Layout.beside(file) is not None]
-
-
-def _layout(place: Path, stated: str | os.PathLike[str] | Layout | None) -> Layout | None:
-    """Return what the given layout file says, or the one beside a recording; None if there is none."""
-    if isinstance(stated, Layout):
-        return stated
-    file = Layout.beside(place) if stated is None else Path(arguments.checked_path("layout", stated))
-    return None if file is None else Layout.read(file)
-
-
-def _recording_of(trial: Trial, place: Path, kind: str, given_layout: str | os.PathLike[str] | None) -> Recording:
+def _recording_of(trial: Trial, path: Path, kind: str, given_layout: str | os.PathLike[str] | None) -> Recording:
     """Return a trial of another format as a recording, with its reference events as notes."""
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
     )
     label = trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board"
-    origin = parts.Origin(place if place.is_file() else place / trial.name, trial.name, kind, label, trial.source)
-    contents = Contents.of(
+    origin = sections.Origin(path if path.is_file() else path / trial.name, trial.name, kind, label, trial.source)
+    contents = Contents.single(
         source_from(
             trial.recorded,
             origin,
             untimed=not trial.timed,
-            sensor=parts.Sensor(trial.recorded.array, trial.foot),
-            marks=parts.Marks(notes=known(tuple(notes))),
-            losses=parts.Losses(lost=known(_beside_frames(trial))),
+            sensor=sections.Sensor(trial.recorded.array, trial.foot),
+            marks=sections.Marks(notes=known(tuple(notes))),
+            losses=sections.Losses(lost=known(_beside_frames(trial))),
         )
     )
-    layout = _layout(place, given_layout)
+    layout = recognition.layout_of(path, given_layout)
     return _with_layout(contents, layout, given=given_layout is not None)
 
 
@@ -438,57 +432,6 @@ def _beside_frames(trial: Trial) -> tuple[str, ...]:
     """Return the line of `lost` for what a file holds of a trial beside its taxels, times and reference events."""
     names = [*trial.series, *trial.unread]
     return (f"columns that are no taxels: {', '.join(names)}",) if names else ()
-
-
-def recordings_in(folder: Path, layout: str | os.PathLike[str] | None = None) -> list[Path]:
-    """Return what of a folder is a recording, ROS bags last, in the order of their names: 2 before 10.
-
-    Tables and arrays of other programs are those that `layout`, or a layout file beside them, describes; they count in
-    a folder that holds nothing else.
-    """
-    files = [file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir())]
-    bags = sorted((file for file in files if os.access(file, os.R_OK) and is_bag(file)), key=_order)
-    recorded = [file for file in files if file not in bags and _is_written_by_taxel(file)]
-    others = [file for kind in formats.FORMATS.values() for file in kind.files(folder)]
-    found = recorded or [file for file in others if file not in bags] or ([] if bags else _with_layouts(files, layout))
-    return [*sorted(found, key=_order), *bags]
-
-
-def check_recording(file: Path, layout: str | os.PathLike[str] | None = None) -> None:
-    """Refuse a file that is no recording by its name, its first bytes, and its layout file.
-
-    Raises
-    ------
-    FormatError : no recording (names the kind of file if it is known); an invalid layout file; a table or arrays of
-        another program that no layout file describes
-    """
-    if not _formats_of(file) and _layout(file, layout) is None:
-        refuse_without_layout(file)
-    kind = _format_or_kind(file, layout)
-    if kind == "mcap":
-        _core.RecordingReader(file, limits.memory(None), False)
-    elif kind == "csv":
-        check_head(file)
-
-
-def is_recording(file: Path, layout: str | os.PathLike[str] | None = None) -> bool:
-    """Return whether `check_recording` takes a file for one; what is damaged inside shows only when it is opened."""
-    if not (file.is_file() or file.is_dir()):
-        return False
-    try:
-        if file.suffix.lower() == ".csv" and is_label_table(file):
-            return False
-        _format_or_kind(file, layout)
-    except (FormatError, OSError):
-        return False
-    return True
-
-
-def _format_or_kind(file: Path, layout: str | os.PathLike[str] | None) -> str:
-    """Return the kind of a recording by its name, its first bytes, and its layout file."""
-    if names := _formats_of(file):
-        return names[0]
-    return "foreign" if is_of_another_program(file) and _layout(file, layout) is not None else kind_of(file)
 
 
 def join_feet(opened: Sequence[Recording]) -> list[Recording]:
@@ -533,33 +476,7 @@ def sensors(recording: Recording) -> list[Recording]:
 
 def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordings") -> list[Recording]:
     """Return each sensor of recordings as one of its own; refuse what is no recording."""
-    every = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
-    if not len(every):
+    entries = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
+    if not len(entries):
         raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
-    return [recording for entry in every for recording in sensors(instance(name, entry, Recording))]
-
-
-def _formats_of(place: Path) -> list[str]:
-    return [name for name, kind in formats.FORMATS.items() if kind.files(place)]
-
-
-def _holds_files_of_taxel(folder: Path) -> bool:
-    is_readable = folder.is_dir() and os.access(folder, os.R_OK | os.X_OK)
-    return is_readable and any(_is_written_by_taxel(file) for file in folder.iterdir())
-
-
-def _is_written_by_taxel(file: Path) -> bool:
-    """Return whether a file is of a kind that taxel writes, by its ending and, for shared endings, by its content."""
-    ending = file.suffix.lower()
-    if not file.is_file():
-        return False
-    if ending == ".csv":
-        return is_table_of_taxel(file)
-    if ending == ".npz":
-        return not _formats_of(file)
-    return is_h5_of_taxel(file) if ending == ".h5" else ending in ENDINGS
-
-
-def _order(path: Path) -> list[tuple[bool, int, str]]:
-    """Return the sort key of a name in natural order: 2 before 10."""
-    return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in re.split(r"([0-9]+)", str(path))]
+    return [recording for entry in entries for recording in sensors(instance(name, entry, Recording))]

@@ -25,13 +25,13 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording.between import Slices, between, inside
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Contents, S, Stream
+from taxel.recording.contents import Contents, S, Stream, refuse_several
 from taxel.recording.frames import as_frames, at_rate, calibrate
 from taxel.recording.kinds import kind_of_file, verdict_of
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import UNKNOWN, Once
-from taxel.recording.parts import Wire
 from taxel.recording.raw import Datagrams
+from taxel.recording.sections import Wire
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
 from taxel.wire import Registers
@@ -87,9 +87,9 @@ class Recording:
         if not isinstance(contents, Contents):
             raise refused("contents", f" is {shown(contents)}: a recording is opened by taxel.open(path), not built")
         self._contents = contents
-        whole = contents.main
-        self.path, self.name, self.kind = whole.origin.path, whole.origin.name, whole.origin.kind
-        self.array, self.source = whole.sensor.array, whole.origin.source
+        main = contents.main
+        self.path, self.name, self.kind = main.origin.path, main.origin.name, main.origin.kind
+        self.array, self.source = main.sensor.array, main.origin.source
         self._cut_from: tuple[weakref.ref[Recording], float, float] | None = None
 
     path: Path
@@ -143,8 +143,8 @@ class Recording:
         ------
         ProblemError : a slice by the clock of one source, as the other sources have other clocks
         """
-        every = self._contents.sources
-        return {name: self if len(every) == 1 else Recording(Contents(every[name], every)) for name in every}
+        sources = self._contents.sources
+        return {name: self if len(sources) == 1 else Recording(Contents(sources[name], sources)) for name in sources}
 
     def on_clock(self, name: str) -> Recording:
         """Return the same recording with the times of all sources by the clock of one of them, or of the host.
@@ -217,14 +217,14 @@ class Recording:
 
     @property
     def is_slice(self) -> bool:
-        """Whether this is a part of the file by time, made by `between`."""
-        return self._contents.main.timing.stretch is not None
+        """Whether this is a slice of the file, made by `between`."""
+        return self._contents.main.timing.interval is not None
 
     @property
-    def stretch(self) -> tuple[int, int] | None:
-        """The first time and the end of a part by time, us; None of a whole."""
-        stretch = self._contents.main.timing.stretch
-        return None if stretch is None else stretch()
+    def interval(self) -> tuple[int, int] | None:
+        """The first time and the end of a slice, us; None of a whole file."""
+        interval = self._contents.main.timing.interval
+        return None if interval is None else interval()
 
     @property
     def is_several(self) -> bool:
@@ -249,10 +249,10 @@ class Recording:
     @property
     def title(self) -> str:
         """The path, with the name of the source or of the trial where the file holds several."""
-        place, sources = str(self.path), inside(self._contents.sources)
+        path, sources = str(self.path), inside(self._contents.sources)
         if self.label and sum(not isinstance(source, Stream) for source in sources.values()) > 1:
-            return f"{place} {self.label}"
-        return place if place.endswith(self.name) else f"{place}, {self.name}"
+            return f"{path} {self.label}"
+        return path if path.endswith(self.name) else f"{path}, {self.name}"
 
     @property
     def notes(self) -> tuple[Note, ...]:
@@ -329,10 +329,8 @@ class Recording:
         ------
         ProblemError : there are none: a stream, a part of a sensor, or a kind of file that does not hold them
         """
-        if self._contents.is_several:
-            # Reading the events raises the error that lists the sources.
-            _ = self._contents.main.table
-        datagrams = self._contents.main.part(Wire).datagrams()
+        refuse_several(self._contents.main)
+        datagrams = self._contents.main.section(Wire).datagrams()
         if datagrams is not None:
             return datagrams
         if self.is_stream:
@@ -409,7 +407,7 @@ class Recording:
         return dict(self._contents.main.losses.rebuilt())
 
     def between(self, start: float, stop: float) -> Recording:
-        """Return the part of ``start <= t < stop`` (us of the board's clock).
+        """Return the slice of ``start <= t < stop`` (us of the board's clock).
 
         Notes without a time are dropped and listed in its `lost`.
 
@@ -430,24 +428,24 @@ class Recording:
         >>> taxel.open(place).between(100, 200)
         Recording(two.npz: 1 event, 192 to 192 us, 8 x 8 taxels)
         """
-        part = Recording(between(self._contents, *window("us", start, stop)))
-        # A weak reference, so that a part does not hold what it was taken from.
-        part._cut_from = weakref.ref(self), start, stop
-        return part
+        time_slice = Recording(between(self._contents, *window("us", start, stop)))
+        # A weak reference, so that a slice does not hold what it was taken from.
+        time_slice._cut_from = weakref.ref(self), start, stop
+        return time_slice
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_cut_from": None}
 
     def _why_empty(self) -> str:
-        """Return where the events or frames of a recording are of which a part without any was taken."""
+        """Return where the events or frames of a recording are of which an empty slice was taken."""
         if self._cut_from is None:
             return f": {self.title} is empty"
-        of, start, stop = self._cut_from
-        asked, whole = f" from {plain(start)} to {plain(stop)} us", of()
-        if whole is None:
-            return f"{asked} of {self.title}"
-        t = whole._contents.main.table.t
-        return f"{asked}: {whole.title} " + (f"lies from {t.min()} to {t.max()} us" if len(t) else "is empty")
+        reference, start, stop = self._cut_from
+        bounds, recording = f" from {plain(start)} to {plain(stop)} us", reference()
+        if recording is None:
+            return f"{bounds} of {self.title}"
+        t = recording._contents.main.table.t
+        return f"{bounds}: {recording.title} " + (f"lies from {t.min()} to {t.max()} us" if len(t) else "is empty")
 
     def at_rate(self, rate_hz: float) -> Recording:
         """Return the same recording of numbered frames with times: so many frames a second, the first at 0.
@@ -464,10 +462,10 @@ class Recording:
         --------
         >>> import pathlib, tempfile, taxel
         >>> from taxel.recording.contents import Contents, source_from
-        >>> from taxel.recording.parts import Origin
+        >>> from taxel.recording.sections import Origin
         >>> frames = taxel.Frames([[[1.0]], [[2.0]]], [0, 1])
         >>> numbered = source_from(frames, Origin(pathlib.Path("grasp"), "grasp", "icub"), untimed=True)
-        >>> taxel.Recording(Contents.of(numbered)).at_rate(50).frames().t
+        >>> taxel.Recording(Contents.single(numbered)).at_rate(50).frames().t
         array([    0, 20000])
         """
         return Recording(at_rate(self._contents, rate_hz))
@@ -512,15 +510,15 @@ class Recording:
         return escaped(f"Recording({self.name}: {', '.join([counted(len(table), noun), time, size, *more])})")
 
 
-def with_notes(of: Contents, more: tuple[Note, ...]) -> Contents:
+def with_notes(contents: Contents, more: tuple[Note, ...]) -> Contents:
     """Return the same contents with further notes."""
-    label, sources = of.main.origin.label, of.sources
+    label, sources = contents.main.origin.label, contents.sources
     if label in sources:
         source = add_notes(inside(sources)[label], more)
         sources = sources.but(label, source) if isinstance(sources, Slices) else {**sources, label: source}
-    return Contents(add_notes(of.main, more), sources)
+    return Contents(add_notes(contents.main, more), sources)
 
 
-def add_notes(of: S, more: tuple[Note, ...]) -> S:
+def add_notes(source: S, more: tuple[Note, ...]) -> S:
     """Return the same source with further notes."""
-    return replace(of, marks=replace(of.marks, notes=Once(lambda: of.marks.notes() + more)))
+    return replace(source, marks=replace(source.marks, notes=Once(lambda: source.marks.notes() + more)))

@@ -8,38 +8,38 @@ from pathlib import Path
 from taxel._core import ProblemError
 from taxel.calibration import Calibration
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording.contents import Contents, FrameSource, Source, Stream, alone, share_clock
+from taxel.recording.contents import Contents, FrameSource, RecordedSource, Stream, alone, share_clock
 from taxel.recording.frames import calibrate
 from taxel.recording.once import Once, known
-from taxel.recording.parts import Origin
 from taxel.recording.recording import Recording
+from taxel.recording.sections import Origin
 
 
-def with_sidecars(of: Contents) -> Contents:
+def with_sidecars(contents: Contents) -> Contents:
     """Return the contents of a file with the labels of `NAME.notes.csv` and the calibration in its folder."""
     # Labels are by the clock of the file's first source, or of all.
-    labelled = set(of.sources) if share_clock(of.sources) else {*list(of.sources)[:1]}
-    return alone({name: _of_one(source, labelled=name in labelled) for name, source in of.sources.items()})
+    labelled = set(contents.sources) if share_clock(contents.sources) else {*list(contents.sources)[:1]}
+    return alone({name: _with_sidecars(source, labelled=name in labelled) for name, source in contents.sources.items()})
 
 
-def _of_one(of: Source, *, labelled: bool) -> Source:
-    path, marks = of.origin.path, of.marks
+def _with_sidecars(source: RecordedSource, *, labelled: bool) -> RecordedSource:
+    path, marks = source.origin.path, source.marks
     if labelled and path.exists() and beside(path).is_file():
-        marks = replace(marks, notes=Once(lambda: _notes(of)))
-    return replace(of, sensor=replace(of.sensor, calibration=calibration_beside(path, of)), marks=marks)
+        marks = replace(marks, notes=Once(lambda: _notes(source)))
+    return replace(source, sensor=replace(source.sensor, calibration=calibration_beside(path, source)), marks=marks)
 
 
-def _notes(of: Source) -> tuple[Note, ...]:
+def _notes(source: RecordedSource) -> tuple[Note, ...]:
     """Return the notes of a recording, and the labels that people set on it: of its trial and source, and those of all.
 
     Notes can be used as labels: one that a label replaces is left out, and a label that says the same at the same time
     is that note.
     """
-    labels, which = Labels(beside(of.origin.path)), labels_of(of.origin)
-    replaced = labels._replaced(*which)
-    notes = tuple(note for note in of.marks.notes() if note.t is None or note.t not in replaced)
+    labels, names = Labels(beside(source.origin.path)), labels_of(source.origin)
+    replaced = labels._replaced(*names)
+    notes = tuple(note for note in source.marks.notes() if note.t is None or note.t not in replaced)
     noted = {(note.text, note.t) for note in notes}
-    more = sorted((row for row in labels._rows(*which) if (row.text, row.t) not in noted), key=lambda row: row.t or 0)
+    more = sorted((row for row in labels._rows(*names) if (row.text, row.t) not in noted), key=lambda row: row.t or 0)
     return notes + tuple(Note(row.text, row.t, row.at_ns) for row in more)
 
 
@@ -48,7 +48,7 @@ def labels_of(origin: Origin) -> tuple[Path, str, str]:
     return origin.path, origin.label, trial_of(origin.name, origin.label)
 
 
-def calibration_beside(path: Path, of: Source) -> Once[Calibration | None]:
+def calibration_beside(path: Path, source: RecordedSource) -> Once[Calibration | None]:
     """Return the calibration beside a file (`Calibration.beside`); None if there is none.
 
     Reading it raises a FormatError if it cannot be read, and a ProblemError if it is of another array than the
@@ -56,13 +56,13 @@ def calibration_beside(path: Path, of: Source) -> Once[Calibration | None]:
     """
 
     def read() -> Calibration | None:
-        place = Calibration.beside(path)
-        return None if place is None else _fitting(place, of)
+        file = Calibration.beside(path)
+        return None if file is None else _fitting(file, source)
 
     return Once(read, lambda: Calibration.beside(path) is not None)
 
 
-def calibrate_by(recording: Recording, place: Path) -> Recording:
+def calibrate_by(recording: Recording, path: Path) -> Recording:
     """Return a recording, or each sensor of one with several, as frames in N or kPa by a calibration file.
 
     Raises
@@ -71,23 +71,23 @@ def calibrate_by(recording: Recording, place: Path) -> Recording:
     ProblemError : it is of another array than the recording, or of readings in another unit
     """
 
-    def with_calibration(source: Source) -> Source:
+    def with_calibration(source: RecordedSource) -> RecordedSource:
         if isinstance(source, Stream):
             return source
-        calibration: Once[Calibration | None] = known(_fitting(place, source))
+        calibration: Once[Calibration | None] = known(_fitting(path, source))
         return calibrate(replace(source, sensor=replace(source.sensor, calibration=calibration)))
 
     sources = recording._contents.sources
     return Recording(alone({name: with_calibration(source) for name, source in sources.items()}))
 
 
-def _fitting(place: Path, of: Source) -> Calibration:
+def _fitting(path: Path, source: RecordedSource) -> Calibration:
     """Return a calibration; refuse one of another array or of readings in another unit."""
-    calibration = Calibration.load(place)
-    read = of.table.unit if isinstance(of, FrameSource) else "ticks"
-    if not calibration.array.fits(of.sensor.array) or calibration.of != read:
+    calibration = Calibration.load(path)
+    unit = source.table.unit if isinstance(source, FrameSource) else "ticks"
+    if not calibration.array.fits(source.sensor.array) or calibration.reading_unit != unit:
         raise ProblemError(
-            f"{place}: turns {calibration.of} of {calibration.array!r} into {calibration.unit}; {of.origin.name} holds "
-            f"{read} of {of.sensor.array!r}, another array"
+            f"{path}: turns {calibration.reading_unit} of {calibration.array!r} into {calibration.unit}; "
+            f"{source.origin.name} holds {unit} of {source.sensor.array!r}, another array"
         )
     return calibration

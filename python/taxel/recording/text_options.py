@@ -16,7 +16,8 @@ from taxel.formats.layout import Layout
 from taxel.recording.contents import Contents
 from taxel.recording.layout import on_array
 from taxel.recording.opening import SharedOptions, join_feet, open_all, sensors
-from taxel.recording.read_foreign import is_lone_array
+from taxel.recording.readers.foreign import is_lone_array
+from taxel.recording.recognition import ForeignFile, recognise
 from taxel.recording.recording import Recording
 
 
@@ -44,13 +45,13 @@ class TextOptions(SharedOptions):
         ------
         ProblemError : an `array` that differs from the sensor that a file holds; a `rate_hz` of one with times
         """
-        place = Path(checked_path("path", path))
+        file = Path(checked_path("path", path))
         sizes = [] if self.array is None else several("array", self.array)
         arrays = [of_size(text("array", size), of_wire=False) for size in sizes]
         options = {option.name: getattr(self, option.name) for option in fields(SharedOptions)}
         options["array"] = arrays if len(arrays) > 1 else arrays[0] if arrays else None
-        options["layout"] = self.layout or self._instead_of_layout(place)
-        opened = open_all(place, **options)
+        options["layout"] = self.layout or self._instead_of_layout(file)
+        opened = open_all(file, **options)
         placed = map(self._on_array, opened)
         return [recording if self.rate_hz is None else recording.at_rate(self.rate_hz) for recording in placed]
 
@@ -73,14 +74,14 @@ class TextOptions(SharedOptions):
 
     def _names_topic(self, bag: Path) -> bool:
         """Return whether these options, or the layout file of a ROS bag, say which topic to open."""
-        place = self.layout or Layout.beside(bag)
-        return bool(self.topic) or (place is not None and "topic" in Layout.read(Path(place)).ros)
+        layout = self.layout or Layout.beside(bag)
+        return bool(self.topic) or (layout is not None and "topic" in Layout.read(Path(layout)).ros)
 
     def _instead_of_layout(self, path: Path) -> Any:
         """Return an empty layout for an array without one, whose rate `rate_hz` says; else None."""
-        if self.rate_hz is None:
+        if self.rate_hz is None or not path.is_file() or recognise(path) != ForeignFile(has_layout=False):
             return None
-        return Layout(path) if Layout.beside(path) is None and is_lone_array(path) else None
+        return Layout(path) if is_lone_array(path) else None
 
     def _on_array(self, recording: Recording) -> Recording:
         """Return a recording on the sensor of `array`; refuse one that holds a sensor that differs from it."""
@@ -89,7 +90,7 @@ class TextOptions(SharedOptions):
             return recording
         stated, array = recording.array, of_size(self.array[0], of_wire=False)
         if _is_row_of(recording, array):
-            return _place_on(recording, array)
+            return _on_sensor(recording, array)
         differs = array.pitch_mm is not None and (stated.pitch_mm, stated.places) != (array.pitch_mm, None)
         if stated.shape != array.shape or differs:
             sizes = ", ".join(self.array)
@@ -99,7 +100,7 @@ class TextOptions(SharedOptions):
             return recording
         # A size without a pitch says nothing of it, and events without one are of the board's wire.
         wire = of_size(self.array[0])
-        return _place_on(recording, Array(*stated.shape, wire.pitch_mm, stated.exists, wire.name))
+        return _on_sensor(recording, Array(*stated.shape, wire.pitch_mm, stated.exists, wire.name))
 
     def open_joined(self, path: str | os.PathLike[str]) -> list[Recording]:
         """Open a file or a folder, with the feet of each trial joined as its sources."""
@@ -120,14 +121,14 @@ class TextOptions(SharedOptions):
         ------
         ProblemError : it holds several
         """
-        every = self.open_joined(path)
-        if len(every) != 1:
-            some = ", ".join(recording.name for recording in every[:3]) + ", ..." * (len(every) > 3)
-            raise ProblemError(f"{path}: holds {len(every)} recordings ({some}); must be one")
-        return every[0]
+        recordings = self.open_joined(path)
+        if len(recordings) != 1:
+            some = ", ".join(recording.name for recording in recordings[:3]) + ", ..." * (len(recordings) > 3)
+            raise ProblemError(f"{path}: holds {len(recordings)} recordings ({some}); must be one")
+        return recordings[0]
 
 
-def _place_on(recording: Recording, array: Array) -> Recording:
+def _on_sensor(recording: Recording, array: Array) -> Recording:
     """Return a recording on another description of its sensor."""
     contents = recording._contents
     return type(recording)(Contents(on_array(contents.main, array), contents.sources))

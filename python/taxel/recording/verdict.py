@@ -72,28 +72,28 @@ class Verdict(str):
     @classmethod
     def _from(cls, held: Mapping[str, Any]) -> Self:
         """Return the verdict that the compiled part states."""
-        made = str.__new__(cls, held["text"])
-        made._held = held
-        return made
+        verdict = str.__new__(cls, held["text"])
+        verdict._held = held
+        return verdict
 
     @classmethod
-    def _together(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
+    def _together(cls, named: Iterable[tuple[str, Verdict]]) -> Self:
         """Return the verdict on several recordings or sources, each with its name."""
-        return cls._of({"together": [(name, part._held) for name, part in parts]})
+        return cls._of({"together": [(name, verdict._held) for name, verdict in named]})
 
     @classmethod
-    def _of_sources(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
+    def _of_sources(cls, named: Iterable[tuple[str, Verdict]]) -> Self:
         """Return the verdict on the sources of one file, each with its name; damage of the file counts once."""
-        return cls._of({"sources": [(name, part._held) for name, part in parts]})
+        return cls._of({"sources": [(name, verdict._held) for name, verdict in named]})
 
     @classmethod
-    def _of_stretches(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
-        """Return the verdict on stretches of one recording, each with its name; what the whole lost counts once."""
-        return cls._of({"stretches": [(name, part._held) for name, part in parts]})
+    def _of_stretches(cls, named: Iterable[tuple[str, Verdict]]) -> Self:
+        """Return the verdict on slices of one recording, each with its name; what the whole lost counts once."""
+        return cls._of({"stretches": [(name, verdict._held) for name, verdict in named]})
 
-    def _as_stretch_of(self, whole: str) -> Self:
+    def _as_stretch_of(self, name: str) -> Self:
         """Return the same verdict as that of a stretch of the recording of this name."""
-        return self._from({**self._held, "stretch_of": whole})
+        return self._from({**self._held, "stretch_of": name})
 
     def _later(self, shift: int) -> Self:
         """Return the verdict on the recording whose times are later by so many us."""
@@ -137,7 +137,7 @@ class Verdict(str):
     @property
     def parts(self) -> dict[str, Verdict]:
         """The verdicts of the sources or merged recordings, by name."""
-        return {name: Verdict._from(part) for name, part in self._held["parts"]}
+        return {name: Verdict._from(verdict) for name, verdict in self._held["parts"]}
 
     def to_dict(self) -> dict[str, Any]:
         """Return text, status and numbers, ready for JSON.
@@ -153,7 +153,7 @@ class Verdict(str):
         {}
         """
         numbers = {name: dict(self._held[name]) for name in _NUMBERS}
-        parts = {name: part.to_dict() for name, part in self.parts.items()}
+        parts = {name: verdict.to_dict() for name, verdict in self.parts.items()}
         about = {"status": self.status, "text": str(self), **numbers}
         rest = {"doubtful_after_us": self.doubtful_after_us, "steps_back": self.steps_back}
         return about | rest | {"stretch_of": self.stretch_of, "parts": parts}
@@ -231,8 +231,8 @@ def _check(held: Any) -> dict[str, Any]:
                 raise ProblemError(
                     f"verdict: its {name} has {totals.get(cause, 0)} of {cause}, its parts {least}: must be no fewer"
                 )
-    made = {"status": values["status"], "text": values["text"], doubtful: values.get(doubtful)}
-    made |= {"steps_back": [dict(step) for step in values.get("steps_back", [])]}
-    made |= {"stretch_of": values.get("stretch_of")}
-    made |= {name: dict(each) for name, each in zip(_NUMBERS, numbers, strict=True)}
-    return made | {"parts": list(stated.items())}
+    fields = {"status": values["status"], "text": values["text"], doubtful: values.get(doubtful)}
+    fields |= {"steps_back": [dict(step) for step in values.get("steps_back", [])]}
+    fields |= {"stretch_of": values.get("stretch_of")}
+    fields |= {name: dict(each) for name, each in zip(_NUMBERS, numbers, strict=True)}
+    return fields | {"parts": list(stated.items())}

@@ -29,9 +29,9 @@ from taxel.encode import Composite, Encoder
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
+from taxel.recording.analysis.pressure import series
 from taxel.recording.contents import Contents, source_from
-from taxel.recording.parts import Origin
-from taxel.recording.pressure import series
+from taxel.recording.sections import Origin
 from taxel.report.page import render
 from taxel.report.svg import INK, STYLE, picture
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -59,7 +59,7 @@ class _Moment(NamedTuple):
     recording: int
     label: str
     t: float
-    what: str
+    title: str
     badness: float
 
 
@@ -105,7 +105,7 @@ def write_detections(
     detector("readout", readout)
     if not listened:
         raise refused("listened", " is empty: there is nothing to report")
-    place = Path(folder)
+    target = Path(folder)
     moments = {label: _moments(listened, label) for label in readout.labels}
     aligned = {} if alignments is None else alignments
     with mpl.rc_context(STYLE):
@@ -145,8 +145,8 @@ def write_detections(
         outside=[outcome for outcome in listened if isinstance(readout, Readout)],
         scored=any(outcome.score is not None for outcome in listened),
     )
-    place.mkdir(parents=True, exist_ok=True)  # so late that nothing is left of one that is ended
-    return write_whole(place / "report.html", lambda file: file.write(text.encode()))
+    target.mkdir(parents=True, exist_ok=True)  # so late that nothing is left of one that is ended
+    return write_whole(target / "report.html", lambda file: file.write(text.encode()))
 
 
 def _beside(labels: Sequence[str], scored: Judged | None) -> list[tuple[str, str, Score | None]]:
@@ -189,18 +189,22 @@ def _picture(figure: Figure | None) -> Markup | None:
 def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
     """Draw the sum of each recording of frames over time, so of each foot, and what was detected."""
     of_outcomes = [(outcome, recorded(outcome.example.source, hold=False)) for outcome in listened]
-    shown = [(outcome, of) for outcome, of in of_outcomes if isinstance(of, Frames) and len(of)][:_MOST_SUMS]
+    shown = [(outcome, pressed) for outcome, pressed in of_outcomes if isinstance(pressed, Frames) and len(pressed)][
+        :_MOST_SUMS
+    ]
     if not shown:
         return None
     figure, axes = plt.subplots(
         len(shown), 1, figsize=(9.0, 0.6 + 1.4 * len(shown)), layout="constrained", squeeze=False
     )
     for axis, (outcome, frames) in zip(axes[:, 0], shown, strict=True):
-        of = series(Recording(Contents.of(source_from(frames, Origin(Path(outcome.name))))), outcome.example.tare)
-        assert of is not None  # frames have values
-        total, unit = (of.total, of.unit) if of.force is None else (of.force, "N")
+        pressed = series(
+            Recording(Contents.single(source_from(frames, Origin(Path(outcome.name))))), outcome.example.tare
+        )
+        assert pressed is not None  # frames have values
+        total, unit = (pressed.total, pressed.unit) if pressed.force is None else (pressed.force, "N")
         begins = np.arange(0, len(total), 1 + len(total) // _STRETCHES)
-        seconds, most = (of.t[begins] - outcome.begin_us) / 1e6, np.fmax.reduceat(total, begins)
+        seconds, most = (pressed.t[begins] - outcome.begin_us) / 1e6, np.fmax.reduceat(total, begins)
         axis.plot(seconds, most, color=INK, linewidth=0.9, label=escaped(f"sum, {unit}"))
         for k, label in enumerate(labels):
             at = (outcome.found[label].t - outcome.begin_us) / 1e6
@@ -251,31 +255,31 @@ def _potential(
     """Draw potential and threshold around moments, with detections, and labels as given and as learnt."""
     if not moments:
         return None
-    cell = readout.neurons[label]
+    trained = readout.neurons[label]
     figure, axes = plt.subplots(
         1, len(moments), figsize=(2.9 * len(moments), 2.6), layout="constrained", squeeze=False, sharey=True
     )
     for axis, moment in zip(axes[0], moments, strict=True):
         # Wide enough for the label and its detection, or for what was felt late of one that has none.
         apart = moment.badness if np.isfinite(moment.badness) else _MISSED_MS
-        reach = _AROUND * cell.neuron.tau + cell.delay_ms + apart
+        reach = _AROUND * trained.neuron.tau + trained.delay_ms + apart
         outcome = listened[moment.recording]
         trains = readout.trains_of(label, _trains(readout, outcome))
         detected_ms = to_ms(outcome.found[label].t)
         at = to_ms(moment.t)
         times = np.linspace(at - reach, at + reach, 600)
-        crossings = detected_ms + readout.encoder_of(label).latency_ms + cell.delay_ms
-        potential = cell.neuron.potential(cell.weights, trains, times, spikes=crossings)
+        crossings = detected_ms + readout.encoder_of(label).latency_ms + trained.delay_ms
+        potential = trained.neuron.potential(trained.weights, trains, times, spikes=crossings)
         axis.plot(times - at, potential, color=_POTENTIAL, linewidth=1, label="potential")
-        threshold = readout.run_threshold * cell.neuron.theta_0
+        threshold = readout.run_threshold * trained.neuron.theta_0
         axis.axhline(threshold, color="#999999", linewidth=0.8, linestyle=":", label="threshold at rest")
         true = to_ms(np.asarray(outcome.example.labels.get(label, ()), np.float64))
         felt = np.empty(0) if aligned is None else to_ms(aligned.felt(moment.recording))
         lines = (("detected", detected_ms, _DETECTED, "-"), ("true", true, _TRUE, "--"), ("felt", felt, _TRUE, ":"))
-        for what, ms, color, style in lines:
+        for title, ms, color, style in lines:
             for k, t in enumerate(ms[np.abs(ms - at) < reach]):
-                axis.axvline(t - at, color=color, linewidth=1.2, linestyle=style, label=what * (k == 0))
-        axis.set_title(escaped(f"{moment.what}, {(at - to_ms(outcome.begin_us)) / 1000.0:.3f} s"), fontsize=9)
+                axis.axvline(t - at, color=color, linewidth=1.2, linestyle=style, label=title * (k == 0))
+        axis.set_title(escaped(f"{moment.title}, {(at - to_ms(outcome.begin_us)) / 1000.0:.3f} s"), fontsize=9)
         axis.set_xlabel("ms from then")
         axis.legend()
     axes[0][0].set_ylabel("potential, mV")
@@ -374,8 +378,8 @@ def _planes(
     return planes
 
 
-def _nth(what: str, count: int, n: int) -> str:
-    return f"{what} {n + 1}" if count > 1 else ""
+def _nth(noun: str, count: int, n: int) -> str:
+    return f"{noun} {n + 1}" if count > 1 else ""
 
 
 def _errors(listened: Sequence[Outcome], label: str) -> Figure | None:

@@ -152,8 +152,8 @@ def _by_taxels(ax: Axes, answer: Answer) -> None:
         if line:
             ax.plot([p.taxels for p in line], [p.found.bits for p in line], style, ms=4, label=kind)
     at = answer.taxels[0].period_ms if answer.taxels else answer.full.period_ms
-    every = next(p for p in answer.by_period if p.period_ms == at)
-    ax.plot(every.taxels, every.found.bits, "k*", ms=8, label="all")
+    answer_at = next(p for p in answer.by_period if p.period_ms == at)
+    ax.plot(answer_at.taxels, answer_at.found.bits, "k*", ms=8, label="all")
     ax.set(xscale="log", xlabel="taxels", title=f"how many taxels ({at:g} ms)")
     ax.legend(frameon=False)
 

@@ -25,7 +25,7 @@ def _lines(value: object) -> Markup:
 
 @cache
 def _environment(package: str) -> jinja2.Environment:
-    made = jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.ChoiceLoader([jinja2.PackageLoader(name, ".") for name in dict.fromkeys((package, "taxel"))]),
         autoescape=True,
         trim_blocks=True,
@@ -33,8 +33,8 @@ def _environment(package: str) -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
         finalize=_show,
     )
-    made.filters["lines"] = _lines
-    return made
+    environment.filters["lines"] = _lines
+    return environment
 
 
 def render(template: str, *, package: str = "taxel", **values: Any) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import finite, flag, number, numbers, parameters, shown, whole
+from taxel._base.arguments import finite, flag, integer, number, numbers, parameters, shown
 from taxel._base.errors import refused
 from taxel._base.messages import escaped, plain, warn
 from taxel._core import ProblemError
@@ -189,7 +189,7 @@ class Scene:
         True
         """
         parts = Array._of(array)._parts()
-        seed, index = whole("seed", seed, 0), whole("index", index, 0, 1_000_000)
+        seed, index = integer("seed", seed, 0), integer("index", index, 0, 1_000_000)
         return cls(_core.draw_scene(parts, seed, index, flag("left_to_rest", left_to_rest)))
 
     def replace(self, **changes: Any) -> Scene:
@@ -230,7 +230,7 @@ class Scene:
         80.0
         """
         bodies = list(self.parameters["bodies"])
-        n = whole("n", n, 0, len(bodies) - 1)
+        n = integer("n", n, 0, len(bodies) - 1)
         bodies[n] = _replaced("a body", bodies[n], changes, _BODY)
         return Scene({**self.parameters, "bodies": bodies})
 
@@ -295,13 +295,13 @@ def _only(body: object, part: str) -> str:
 
 
 def _replaced(
-    what: str, before: Mapping[str, Any], changes: Mapping[str, Any], more: Sequence[str] = ()
+    noun: str, before: Mapping[str, Any], changes: Mapping[str, Any], more: Sequence[str] = ()
 ) -> dict[str, Any]:
     """Return parameters with some changed; parts are merged to any depth, but for one of several kinds."""
     merged = dict(before)
     for name, change in changes.items():
         if name not in before and name not in more:
-            raise ProblemError(f"{name}: {what} has {', '.join(dict.fromkeys([*before, *more]))}")
+            raise ProblemError(f"{name}: {noun} has {', '.join(dict.fromkeys([*before, *more]))}")
         merged[name] = _merged(merged.get(name), change)
     return merged
 

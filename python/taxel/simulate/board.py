@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taxel import _core
-from taxel._base.arguments import buffer_bytes, flag, instance, numbers, text, whole
+from taxel._base.arguments import buffer_bytes, flag, instance, integer, numbers, text
 from taxel._base.errors import refused
 from taxel._base.messages import escaped, plain
 from taxel._base.options import option
@@ -66,7 +66,7 @@ class Version2:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            whole(field.name, getattr(self, field.name), field.metadata["min"], field.metadata["max"])
+            integer(field.name, getattr(self, field.name), field.metadata["min"], field.metadata["max"])
 
 
 def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:
@@ -94,9 +94,9 @@ def fitting(preset: str | None, array: Array) -> Registers:
         if max(array.shape) > _THESIS_LINES:
             return Registers(array=array)
         preset = "5.2 kHz"
-    held = _core.registers_preset(text("preset", preset), array._parts())
+    values = _core.registers_preset(text("preset", preset), array._parts())
     try:
-        return Registers._of(held, array)
+        return Registers._of(values, array)
     except DeviceError as error:
         size = f"{array.rows} x {array.columns} taxels"
         raise DeviceError(f'preset "{preset}" does not read {size}: {error}') from None
@@ -168,7 +168,7 @@ class Board:
         options = {
             "previous": text("previous", previous, ("last_sent", "last_sample")),
             "intensity": text("intensity", intensity, ("value", "difference", "nothing")),
-            "queue": whole("queue", queue, 0, 2**32),
+            "queue": integer("queue", queue, 0, 2**32),
             "version_2": asdict(instance("version_2", Version2() if version_2 is None else version_2, Version2)),
             **reading(circuit, asynchronous),
         }
@@ -201,7 +201,7 @@ class Board:
         >>> [len(datagram) for datagram in Board().frame(np.full((64, 64), 100, np.uint16))][:1]
         [1400]
         """
-        at_most = 2**32 if most is None else whole("most", most, 0, 2**32)
+        at_most = 2**32 if most is None else integer("most", most, 0, 2**32)
         given = numbers("ticks", ticks, np.uint16).reshape(-1)
         flags = None if accepted is None else numbers("accepted", accepted, np.bool_).reshape(-1)
         return self._core.frame(given, at_most, flags)

@@ -436,8 +436,8 @@ class Converter(Value):
         (301, 3.0)
         """
         lines = floats("line_v", line_v, "V").tolist()
-        every, stop = number("every_us", every_us, "us"), number("stop_us", stop_us, "us")
-        return Trace(**_core.converter_trace(self._json(), lines, every, stop))
+        period, stop = number("every_us", every_us, "us"), number("stop_us", stop_us, "us")
+        return Trace(**_core.converter_trace(self._json(), lines, period, stop))
 
 
 class Converted(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._base.arguments import callback, instance, integer, mapping, number, parameters, several, shown, text
 from taxel._base.errors import refused
 from taxel._base.options import with_options
 from taxel._core import ProblemError
@@ -73,8 +73,8 @@ def truth(
     (427782, 0.0)
     """
     sensed, acts = Array._of(array), several("acts", acts)
-    held = fitting(preset, sensed)._json()
-    contacts, force, narrow = _core.truth(sensed._parts(), held, _parts(acts, sensed))
+    registers = fitting(preset, sensed)._json()
+    contacts, force, narrow = _core.truth(sensed._parts(), registers, _parts(acts, sensed))
     _warn(acts, narrow)
     return [Contact(**contact) for contact in contacts], force
 
@@ -134,14 +134,14 @@ def play(
     ((50300, True), (59900, False))
     """
     sensed, acts = Array._of(array), several("acts", acts)
-    parts, held = _parts(acts, sensed), fitting(preset, sensed)
+    parts, registers = _parts(acts, sensed), fitting(preset, sensed)
     if wire is not None or asynchronous:
-        held = held.replace(wire_version=2 if wire is None else whole("wire", wire, 1, 2))
+        registers = registers.replace(wire_version=2 if wire is None else integer("wire", wire, 1, 2))
     played = _core.play(
         sensed._parts(),
-        held._json(),
+        registers._json(),
         parameters({} if sensor is None else mapping("sensor", sensor)),
-        whole("seed", seed, 0),
+        integer("seed", seed, 0),
         parts,
         number("tare_ms", tare_ms),
         parameters(reading(circuit, asynchronous)),
@@ -251,7 +251,7 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
         text("to", options.to),
         sensed._parts(),
         parameters({} if options.sensor is None else mapping("sensor", options.sensor)),
-        whole("seed", options.seed, 0),
+        integer("seed", options.seed, 0),
         felt,
         parameters(options.for_rust()),
         callback("begun", options.begun),

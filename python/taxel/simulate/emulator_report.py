@@ -75,8 +75,8 @@ class EmulatorReport:
         late = ", ".join(f"{to_ms(self.late_us[q]):.2f} ms ({quantile})" for q, quantile in _QUANTILES.items())
         late = f"late by {late}; {self.late_frames} of {self.frames} by a frame or more"
         if self.held:
-            whole = "held" if self.late_frames <= 0.01 * self.frames else "held on the whole, but not frame by frame"
-            return f"{self.wanted_hz:.0f} frames/s {whole}; frames were {late}"
+            pace = "held" if self.late_frames <= 0.01 * self.frames else "held on the whole, but not frame by frame"
+            return f"{self.wanted_hz:.0f} frames/s {pace}; frames were {late}"
         short = 100.0 * (1.0 - self.reached_hz / self.wanted_hz)
         return (
             f"this machine cannot hold {self.wanted_hz:.0f} frames/s: it reached {self.reached_hz:.0f}, "

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import finite_numbers, mapping, number, parameters, whole
+from taxel._base.arguments import finite_numbers, integer, mapping, number, parameters
 from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel.array import Array
@@ -94,7 +94,7 @@ class Layer:
         self.foam: dict[str, Any] = {} if foam is None else mapping("foam", foam)
         if not 0 < number("tolerance", tolerance) < 1:
             raise refused("tolerance", f" is {tolerance:g}: must be above 0 and below 1")
-        self.cells_per_pitch = whole("cells_per_pitch", cells_per_pitch, 1, 16)
+        self.cells_per_pitch = integer("cells_per_pitch", cells_per_pitch, 1, 16)
         self._core = _core.Layer(
             self.array._parts(), parameters(self.foam), self.cells_per_pitch, number("tolerance", tolerance)
         )

@@ -9,8 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from taxel._base.arguments import checked_path, flag, instance, number, text, whole
+from taxel._base.arguments import checked_path, flag, instance, integer, number, text
 from taxel._base.options import option
+from taxel._core import BAUDS
 from taxel.array import Array
 from taxel.simulate.acts import Act, Contact
 from taxel.simulate.board import Version2, fitting, reading
@@ -75,7 +76,7 @@ class EmulateOptions:
     line: str | os.PathLike[str] | None = option(
         None, "Accept commands on a serial line of this name (a link to a pseudo-terminal)."
     )
-    baud: int = option(115_200, "Baud rate of --line. Default: 115200.", least=300, most=4_000_000)
+    baud: int = option(115_200, "Baud rate of --line. Default: 115200.", least=BAUDS[0], most=BAUDS[1])
     sync: str | os.PathLike[str] | None = option(
         None, "Write the sync line as text to a new file or a pipe: board us, 1 or 0, host ns."
     )
@@ -96,13 +97,13 @@ class EmulateOptions:
         registers = preset(self.preset) if registers is None else registers
         registers = instance("registers", registers, Registers)
         if self.wire is not None:
-            registers = registers.replace(wire_version=whole("wire", self.wire, 1, 2))
+            registers = registers.replace(wire_version=integer("wire", self.wire, 1, 2))
         return replace(self, array=array, registers=registers)
 
     def for_rust(self) -> dict[str, Any]:
         """Return the completed options as Rust reads them."""
         registers = instance("registers", self.registers, Registers)
-        baud, overwrite = whole("baud", self.baud, 300, 4_000_000), flag("overwrite", self.overwrite)
+        baud, overwrite = integer("baud", self.baud, *BAUDS), flag("overwrite", self.overwrite)
         return {
             "registers": registers._held,
             "tare_ms": None if isinstance(self.touch, Replay | Pipe) else number("tare_ms", self.tare_ms),
@@ -119,5 +120,5 @@ class EmulateOptions:
             "faults": None if self.faults is None else instance("faults", self.faults, Faults)._parts(),
             "reset_every_s": None if self.reset_every_s is None else number("reset_every_s", self.reset_every_s),
             "drift_ppm": number("drift_ppm", self.drift_ppm),
-            "source_port": whole("source_port", self.source_port, 0, 65_535),
+            "source_port": integer("source_port", self.source_port, 0, 65_535),
         }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import IO, Any
 
-from taxel._base.arguments import number, shown, whole
+from taxel._base.arguments import integer, number, shown
 from taxel._base.documents import of_json
 from taxel._base.errors import refused
 from taxel._core import DeviceError, FormatError, ProblemError
@@ -56,12 +56,12 @@ class Pipe:
             begin = line[:60].decode("utf-8", "replace")
             raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be like {_EXPECTED}") from None
         self.array = Array(rows, columns, pitch_mm=header.get("pitch_mm"), name=header.get("name", "pipe"))
-        self.rate_hz, floor = number("rate", rate), whole("noise_floor", noise_floor, 0, 255)
+        self.rate_hz, floor = number("rate", rate), integer("noise_floor", noise_floor, 0, 255)
         try:
-            held, self.shift = Registers._of_source(self.array, self.rate_hz, whole("bits", bits, 1, 16))
+            registers, self.shift = Registers._of_source(self.array, self.rate_hz, integer("bits", bits, 1, 16))
         except DeviceError as error:
             raise ProblemError(f"standard input, line 1: {rows} x {columns} taxels: {error}") from None
-        self._registers = held.replace(noise_floor=floor)
+        self._registers = registers.replace(noise_floor=floor)
 
     def registers(self, preset: str | None) -> Registers:  # noqa: ARG002  the frames' line has their rate
         """Return the registers of a board that scans such frames.

@@ -70,20 +70,20 @@ class Replay:
         known = None if self.recording is None else self.recording.registers
         if known is not None and not known.array.fits(self.array):
             # A region of a sensor is played as a board of its own, at the frame rate of the whole one.
-            held, _ = Registers._of_source(self.array, 1e6 / known.frame_us, int(known.ramp).bit_length())
-            held = held.replace(noise_floor=known.noise_floor, wire_version=known.wire_version)
+            registers, _ = Registers._of_source(self.array, 1e6 / known.frame_us, int(known.ramp).bit_length())
+            registers = registers.replace(noise_floor=known.noise_floor, wire_version=known.wire_version)
         else:
-            held = fitting(preset, self.array) if known is None else known.replace(record=False)
+            registers = fitting(preset, self.array) if known is None else known.replace(record=False)
         values = self.source.intensity if isinstance(self.source, Events) else None
         most = 0 if values is None else int(values.max())
         # A converter reads nothing above its ramp, so a preset's ramp is lengthened until the largest value fits.
-        rate_hz = 1e6 / held.frame_us
-        while most >= held.ramp:
+        rate_hz = 1e6 / registers.frame_us
+        while most >= registers.ramp:
             longer, halved = Registers._of_source(self.array, rate_hz, (most + 1).bit_length())
             rate_hz /= 2
             if not halved:
-                held = longer.replace(noise_floor=held.noise_floor, wire_version=held.wire_version)
-        return held
+                registers = longer.replace(noise_floor=registers.noise_floor, wire_version=registers.wire_version)
+        return registers
 
     def _touch(self, registers: Registers) -> tuple[Any, ...]:
         if isinstance(self.source, Events):

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from taxel import _core
-from taxel._base.arguments import checked_path, number, text, whole
+from taxel._base.arguments import checked_path, integer, number, text
 from taxel._base.documents import read_text, read_toml
 from taxel._base.limits import DESCRIPTION
 from taxel._core import SceneError
@@ -109,22 +109,23 @@ class SceneFile:
         -----
         UserWarning : a touch narrower than its cells resolve, as a `Scene` does
         """
-        place = Path(checked_path("path", path))
-        document = read_toml(place)
+        file = Path(checked_path("path", path))
+        document = read_toml(file)
         try:
-            return cls._of(document, place.parent)
+            return cls._of(document, file.parent)
         except _core.Error as error:
-            raise SceneError(f"{place}: {error}") from None
+            raise SceneError(f"{file}: {error}") from None
 
     @classmethod
     def _of(cls, document: Mapping[str, Any], folder: Path) -> SceneFile:
         _known("", document, (*_OWN, *_SCENE))
-        of = document.get("array", {})
-        _known("array", of, ("rows", "columns", "pitch_mm"))
+        size = document.get("array", {})
+        _known("array", size, ("rows", "columns", "pitch_mm"))
         thesis = Array.thesis()
-        array = Array(
-            of.get("rows", thesis.rows), of.get("columns", thesis.columns), pitch_mm=of.get("pitch_mm", thesis.pitch_mm)
-        ) if of else thesis  # fmt: skip
+        array = thesis
+        if size:
+            rows, columns = size.get("rows", thesis.rows), size.get("columns", thesis.columns)
+            array = Array(rows, columns, pitch_mm=size.get("pitch_mm", thesis.pitch_mm))
         sensor = document.get("taxels", {})
         _known("taxels", sensor, _TAXELS)
         if "bodies" not in document:
@@ -144,7 +145,7 @@ class SceneFile:
             raise SceneError(f"tare_ms is {tare_ms:g} ms: must be from 0 to {_LONGEST_MS:g}")
         return cls(
             scene,
-            whole("seed", document.get("seed", cls.seed), 0),
+            integer("seed", document.get("seed", cls.seed), 0),
             preset,
             tare_ms,
             array,
@@ -166,15 +167,15 @@ class SceneFile:
         return {"preset": self.preset, "tare_ms": self.tare_ms, "array": self.array, "sensor": self.sensor}
 
 
-def _known(place: str, table: object, names: tuple[str, ...] | list[str]) -> None:
+def _known(location: str, table: object, names: tuple[str, ...] | list[str]) -> None:
     """Refuse a key that is not known, with the one that was meant."""
     if not isinstance(table, Mapping):
-        raise SceneError(f"{place} is {json.dumps(table, default=str)}: must be a table")
+        raise SceneError(f"{location} is {json.dumps(table, default=str)}: must be a table")
     for name in table:
         if name not in names:
             near = difflib.get_close_matches(name, names, 1)
             meant = f" (did you mean {near[0]}?)" if near else ""
-            raise SceneError(f"{place}{'.' * bool(place)}{name} is not known{meant}: there is {', '.join(names)}")
+            raise SceneError(f"{location}{'.' * bool(location)}{name} is not known{meant}: there is {', '.join(names)}")
 
 
 def _bodies(described: Any, folder: Path) -> Any:
@@ -196,14 +197,14 @@ def _bodies(described: Any, folder: Path) -> Any:
             where = f"bodies[{n}].shape.height_map"
             if "heights_mm" in relief:
                 raise SceneError(f"{where} has heights_mm and a file: must have one of both")
-            place = folder / text(f"{where}.file", relief["file"])
+            file = folder / text(f"{where}.file", relief["file"])
             try:
-                rows = read_text(place, DESCRIPTION).replace(",", " ").splitlines()
+                rows = read_text(file, DESCRIPTION).replace(",", " ").splitlines()
                 heights = np.loadtxt(rows, ndmin=2).tolist()
             except FileNotFoundError:
-                raise SceneError(f"{where}.file {place}: no such file") from None
+                raise SceneError(f"{where}.file {file}: no such file") from None
             except ValueError as error:
-                raise SceneError(f"{where}.file {place}: {error}") from None
+                raise SceneError(f"{where}.file {file}: {error}") from None
             rest = {name: value for name, value in relief.items() if name != "file"}
             body = {**body, "shape": {**shape, "height_map": {"heights_mm": heights, **rest}}}  # noqa: PLW2901
         bodies.append(body)

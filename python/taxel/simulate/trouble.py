@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from taxel._base.arguments import finite, mapping, shown, whole
+from taxel._base.arguments import finite, integer, mapping, shown
 from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel._core import ProblemError
@@ -61,13 +61,13 @@ class Flaws:
     def __post_init__(self) -> None:
         for name in self._names():
             if name == "loose":
-                whole(name, self.loose, 0)
+                integer(name, self.loose, 0)
             else:
                 finite(name, getattr(self, name), least=0.0, most=1.0 if name in ("dead", "stuck") else math.inf)
         for name, seed in mapping("seeds", {} if self.seeds is None else self.seeds).items():
             if name not in self._names():
                 raise refused("seeds", f": {shown(name)} is no flaw: there are {', '.join(self._names())}")
-            whole(f"seeds[{name}]", seed, 0, 2**63 - 1)
+            integer(f"seeds[{name}]", seed, 0, 2**63 - 1)
 
     @classmethod
     def _names(cls) -> list[str]:
@@ -114,7 +114,7 @@ class Faults:
         shares = [finite(name, getattr(self, name), least=0.0, most=1.0) for name in self._names()]
         if sum(shares) > 1:
             raise ProblemError(f"{', '.join(self._names())} are {sum(shares):g} together: must be at most 1")
-        whole("seed", self.seed, 0, 2**63 - 1)
+        integer("seed", self.seed, 0, 2**63 - 1)
 
     @classmethod
     def _names(cls) -> list[str]:

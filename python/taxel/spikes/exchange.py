@@ -77,15 +77,15 @@ def _write(file: BinaryIO, source: BinaryIO) -> None:
 
 def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | None) -> Read:
     """Read the units of an NWB file; see `SpikeTrains.from_nwb`."""
-    place = checked_path("path", path)
+    file = checked_path("path", path)
     window_ms = [
         None if edge is None else number(name, edge, "ms") for name, edge in (("start", start), ("stop", stop))
     ]
-    with H5File(place) as h5:
+    with H5File(file) as h5:
         if h5.attribute("nwb_version") is None:
-            raise FormatError(f"{place}: no NWB file: it has no attribute nwb_version")
+            raise FormatError(f"{file}: no NWB file: it has no attribute nwb_version")
         if "units/spike_times" not in h5.entries:
-            raise FormatError(f"{place}: an NWB file without spike times in a table of units")
+            raise FormatError(f"{file}: an NWB file without spike times in a table of units")
         seconds, offsets = _lists(h5, "spike_times")
         values: NDArray[Any] | None = None
         kind: Kind = "unsigned"
@@ -93,12 +93,12 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
             kind = _kind_of(h5)
             values, others = _lists(h5, "value")
             if not np.array_equal(offsets, others):
-                raise FormatError(f"{place}, units/value: must have the lengths of the trains, one value a spike")
+                raise FormatError(f"{file}, units/value: must have the lengths of the trains, one value a spike")
         watched = np.empty((0, 2))
         if "units/obs_intervals" in h5.entries and len(offsets) > 1:
             watched = 1000.0 * h5.numbers("units/obs_intervals").astype(np.float64)
             if watched.ndim != 2 or watched.shape[1] != 2:
-                raise FormatError(f"{place}, units/obs_intervals: shape {watched.shape}; must be (intervals, 2)")
+                raise FormatError(f"{file}, units/obs_intervals: shape {watched.shape}; must be (intervals, 2)")
     times = 1000.0 * seconds.astype(np.float64, copy=False)
     if len(watched):
         widest = (watched[:, 0].min(), watched[:, 1].max())

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.archive import read_arrays
 from taxel._base.arguments import bare, checked_path, column, floats, instance, nth, number, several, shown, window
-from taxel._base.columns import Columns, frozen, frozen_column
+from taxel._base.columns import FrozenColumns, frozen, frozen_column
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
 from taxel._base.files import write_whole
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
-class SpikeTrains(Columns):
+class SpikeTrains(FrozenColumns):
     """Hold spike times by train, with the window in which spikes were recorded.
 
     Parameters
@@ -557,14 +557,14 @@ class SpikeTrains(Columns):
         >>> SpikeTrains.load(place).times
         array([1., 5.])
         """
-        place = checked_path("path", path)
+        file = checked_path("path", path)
         try:
-            held = read_arrays(place, ("times", "offsets", "start", "stop", "values", "kind"), texts={"kind": UNIT})
-            kind = held["kind"].item() if "kind" in held else None
-            start, stop = held["start"].item(), held["stop"].item()
-            return cls(held["times"], held["offsets"], start, stop, held.get("values"), kind=kind)
+            arrays = read_arrays(file, ("times", "offsets", "start", "stop", "values", "kind"), texts={"kind": UNIT})
+            kind = arrays["kind"].item() if "kind" in arrays else None
+            start, stop = arrays["start"].item(), arrays["stop"].item()
+            return cls(arrays["times"], arrays["offsets"], start, stop, arrays.get("values"), kind=kind)
         except (ValueError, KeyError, ProblemError, FormatError) as error:
-            raise FormatError(f"{place}: holds no spike trains: {shown(str(error))}") from None
+            raise FormatError(f"{file}: holds no spike trains: {shown(str(error))}") from None
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the raster: time (ms) to the right, trains upwards, OFF spikes and values below 0 in another colour."""

@@ -26,8 +26,8 @@ from taxel.tasks.information import information as information
 from taxel.tasks.rest import TakenRest as TakenRest
 from taxel.tasks.rest import rest as rest
 from taxel.tasks.train import train as train
-from taxel.tasks.training import Training as Training
-from taxel.tasks.training import TrainOptions as TrainOptions
+from taxel.tasks.train_result import Training as Training
+from taxel.tasks.train_result import TrainOptions as TrainOptions
 
 # The imports above say what is public.
-__all__ = [name for name, held in sorted(globals().items()) if callable(held)]
+__all__ = [name for name, value in sorted(globals().items()) if callable(value)]

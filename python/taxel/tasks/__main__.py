@@ -43,7 +43,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
 from taxel._base.arguments import mapping, shown
-from taxel._base.files import try_whole
+from taxel._base.files import check_writable
 from taxel._base.messages import collected, escaped
 from taxel._base.progress import Progress
 from taxel._base.stopping import leave, stop_on_signals
@@ -58,7 +58,7 @@ from taxel.tasks.info import info
 from taxel.tasks.information import InformationOptions, information
 from taxel.tasks.rest import rest
 from taxel.tasks.train import train
-from taxel.tasks.training import TrainOptions
+from taxel.tasks.train_result import TrainOptions
 
 __all__ = ["run"]
 
@@ -89,9 +89,9 @@ def _calibrate(recordings: Sequence[Recording], request: Request, _: Progress, s
     loads, options = request.pop("loads", []), _fields(CalibrateOptions, request)
     if not isinstance(loads, str):
         loads = [_fields(KnownLoad, {"loads": load}, "loads") for load in loads]
-    made = calibrate(_one(recordings), loads, options)
-    save(made.calibration)
-    return made
+    calibrated = calibrate(_one(recordings), loads, options)
+    save(calibrated.calibration)
+    return calibrated
 
 
 def _encode(recordings: Sequence[Recording], request: Request, progress: Progress, save: _Save) -> Any:
@@ -147,8 +147,8 @@ def run(name: str, request: Mapping[str, Any], progress: Progress) -> dict[str, 
     save: _Save = lambda _: None  # noqa: E731
     if "out" in known:
         out = Path(_needed(left, "out"))
-        try_whole(out, overwrite=overwrite)
-        save = lambda made: made.save(out, overwrite=overwrite)  # noqa: E731
+        check_writable(out, overwrite=overwrite)
+        save = lambda finished: finished.save(out, overwrite=overwrite)  # noqa: E731
     opener = _fields(TextOptions, left, "open")
     paths = [Path(path) for path in _needed(left, "recordings")]
     with collected() as warnings:
@@ -178,10 +178,10 @@ def _needed(request: Request, key: str) -> Any:
     return request.pop(key)
 
 
-def _refuse_unknown(values: Mapping[str, Any], known: Sequence[str], what: str) -> None:
+def _refuse_unknown(values: Mapping[str, Any], known: Sequence[str], noun: str) -> None:
     unknown = next((key for key in values if key not in known), None)
     if unknown is not None:
-        raise ProblemError(f"{unknown} is no {what}; there are {', '.join(known)}")
+        raise ProblemError(f"{unknown} is no {noun}; there are {', '.join(known)}")
 
 
 def _one(recordings: Sequence[Recording]) -> Recording:
@@ -194,8 +194,8 @@ def _say(line: Mapping[str, Any]) -> None:
     print(json.dumps(line), flush=True)
 
 
-def _show(step: str, done: int, of: int) -> None:
-    _say({"type": "progress", "step": step, "done": done, "of": of})
+def _show(step: str, done: int, total: int) -> None:
+    _say({"type": "progress", "step": step, "done": done, "of": total})
 
 
 def _main() -> NoReturn:

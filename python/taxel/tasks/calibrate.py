@@ -21,7 +21,7 @@ from taxel.calibration import Calibration, Load
 from taxel.formats import text
 from taxel.frames import Frames
 from taxel.recording import Recording
-from taxel.recording.pressure import readings
+from taxel.recording.analysis.pressure import readings
 from taxel.tasks.rest import GivenTare, check_tare, given_tare
 
 
@@ -138,9 +138,14 @@ class Calibrated:
 
     def to_dict(self) -> dict[str, Any]:
         """Return what it calibrates, and how well it meets the loads, as plain values for JSON."""
-        of = self.calibration
-        result: dict[str, Any] = {"unit": of.unit, "of": of.of, "date": of.date, "residual": of.residual}
-        loads = [{"load": load, "unit": unit, "made": made} for load, unit, made in of.loads]
+        calibration = self.calibration
+        result: dict[str, Any] = {
+            "unit": calibration.unit,
+            "of": calibration.reading_unit,
+            "date": calibration.date,
+            "residual": calibration.residual,
+        }
+        loads = [{"load": load, "unit": unit, "made": total} for load, unit, total in calibration.loads]
         return result | {"loads": loads, "warnings": list(self.warnings)}
 
 
@@ -177,19 +182,19 @@ def calibrate(
     >>> place = pathlib.Path(tempfile.mkdtemp()) / "weight.npz"
     >>> _ = taxel.convert(frames, place)
     >>> made = calibrate(taxel.open(place), [KnownLoad(12.0, from_s=1.2, to_s=1.8)], CalibrateOptions(exponent=1.0))
-    >>> made.calibration.of, made.calibration.unit, [round(one["made"], 6) for one in made.to_dict()["loads"]]
+    >>> made.calibration.reading_unit, made.calibration.unit, [round(one["made"], 6) for one in made.to_dict()["loads"]]
     ('counts', 'N', [12.0])
     """
     instance("recording", recording, Recording)
-    asked = CalibrateOptions() if options is None else instance("options", options, CalibrateOptions)
+    options = CalibrateOptions() if options is None else instance("options", options, CalibrateOptions)
     table = isinstance(loads, str | os.PathLike)
     known = read_loads(checked_path("loads", loads)) if table else several("loads", loads)
-    if not known and not asked.law and asked.table is None:
+    if not known and not options.law and options.table is None:
         raise helped(ProblemError("there is no law and no table to calibrate by"), "loads", "give")
-    if not known and (asked.each or asked.exponent is not None):
+    if not known and (options.each or options.exponent is not None):
         raise helped(ProblemError("each and exponent belong to a fit"), "loads", "give")
     with collected() as warnings:
-        made = _calibrated(recording, [instance("loads", load, KnownLoad) for load in known], asked)
+        made = _calibrated(recording, [instance("loads", load, KnownLoad) for load in known], options)
     return replace(Calibrated(made), warnings=tuple(warnings))
 
 
@@ -206,7 +211,7 @@ def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: Calib
         calibration = Calibration.law(recording.array, ramp=ramp, sensor=options.sensor, **how)
     elif options.table is not None:
         points = _points(Path(options.table), recording.array)
-        calibration = Calibration.table(recording.array, *points, of=frames.unit, **how)
+        calibration = Calibration.table(recording.array, *points, reading_unit=frames.unit, **how)
     measured = [_load(frames, load) for load in known]
     if measured:
         calibration = Calibration.fit(measured, start=calibration, exponent=options.exponent, each=options.each, **how)
@@ -223,8 +228,8 @@ def _read(recording: Recording, tare: GivenTare | None) -> tuple[Frames, NDArray
     if rest.source == "none" and recording.has_events:
         error = ProblemError(f"{recording.path}: the rest of its taxels is not known, as no half second is quiet")
         raise helped(error, "tare", "give")
-    known = rest.source not in ("unit", "none")
-    return frames, rest.values.reshape(recording.array.shape) if known else None, floor
+    is_measured = rest.source not in ("unit", "none")
+    return frames, rest.values.reshape(recording.array.shape) if is_measured else None, floor
 
 
 def _load(frames: Frames, known: KnownLoad) -> Load:
@@ -264,17 +269,17 @@ def read_loads(path: str | os.PathLike[str]) -> list[KnownLoad]:
         def value(name: str, row: dict[str, str] = row, line: int = line) -> float:
             return text.number(row[name], path, line, name)
 
-        place = f"{path.name}, line {line}"
+        location = f"{path.name}, line {line}"
         if row["unit"].strip() not in {"N", "kPa"}:
-            raise FormatError(f"{place}: unit is {row['unit']!r}; must be N or kPa")
+            raise FormatError(f"{location}: unit is {row['unit']!r}; must be N or kPa")
         taxel = None
         if row.get("x", "").strip() or row.get("y", "").strip():
             x, y = value("x"), value("y")
             if x != int(x) or y != int(y):
-                raise FormatError(f"{place}: taxel at row {y:g}, column {x:g}; must be whole numbers")
+                raise FormatError(f"{location}: taxel at row {y:g}, column {x:g}; must be whole numbers")
             taxel = (int(x), int(y))
         unit, stretch = row["unit"].strip(), (value("from_s"), value("to_s"))
-        loads.append(KnownLoad(value("load"), unit, *stretch, taxel, place))
+        loads.append(KnownLoad(value("load"), unit, *stretch, taxel, location))
     if not loads:
         raise FormatError(f"{path.name}: no load in it")
     return loads
@@ -286,21 +291,21 @@ def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.f
     pairs = text.numbers([[row["reading"], row["value"]] for row in rows], path, 2, ["reading", "value"])
     if not rows or "x" not in rows[0] or "y" not in rows[0]:
         return pairs[:, 0], pairs[:, 1]
-    places = text.numbers([[row["x"], row["y"]] for row in rows], path, 2, ["x", "y"])
+    taxels = text.numbers([[row["x"], row["y"]] for row in rows], path, 2, ["x", "y"])
     exists = array._there()
     values = np.unique(pairs[:, 1])
     # Taxels that do not exist get rising values, which are never used.
-    every = np.where(exists, np.nan, np.arange(1.0, len(values) + 1)[:, None, None])
-    for k, ((x, y), (reading, value)) in enumerate(zip(places, pairs, strict=True), start=2):
+    readings = np.where(exists, np.nan, np.arange(1.0, len(values) + 1)[:, None, None])
+    for k, ((x, y), (reading, value)) in enumerate(zip(taxels, pairs, strict=True), start=2):
         if x != int(x) or y != int(y) or not (0 <= x < array.columns and 0 <= y < array.rows):
             raise FormatError(
                 f"{path.name}, line {k}: taxel at row {y:g}, column {x:g}; the array has {array.rows} x {array.columns}"
             )
-        every[np.searchsorted(values, value), int(y), int(x)] = reading
-    missing = np.argwhere(np.isnan(every))
+        readings[np.searchsorted(values, value), int(y), int(x)] = reading
+    missing = np.argwhere(np.isnan(readings))
     if len(missing):
         point, y, x = missing[0]
         raise FormatError(
             f"{path.name}: no reading of row {y}, column {x} under {values[point]:g}; each taxel needs each value"
         )
-    return every, values
+    return readings, values

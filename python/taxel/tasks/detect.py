@@ -24,8 +24,8 @@ from taxel.encode import ContactArea, Moments
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
+from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.opening import sensors_of
-from taxel.recording.rest import FORCE_UNITS, of_frames
 from taxel.spikes import SpikeTrains
 from taxel.tasks.labels import GivenLabels, references
 from taxel.tasks.rest import GivenTare, TakenRest, check_tare, rest
@@ -197,7 +197,7 @@ def detect(
     (array([700000, 900000]), 'its first quiet stretch, 0.000 to 0.500 s')
     """
     detector("readout", readout)
-    asked = DetectOptions() if options is None else instance("options", options, DetectOptions)
+    options = DetectOptions() if options is None else instance("options", options, DetectOptions)
     update = reporting(progress)
     opened = sensors_of(recordings)
     with collected() as warnings:
@@ -209,12 +209,14 @@ def detect(
         each = []
         for recording, labelled in zip(opened, events, strict=True):
             update(f"detecting in {recording.title}", 0, 0)
-            each.append(_detected(readout, recording, labelled, asked))
+            each.append(_detected(readout, recording, labelled, options))
     outcomes = [detected.outcome for detected in each]
     truths = [outcome.example.labels for outcome in outcomes if outcome.score is not None]
-    together = score_together([outcome.found for outcome in outcomes], truths, asked.window_ms) if truths else None
-    unknown = sorted({label for of in events if of is not None for label in of} - set(readout.labels))
-    return Detecting(tuple(each), together, tuple(unknown), asked.window_ms, tuple(warnings))
+    together = score_together([outcome.found for outcome in outcomes], truths, options.window_ms) if truths else None
+    unknown = sorted(
+        {label for labels_of in events if labels_of is not None for label in labels_of} - set(readout.labels)
+    )
+    return Detecting(tuple(each), together, tuple(unknown), options.window_ms, tuple(warnings))
 
 
 def _detected(
@@ -270,7 +272,7 @@ def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
     if tare is None or not floors or isinstance(source, SpikeTrains):
         return None
     count = count_drifted(source, tare, max(floors))
-    what = (
+    cause = (
         f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that lifts are missed"
     )
-    return f"{what}: take another tare" if count else None
+    return f"{cause}: take another tare" if count else None

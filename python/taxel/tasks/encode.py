@@ -122,11 +122,11 @@ def encode(recording: Recording, options: EncodeOptions, *, progress: Progress |
     array([2])
     """
     show = reporting(progress)
-    asked = instance("options", options, EncodeOptions)
+    options = instance("options", options, EncodeOptions)
     instance("recording", recording, Recording)
     with collected() as warnings:
-        encoder = asked._chosen()
-        rest = given_or_by_unit(asked.tare, recording)
+        encoder = options._chosen()
+        rest = given_or_by_unit(options.tare, recording)
         encoder = encoder if rest is None else encoder.with_tare(rest)
         events = recording.has_events
         count = len(recording.events) if events else len(recording.frames())

@@ -8,8 +8,8 @@ from typing import Any
 from taxel._base.arguments import instance
 from taxel._base.messages import collected
 from taxel.recording import Recording
-from taxel.recording.pressure import Series, series
-from taxel.recording.summary import summary
+from taxel.recording.analysis.pressure import Series, series
+from taxel.recording.analysis.summary import summary
 from taxel.tare import Tare
 from taxel.tasks.rest import GivenTare, given_tare
 
@@ -22,7 +22,7 @@ class Info:
     ----------
     facts : mapping of str to value
         Of several sources those of each, with offset and drift of their clocks against the first one's.
-    pressed : taxel.recording.pressure.Series, optional
+    pressed : taxel.recording.analysis.pressure.Series, optional
         The pressure over time; None of several sources, and without intensities.
     tare : Tare, optional
         The one that was given.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from taxel._base.arguments import checked_path, instance, mapping, several, text, whole
+from taxel._base.arguments import checked_path, instance, integer, mapping, several, text
 from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, counted
 from taxel._base.progress import Progress, reporting
@@ -126,33 +126,33 @@ def information(
     ProblemError : labels that make no trials, or too few of them; options that do not fit
     FormatError : a table that is none
     """
-    asked = InformationOptions() if options is None else instance("options", options, InformationOptions)
+    options = InformationOptions() if options is None else instance("options", options, InformationOptions)
     show = reporting(progress)
-    encoder, opened = asked._chosen(), sensors_of(recordings)
+    encoder, opened = options._chosen(), sensors_of(recordings)
     labels = None if labels is None else checked_path("labels", labels)
     with collected() as warnings:
-        trials = _trials(labels, opened, asked.window_ms)
+        trials = _trials(labels, opened, options.window_ms)
         if labels is None and len({trial.label for trial in trials}) == 1:
             error = ProblemError(
                 f"{trials[0].name}: without a table each recording is a trial and its folder's name the label, "
                 f"here {trials[0].label!r} alone"
             )
             raise helped(error, "labels", "give")
-        _check_folds(trials, str(opened[0].path) if labels in (None, "notes") else str(labels), asked)
+        _check_folds(trials, str(opened[0].path) if labels in (None, "notes") else str(labels), options)
         show(counted(len(trials), "trial"), 0, 0)
         found = answer(
             trials,
             encoder=encoder,
-            window_ms=asked.window_ms,
-            windows_ms=asked.windows_ms,
-            periods_ms=asked.periods_ms,
-            taxels=asked.taxels,
-            pools=asked.pools,
-            draws=asked.draws,
-            folds=asked.folds,
-            shuffles=asked.shuffles,
-            classifiers=several("classifiers", asked.classifiers),
-            seed=asked.seed,
+            window_ms=options.window_ms,
+            windows_ms=options.windows_ms,
+            periods_ms=options.periods_ms,
+            taxels=options.taxels,
+            pools=options.pools,
+            draws=options.draws,
+            folds=options.folds,
+            shuffles=options.shuffles,
+            classifiers=several("classifiers", options.classifiers),
+            seed=options.seed,
             progress=show,
             watch=watch,
         )
@@ -171,11 +171,11 @@ def _trials(
     return notes_as_trials(opened, window_ms=window_ms)
 
 
-def _check_folds(trials: list[LabelledTrial], place: str, options: InformationOptions) -> None:
+def _check_folds(trials: list[LabelledTrial], location: str, options: InformationOptions) -> None:
     """Refuse labels and groups that cannot be split into folds; the error names their table."""
-    count, seed = whole("folds", options.folds, 2), whole("seed", options.seed, 0)
+    count, seed = integer("folds", options.folds, 2), integer("seed", options.seed, 0)
     groups = [trial.group for trial in trials]
     try:
         folds([trial.label for trial in trials], count=count, groups=groups if any(groups) else None, seed=seed)
     except ProblemError as error:
-        raise ProblemError(f"{place}: {error}") from None
+        raise ProblemError(f"{location}: {error}") from None

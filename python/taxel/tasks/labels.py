@@ -22,8 +22,8 @@ from taxel.recording.cut import span_us
 #: "notes" (the recordings' own notes), the path of a table, or times (us) by label, a mapping for each recording.
 GivenLabels: TypeAlias = str | os.PathLike[str] | Sequence[Mapping[str, Any]]
 
-#: So long after the last event of a board a label may follow, us, as people mark late; one further than the window of a
-#: score is named, as no detection can lie so near to it.
+#: How long after the last event of a board a label may be, us, as people mark late; and from which distance on, the
+#: window of a score, a warning names the label, as no detection can lie near it.
 _LATE_US, _NEAR_US = 1_000_000, 50_000
 
 
@@ -74,7 +74,9 @@ def _mapped(
         have = counted(len(recordings), "recording")
         raise refused(argument, f" is {counted(len(each), 'mapping')}: must be one for each of {have}")
     named = [mapping(argument, times) for times in each]
-    return [{label: column(f"{argument}[{label!r}]", t, np.int64, "us") for label, t in of.items()} for of in named]
+    return [
+        {label: column(f"{argument}[{label!r}]", t, np.int64, "us") for label, t in labels.items()} for labels in named
+    ]
 
 
 def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
@@ -103,8 +105,8 @@ def _named(table: Labels, recordings: Sequence[Recording]) -> list[tuple[str, se
 
 def _few(names: Iterable[str]) -> str:
     """Return the first five names, and how many more there are."""
-    every = list(names)
-    return ", ".join(every[:5]) + f" and {len(every) - 5} more" * (len(every) > 5)
+    all_names = list(names)
+    return ", ".join(all_names[:5]) + f" and {len(all_names) - 5} more" * (len(all_names) > 5)
 
 
 def labelled_trials(source: GivenLabels, recordings: Sequence[Recording]) -> list[Recording]:
@@ -118,12 +120,12 @@ def labelled_trials(source: GivenLabels, recordings: Sequence[Recording]) -> lis
     for recording in recordings:
         trials.setdefault(recording.path, set()).add(_trial(recording))
     named: dict[Path, set[str]] = {}
-    for path, every in trials.items():
+    for path, names in trials.items():
         table = beside(path) if source == "notes" else Path(source)
-        named[path] = every & {row.recording for row in Labels(table).rows} if table.is_file() else set()
-        if 0 < len(named[path]) < len(every):
+        named[path] = names & {row.recording for row in Labels(table).rows} if table.is_file() else set()
+        if 0 < len(named[path]) < len(names):
             warn(
-                f"{path}: left out {len(every) - len(named[path])} of its {len(every)} trials, which have no labels",
+                f"{path}: left out {len(names) - len(named[path])} of its {len(names)} trials, which have no labels",
                 stacklevel=2,
             )
     return [each for each in recordings if not named[each.path] or _trial(each) in named[each.path]]
@@ -133,7 +135,7 @@ def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]
     """Refuse labels of a source that their recording does not have."""
     names = _named(table, recordings)
     for row in table.rows:
-        labels = {label for label, every in names if row.recording in every}
+        labels = {label for label, names_of_label in names if row.recording in names_of_label}
         if row.source and labels and row.source not in labels:
             there = ", ".join(sorted(labels))
             raise refused(
@@ -152,7 +154,7 @@ def _notes(recording: Recording) -> dict[str, NDArray[np.int64]]:
 
 def _within(table: Labels, recording: Recording, argument: str) -> dict[str, NDArray[np.int64]]:
     """Return the events of a table that lie within a recording; refuse a table of which none does."""
-    events = table.of(recording)
+    events = table.times(recording)
     if recording.clock is None and any(row.at_ns for row in table.rows):
         warn(
             f"the {kind_of_file(recording.kind)} holds no arrival times, so host_ns cannot show by how many periods of "
@@ -163,8 +165,8 @@ def _within(table: Labels, recording: Recording, argument: str) -> dict[str, NDA
     if any(map(len, events.values())) and not any(map(len, inside.values())):
         times = np.concatenate(list(events.values()))
         ends = " to ".join(f"{t / 1e6:.3f}" for t in np.unique([times.min(), times.max()]))
-        held = f"{argument} is {table.path}: holds {counted(len(times), 'event')} ({ends} s)"
-        raise ProblemError(f"{held}, none within {_span(recording)}")
+        content = f"{argument} is {table.path}: holds {counted(len(times), 'event')} ({ends} s)"
+        raise ProblemError(f"{content}, none within {_span(recording)}")
     return inside
 
 
@@ -188,8 +190,8 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
         return dict(events)
     first, last = span_us(recording)
     if recording.has_events:
-        held, stretch = recording.events, recording.stretch
-        seen = [last, *(t for t, _ in held.markers), *(() if stretch is None else stretch[1:])]
+        board_events, interval = recording.events, recording.interval
+        seen = [last, *(t for t, _ in board_events.markers), *(() if interval is None else interval[1:])]
         # A heartbeat or a frame without events is a sign of life, too.
         end = max(seen if recording.clock is None else [*seen, *recording.clock.board_us[-1:].tolist()])
         near_us, late_us = _NEAR_US, _LATE_US

@@ -22,9 +22,9 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
-from taxel.recording.preload import free_of_preload, without_preload
-from taxel.recording.pressure import quiet_rest
-from taxel.recording.rest import NOISE_FLOOR, by_unit, of_quiet
+from taxel.recording.analysis.preload import free_of_preload, without_preload
+from taxel.recording.analysis.pressure import quiet_rest
+from taxel.recording.analysis.rest import NOISE_FLOOR, by_unit, of_quiet
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
@@ -33,7 +33,7 @@ GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
 
 #: How long before the first label the rest ends, and how long it must last at least, us.
 _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
-#: Of fewer frames the noise is not known.
+#: The noise is not known from fewer frames.
 _LEAST_FRAMES = 20
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
@@ -190,11 +190,11 @@ def given_or_by_unit(tare: GivenTare | None, recording: Recording) -> Tare | Non
 
 def _warn_of_touch(tare: GivenTare, recording: Recording, source: Events | Frames, measured: Tare) -> None:
     """Warn of a tare in which something was touched, by which lifts are missed or false."""
-    held = held_by_tare([Example(source, {}, measured)], NOISE_FLOOR)
-    if held >= TOUCH:
+    taxels = held_by_tare([Example(source, {}, measured)], NOISE_FLOOR)
+    if taxels >= TOUCH:
         warn(
-            f"tare is {tare}: the beginning of {recording.title} is not quiet but holds a touch of {held} taxels; give "
-            "the seconds before it, or a file",
+            f"tare is {tare}: the beginning of {recording.title} is not quiet but holds a touch of {taxels} taxels; "
+            "give the seconds before it, or a file",
             stacklevel=3,
         )
 
@@ -202,7 +202,7 @@ def _warn_of_touch(tare: GivenTare, recording: Recording, source: Events | Frame
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
     """Return the tare of the time before a recording's first label, or before the board's start marker.
 
-    Of frames in a unit of force or pressure it is 0, as everywhere (`taxel.recording.rest`).
+    The tare of frames in a unit of force or pressure is 0, as everywhere (`taxel.recording.analysis.rest`).
     A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 frames come before
     it, the tare is that of a quiet stretch, if there is one. Where something lay on the array before it and was taken
     away, the tare is of the longest time without it, before the label if there is one; a warning says so.
@@ -230,8 +230,8 @@ def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Ta
     if isinstance(source, Events):
         ends += [t for t, start in source.markers if start and t > first]
     if not ends or min(ends) - first < _LEAST_REST_US:
-        what = f"only {to_ms(max(0, min(ends) - first)):g} ms before its first label" if ends else "no label"
-        error = ProblemError(f"{recording.path}: holds {what}, from which to take the taxels' rest")
+        content = f"only {to_ms(max(0, min(ends) - first)):g} ms before its first label" if ends else "no label"
+        error = ProblemError(f"{recording.path}: holds {content}, from which to take the taxels' rest")
         raise helped(error, "tare", "give")
     return _measured(recording, source, min(ends))
 

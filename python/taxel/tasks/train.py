@@ -19,6 +19,7 @@ from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
 from taxel.detect.advice import advise, fallen
 from taxel.detect.examples import check_examples
+from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.folds import INNER, count_of_folds
 from taxel.detect.label_times import off_by
@@ -26,16 +27,15 @@ from taxel.detect.loads import clock_of
 from taxel.detect.plain_score import floor_of, plain_score
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import score_together
-from taxel.detect.training import Trained, fit_aligned
 from taxel.recorded import recorded
 from taxel.recording import Recording
+from taxel.recording.analysis.rest import BY_UNIT
 from taxel.recording.opening import sensors_of
-from taxel.recording.rest import BY_UNIT
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 from taxel.tasks.labels import GivenLabels, labelled_trials, references
 from taxel.tasks.rest import GivenTare, given_tare, tare_before, tare_if_any
-from taxel.tasks.training import Training, TrainOptions
+from taxel.tasks.train_result import Training, TrainOptions
 
 
 def train(
@@ -87,10 +87,10 @@ def train(
     >>> training.readout.labels
     ('contact',)
     """
-    asked = TrainOptions() if options is None else instance("options", options, TrainOptions)
+    options = TrainOptions() if options is None else instance("options", options, TrainOptions)
     update = reporting(progress)
     with collected() as warnings:
-        training = _train(sensors_of(recordings), labels, asked, update)
+        training = _train(sensors_of(recordings), labels, options, update)
     return replace(training, warned=tuple(warnings))
 
 
@@ -206,21 +206,21 @@ class _Work:
         if search:
             plan = choose(self.examples, plan, window_ms=window_ms, progress=self.update)
         begun = perf_counter()
-        made = fit_aligned(self.examples, plan, self.update)
-        outcomes = self._outcomes(made)
+        trained = fit_aligned(self.examples, plan, self.update)
+        outcomes = self._outcomes(trained)
         a_point_s = None if search else (perf_counter() - begun) * INNER * (count + 1)
         trained_on = _own(outcomes, window_ms)
         if scored is None:
             truths, sound = [outcome.example.labels for outcome in outcomes], check_examples(self.examples)
-            what = sound, list(truths[0]), [clock_of(example) for example in self.examples], floor_of(plan.encoder)
-            scored = replace(trained_on, plain=plain_score(*what, [], truths, window_ms, self.update))
-        advice = advise(made, self.examples, scored.together, trained_on.together, a_point_s, scored.plain)
+            loads = sound, list(truths[0]), [clock_of(example) for example in self.examples], floor_of(plan.encoder)
+            scored = replace(trained_on, plain=plain_score(*loads, [], truths, window_ms, self.update))
+        advice = advise(trained, self.examples, scored.together, trained_on.together, a_point_s, scored.plain)
         taken = _taken(self.examples) if self.options.tare is None else ()
-        return Training(self.options, self.opened, made, scored, why, advice, outcomes, taken)
+        return Training(self.options, self.opened, trained, scored, why, advice, outcomes, taken)
 
-    def _outcomes(self, made: Trained) -> list[Outcome]:
+    def _outcomes(self, trained: Trained) -> list[Outcome]:
         """Return the outcomes of the readout on the recordings that it was trained on."""
-        readout, outcomes = made.readout, []
+        readout, outcomes = trained.readout, []
         for recording, example in zip(self.opened, self.examples, strict=True):
             self.update(f"scoring on {recording.title}", 0, 0)
             truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}

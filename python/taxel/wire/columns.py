@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, whole
+from taxel._base.arguments import instance, integer
 from taxel._base.columns import frozen
 from taxel._base.errors import refused
 from taxel._base.messages import counted
@@ -51,7 +51,7 @@ class Columns:
     """
 
     def __init__(self, rows: int) -> None:
-        self._lay_out(whole("rows", rows, 1, 2**48), _on_a_line)
+        self._lay_out(integer("rows", rows, 1, 2**48), _on_a_line)
 
     def _lay_out(self, n: int, memory: Callable[[int, Any], NDArray[Any]]) -> None:
         try:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from taxel import _core
-from taxel._base.arguments import buffer_bytes, whole
+from taxel._base.arguments import buffer_bytes, integer
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Command:
     value: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "register", whole("register", self.register, 0, 7))
-        object.__setattr__(self, "value", whole("value", self.value, 0, 2**32 - 1))
+        object.__setattr__(self, "register", integer("register", self.register, 0, 7))
+        object.__setattr__(self, "value", integer("value", self.value, 0, 2**32 - 1))
 
     def to_bytes(self) -> bytes:
         """Return the five bytes.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import buffer_bytes, column, flag, instance, text, whole
+from taxel._base.arguments import buffer_bytes, column, flag, instance, integer, text
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
@@ -156,7 +156,7 @@ class Decoder:
         pairing: Literal["direct", "taxel"] = "direct",
         differences: bool = False,
     ) -> None:
-        self.version = whole("version", version, 1, 2)
+        self.version = integer("version", version, 1, 2)
         self.array = Array._of(array)
         text("pairing", pairing, _PAIRINGS)
         if self.version == 2 and (pairing != "direct" or flag("differences", differences)):
@@ -225,7 +225,7 @@ class Decoder:
 
     def _fill(self, columns: Columns, data: NDArray[np.uint8], arrived: int | None) -> _core._Filled:
         """Fill columns; return the number of rows, whether they have intensities, repaired rows, and markers."""
-        when = None if arrived is None else whole("arrived", arrived)
+        when = None if arrived is None else integer("arrived", arrived)
         return self._core.fill(data, when, columns._parts(), False)
 
     def end_of_datagram(self) -> Events:

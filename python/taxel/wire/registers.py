@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from taxel import _core
-from taxel._base.arguments import finite, flag, instance, several, shown, text, whole
+from taxel._base.arguments import finite, flag, instance, integer, several, shown, text
 from taxel._base.errors import refused
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
@@ -91,13 +91,13 @@ class Registers:
 
     def __init__(self, *, array: Array | None = None, **fields: float) -> None:
         sensor = Array._of(array)
-        channels = whole("channels", fields.get("channels", 16), 0, 255)
+        channels = integer("channels", fields.get("channels", 16), 0, 255)
         self._set(_core.registers_at_reset(sensor._parts(), channels), fields, sensor)
 
-    def _set(self, held: dict[str, Any], fields: dict[str, float], array: Array | None) -> None:
+    def _set(self, values: dict[str, Any], fields: dict[str, float], array: Array | None) -> None:
         self.array = Array._of(array)
         raw = [(name, _raw(name, value)) for name, value in fields.items()]
-        self._held = _core.registers_with(json.dumps(held), raw, self.array._parts())
+        self._held = _core.registers_with(json.dumps(values), raw, self.array._parts())
 
     @classmethod
     def preset(cls, name: str, *, array: Array | None = None) -> Registers:
@@ -126,17 +126,17 @@ class Registers:
         return cls._of(_core.registers_preset(text("preset", name)), Array._of(array))
 
     @classmethod
-    def _of(cls, held: dict[str, Any], array: Array, **fields: float) -> Registers:
+    def _of(cls, values: dict[str, Any], array: Array, **fields: float) -> Registers:
         """Return the set that a file or a board holds, in the registers' own units, with some fields changed."""
         registers = cls.__new__(cls)
-        registers._set(held, fields, array)
+        registers._set(values, fields, array)
         return registers
 
     @classmethod
     def _of_source(cls, array: Array, rate_hz: float, bits: int) -> tuple[Registers, int]:
         """Return the registers of a board that scans another sensor's frames, and how often it halves their values."""
-        held, halved = _core.registers_of_source(array._parts(), rate_hz, bits)
-        return cls._of(held, array), halved
+        values, halved = _core.registers_of_source(array._parts(), rate_hz, bits)
+        return cls._of(values, array), halved
 
     @classmethod
     def from_words(cls, words: Sequence[int], *, array: Array | None = None, channels: int = 16) -> Registers:
@@ -165,11 +165,11 @@ class Registers:
         >>> Registers.from_words(fast.words) == fast
         True
         """
-        eight = [whole(f"words[{n}]", word, 0, 2**32 - 1) for n, word in enumerate(several("words", words))]
+        eight = [integer(f"words[{n}]", word, 0, 2**32 - 1) for n, word in enumerate(several("words", words))]
         if len(eight) != 8:
             raise refused("words", f": {len(eight)}, must be 8")
-        held = _core.registers_of_words(eight, whole("channels", channels, 0, 255))
-        return cls._of(held, Array._of(array))
+        values = _core.registers_of_words(eight, integer("channels", channels, 0, 255))
+        return cls._of(values, Array._of(array))
 
     def replace(self, **fields: float) -> Registers:
         """Return a set with some fields changed, by taxel's names or the manual's.
@@ -220,8 +220,8 @@ class Registers:
         (7.81, 10, 2)
         """
         preset = text("preset", name)
-        held = _core.registers_with_preset(self._json(), preset, self.array._parts())
-        return self._of(held, self.array)
+        values = _core.registers_with_preset(self._json(), preset, self.array._parts())
+        return self._of(values, self.array)
 
     @property
     def frame_us(self) -> float:
@@ -270,11 +270,11 @@ class Registers:
         return json.dumps(self._held)
 
     def __getattr__(self, name: str) -> Any:
-        held = self.__dict__.get("_held", {})
-        if name in held:
-            return held[name] / 100 if name in _TIMES else held[name]
-        if name in _MANUAL and held:
-            value = held[_MANUAL[name]]
+        values = self.__dict__.get("_held", {})
+        if name in values:
+            return values[name] / 100 if name in _TIMES else values[name]
+        if name in _MANUAL and values:
+            value = values[_MANUAL[name]]
             return int(value) - _FIELDS[_MANUAL[name]]["offset"]
         raise AttributeError(f"Registers have no {name!r}")
 
@@ -332,7 +332,7 @@ def _raw(name: str, value: object) -> int:
     if _MANUAL.get(name, name) in _FLAGS:
         return int(flag(name, bool(value) if isinstance(value, int) and value in (0, 1) else value))
     try:
-        return whole(name, value, 0, 2**32 - 1)
+        return integer(name, value, 0, 2**32 - 1)
     except ProblemError:
         # The rules check numbers that fit a register's word; others are refused here.
         field = _FIELDS.get(_MANUAL.get(name, name))

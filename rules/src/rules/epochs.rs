@@ -35,7 +35,7 @@ pub struct Training {
     pub within_ms: f64,
     /// Whether to end as soon as every pattern is right.
     pub until_right: bool,
-    /// Of the first weights and the order of patterns.
+    /// The seed of the first weights and of the order of patterns.
     pub seed: u64,
     /// The time after which the caller requests the best so far, s; this crate reads no clock.
     pub max_seconds: Option<f64>,

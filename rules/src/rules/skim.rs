@@ -348,10 +348,10 @@ impl BatchRule for Skim {
         let mut counts = vec![(0, 0, 0); self.thresholds.len()];
         for (p, (pattern, targets)) in patterns.iter().zip(targets).enumerate() {
             let output = self.output(&weights, pattern, stop)?;
-            let (what, wanted) = (format!("output of pattern {p}"), format!("targets[{p}]"));
+            let (name, wanted) = (format!("output of pattern {p}"), format!("targets[{p}]"));
             for (&threshold, (found, missed, too_many)) in self.thresholds.iter().zip(&mut counts) {
                 let fired = crossings(&output, threshold, Grid::new(pattern.start, self.step_ms));
-                let pairs = match_spikes((&what, &fired), (&wanted, targets), self.within_ms, stop)?.len();
+                let pairs = match_spikes((&name, &fired), (&wanted, targets), self.within_ms, stop)?.len();
                 *found += pairs;
                 *missed += targets.len() - pairs;
                 *too_many += fired.len() - pairs;

@@ -31,7 +31,7 @@ pub enum Current {
 pub enum AfterSpike {
     /// It falls by `theta_0`, a fall that decays with `tau` (the SRM0 of Florian, and of Gardner and Grüning).
     Subtract,
-    /// It is put to 0; currents go on (leaky integrate and fire).
+    /// The potential is reset to 0; synaptic currents continue (leaky integrate-and-fire).
     Membrane,
     /// All inputs up to the spike are lost, as `after_spike` "reset" of the other learners has it.
     Reset,

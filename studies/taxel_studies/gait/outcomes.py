@@ -119,15 +119,15 @@ def figures(units: Sequence[Unit]) -> dict[str, Any]:
         "minutes": round(minutes, 2),
         "found_percent": round(100 * len(errors) / events, 2) if events else None,
         "false_per_minute": round(false / minutes, 3) if minutes else None,
-        "within_10_ms_percent": _share(errors, 10.0),
-        "within_3.4_ms_percent": _share(errors, 3.4),
+        "within_10_ms_percent": _percent_within(errors, 10.0),
+        "within_3.4_ms_percent": _percent_within(errors, 3.4),
         "error_ms": _spread(errors),
         "known_ms": _spread(delays),
     }
 
 
-def _share(errors: np.ndarray[Any, Any], within: float) -> float | None:
-    return round(100 * float(np.mean(np.abs(errors) <= within)), 2) if len(errors) else None
+def _percent_within(errors: np.ndarray[Any, Any], distance_ms: float) -> float | None:
+    return round(100 * float(np.mean(np.abs(errors) <= distance_ms)), 2) if len(errors) else None
 
 
 def _spread(values: np.ndarray[Any, Any]) -> dict[str, float] | None:

@@ -37,7 +37,7 @@ impl BoardAfferents {
     /// Its first one counts as what had always been.
     pub(super) fn sample(&mut self, taxel: usize, ticks: u16, registers: &Registers) -> bool {
         let rest = rest(registers);
-        let share = |part: u16, whole: u32| (u64::from(part) * u64::from(rest) / u64::from(whole)) as u32;
+        let share = |part: u16, total: u32| (u64::from(part) * u64::from(rest) / u64::from(total)) as u32;
         let pressure = pressure(ticks);
         let Some(BoardAfferent { base, threshold, fired }) = &mut self.0[taxel] else {
             self.0[taxel] = Some(BoardAfferent { base: pressure, threshold: rest, fired: 0 });

@@ -3,14 +3,15 @@
 use super::Board;
 use super::refresh::totals;
 use crate::wire::v2::BoardTotals;
-use crate::wire::{Command, Registers};
+use crate::wire::{Command, Greeting, Registers, StatusLine};
 
 impl Board {
     /// The status line of a reset: version of the wire, size and channels.
     #[must_use]
     pub fn greeting(&self) -> String {
         let Registers { wire_version, channels, .. } = self.written;
-        format!("taxel-board v{wire_version} {}x{} {channels}ch\n", self.array.rows, self.array.columns)
+        let greeting = Greeting { wire_version, rows: self.array.rows, columns: self.array.columns, channels };
+        format!("{greeting}\n")
     }
 
     /// Executes command bytes as they arrive; returns the status lines that answer them, each with its line end.
@@ -37,16 +38,17 @@ impl Board {
             );
         }
         if register == 6 && value < 8 {
-            return format!("ok REG{value}=0x{:08X}", self.written.word(value as u8));
+            let register = value as u8;
+            return StatusLine::Register { register, value: self.written.word(register) }.to_string();
         }
         let recording = self.written.record;
         match self.written.write(command, &self.array) {
-            Err(refusal) => format!("bad REG{register} rule {}", refusal.rule),
+            Err(refusal) => StatusLine::Refusal { register, rule: refusal.rule }.to_string(),
             Ok(()) => {
                 if self.written.record != recording {
                     self.mark(self.written.record);
                 }
-                format!("ok REG{register}=0x{value:08X}")
+                StatusLine::Register { register, value }.to_string()
             }
         }
     }
@@ -83,7 +85,7 @@ impl Board {
         let mut lines = String::new();
         for ((name, count), reported) in now.into_iter().zip(&mut self.reported) {
             if count != *reported {
-                lines += &format!("fault {name} {count}\n");
+                lines += &format!("{}\n", StatusLine::Fault { name: name.to_owned(), count });
                 *reported = count;
             }
         }

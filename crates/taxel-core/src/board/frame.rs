@@ -57,9 +57,9 @@ impl Board {
         if self.is_asynchronous() {
             self.queue_crossings(any, read, &mut sink);
         } else if any {
-            for (place, &x) in (0_u64..).zip(&lines) {
+            for (n, &x) in (0_u64..).zip(&lines) {
                 if self.comparators.line_changed[usize::from(x)] {
-                    self.line(x, self.time + place * u64::from(registers.line_period), read, &mut sink);
+                    self.line(x, self.time + n * u64::from(registers.line_period), read, &mut sink);
                 }
             }
         }
@@ -185,9 +185,9 @@ impl Board {
     /// Sends what is due at the end of a frame: all words of version 1; for version 2 events, promises, states and
     /// totals.
     fn end_frame(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
-        let every = self.version_2.states_us * 100;
-        if every > 0 {
-            self.refresh.frame(&self.active, every);
+        let period = self.version_2.states_us * 100;
+        if period > 0 {
+            self.refresh.frame(&self.active, period);
         }
         if self.active.wire_version == 1 {
             self.link.flush_words(&mut self.counts, sink);
@@ -214,7 +214,7 @@ impl Board {
         let taxels = (0..array.rows)
             .map(|y| ((x, y), array.index(x, y)))
             .filter(|&(_, taxel)| exists(taxel))
-            .map(|(place, taxel)| (place, comparators.values[taxel]));
+            .map(|(position, taxel)| (position, comparators.values[taxel]));
         link.states(now, taxels, counts, sink);
     }
 

@@ -144,8 +144,8 @@ impl Network {
         for (others, _) in &mut self.behind {
             *others = others.saturating_sub(1);
         }
-        while let Some(place) = self.behind.iter().position(|(others, _)| *others == 0) {
-            if let Some((_, late)) = self.behind.remove(place) {
+        while let Some(index) = self.behind.iter().position(|(others, _)| *others == 0) {
+            if let Some((_, late)) = self.behind.remove(index) {
                 self.deliver(&late, sink);
             }
         }

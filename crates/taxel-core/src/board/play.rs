@@ -86,12 +86,12 @@ impl Play {
             Crossed::fits(chain, &self.sensor)?;
             crossed = Some(Crossed::new(chain.clone(), &self.registers, &self.array)?);
         }
-        let mut first = vec![0; self.array.len()];
-        stage.frame(&mut first, stop)?;
+        let mut first_frame = vec![0; self.array.len()];
+        stage.frame(&mut first_frame, stop)?;
         if let Some(crossed) = &mut crossed {
-            crossed.read(&self.registers, &mut first, stop)?;
+            crossed.read(&self.registers, &mut first_frame, stop)?;
         }
-        board.arm(&first)?;
+        board.arm(&first_frame)?;
         Ok(Armed { board, crossed, stage, commands })
     }
 

@@ -18,15 +18,15 @@ pub(super) struct Refresh {
 }
 
 impl Refresh {
-    /// Advances by a frame, if all lines are repeated once in `every` (10 ns).
-    pub(super) fn frame(&mut self, registers: &Registers, every: u64) {
+    /// Advances by a frame, if all lines are repeated once in `period` (10 ns).
+    pub(super) fn frame(&mut self, registers: &Registers, period: u64) {
         let passed = registers.frame_10ns();
         self.since_line += passed * u64::from(registers.lines);
-        self.line_due |= self.since_line >= every;
-        self.since_line %= every;
+        self.line_due |= self.since_line >= period;
+        self.since_line %= period;
         self.since_totals += passed;
-        self.totals_due |= self.since_totals >= every;
-        self.since_totals %= every;
+        self.totals_due |= self.since_totals >= period;
+        self.since_totals %= period;
     }
 
     /// The line to repeat at the end of this frame: one at most, so that logic can do it.

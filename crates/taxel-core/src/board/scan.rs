@@ -65,8 +65,8 @@ impl Lfsr {
     fn shuffle(&mut self, lines: &mut [u16]) {
         let n = lines.len();
         for k in 0..n.saturating_sub(1) {
-            let place = k + ((usize::from(self.draw()) * (n - k)) >> 16);
-            lines.swap(k, place);
+            let index = k + ((usize::from(self.draw()) * (n - k)) >> 16);
+            lines.swap(k, index);
         }
     }
 }

@@ -126,8 +126,8 @@ impl Adaptive {
                 return Ok(out);
             }
             for x in 0..columns {
-                let place = (t_us + x as f64 * line_us) / period_us;
-                let (k, share) = ((place as usize).min(frames.saturating_sub(2)), place);
+                let steps = (t_us + x as f64 * line_us) / period_us;
+                let (k, share) = ((steps as usize).min(frames.saturating_sub(2)), steps);
                 let share = share - k as f64;
                 for y in 0..rows {
                     let at = k * taxels + y * columns + x;

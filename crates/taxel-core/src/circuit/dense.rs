@@ -63,9 +63,9 @@ impl Matrix {
 /// `row - sum of factor times other row`, a block wide.
 #[inline(always)]
 fn subtract_rows(mut row: Lanes, factors: &[f64], others: &[Lanes]) -> Lanes {
-    for (factor, other) in factors.iter().zip(others) {
+    for (factor, row_behind) in factors.iter().zip(others) {
         for lane in 0..LANES {
-            row[lane] -= factor * other[lane];
+            row[lane] -= factor * row_behind[lane];
         }
     }
     row

@@ -45,7 +45,7 @@ pub struct Crossbar {
     pub sense_ohm: f64,
     /// From a driven line's switch, on, to its first crossing, ohm.
     pub drive_ohm: f64,
-    /// Of a line from one crossing to the next, and from its end to the first, ohm; 0, or 0.001 or more.
+    /// Resistance of a line from one crossing to the next, and from its end to the first, ohm; 0, or 0.001 or more.
     pub wire_ohm: f64,
     /// The state of the lines that are not read.
     pub idle: Idle,
@@ -139,7 +139,7 @@ impl Crossbar {
         } else {
             None
         };
-        // Of the line read: its weight is one that is held, and its voltage drives.
+        // The share of the line that is read: its weight is one that is held, and its voltage drives.
         let mut share = vec![0.0; m];
         for (k, share) in share.iter_mut().enumerate() {
             let more = weights[k] - held(k);

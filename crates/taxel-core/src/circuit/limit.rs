@@ -5,7 +5,7 @@ use crate::Result;
 
 /// The voltages between which a source works; beyond, `ohm` connects its line to the nearer one.
 ///
-/// Of an amplifier these are its rails, and `ohm` its feedback resistor.
+/// An amplifier has its rails as these voltages, and its feedback resistor as `ohm`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limit {
     /// The lower voltage, above that of the idle lines, V.

@@ -191,37 +191,37 @@ impl Body {
         self.after_ms + moving
     }
 
-    /// Checks that it makes sense; `place` names it.
+    /// Checks that it makes sense; `path` names it.
     ///
     /// # Errors
     ///
     /// `Scene`, naming the parameter.
-    pub fn check(&self, place: &str) -> Result<()> {
-        self.shape.check(&format!("{place}.shape"))?;
-        within(place, "x_mm", self.x_mm, "mm", Range::FINITE)?;
-        within(place, "y_mm", self.y_mm, "mm", Range::FINITE)?;
+    pub fn check(&self, path: &str) -> Result<()> {
+        self.shape.check(&format!("{path}.shape"))?;
+        within(path, "x_mm", self.x_mm, "mm", Range::FINITE)?;
+        within(path, "y_mm", self.y_mm, "mm", Range::FINITE)?;
         if let Some(mass) = self.mass_g {
-            within(place, "mass_g", mass, "g", Range::ABOVE_0)?;
+            within(path, "mass_g", mass, "g", Range::ABOVE_0)?;
         }
         if let Some(stiffness) = self.stiffness_n_mm {
-            within(place, "stiffness_n_mm", stiffness, "N/mm", Range::ABOVE_0)?;
+            within(path, "stiffness_n_mm", stiffness, "N/mm", Range::ABOVE_0)?;
         }
-        within(place, "friction", self.friction, "", Range::within(0.0, 10.0))?;
-        within(place, "rolling_friction", self.rolling_friction, "", Range::within(0.0, 10.0))?;
-        within(place, "after_ms", self.after_ms, "ms", WAIT)?;
-        let moves = |name: &str| format!("{place}.motion.{name}");
+        within(path, "friction", self.friction, "", Range::within(0.0, 10.0))?;
+        within(path, "rolling_friction", self.rolling_friction, "", Range::within(0.0, 10.0))?;
+        within(path, "after_ms", self.after_ms, "ms", WAIT)?;
+        let moves = |name: &str| format!("{path}.motion.{name}");
         match &self.motion {
             Move::Dropped { height_mm, ending } => {
-                let place = moves("dropped");
-                within(&place, "height_mm", *height_mm, "mm", Range::ABOVE_0.at_most(2_000.0))?;
+                let path = moves("dropped");
+                within(&path, "height_mm", *height_mm, "mm", Range::ABOVE_0.at_most(2_000.0))?;
                 match ending {
                     Ending::Caught { after, press } => {
-                        within(&place, "after", f64::from(*after), "impacts", Range::FROM_1)?;
-                        press.check(&place)?;
+                        within(&path, "after", f64::from(*after), "impacts", Range::FROM_1)?;
+                        press.check(&path)?;
                     }
                     Ending::LeftToRest { rest_ms, lift_mm_s } => {
-                        within(&place, "rest_ms", *rest_ms, "ms", WAIT)?;
-                        within(&place, "lift_mm_s", *lift_mm_s, "mm/s", HAND)?;
+                        within(&path, "rest_ms", *rest_ms, "ms", WAIT)?;
+                        within(&path, "lift_mm_s", *lift_mm_s, "mm/s", HAND)?;
                     }
                 }
             }
@@ -229,7 +229,7 @@ impl Body {
             Move::Rolled(along) => {
                 along.check(&moves("rolled"))?;
                 if self.shape.turns().0 + self.shape.turns().1 == 0.0 {
-                    return Err(Error::scene(format!("{place}: only a sphere or a cylinder rolls; let it be slid")));
+                    return Err(Error::scene(format!("{path}: only a sphere or a cylinder rolls; let it be slid")));
                 }
             }
             Move::Slid(along) => along.check(&moves("slid"))?,
@@ -241,7 +241,7 @@ impl Body {
         };
         if free && self.mass_g().is_none() {
             return Err(Error::scene(format!(
-                "{place}: mass_g is missing: a body that moves freely needs one{}",
+                "{path}: mass_g is missing: a body that moves freely needs one{}",
                 if self.shape.volume_mm3().is_some() { ", or a material" } else { "" }
             )));
         }
@@ -254,23 +254,23 @@ pub(super) const WAIT: Range = Range::within(0.0, 60_000.0);
 const HAND: Range = Range::within(1.0, 2_000.0);
 
 impl Press {
-    fn check(&self, place: &str) -> Result<()> {
+    fn check(&self, path: &str) -> Result<()> {
         match (self.peak_n, self.depth_mm) {
-            (Some(force), None) => within(place, "peak_n", force, "N", Range::ABOVE_0.at_most(2_000.0))?,
-            (None, Some(depth)) => within(place, "depth_mm", depth, "mm", Range::ABOVE_0)?,
-            _ => return Err(Error::scene(format!("{place}: must have peak_n or depth_mm, and not both"))),
+            (Some(force), None) => within(path, "peak_n", force, "N", Range::ABOVE_0.at_most(2_000.0))?,
+            (None, Some(depth)) => within(path, "depth_mm", depth, "mm", Range::ABOVE_0)?,
+            _ => return Err(Error::scene(format!("{path}: must have peak_n or depth_mm, and not both"))),
         }
-        within(place, "speed_mm_s", self.speed_mm_s, "mm/s", HAND)?;
-        within(place, "hold_ms", self.hold_ms, "ms", WAIT)?;
-        within(place, "wait_ms", self.wait_ms, "ms", WAIT)
+        within(path, "speed_mm_s", self.speed_mm_s, "mm/s", HAND)?;
+        within(path, "hold_ms", self.hold_ms, "ms", WAIT)?;
+        within(path, "wait_ms", self.wait_ms, "ms", WAIT)
     }
 }
 
 impl Along {
-    fn check(&self, place: &str) -> Result<()> {
-        within(place, "speed_mm_s", self.speed_mm_s, "mm/s", Range::within(1.0, 10_000.0))?;
-        within(place, "toward_deg", self.toward_deg, "degrees", Range::FINITE)?;
-        within(place, "for_ms", self.for_ms, "ms", WAIT)?;
-        self.press_n.map_or(Ok(()), |force| within(place, "press_n", force, "N", Range::ABOVE_0.at_most(2_000.0)))
+    fn check(&self, path: &str) -> Result<()> {
+        within(path, "speed_mm_s", self.speed_mm_s, "mm/s", Range::within(1.0, 10_000.0))?;
+        within(path, "toward_deg", self.toward_deg, "degrees", Range::FINITE)?;
+        within(path, "for_ms", self.for_ms, "ms", WAIT)?;
+        self.press_n.map_or(Ok(()), |force| within(path, "press_n", force, "N", Range::ABOVE_0.at_most(2_000.0)))
     }
 }

@@ -152,11 +152,11 @@ impl Bonded {
 
     /// Where cell column or row `n` lies, mm right of or below the first taxel.
     #[must_use]
-    pub fn place_mm(&self, n: usize) -> f64 {
+    pub fn cell_mm(&self, n: usize) -> f64 {
         (n as f64 - self.margin as f64) * self.pitch_mm + self.first_mm
     }
 
-    /// The grid's columns or rows (`count` of them) from one place to another.
+    /// The grid's columns or rows (`count` of them) from one position to another.
     #[must_use]
     pub fn between(&self, from_mm: f64, to_mm: f64, count: usize) -> std::ops::Range<usize> {
         let at = |mm: f64| ((mm - self.first_mm) / self.pitch_mm + self.margin as f64).clamp(-1.0, count as f64);
@@ -196,8 +196,8 @@ impl Bonded {
     #[must_use]
     pub fn cells_mm(&self) -> (Vec<f64>, Vec<f64>) {
         let (rows, columns) = self.over_array();
-        let places = |count| (0..count).map(|n| self.place_mm(n + self.margin)).collect();
-        (places(rows), places(columns))
+        let positions = |count| (0..count).map(|n| self.cell_mm(n + self.margin)).collect();
+        (positions(rows), positions(columns))
     }
 
     /// Cells that may be touched by a body that has sunk by `sunk_mm` at each cell over the array, row by row.

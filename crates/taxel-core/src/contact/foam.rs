@@ -90,12 +90,12 @@ impl Foam {
         let linear = strain.clamp(0.0, self.yield_strain);
         let (mut zeroth, mut first) = (modulus * linear.powi(2) / 2.0, modulus * linear.powi(3) / 3.0);
         if strain > self.yield_strain {
-            let whole = self.densification_strain - self.yield_strain;
+            let range = self.densification_strain - self.yield_strain;
             let left = (self.densification_strain - strain).max(SOLID);
-            let scale = modulus * self.yield_strain * whole.powf(m);
-            let rise = scale * (left.powf(1.0 - m) - whole.powf(1.0 - m)) / (m - 1.0);
+            let scale = modulus * self.yield_strain * range.powf(m);
+            let rise = scale * (left.powf(1.0 - m) - range.powf(1.0 - m)) / (m - 1.0);
             zeroth += rise;
-            first += self.densification_strain * rise - scale * (whole.powf(2.0 - m) - left.powf(2.0 - m)) / (2.0 - m);
+            first += self.densification_strain * rise - scale * (range.powf(2.0 - m) - left.powf(2.0 - m)) / (2.0 - m);
         }
         let (begins, stress, slope) = self.solid();
         if strain > begins {

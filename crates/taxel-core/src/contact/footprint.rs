@@ -66,14 +66,14 @@ impl Footprint {
     /// `None` beyond the last.
     #[must_use]
     pub fn ring(r_mm: f64) -> Option<(usize, f32)> {
-        let place = r_mm / RING_MM;
-        (place < (RINGS - 1) as f64).then(|| (place as usize, place.fract() as f32))
+        let position = r_mm / RING_MM;
+        (position < (RINGS - 1) as f64).then(|| (position as usize, position.fract() as f32))
     }
 
     /// Base stress per force at each ring, 1/mm^2; nowhere negative, since the fabric cannot be pulled.
     pub fn profile(&self, depth_mm: f64, out: &mut Vec<f32>) {
-        let place = (depth_mm.max(0.0).sqrt() * self.per_root_mm).min((DEPTHS - 1) as f64 - 1e-6);
-        let (row, share) = (place as usize, place.fract() as f32);
+        let position = (depth_mm.max(0.0).sqrt() * self.per_root_mm).min((DEPTHS - 1) as f64 - 1e-6);
+        let (row, share) = (position as usize, position.fract() as f32);
         let (low, high) = self.table[row * RINGS..(row + 2) * RINGS].split_at(RINGS);
         out.clear();
         out.extend(low.iter().zip(high).map(|(a, b)| (a + share * (b - a)).max(0.0)));
@@ -111,9 +111,9 @@ impl Bessel {
     }
 
     fn at(&self, x: f64) -> f64 {
-        let place = x * Self::PER_UNIT;
-        let k = place as usize;
-        self.0[k] + place.fract() * (self.0[k + 1] - self.0[k])
+        let position = x * Self::PER_UNIT;
+        let k = position as usize;
+        self.0[k] + position.fract() * (self.0[k + 1] - self.0[k])
     }
 }
 

@@ -14,7 +14,7 @@ pub struct Motion {
     pub pushes: Vec<Push>,
     /// The touches, by time; us from the scene's start.
     pub contacts: Vec<Contact>,
-    /// Of touches that are narrower than cells resolve, the narrowest.
+    /// The narrowest of the touches that are narrower than cells resolve.
     pub narrow: Option<Narrow>,
 }
 

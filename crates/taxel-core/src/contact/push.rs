@@ -10,7 +10,7 @@ const DEPTHS: usize = 160;
 /// Neighbours on each side over which the table is smoothed.
 const SMOOTH: usize = 2;
 /// Places within a cell (columns, rows) at which the force of a body is worked out: spread evenly, two in no row.
-const PLACES: [(f64, f64); 9] = [
+const POINTS: [(f64, f64); 9] = [
     (0.056, 0.5),
     (0.167, 0.833),
     (0.278, 0.167),
@@ -61,25 +61,25 @@ impl Push {
             (Some(layer), shape) => {
                 let (mut sinking, shape, at) = (Sinking::default(), shape.clone(), (body.x_mm, body.y_mm));
                 // The rim of a touch moves from cell to cell, so that force has steps that come from the grid alone: the
-                // mean over places within a cell removes them.
+                // mean over points within a cell removes them.
                 Box::new(move |depth| {
-                    // Of many cells the rim is a small part: one place does.
+                    // With many cells the rim is a small part: one point is enough.
                     let many = {
                         sinking.find(layer, &[(&shape, at, depth)]);
                         sinking.cells.len() > MOST_SWEPT
                     };
-                    let places = if many { &PLACES[4..5] } else { &PLACES[..] };
+                    let points = if many { &POINTS[4..5] } else { &POINTS[..] };
                     let mut sum = 0.0;
-                    for (right, down) in places {
-                        let place = (at.0 + (right - 0.5) * layer.pitch_mm(), at.1 + (down - 0.5) * layer.pitch_mm());
-                        sinking.find(layer, &[(&shape, place, depth)]);
+                    for (right, down) in points {
+                        let point = (at.0 + (right - 0.5) * layer.pitch_mm(), at.1 + (down - 0.5) * layer.pitch_mm());
+                        sinking.find(layer, &[(&shape, point, depth)]);
                         if !many {
                             layer.forget();
                         }
                         let pressure: f64 = layer.press(&sinking.cells, stop)?.iter().sum();
                         sum += pressure * layer.area_mm2();
                     }
-                    Ok(sum / places.len() as f64)
+                    Ok(sum / points.len() as f64)
                 })
             }
         };
@@ -192,7 +192,7 @@ pub(super) struct Sinking {
 }
 
 impl Sinking {
-    /// Finds them of bodies given by shape, place of the middle and depth of the lowest point, all in mm.
+    /// Finds them of bodies given by shape, position of the middle and depth of the lowest point, all in mm.
     pub fn find(&mut self, layer: &Bonded, bodies: &[(&BodyShape, (f64, f64), f64)]) {
         let (rows, columns) = layer.shape();
         let nothing = (f64::NEG_INFINITY, 0);
@@ -207,7 +207,7 @@ impl Sinking {
             let across = layer.between(x - rx, x + rx, columns);
             for row in layer.between(y - ry, y + ry, rows) {
                 for column in across.clone() {
-                    let height = shape.height_mm(layer.place_mm(column) - x, layer.place_mm(row) - y);
+                    let height = shape.height_mm(layer.cell_mm(column) - x, layer.cell_mm(row) - y);
                     let at = &mut self.grid[row * columns + column];
                     if depth - height > above.max(at.0) {
                         *at = (depth - height, n as u32);

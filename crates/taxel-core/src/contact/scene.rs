@@ -164,12 +164,12 @@ impl Scene {
             return Err(Error::scene("scene: bodies is empty: must be one or more"));
         }
         for (n, body) in self.bodies.iter().enumerate() {
-            let place = format!("bodies[{n}]");
-            body.check(&place)?;
+            let path = format!("bodies[{n}]");
+            body.check(&path)?;
             let last = |count: u16| Range::within(0.0, f64::from(count - 1) * pitch_mm);
             let off = |error: Error| Error::scene(format!("{error} (the body is off the array)"));
-            within(&place, "x_mm", body.x_mm, "mm", last(array.columns)).map_err(off)?;
-            within(&place, "y_mm", body.y_mm, "mm", last(array.rows)).map_err(off)?;
+            within(&path, "x_mm", body.x_mm, "mm", last(array.columns)).map_err(off)?;
+            within(&path, "y_mm", body.y_mm, "mm", last(array.rows)).map_err(off)?;
         }
         if self.surface == Surface::Columns {
             if self.cells_per_pitch > 1 {

@@ -169,9 +169,9 @@ impl Taxels {
     #[must_use]
     pub fn ticks(&self, index: usize, drive: f32) -> f32 {
         let volts = self.rest_v[index] + self.gain_v[index] * drive;
-        let place = (volts * (Self::STEPS as f64 / RAMP_END_V) as f32).clamp(0.0, Self::STEPS as f32);
-        let k = place as usize;
-        self.ticks_of[k] + (place - k as f32) * (self.ticks_of[k + 1] - self.ticks_of[k])
+        let step = (volts * (Self::STEPS as f64 / RAMP_END_V) as f32).clamp(0.0, Self::STEPS as f32);
+        let k = step as usize;
+        self.ticks_of[k] + (step - k as f32) * (self.ticks_of[k + 1] - self.ticks_of[k])
     }
 
     /// Converts once more: noise, then what the counter shows.

@@ -53,32 +53,32 @@ impl BodyShape {
     /// # Errors
     ///
     /// `Scene`, naming the parameter.
-    pub fn check(&self, place: &str) -> Result<()> {
+    pub fn check(&self, path: &str) -> Result<()> {
         let size = Range::ABOVE_0.at_most(LARGEST_MM);
         match self {
-            Self::Sphere { radius_mm } => within(place, "radius_mm", *radius_mm, "mm", size),
+            Self::Sphere { radius_mm } => within(path, "radius_mm", *radius_mm, "mm", size),
             Self::Cylinder { radius_mm, length_mm, axis_deg } => {
-                within(place, "radius_mm", *radius_mm, "mm", size)?;
-                within(place, "length_mm", *length_mm, "mm", size)?;
-                within(place, "axis_deg", *axis_deg, "degrees", Range::FINITE)
+                within(path, "radius_mm", *radius_mm, "mm", size)?;
+                within(path, "length_mm", *length_mm, "mm", size)?;
+                within(path, "axis_deg", *axis_deg, "degrees", Range::FINITE)
             }
             Self::Edge { slope_deg, length_mm, axis_deg } => {
-                within(place, "slope_deg", *slope_deg, "degrees", Range::within(1.0, 89.0))?;
-                within(place, "length_mm", *length_mm, "mm", size)?;
-                within(place, "axis_deg", *axis_deg, "degrees", Range::FINITE)
+                within(path, "slope_deg", *slope_deg, "degrees", Range::within(1.0, 89.0))?;
+                within(path, "length_mm", *length_mm, "mm", size)?;
+                within(path, "axis_deg", *axis_deg, "degrees", Range::FINITE)
             }
             Self::HeightMap { heights_mm, pitch_mm } => {
-                within(place, "pitch_mm", *pitch_mm, "mm", size)?;
+                within(path, "pitch_mm", *pitch_mm, "mm", size)?;
                 let columns = heights_mm.first().map_or(0, Vec::len);
                 if columns < 2 || heights_mm.len() < 2 || heights_mm.iter().any(|row| row.len() != columns) {
                     return Err(crate::Error::scene(format!(
-                        "{place}: heights_mm has {} rows, the first of {columns}: must be 2 or more rows of one length, 2 or more",
+                        "{path}: heights_mm has {} rows, the first of {columns}: must be 2 or more rows of one length, 2 or more",
                         heights_mm.len()
                     )));
                 }
                 for (y, row) in heights_mm.iter().enumerate() {
                     for (x, height) in row.iter().enumerate() {
-                        within(&format!("{place}: row {y}, column {x}"), "heights_mm", *height, "mm", Range::FROM_0)?;
+                        within(&format!("{path}: row {y}, column {x}"), "heights_mm", *height, "mm", Range::FROM_0)?;
                     }
                 }
                 Ok(())
@@ -86,7 +86,7 @@ impl BodyShape {
         }
     }
 
-    /// Height above the lowest point, at a place from the middle, mm; infinite where there is nothing.
+    /// Height above the lowest point, at a point from the middle, mm; infinite where there is nothing.
     #[must_use]
     pub fn height_mm(&self, x: f64, y: f64) -> f64 {
         match self {
@@ -102,8 +102,8 @@ impl BodyShape {
             }
             Self::HeightMap { heights_mm, pitch_mm } => {
                 let (rows, columns) = (heights_mm.len(), heights_mm[0].len());
-                let place = |mm: f64, count: usize| mm / pitch_mm + (count - 1) as f64 / 2.0;
-                let (px, py) = (place(x, columns), place(y, rows));
+                let index = |mm: f64, count: usize| mm / pitch_mm + (count - 1) as f64 / 2.0;
+                let (px, py) = (index(x, columns), index(y, rows));
                 if !(0.0..=(columns - 1) as f64).contains(&px) || !(0.0..=(rows - 1) as f64).contains(&py) {
                     return f64::INFINITY;
                 }
@@ -211,7 +211,7 @@ fn arc(radius: f64, off: f64) -> f64 {
     if off < radius { radius - (radius * radius - off * off).sqrt() } else { f64::INFINITY }
 }
 
-/// A place by an axis: along it and across it.
+/// A point by an axis: along it and across it.
 pub(super) fn rotate(x: f64, y: f64, axis_deg: f64) -> (f64, f64) {
     let (sin, cos) = axis_deg.to_radians().sin_cos();
     (x * cos + y * sin, y * cos - x * sin)
@@ -257,7 +257,7 @@ mod tests {
                 .collect(),
             pitch_mm: 0.1,
         };
-        // Of two chords across each other through a point of a disc the shorter one has, in the mean, this many diameters.
+        // Mean length of the shorter of two perpendicular chords through a point of a disc, in diameters.
         let disc = 4.359 * 8.0 / std::f64::consts::PI * (1.0 - 0.5_f64.sqrt());
         for (shape, height, width, map_width) in [
             (BodyShape::Sphere { radius_mm: 5.0 }, 0.5, 4.359, disc),

@@ -202,8 +202,8 @@ impl Stage {
                 layer.show(self.frame, self.frame_us, &self.taxels, &mut self.clean, stop)?
             }
             ScenePartKind::Frames { sequence, count } => {
-                let place = self.frame as f64 * self.frame_us / sequence.period_us;
-                let (k, share) = ((place as usize).min(*count - 1), place.fract() as f32);
+                let steps = self.frame as f64 * self.frame_us / sequence.period_us;
+                let (k, share) = ((steps as usize).min(*count - 1), steps.fract() as f32);
                 let size = self.clean.len();
                 let now = &sequence.values[k * size..(k + 1) * size];
                 let next = if k + 1 < *count { &sequence.values[(k + 1) * size..(k + 2) * size] } else { now };

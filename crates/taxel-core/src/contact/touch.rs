@@ -18,7 +18,7 @@ pub enum TouchKind {
     Roll,
     /// Set down, sliding, and lifted.
     Slide,
-    /// Frames laid over the array.
+    /// A touch of recorded frames that are played over the array.
     Frames,
 }
 

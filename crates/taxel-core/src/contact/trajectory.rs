@@ -59,7 +59,7 @@ pub(super) struct Trajectory<'a> {
     raw: f64,
     touching: bool,
     /// Its middle, mm; its speed along the foam, and that of its lowest point by its turning, mm/ms.
-    place: [f64; 2],
+    position: [f64; 2],
     along: [f64; 2],
     turning: [f64; 2],
     pub track: Track,
@@ -85,7 +85,7 @@ impl<'a> Trajectory<'a> {
             speed: 0.0,
             raw: 0.0,
             touching: false,
-            place: [body.x_mm, body.y_mm],
+            position: [body.x_mm, body.y_mm],
             along: [0.0; 2],
             turning: [0.0; 2],
             track: Track::default(),
@@ -212,8 +212,8 @@ impl<'a> Trajectory<'a> {
     /// Appends the present state to the track.
     fn record(&mut self) {
         let Self { track, push, .. } = self;
-        track.x_mm.push(self.place[0] as f32);
-        track.y_mm.push(self.place[1] as f32);
+        track.x_mm.push(self.position[0] as f32);
+        track.y_mm.push(self.position[1] as f32);
         track.depth_mm.push(push.depth_mm(self.depth) as f32);
         track.force_n.push(self.raw.max(0.0) as f32);
     }
@@ -249,7 +249,7 @@ impl<'a> Trajectory<'a> {
         let (down_y, down_x) = self.scene.downhill_deg.to_radians().sin_cos();
         self.depth = -height_mm * cos;
         self.speed = 0.0;
-        self.place = [self.body.x_mm - height_mm * sin * down_x, self.body.y_mm - height_mm * sin * down_y];
+        self.position = [self.body.x_mm - height_mm * sin * down_x, self.body.y_mm - height_mm * sin * down_y];
     }
 
     fn fall_until_caught(&mut self, after: u32) -> Result<()> {
@@ -345,8 +345,8 @@ impl<'a> Trajectory<'a> {
         }
         (self.depth, self.speed, self.raw, self.touching) =
             (depth, speed, if depth > 0.0 { raw } else { 0.0 }, touching);
-        self.place[0] += self.inner_ms * self.along[0];
-        self.place[1] += self.inner_ms * self.along[1];
+        self.position[0] += self.inner_ms * self.along[0];
+        self.position[1] += self.inner_ms * self.along[1];
         self.now += 1;
         if self.now.is_multiple_of(INNER) {
             self.record();

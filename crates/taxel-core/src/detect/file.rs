@@ -12,11 +12,11 @@ const VERSION: u64 = 1;
 ///
 /// # Errors
 ///
-/// `Format`, beginning with `what`, if the text is not JSON, or if its format or version is another.
-pub(super) fn parts(what: &str, text: &str, formats: &[&'static str]) -> Result<(&'static str, Value)> {
-    let format = |message: String| Error::format(format!("{what}: {message}"));
+/// `Format`, beginning with `name`, if the text is not JSON, or if its format or version is another.
+pub(super) fn parts(name: &str, text: &str, formats: &[&'static str]) -> Result<(&'static str, Value)> {
+    let format = |message: String| Error::format(format!("{name}: {message}"));
     let names = formats.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(" or ");
-    let mut value: Value = reading::from_text(text).map_err(|unfit| Error::format(unfit.text(what)))?;
+    let mut value: Value = reading::from_text(text).map_err(|unfit| Error::format(unfit.text(name)))?;
     let Some(object) = value.as_object_mut() else {
         return Err(format("not a JSON object".to_owned()));
     };

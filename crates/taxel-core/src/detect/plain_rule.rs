@@ -154,7 +154,7 @@ impl PlainRule {
     /// As [`PlainRule::from_json`], from the contents of the file without format and version.
     pub(super) fn from_parts(parts: Value) -> Result<Self> {
         let rule: Self = reading::from_value(parts).map_err(|unfit| Error::format(unfit.text("plain rule")))?;
-        rule.check().map_err(|e| Error::format(format!("plain rule: {e}")))?;
+        rule.check().map_err(|error| error.in_part("plain rule").into_format())?;
         Ok(rule)
     }
 

@@ -83,12 +83,14 @@ impl Readout {
             cell.neuron.check().map_err(|error| error.in_part(label))?;
             self.encoder_of(cell).map_err(|error| error.in_part(label))?;
             if cell.neuron.time != self.time {
-                let (its, mine) = (word(&cell.neuron.time), word(&self.time));
-                return Err(problem!("{label}: trained for time {its}, this readout is for time {mine}"));
+                let (trained, expected) = (word(&cell.neuron.time), word(&self.time));
+                return Err(problem!("{label}: trained for time {trained}, this readout is for time {expected}"));
             }
             if cell.neuron.after_spike != self.after_spike {
-                let (its, mine) = (word(&cell.neuron.after_spike), word(&self.after_spike));
-                return Err(problem!("{label}: trained for after_spike {its}, this readout is for after_spike {mine}"));
+                let (trained, expected) = (word(&cell.neuron.after_spike), word(&self.after_spike));
+                return Err(problem!(
+                    "{label}: trained for after_spike {trained}, this readout is for after_spike {expected}"
+                ));
             }
             if !(0.0..=LONGEST_DELAY_MS).contains(&cell.delay_ms) {
                 return Err(problem!("{label}: delay_ms is {}: must be from 0 to {LONGEST_DELAY_MS}", cell.delay_ms));
@@ -164,21 +166,21 @@ impl Readout {
     /// period is not valid.
     pub fn stream(&self, array: &Array, frames: impl Into<FrameTime>, tare: Option<&Tare>) -> Result<ReadoutStream> {
         self.check()?;
-        if let Some(mine) = &self.array
-            && !mine.fits(array)
+        if let Some(sensor) = &self.array
+            && !sensor.fits(array)
         {
-            let others = (mine.rows, mine.columns) == (array.rows, array.columns);
-            let which = if others { ", of which others exist" } else { "" };
+            let same_shape = (sensor.rows, sensor.columns) == (array.rows, array.columns);
+            let difference = if same_shape { ", of which others exist" } else { "" };
             let error = problem!(
-                "an array of {} x {} taxels: the readout was trained on {} x {}{which}",
+                "an array of {} x {} taxels: the readout was trained on {} x {}{difference}",
                 array.rows,
                 array.columns,
-                mine.rows,
-                mine.columns
+                sensor.rows,
+                sensor.columns
             );
-            let row = array.rows == 1 && array.len() == mine.len();
+            let row = array.rows == 1 && array.len() == sensor.len();
             return Err(match row {
-                true if mine.rows == 1 => error.with_hint("array", Hint::Pitch),
+                true if sensor.rows == 1 => error.with_hint("array", Hint::Pitch),
                 true => error.with_hint("array", Hint::LayOut),
                 false => error,
             });

@@ -61,8 +61,8 @@ impl Spread {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
         let quantile = |q: f64| {
-            let place = q * (n - 1) as f64;
-            let (below, share) = (place.floor() as usize, place.fract());
+            let rank = q * (n - 1) as f64;
+            let (below, share) = (rank.floor() as usize, rank.fract());
             sorted[below] + share * (sorted[(below + 1).min(n - 1)] - sorted[below])
         };
         Self {

@@ -153,15 +153,15 @@ impl ReadoutStream {
     pub fn zero(&mut self, zeroing: &Zeroing) -> Result<()> {
         check_time(zeroing.t)?;
         zeroing.check(&self.array)?;
-        let place = self.zeroings.partition_point(|earlier| earlier.t <= zeroing.t);
-        self.zeroings.insert(place, *zeroing);
+        let index = self.zeroings.partition_point(|earlier| earlier.t <= zeroing.t);
+        self.zeroings.insert(index, *zeroing);
         Ok(())
     }
 
     /// The rest of each taxel, row by row; `None` if it is unknown, or if the encoder uses no tare.
     #[must_use]
     pub fn rest(&self) -> Vec<Option<f64>> {
-        (0..self.array.len()).map(|place| self.encoder.rest(place)).collect()
+        (0..self.array.len()).map(|taxel| self.encoder.rest(taxel)).collect()
     }
 
     /// The number of events that arrived after later events, or after time was advanced beyond them.
@@ -252,8 +252,8 @@ impl ReadoutStream {
         let over = self.zeroings.partition_point(|zeroing| zeroing.t < t);
         for zeroing in self.zeroings.drain(..over) {
             let at = self.now.map_or(zeroing.t, |now| now.max(zeroing.t));
-            let place = self.array.index(zeroing.x, zeroing.y);
-            self.encoder.set_rest(at, place, zeroing.rest, &mut self.emitted);
+            let taxel = self.array.index(zeroing.x, zeroing.y);
+            self.encoder.set_rest(at, taxel, zeroing.rest, &mut self.emitted);
         }
     }
 
@@ -278,15 +278,15 @@ impl ReadoutStream {
         }
     }
 
-    fn check_shape(&self, other: &Array) -> Result<()> {
-        let (mine, theirs) = ((self.array.rows, self.array.columns), (other.rows, other.columns));
-        if mine != theirs {
+    fn check_shape(&self, array: &Array) -> Result<()> {
+        let (expected, given) = ((self.array.rows, self.array.columns), (array.rows, array.columns));
+        if expected != given {
             return Err(problem!(
                 "input from {} x {} taxels: this readout reads {} x {}",
-                theirs.0,
-                theirs.1,
-                mine.0,
-                mine.1
+                given.0,
+                given.1,
+                expected.0,
+                expected.1
             ));
         }
         Ok(())

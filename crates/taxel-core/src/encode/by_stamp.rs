@@ -28,14 +28,14 @@ pub(super) trait Measure: Clone + Send + 'static {
         false
     }
 
-    /// Sets the rest of a place from now on.
+    /// Sets the rest of a taxel from now on.
     fn set_rest(&mut self, _place: usize, _rest: f64) {}
 
     /// Ends the stamp, or the frame, at `t` us: emits its spikes, given the loaded taxels and all current values.
     fn emit(&mut self, t: i64, loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>);
 }
 
-/// Passes a measure the loaded taxels and the current values of all places, by stamp or by frame.
+/// Passes a measure the loaded taxels and the current values of all taxels, by stamp or by frame.
 #[derive(Clone)]
 pub(super) struct ByStamp<M> {
     measure: M,
@@ -59,7 +59,7 @@ impl<M: Measure> ByStamp<M> {
             loaded,
             held: Held::all(blocks(array.len()) * BLOCK, 0.0),
             changed: vec![false; blocks(array.len())],
-            // Channels are all places here; `loaded` defines which taxels exist.
+            // Channels are all taxels here; `loaded` defines which taxels exist.
             channels: Channels::new(&Array { exists: None, ..array.clone() }),
             source: StreamInput::Unknown,
             fresh: false,
@@ -120,34 +120,34 @@ impl<M: Measure> Stream for ByStamp<M> {
                 self.pass(present, events.t[k], out);
                 present = events.t[k];
             }
-            let place = events.array.index(events.x[k], events.y[k]);
-            if !events.array.has(place) {
+            let taxel = events.array.index(events.x[k], events.y[k]);
+            if !events.array.has(taxel) {
                 continue;
             }
             self.fresh = true;
             if intensity.present[k] {
                 let value = f32::from(intensity.ticks[k]);
-                self.held.set(place, value);
-                self.loaded.take(place, value);
+                self.held.set(taxel, value);
+                self.loaded.take(taxel, value);
             }
         }
         Ok(())
     }
 
-    fn set_rest(&mut self, t: i64, place: usize, rest: f64, out: &mut Vec<Spike>) {
+    fn set_rest(&mut self, t: i64, taxel: usize, rest: f64, out: &mut Vec<Spike>) {
         self.advance(t, out);
-        self.loaded.set_rest(place, rest);
-        self.measure.set_rest(place, rest);
+        self.loaded.set_rest(taxel, rest);
+        self.measure.set_rest(taxel, rest);
         self.fresh = true;
         match self.source {
             // Marks the block as changed, so that it is computed with the new rest in the next frame.
-            StreamInput::Frames { .. } => self.changed[place / BLOCK] = true,
-            _ => self.loaded.take(place, self.held.values()[place]),
+            StreamInput::Frames { .. } => self.changed[taxel / BLOCK] = true,
+            _ => self.loaded.take(taxel, self.held.values()[taxel]),
         }
     }
 
-    fn rest(&self, place: usize) -> Option<f64> {
-        self.loaded.rest(place)
+    fn rest(&self, taxel: usize) -> Option<f64> {
+        self.loaded.rest(taxel)
     }
 
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {

@@ -86,7 +86,7 @@ impl Rule for ChangeRule {
         self.last = held.to_vec();
     }
 
-    const ASKS: bool = true;
+    const PREFETCHES: bool = true;
 
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
@@ -101,11 +101,11 @@ impl Rule for ChangeRule {
                 for (lane, (&new, last)) in new.iter().zip(last.iter_mut()).enumerate() {
                     if moved(new, *last) {
                         let units = (new - *last) / floor;
-                        let whole = match self.rounding {
+                        let rounded = match self.rounding {
                             Rounding::Truncate => units.trunc(),
                             Rounding::Floor => units.floor(),
                         };
-                        let value = whole.clamp(-self.most, self.most);
+                        let value = rounded.clamp(-self.most, self.most);
                         out.push(Spike { t: ms(t), train: (block * BLOCK + lane) as u32, value });
                         *last = new;
                     }

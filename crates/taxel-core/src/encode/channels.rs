@@ -46,47 +46,47 @@ pub(super) struct Channels {
     rows: u16,
     columns: u16,
     name: String,
-    /// The place of each channel in a frame; `None` if every place is a channel.
-    places: Option<Vec<u32>>,
-    /// The channel of each place, [`NONE`] if no taxel exists there; `None` if every place is a channel.
-    of_place: Option<Vec<u32>>,
+    /// The taxel of each channel in a frame; `None` if every taxel is a channel.
+    taxels: Option<Vec<u32>>,
+    /// The channel of each taxel, [`NONE`] if no taxel exists there; `None` if every taxel is a channel.
+    of_taxel: Option<Vec<u32>>,
 }
 
 const NONE: u32 = u32::MAX;
 
 impl Channels {
     pub(super) fn new(array: &Array) -> Self {
-        let (mut places, mut of_place) = (None, None);
+        let (mut taxels, mut of_taxel) = (None, None);
         if let Some(exists) = &array.exists {
-            let existing: Vec<u32> = (0..).zip(exists).filter(|&(_, &e)| e).map(|(place, _)| place).collect();
+            let existing: Vec<u32> = (0..).zip(exists).filter(|&(_, &e)| e).map(|(taxel, _)| taxel).collect();
             let mut channels = vec![NONE; exists.len()];
-            for (channel, &place) in (0..).zip(&existing) {
-                channels[place as usize] = channel;
+            for (channel, &taxel) in (0..).zip(&existing) {
+                channels[taxel as usize] = channel;
             }
-            (places, of_place) = (Some(existing), Some(channels));
+            (taxels, of_taxel) = (Some(existing), Some(channels));
         }
-        Self { rows: array.rows, columns: array.columns, name: array.name.clone(), places, of_place }
+        Self { rows: array.rows, columns: array.columns, name: array.name.clone(), taxels, of_taxel }
     }
 
     /// Number of existing taxels.
     pub(super) fn len(&self) -> usize {
-        self.places.as_ref().map_or(self.grid(), Vec::len)
+        self.taxels.as_ref().map_or(self.grid(), Vec::len)
     }
 
     fn grid(&self) -> usize {
         usize::from(self.rows) * usize::from(self.columns)
     }
 
-    /// The place of a column and a row.
-    pub(super) fn place(&self, x: u16, y: u16) -> usize {
+    /// The taxel of a column and a row.
+    pub(super) fn taxel(&self, x: u16, y: u16) -> usize {
         usize::from(y) * usize::from(self.columns) + usize::from(x)
     }
 
-    /// The channel of a place; `None` if no taxel exists there.
-    pub(super) fn of_place(&self, place: usize) -> Option<usize> {
-        match &self.of_place {
-            None => Some(place),
-            Some(channels) => (channels[place] != NONE).then_some(channels[place] as usize),
+    /// The channel of a taxel; `None` if no taxel exists there.
+    pub(super) fn of_taxel(&self, taxel: usize) -> Option<usize> {
+        match &self.of_taxel {
+            None => Some(taxel),
+            Some(channels) => (channels[taxel] != NONE).then_some(channels[taxel] as usize),
         }
     }
 
@@ -104,20 +104,20 @@ impl Channels {
             let (rows, columns) = (self.rows, self.columns);
             return Err(problem!("frame at {t} us: {} values, must be {rows} x {columns}", values.len()));
         }
-        let Some(places) = &self.places else {
-            let (whole, rest) = values.as_chunks::<BLOCK>();
-            take(t, whole, held, changed, next)?;
+        let Some(taxels) = &self.taxels else {
+            let (full, rest) = values.as_chunks::<BLOCK>();
+            take(t, full, held, changed, next)?;
             if !rest.is_empty() {
                 let mut new = [0.0; BLOCK];
                 new[..rest.len()].copy_from_slice(rest);
-                take(t, &[new], &mut held[whole.len()..], &mut changed[whole.len()..], next)?;
+                take(t, &[new], &mut held[full.len()..], &mut changed[full.len()..], next)?;
             }
             return Ok(());
         };
-        for (block, places) in places.chunks(BLOCK).enumerate() {
+        for (block, taxels) in taxels.chunks(BLOCK).enumerate() {
             let mut new = [0.0; BLOCK];
-            for (value, &place) in new.iter_mut().zip(places) {
-                *value = values[place as usize];
+            for (value, &taxel) in new.iter_mut().zip(taxels) {
+                *value = values[taxel as usize];
             }
             take(t, &[new], &mut held[block..], &mut changed[block..], next)?;
         }

@@ -307,7 +307,7 @@ impl Rule for Fa1Afferents {
         }
     }
 
-    const ASKS: bool = true;
+    const PREFETCHES: bool = true;
 
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {

@@ -165,7 +165,7 @@ struct LevelCrossings {
 
 #[derive(Clone)]
 struct Tonic {
-    every: i64,
+    interval_us: i64,
     level: usize,
     /// The time of each channel's next tonic spike, the channel, and its crossing's time; the period is the same for
     /// all, so the queue is ordered by time.
@@ -181,8 +181,8 @@ impl LevelCrossings {
         let releases: Vec<f64> = levels.iter().map(|&l| parameters.release(l)).collect();
         let tonic = match parameters.tonic_ms {
             None => None,
-            Some(every) => Some(Tonic {
-                every: micros("tonic_ms", every)?,
+            Some(interval_us) => Some(Tonic {
+                interval_us: micros("tonic_ms", interval_us)?,
                 level: parameters.tonic_level.and_then(|l| levels.iter().position(|&m| m == l)).unwrap_or(0),
                 next: VecDeque::new(),
                 above_since: vec![None; channels],
@@ -304,7 +304,7 @@ impl LevelCrossings {
         tonic.above_since[channel] = above.then_some(t);
         if above {
             out.push(Spike { t: ms(t), train: (first + channel) as u32, value: 1.0 });
-            tonic.next.push_back((t + tonic.every, channel, t));
+            tonic.next.push_back((t + tonic.interval_us, channel, t));
         }
     }
 
@@ -333,7 +333,7 @@ impl LevelCrossings {
             tonic.next.pop_front();
             if tonic.above_since[channel] == Some(since) {
                 out.push(Spike { t: ms(due), train: (first + channel) as u32, value: 1.0 });
-                tonic.next.push_back((due + tonic.every, channel, since));
+                tonic.next.push_back((due + tonic.interval_us, channel, since));
             }
         }
     }

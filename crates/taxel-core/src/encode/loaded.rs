@@ -13,7 +13,7 @@ fn round_up(x: f64) -> f32 {
 }
 
 wide! {
-    /// Whether the same places are loaded as before.
+    /// Whether the same taxels are loaded as before.
     fn as_loaded(held: &Block, from: &Block, loaded: &[u32; BLOCK]) -> bool {
         let mut changes = 0;
         for lane in 0..BLOCK {
@@ -23,23 +23,23 @@ wide! {
     }
 }
 
-/// The places of an array at or above a value of their own, and how many of them have such a neighbour.
+/// The taxels of an array at or above a value of their own, and how many of them have such a neighbour.
 #[derive(Clone)]
 pub(super) struct Paired {
     rows: usize,
     columns: usize,
-    /// Smallest value at which each place is loaded; infinite if there is none.
+    /// Smallest value at which each taxel is loaded; infinite if there is none.
     from: Vec<Block>,
-    /// 1 for each loaded place, otherwise 0.
+    /// 1 for each loaded taxel, otherwise 0.
     loaded: Vec<[u32; BLOCK]>,
-    /// Number of loaded neighbours of each place.
+    /// Number of loaded neighbours of each taxel.
     neighbours: Vec<u8>,
-    /// Number of loaded places with a loaded neighbour.
+    /// Number of loaded taxels with a loaded neighbour.
     area: u32,
 }
 
 impl Paired {
-    /// Starts with no place loaded, and no value at which one is.
+    /// Starts with no taxel loaded, and no value at which one is.
     pub(super) fn new(rows: usize, columns: usize) -> Self {
         let n = blocks(rows * columns);
         Self {
@@ -52,61 +52,61 @@ impl Paired {
         }
     }
 
-    /// Sets the smallest value at which a place is loaded; the caller must pass its value again.
-    pub(super) fn set_from(&mut self, place: usize, from: f64) {
-        self.from[place / BLOCK][place % BLOCK] = round_up(from);
+    /// Sets the smallest value at which a taxel is loaded; the caller must pass its value again.
+    pub(super) fn set_from(&mut self, taxel: usize, from: f64) {
+        self.from[taxel / BLOCK][taxel % BLOCK] = round_up(from);
     }
 
-    /// Number of blocks of places.
+    /// Number of blocks of taxels.
     pub(super) fn blocks(&self) -> usize {
         self.loaded.len()
     }
 
-    /// Number of loaded places with a loaded neighbour.
+    /// Number of loaded taxels with a loaded neighbour.
     pub(super) fn area(&self) -> u32 {
         self.area
     }
 
-    /// Whether any place of a block is loaded.
+    /// Whether any taxel of a block is loaded.
     pub(super) fn any(&self, block: usize) -> bool {
         self.loaded[block].iter().any(|&l| l != 0)
     }
 
-    /// Whether a place counts: it and one of its neighbours are loaded.
-    pub(super) fn counts(&self, place: usize) -> bool {
-        self.is_loaded(place) && self.neighbours[place] > 0
+    /// Whether a taxel counts: it and one of its neighbours are loaded.
+    pub(super) fn counts(&self, taxel: usize) -> bool {
+        self.is_loaded(taxel) && self.neighbours[taxel] > 0
     }
 
-    /// Updates the value of a place.
-    pub(super) fn take(&mut self, place: usize, value: f32) {
-        if (value >= self.from[place / BLOCK][place % BLOCK]) != self.is_loaded(place) {
-            self.toggle(place);
+    /// Updates the value of a taxel.
+    pub(super) fn take(&mut self, taxel: usize, value: f32) {
+        if (value >= self.from[taxel / BLOCK][taxel % BLOCK]) != self.is_loaded(taxel) {
+            self.toggle(taxel);
         }
     }
 
-    /// Updates the values of a block of places.
+    /// Updates the values of a block of taxels.
     pub(super) fn take_block(&mut self, block: usize, values: &Block) {
         if !as_loaded(values, &self.from[block], &self.loaded[block]) {
             let last = self.neighbours.len();
-            for (place, &value) in (block * BLOCK..last).zip(values) {
-                self.take(place, value);
+            for (taxel, &value) in (block * BLOCK..last).zip(values) {
+                self.take(taxel, value);
             }
         }
     }
 
-    fn is_loaded(&self, place: usize) -> bool {
-        self.loaded[place / BLOCK][place % BLOCK] != 0
+    fn is_loaded(&self, taxel: usize) -> bool {
+        self.loaded[taxel / BLOCK][taxel % BLOCK] != 0
     }
 
-    /// Toggles whether a place is loaded, and updates its neighbours' counts and the area.
-    fn toggle(&mut self, place: usize) {
-        let loaded = !self.is_loaded(place);
-        self.loaded[place / BLOCK][place % BLOCK] = u32::from(loaded);
-        let (row, column) = (place / self.columns, place % self.columns);
+    /// Toggles whether a taxel is loaded, and updates its neighbours' counts and the area.
+    fn toggle(&mut self, taxel: usize) {
+        let loaded = !self.is_loaded(taxel);
+        self.loaded[taxel / BLOCK][taxel % BLOCK] = u32::from(loaded);
+        let (row, column) = (taxel / self.columns, taxel % self.columns);
         for y in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
             for x in column.saturating_sub(1)..=(column + 1).min(self.columns - 1) {
                 let neighbour = y * self.columns + x;
-                if neighbour == place {
+                if neighbour == taxel {
                     continue;
                 }
                 let counted = self.neighbours[neighbour] > 0;
@@ -120,19 +120,19 @@ impl Paired {
                 }
             }
         }
-        if self.neighbours[place] > 0 {
+        if self.neighbours[taxel] > 0 {
             self.area = if loaded { self.area + 1 } else { self.area - 1 };
         }
     }
 }
 
-/// The loaded places of an array.
+/// The loaded taxels of an array.
 ///
-/// A place is loaded while its value exceeds its rest by more than the noise floor and half a tick; it counts only if
+/// A taxel is loaded while its value exceeds its rest by more than the noise floor and half a tick; it counts only if
 /// one of its 8 neighbours is loaded too, which rejects noise.
 #[derive(Clone)]
 pub(super) struct Loaded {
-    places: Paired,
+    paired: Paired,
     noise_floor: f64,
     rest: Rest<f64>,
 }
@@ -151,55 +151,55 @@ pub(super) struct LoadedSums {
 }
 
 impl Loaded {
-    /// Starts with no taxel loaded; `what` names the encoder in an error.
-    pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
-        let rest = require_tare(what, tare)?.rest_of(array)?;
-        let places = Paired::new(usize::from(array.rows), usize::from(array.columns));
-        let mut fresh = Self { places, noise_floor, rest };
-        (0..array.len()).for_each(|place| fresh.update_threshold(place));
+    /// Starts with no taxel loaded; `subject` names the encoder in an error.
+    pub(super) fn new(subject: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
+        let rest = require_tare(subject, tare)?.rest_of(array)?;
+        let paired = Paired::new(usize::from(array.rows), usize::from(array.columns));
+        let mut fresh = Self { paired, noise_floor, rest };
+        (0..array.len()).for_each(|taxel| fresh.update_threshold(taxel));
         Ok(fresh)
     }
 
-    /// Changes the rest of a place; the caller must pass its value again.
-    pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
-        self.rest.set(place, rest);
-        self.update_threshold(place);
+    /// Changes the rest of a taxel; the caller must pass its value again.
+    pub(super) fn set_rest(&mut self, taxel: usize, rest: f64) {
+        self.rest.set(taxel, rest);
+        self.update_threshold(taxel);
     }
 
-    fn update_threshold(&mut self, place: usize) {
-        self.places.set_from(place, touched_from(self.rest.values()[place], self.noise_floor));
+    fn update_threshold(&mut self, taxel: usize) {
+        self.paired.set_from(taxel, touched_from(self.rest.values()[taxel], self.noise_floor));
     }
 
-    /// The rest of a place; `None` if it is not known.
-    pub(super) fn rest(&self, place: usize) -> Option<f64> {
-        Some(self.rest.values()[place]).filter(|rest| rest.is_finite())
+    /// The rest of a taxel; `None` if it is not known.
+    pub(super) fn rest(&self, taxel: usize) -> Option<f64> {
+        Some(self.rest.values()[taxel]).filter(|rest| rest.is_finite())
     }
 
-    /// Difference between a value and a place's rest.
-    fn above(&self, place: usize, value: f32) -> f64 {
-        self.rest.above(place, f64::from(value))
+    /// Difference between a value and a taxel's rest.
+    fn above(&self, taxel: usize, value: f32) -> f64 {
+        self.rest.above(taxel, f64::from(value))
     }
 
-    /// Sums over the taxels that count, from the values of all places; they are added in the order of places.
+    /// Sums over the taxels that count, from the values of all taxels; they are added in the order of taxels.
     pub(super) fn sums(&self, held: &[Block]) -> LoadedSums {
-        let columns = self.places.columns;
-        self.sums_at(held, |place| [(place % columns) as f64, (place / columns) as f64])
+        let columns = self.paired.columns;
+        self.sums_at(held, |taxel| [(taxel % columns) as f64, (taxel / columns) as f64])
     }
 
-    /// The same, with x and y of each place.
+    /// The same, with x and y of each taxel.
     pub(super) fn sums_at(&self, held: &[Block], at: impl Fn(usize) -> [f64; 2]) -> LoadedSums {
         let mut sums = LoadedSums::default();
         if self.area() == 0 {
             return sums;
         }
-        let places = self.places.neighbours.len();
+        let taxels = self.paired.neighbours.len();
         for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.any(block)) {
-            for (place, &value) in (block * BLOCK..places).zip(values) {
-                if self.counts(place) {
-                    let above = self.above(place, value);
+            for (taxel, &value) in (block * BLOCK..taxels).zip(values) {
+                if self.counts(taxel) {
+                    let above = self.above(taxel, value);
                     sums.total += above;
                     sums.peak = sums.peak.max(above);
-                    let [x, y] = at(place);
+                    let [x, y] = at(taxel);
                     sums.x += above * x;
                     sums.y += above * y;
                 }
@@ -208,14 +208,14 @@ impl Loaded {
         sums
     }
 
-    /// Updates the value of a place.
-    pub(super) fn take(&mut self, place: usize, value: f32) {
-        self.places.take(place, value);
+    /// Updates the value of a taxel.
+    pub(super) fn take(&mut self, taxel: usize, value: f32) {
+        self.paired.take(taxel, value);
     }
 
-    /// Updates the values of a block of places.
+    /// Updates the values of a block of taxels.
     pub(super) fn take_block(&mut self, block: usize, values: &Block) {
-        self.places.take_block(block, values);
+        self.paired.take_block(block, values);
     }
 }
 
@@ -223,11 +223,11 @@ impl std::ops::Deref for Loaded {
     type Target = Paired;
 
     fn deref(&self) -> &Paired {
-        &self.places
+        &self.paired
     }
 }
 
-/// The tare of an encoder that needs one; `what` names the encoder in an error.
-pub(super) fn require_tare<'a>(what: &str, tare: Option<&'a Tare>) -> Result<&'a Tare> {
-    tare.ok_or_else(|| problem!("{what} without a tare").with_hint("tare", Hint::Give))
+/// The tare of an encoder that needs one; `subject` names the encoder in an error.
+pub(super) fn require_tare<'a>(subject: &str, tare: Option<&'a Tare>) -> Result<&'a Tare> {
+    tare.ok_or_else(|| problem!("{subject} without a tare").with_hint("tare", Hint::Give))
 }

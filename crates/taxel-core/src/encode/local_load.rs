@@ -32,7 +32,7 @@ const MEANS_OF_REST: [[f64; 2]; 2] = [[0.0, 10.0], [0.0, 50.0]];
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LocalRest {
-    /// Begins at the tare and follows each taxel's value: [`Baseline::tracked`](crate::baseline::Baseline::tracked).
+    /// Begins at the tare and follows each taxel's value: [`Baseline::tracked`](crate::rest::Baseline::tracked).
     #[default]
     Tracked,
     /// The tare.
@@ -157,10 +157,10 @@ impl LocalLoad {
     }
 
     fn sampled(&self, array: &Array, emit: Emit) -> Result<Sampled<LocalLoadRule>> {
-        let whole = |ms: f64| us(ms).round() as i64;
+        let whole_us = |ms: f64| us(ms).round() as i64;
         let windows: Vec<PastWindow> = self
             .windows()
-            .map(|([from, to], quantities)| PastWindow { from: whole(from), to: whole(to), quantities })
+            .map(|([from, to], quantities)| PastWindow { from: whole_us(from), to: whole_us(to), quantities })
             .collect();
         let recent = RecentSamples::new(windows[0].quantities, &windows);
         let rule = LocalLoadRule { sums: self.sums(array, &self.running_us())?, recent, quantities: vec![], emit };
@@ -219,9 +219,9 @@ impl LargestSum {
         largest
     }
 
-    /// Sets the rest of the taxel at `place`, row by row, from now on.
-    pub fn set_rest(&mut self, place: usize, rest: f64) {
-        self.0.set_rest_at(place, rest);
+    /// Sets the rest of a taxel, by index, from now on.
+    pub fn set_rest(&mut self, taxel: usize, rest: f64) {
+        self.0.set_rest_at(taxel, rest);
     }
 }
 
@@ -252,8 +252,8 @@ impl Measure for SumLevels {
         true
     }
 
-    fn set_rest(&mut self, place: usize, rest: f64) {
-        self.sums.set_rest_at(place, rest);
+    fn set_rest(&mut self, taxel: usize, rest: f64) {
+        self.sums.set_rest_at(taxel, rest);
     }
 
     fn emit(&mut self, t: i64, _loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>) {

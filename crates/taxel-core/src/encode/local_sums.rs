@@ -1,10 +1,9 @@
-//! Sums over 3 x 3 places of values above a baseline, in units of each taxel's own noise.
+//! Sums over 3 x 3 taxels of values above a baseline, in units of each taxel's own noise.
 
 use super::blocks::{BLOCK, Block, in_blocks};
 use super::loaded::Paired;
 use super::tare::Tare;
-use crate::baseline::{Baseline, FAR_NOISE, stands_out_from};
-use crate::rest::Value;
+use crate::rest::{Baseline, FAR_NOISE, Value, stands_out_from};
 use crate::vectors::wide;
 use crate::{Array, Result};
 
@@ -12,14 +11,14 @@ use crate::{Array, Result};
 /// has a sum above [`OUTSTANDING`].
 const CLIP: f64 = 3.0;
 
-/// A place stands out if its sum is above this.
+/// A taxel stands out if its sum is above this.
 const OUTSTANDING: f32 = 4.0;
 
-/// Number of places that are compared at once; divides a block.
+/// Number of taxels that are compared at once; divides a block.
 const LANES: usize = 16;
 
-/// The cells of a grid: the places of an array with a border of one empty cell around each row, in which the neighbours
-/// of any place lie at the same distances.
+/// The cells of a grid: the taxels of an array with a border of one empty cell around each row, in which the neighbours
+/// of any taxel lie at the same distances.
 #[derive(Debug, Clone)]
 struct CellGrid {
     rows: usize,
@@ -37,7 +36,7 @@ struct TaxelRun {
     /// The first one's number among the existing taxels.
     channel: usize,
     /// The first one's index in the array.
-    place: usize,
+    taxel: usize,
     cell: usize,
     len: usize,
 }
@@ -55,14 +54,14 @@ impl CellGrid {
         let stride = columns + 1;
         let mut runs: Vec<TaxelRun> = vec![];
         let mut channel = 0;
-        for place in 0..array.len() {
-            if array.exists.as_ref().is_some_and(|exists| !exists[place]) {
+        for taxel in 0..array.len() {
+            if array.exists.as_ref().is_some_and(|exists| !exists[taxel]) {
                 continue;
             }
-            let cell = (place / columns + 1) * stride + place % columns + 1;
+            let cell = (taxel / columns + 1) * stride + taxel % columns + 1;
             match runs.last_mut() {
-                Some(run) if run.cell + run.len == cell && run.place + run.len == place => run.len += 1,
-                _ => runs.push(TaxelRun { channel, place, cell, len: 1 }),
+                Some(run) if run.cell + run.len == cell && run.taxel + run.len == taxel => run.len += 1,
+                _ => runs.push(TaxelRun { channel, taxel, cell, len: 1 }),
             }
             channel += 1;
         }
@@ -73,7 +72,7 @@ impl CellGrid {
 
     /// The cell of each existing taxel with its index in the array.
     fn taxels(&self) -> impl Iterator<Item = (usize, usize)> {
-        self.runs.iter().flat_map(|run| (0..run.len).map(|k| (run.cell + k, run.place + k)))
+        self.runs.iter().flat_map(|run| (0..run.len).map(|k| (run.cell + k, run.taxel + k)))
     }
 
     /// The cell of the existing taxel with this number.
@@ -83,9 +82,9 @@ impl CellGrid {
     }
 
     /// The number of the existing taxel with this index in the array.
-    fn channel(&self, place: usize) -> Option<usize> {
-        let run = self.runs.iter().find(|run| (run.place..run.place + run.len).contains(&place))?;
-        Some(run.channel + place - run.place)
+    fn channel(&self, taxel: usize) -> Option<usize> {
+        let run = self.runs.iter().find(|run| (run.taxel..run.taxel + run.len).contains(&taxel))?;
+        Some(run.channel + taxel - run.taxel)
     }
 
     /// Copies values into the cells of the existing taxels.
@@ -93,7 +92,7 @@ impl CellGrid {
         for run in &self.runs {
             let new = match values {
                 Values::Taxels(values) => &values[run.channel..],
-                Values::Frame(values) => &values[run.place..],
+                Values::Frame(values) => &values[run.taxel..],
             };
             cells[run.cell..][..run.len].copy_from_slice(&new[..run.len]);
         }
@@ -169,7 +168,7 @@ impl CellNoise {
 pub(super) struct SumPair {
     /// The largest sum over 3 x 3 clipped values, in units of its noise, at least 0; above and below.
     pub(super) largest: [f64; 2],
-    /// The number of places whose sum is above 4 units of its noise.
+    /// The number of taxels whose sum is above 4 units of its noise.
     pub(super) places: f64,
     /// The number of taxels that stand out and have a neighbour that does; above and below.
     pub(super) area: [f64; 2],
@@ -323,9 +322,9 @@ impl LocalSums {
     ) -> Result<Self> {
         let (rest, measured, grid) = (tare.rest_of(array)?, tare.place_noise(), CellGrid::new(array));
         let (mut begins, mut sd) = (vec![f64::NO_REST; grid.cells], vec![None; grid.cells]);
-        for (cell, place) in grid.taxels() {
-            begins[cell] = rest.values()[place];
-            sd[cell] = (begins[cell] != f64::NO_REST).then(|| measured[place].max(least));
+        for (cell, taxel) in grid.taxels() {
+            begins[cell] = rest.values()[taxel];
+            sd[cell] = (begins[cell] != f64::NO_REST).then(|| measured[taxel].max(least));
         }
         let noise = CellNoise::new(&grid, sd, least, floor);
         let baseline = if tracked {
@@ -359,8 +358,8 @@ impl LocalSums {
     }
 
     /// Sets the rest of the taxel with this index in the array, if it exists.
-    pub(super) fn set_rest_at(&mut self, place: usize, rest: f64) {
-        if let Some(channel) = self.grid.channel(place) {
+    pub(super) fn set_rest_at(&mut self, taxel: usize, rest: f64) {
+        if let Some(channel) = self.grid.channel(taxel) {
             self.set_rest(channel, rest);
         }
     }

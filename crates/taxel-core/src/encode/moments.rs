@@ -168,15 +168,15 @@ impl Encoding for Moments {
             levels,
             first_graded: self.level_trains(),
             graded: self.all_graded(),
-            centre: self.centre.then(|| [array.columns, array.rows].map(|places| (places.max(2) - 1) as f64 / 2.0)),
-            place: [0.0; CENTRE],
+            centre: self.centre.then(|| [array.columns, array.rows].map(|count| (count.max(2) - 1) as f64 / 2.0)),
+            position: [0.0; CENTRE],
             ages: self.all_ages(),
-            every: self.tonic_ms.map(|every| micros("tonic_ms", every)).transpose()?,
+            interval_us: self.tonic_ms.map(|interval_us| micros("tonic_ms", interval_us)).transpose()?,
             due: VecDeque::new(),
         };
-        // Channels are all places here; `loaded` defines which taxels exist.
-        let places = Array { exists: None, ..array.clone() };
-        Ok(Box::new(Sampled::new(self, passing, &places, self.period_ms)?))
+        // Channels are all taxels here; `loaded` defines which taxels exist.
+        let grid = Array { exists: None, ..array.clone() };
+        Ok(Box::new(Sampled::new(self, passing, &grid, self.period_ms)?))
     }
 
     fn trains(&self, _array: &Array) -> usize {
@@ -257,13 +257,13 @@ struct LevelPass {
     /// Half of the columns and rows, where the centre is emitted; `None` where it is not.
     centre: Option<[f64; 2]>,
     /// The place of the centre in the last sample.
-    place: [f64; CENTRE],
+    position: [f64; CENTRE],
     /// The ages that have a train each, us.
     ages: Vec<i64>,
     /// The time at which each level was reached, us; `None` below it.
     since: Vec<Option<i64>>,
     /// Period of the tonic spikes, us.
-    every: Option<i64>,
+    interval_us: Option<i64>,
     /// The time of a level's next tonic spike, the level, and when it was reached; the period is the same for all, so
     /// the queue is ordered by time.
     due: VecDeque<(i64, usize, i64)>,
@@ -277,7 +277,7 @@ impl LevelPass {
             return;
         }
         let (LoadedSums { total, peak, x, y }, unit) = match &self.way {
-            Some(Way::Places(at)) => (self.loaded.sums_at(held, |place| at[place]), [1.0; 2]),
+            Some(Way::Places(at)) => (self.loaded.sums_at(held, |taxel| at[taxel]), [1.0; 2]),
             Some(Way::Pitch(Pitch { rows, columns })) => (self.loaded.sums(held), [*columns, *rows]),
             None => (self.loaded.sums(held), [0.0; 2]),
         };
@@ -288,7 +288,7 @@ impl LevelPass {
         if let Some(half) = self.centre {
             let LoadedSums { total, x, y, .. } = self.loaded.sums(held);
             let [column, row] = [x / total / half[0] - 1.0, y / total / half[1] - 1.0];
-            self.place = [column, column * column, row, row * row];
+            self.position = [column, column * column, row, row * row];
         }
     }
 
@@ -309,34 +309,34 @@ impl LevelPass {
             let value = self.moments[moment];
             emit(n, value.abs().ln_1p().copysign(value) as f32);
         }
-        let places = if self.centre.is_some() { &self.place[..] } else { &[] };
-        for (n, &value) in places.iter().enumerate() {
+        let position = if self.centre.is_some() { &self.position[..] } else { &[] };
+        for (n, &value) in position.iter().enumerate() {
             emit(self.graded.len() + n, value as f32);
         }
         if let Some(reached) = self.ages.partition_point(|&age| age <= t - since).checked_sub(1) {
-            emit(self.graded.len() + places.len() + reached, 1.0);
+            emit(self.graded.len() + position.len() + reached, 1.0);
         }
     }
 
     /// Notes that a level is reached: its tonic spikes begin.
     fn reach(&mut self, t: i64, level: usize, out: &mut Vec<Spike>) {
         self.since[level] = Some(t);
-        if let Some(every) = self.every {
+        if let Some(interval_us) = self.interval_us {
             out.push(Spike { t: ms(t), train: (2 * self.levels.len() + level) as u32, value: 1.0 });
-            self.due.push_back((t + every, level, t));
+            self.due.push_back((t + interval_us, level, t));
         }
     }
 
     /// Emits the tonic spikes before `t` (with `at_too` also at `t`).
     fn emit_tonic(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
-        let Some(every) = self.every else { return };
+        let Some(interval_us) = self.interval_us else { return };
         while let Some(&(due, level, since)) = self.due.front()
             && (due < t || (at_too && due == t))
         {
             self.due.pop_front();
             if self.since[level] == Some(since) {
                 out.push(Spike { t: ms(due), train: (2 * self.levels.len() + level) as u32, value: 1.0 });
-                self.due.push_back((due + every, level, since));
+                self.due.push_back((due + interval_us, level, since));
             }
         }
     }

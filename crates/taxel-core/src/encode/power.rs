@@ -38,9 +38,9 @@ fn power_of(x: f64, alpha: f64) -> f64 {
     }
     let small = alpha * (2.0 / LN_2) * s * series;
     // Converts the exponent to f64 through its bits: few machines have a vector instruction for i64 to f64.
-    let whole = f64::from_bits(WHOLE.to_bits() | biased) - (WHOLE + 1023.0);
+    let integer = f64::from_bits(WHOLE.to_bits() | biased) - (WHOLE + 1023.0);
     // 2^y = 2^n * e^(f ln 2) with |f| <= 1/2.
-    let large = alpha * whole;
+    let large = alpha * integer;
     let shifted = (large + small) + ROUND;
     let n = shifted - ROUND;
     let f = ((large - n) + small) * LN_2;

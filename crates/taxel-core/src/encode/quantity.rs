@@ -73,9 +73,9 @@ impl Measure for QuantityMeasure {
         self.local.is_some()
     }
 
-    fn set_rest(&mut self, place: usize, rest: f64) {
+    fn set_rest(&mut self, taxel: usize, rest: f64) {
         if let Some(local) = &mut self.local {
-            local.set_rest(place, rest);
+            local.set_rest(taxel, rest);
         }
     }
 

@@ -207,7 +207,7 @@ impl<F: Filter> Rule for TaxelAfferents<F> {
         self.afferents.begin(x.iter());
     }
 
-    const ASKS: bool = true;
+    const PREFETCHES: bool = true;
 
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {

@@ -143,11 +143,11 @@ impl SampleWindow {
 
 /// The percentile of values, linear between ranks (Hyndman and Fan's 7th, NumPy's default).
 fn percentile(values: &mut [f32], percent: f64) -> f64 {
-    let place = percent / 100.0 * (values.len() - 1) as f64;
-    let (_, below, above) = values.select_nth_unstable_by(place as usize, f32::total_cmp);
+    let rank = percent / 100.0 * (values.len() - 1) as f64;
+    let (_, below, above) = values.select_nth_unstable_by(rank as usize, f32::total_cmp);
     let below = f64::from(*below);
     match above.iter().copied().min_by(f32::total_cmp) {
-        Some(next) => below + (f64::from(next) - below) * place.fract(),
+        Some(next) => below + (f64::from(next) - below) * rank.fract(),
         None => below,
     }
 }

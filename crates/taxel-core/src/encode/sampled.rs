@@ -29,7 +29,7 @@ pub(super) trait Rule: Send + Clone + 'static {
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>);
 
     /// Whether a block takes so long to compute that the rule prefetches parts of the `next` frame between blocks.
-    const ASKS: bool = false;
+    const PREFETCHES: bool = false;
 
     /// Emits the spikes that are due before `t` (exclusive) while the last sample holds.
     fn pass(&mut self, _t: i64, _out: &mut Vec<Spike>) {}
@@ -161,15 +161,15 @@ pub(super) struct Sampled<R> {
 #[derive(Clone)]
 struct Above {
     rest: Rest<f64>,
-    /// The current value of each place.
+    /// The current value of each taxel.
     held: Held<f32>,
     /// A frame of the values above rest.
     frame: Vec<f32>,
 }
 
 impl Above {
-    fn value(&self, place: usize) -> f32 {
-        self.rest.above(place, f64::from(self.held.values()[place])) as f32
+    fn value(&self, taxel: usize) -> f32 {
+        self.rest.above(taxel, f64::from(self.held.values()[taxel])) as f32
     }
 }
 
@@ -277,14 +277,14 @@ impl<R: Rule> Stream for Sampled<R> {
                     self.sample_until(present, out);
                 }
             }
-            let place = self.channels.place(events.x[k], events.y[k]);
+            let taxel = self.channels.taxel(events.x[k], events.y[k]);
             if intensity.present[k]
-                && let Some(channel) = self.channels.of_place(place)
+                && let Some(channel) = self.channels.of_taxel(taxel)
             {
                 let read = f32::from(intensity.ticks[k]);
                 let value = self.above.as_mut().map_or(read, |above| {
-                    above.held.set(place, read);
-                    above.value(place)
+                    above.held.set(taxel, read);
+                    above.value(taxel)
                 });
                 let before = self.held.set(channel, value);
                 if self.begun && events.is_repaired(k) {
@@ -304,8 +304,8 @@ impl<R: Rule> Stream for Sampled<R> {
         R::SPIKES_OF_REPAIRED.then(|| ms(self.period) + self.latency_ms)
     }
 
-    fn set_rest(&mut self, t: i64, place: usize, rest: f64, out: &mut Vec<Spike>) {
-        let Some(channel) = self.channels.of_place(place) else { return };
+    fn set_rest(&mut self, t: i64, taxel: usize, rest: f64, out: &mut Vec<Spike>) {
+        let Some(channel) = self.channels.of_taxel(taxel) else { return };
         if let StreamInput::Events { present, .. } = &mut self.source {
             *present = t.max(*present);
             self.sample_until(t, out);
@@ -315,16 +315,16 @@ impl<R: Rule> Stream for Sampled<R> {
         }
         self.rule.set_rest(channel, rest);
         if let Some(above) = &mut self.above {
-            above.rest.set(place, rest);
-            self.held.set(channel, above.value(place));
+            above.rest.set(taxel, rest);
+            self.held.set(channel, above.value(taxel));
         }
         self.changed[channel / BLOCK] = true;
         self.quiet = false;
     }
 
-    fn rest(&self, place: usize) -> Option<f64> {
-        let channel = self.channels.of_place(place)?;
-        let above = self.above.as_ref().map(|above| above.rest.values()[place]).filter(|rest| rest.is_finite());
+    fn rest(&self, taxel: usize) -> Option<f64> {
+        let channel = self.channels.of_taxel(taxel)?;
+        let above = self.above.as_ref().map(|above| above.rest.values()[taxel]).filter(|rest| rest.is_finite());
         above.or_else(|| self.rule.rest(channel))
     }
 
@@ -336,13 +336,13 @@ impl<R: Rule> Stream for Sampled<R> {
                 .with_hint("period_ms", Hint::Give));
         }
         let (now, later) = (NextFrame::after(values), NextFrame::unknown());
-        let (mut now, later) = if R::ASKS { (later, now) } else { (now, later) };
+        let (mut now, later) = if R::PREFETCHES { (later, now) } else { (now, later) };
         let values = match &mut self.above {
             Some(above) if values.len() == above.frame.len() => {
                 above.held.values_mut().copy_from_slice(values);
-                for (place, &read) in values.iter().enumerate() {
+                for (taxel, &read) in values.iter().enumerate() {
                     // Infinite values and NaN stay, so that they are refused below.
-                    above.frame[place] = if read.is_finite() { above.value(place) } else { read };
+                    above.frame[taxel] = if read.is_finite() { above.value(taxel) } else { read };
                 }
                 &above.frame
             }

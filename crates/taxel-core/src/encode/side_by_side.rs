@@ -85,13 +85,13 @@ impl Stream for SideBySide {
         self.parts.iter().filter_map(|part| part.stream.repaired_span_ms()).reduce(f64::max)
     }
 
-    fn set_rest(&mut self, t: i64, place: usize, rest: f64, out: &mut Vec<Spike>) {
-        self.pass(|part, spikes| part.set_rest(t, place, rest, spikes));
+    fn set_rest(&mut self, t: i64, taxel: usize, rest: f64, out: &mut Vec<Spike>) {
+        self.pass(|part, spikes| part.set_rest(t, taxel, rest, spikes));
         self.emit(t, out);
     }
 
-    fn rest(&self, place: usize) -> Option<f64> {
-        self.parts.iter().find_map(|part| part.stream.rest(place))
+    fn rest(&self, taxel: usize) -> Option<f64> {
+        self.parts.iter().find_map(|part| part.stream.rest(taxel))
     }
 
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {

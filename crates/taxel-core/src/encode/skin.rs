@@ -334,7 +334,7 @@ impl Rule for PlacedAfferents {
         self.fa2.begin(t, held, out);
     }
 
-    const ASKS: bool = true;
+    const PREFETCHES: bool = true;
 
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {

@@ -31,11 +31,11 @@ pub trait Stream: Send {
         Some(self.latency_ms())
     }
 
-    /// Sets the rest of the taxel at `place` (row by row) from `t` us on. To be called after the events up to `t` and
+    /// Sets the rest of a taxel, by index, from `t` us on. To be called after the events up to `t` and
     /// before later ones; an encoder that uses no tare ignores it.
     fn set_rest(&mut self, _t: i64, _place: usize, _rest: f64, _out: &mut Vec<Spike>) {}
 
-    /// The rest of the taxel at `place`; `None` if it is not known, or if the encoder uses no tare.
+    /// The rest of a taxel, by index; `None` if it is not known, or if the encoder uses no tare.
     fn rest(&self, _place: usize) -> Option<f64> {
         None
     }

@@ -15,7 +15,7 @@ use crate::{Array, EventsView, FramesView, Result, problem, reading};
 pub struct Tare {
     /// The sensor.
     pub array: Array,
-    /// Rest by place (`row * columns + column`), in the sensor's unit; `None` for a taxel without any event.
+    /// Rest by taxel (`row * columns + column`), in the sensor's unit; `None` for a taxel without any event.
     pub rest: Vec<Option<f64>>,
     /// Standard deviation of the taxels' values over the interval, weighted by time, in the sensor's unit; `None` where
     /// the rest is unknown.
@@ -29,7 +29,7 @@ pub struct Tare {
 }
 
 impl Tare {
-    /// Checks that there is one finite rest per place, and one finite noise of 0 or more where there is any.
+    /// Checks that there is one finite rest per taxel, and one finite noise of 0 or more where there is any.
     ///
     /// # Errors
     ///
@@ -43,8 +43,8 @@ impl Tare {
         if self.start_us >= self.stop_us {
             return Err(problem!("tare from {} to {} us: start must lie before stop", self.start_us, self.stop_us));
         }
-        if let Some(place) = self.rest.iter().position(|rest| rest.is_some_and(|r| !r.is_finite())) {
-            return Err(problem!("tare: rest of the taxel at {} is not finite", self.array.place_of(place)));
+        if let Some(taxel) = self.rest.iter().position(|rest| rest.is_some_and(|r| !r.is_finite())) {
+            return Err(problem!("tare: rest of the taxel at {} is not finite", self.array.position_text(taxel)));
         }
         if self.noise.len() != self.array.len() {
             return Err(problem!(
@@ -53,9 +53,9 @@ impl Tare {
             ));
         }
         match self.noise.iter().position(|noise| noise.is_some_and(|n| !(n >= 0.0 && n.is_finite()))) {
-            Some(place) => {
-                let place = self.array.place_of(place);
-                Err(problem!("tare: noise of the taxel at {place} must be 0 or more and finite"))
+            Some(taxel) => {
+                let position = self.array.position_text(taxel);
+                Err(problem!("tare: noise of the taxel at {position} must be 0 or more and finite"))
             }
             None => Ok(()),
         }
@@ -79,11 +79,11 @@ impl Tare {
                 to.columns
             ));
         }
-        let of_place = |(place, rest): (usize, &Option<f64>)| rest.filter(|_| array.has(place)).unwrap_or(f64::NO_REST);
-        Ok(Rest::measured(self.rest.iter().enumerate().map(of_place).collect()))
+        let rest_of = |(taxel, rest): (usize, &Option<f64>)| rest.filter(|_| array.has(taxel)).unwrap_or(f64::NO_REST);
+        Ok(Rest::measured(self.rest.iter().enumerate().map(rest_of).collect()))
     }
 
-    /// The noise of each place; 0 where it is not known.
+    /// The noise of each taxel; 0 where it is not known.
     pub(super) fn place_noise(&self) -> Vec<f64> {
         self.noise.iter().map(|noise| noise.unwrap_or(0.0)).collect()
     }
@@ -297,9 +297,9 @@ impl TareBuilder {
         for (integral, &held) in self.integrals.iter_mut().zip(self.held.values()) {
             integral.extend(stop, held);
         }
-        let exists = |place: usize| self.array.exists.as_ref().is_none_or(|e| e[place]);
+        let exists = |taxel: usize| self.array.exists.as_ref().is_none_or(|e| e[taxel]);
         let of_each = |measure: fn(&Integral) -> Option<f64>| -> Vec<Option<f64>> {
-            let known = (0..).zip(&self.integrals).map(|(place, integral)| (exists(place), integral));
+            let known = (0..).zip(&self.integrals).map(|(taxel, integral)| (exists(taxel), integral));
             known.map(|(exists, integral)| measure(integral).filter(|_| exists)).collect()
         };
         let (rest, noise) = (of_each(Integral::mean), of_each(Integral::deviation));

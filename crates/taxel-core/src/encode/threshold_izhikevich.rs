@@ -336,7 +336,7 @@ impl Rule for Pairs {
         }
     }
 
-    const ASKS: bool = true;
+    const PREFETCHES: bool = true;
 
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {

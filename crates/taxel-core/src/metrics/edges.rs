@@ -43,9 +43,9 @@ pub(super) fn window(
         for (p, n) in (0..side.count).flat_map(|p| (0..side.trains).map(move |n| (p, n))) {
             let train = side.train(p, n);
             if let Some(k) = train.iter().position(|&t| t < start || t > stop) {
-                let place = side.place(p, n);
+                let name = side.train_name(p, n);
                 return Err(problem!(
-                    "{place}, spike {k}: {} ms lies outside the window {start} to {stop} ms",
+                    "{name}, spike {k}: {} ms lies outside the window {start} to {stop} ms",
                     train[k]
                 ));
             }

@@ -20,29 +20,29 @@ pub fn described() -> Described {
 ///
 /// # Errors
 ///
-/// `Problem` for times that do not ascend or are not valid (names the list, `what`), or for a window that is not valid;
+/// `Problem` for times that do not ascend or are not valid (names the list, `name`), or for a window that is not valid;
 /// those of [`in_order`].
 pub fn match_spikes(
-    (what, spikes): (&str, &[f64]),
+    (name, spikes): (&str, &[f64]),
     (wanted, targets): (&str, &[f64]),
     window_ms: f64,
     stop: Stop<'_>,
 ) -> Result<Vec<(usize, usize)>> {
     WINDOW.check(&window_ms)?;
     let windows = vec![(window_ms * 1e6).round() as i64; targets.len()];
-    in_order(&nanoseconds(what, spikes)?, &nanoseconds(wanted, targets)?, &windows, stop)
+    in_order(&nanoseconds(name, spikes)?, &nanoseconds(wanted, targets)?, &windows, stop)
 }
 
 /// Times in whole ns, so that a time at the edge of a window is inside despite rounding.
-fn nanoseconds(what: &str, times: &[f64]) -> Result<Vec<i64>> {
+fn nanoseconds(name: &str, times: &[f64]) -> Result<Vec<i64>> {
     // A hundred years.
     const MOST_MS: f64 = 3.2e12;
     if let Some(k) = times.iter().position(|t| !(-MOST_MS..=MOST_MS).contains(t)) {
-        return Err(problem!("{what}[{k}] is {} ms: must be finite, within a hundred years", times[k]));
+        return Err(problem!("{name}[{k}] is {} ms: must be finite, within a hundred years", times[k]));
     }
     if let Some(k) = times.windows(2).position(|w| w[1] < w[0]) {
         let (before, after) = (times[k], times[k + 1]);
-        return Err(problem!("{what}[{}] is {after} ms, after {before} ms: times must ascend", k + 1));
+        return Err(problem!("{name}[{}] is {after} ms, after {before} ms: times must ascend", k + 1));
     }
     Ok(times.iter().map(|t| (t * 1e6).round() as i64).collect())
 }

@@ -37,7 +37,7 @@ impl Patterns<'_> {
 
     /// The name of train `n` of pattern `p` in errors.
     #[must_use]
-    pub fn place(&self, p: usize, n: usize) -> String {
+    pub fn train_name(&self, p: usize, n: usize) -> String {
         let entry = if self.listed { format!("{}[{p}]", self.name) } else { self.name.to_owned() };
         if self.trains == 1 { format!("train {entry}") } else { format!("{entry}, train {n}") }
     }
@@ -70,11 +70,11 @@ impl Patterns<'_> {
 
     /// The error for the first fault of an invalid train.
     fn fault(&self, p: usize, n: usize) -> crate::Error {
-        let (train, place) = (self.train(p, n), self.place(p, n));
+        let (train, name) = (self.train(p, n), self.train_name(p, n));
         if let Some(k) = train.iter().position(|t| !t.is_finite()) {
-            return problem!("{place}, spike {k}: time is {}, must be finite", train[k]);
+            return problem!("{name}, spike {k}: time is {}, must be finite", train[k]);
         }
         let k = train.windows(2).position(|w| w[1] < w[0]).unwrap_or(0);
-        problem!("{place}, spike {}: {} ms comes after {} ms, times must ascend", k + 1, train[k + 1], train[k])
+        problem!("{name}, spike {}: {} ms comes after {} ms, times must ascend", k + 1, train[k + 1], train[k])
     }
 }

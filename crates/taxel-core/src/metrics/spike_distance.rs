@@ -38,19 +38,19 @@ struct Far {
 }
 
 impl Far {
-    fn new(spikes: &[f64], other: &[f64], window: ObservationWindow) -> Self {
+    fn new(spikes: &[f64], reference: &[f64], window: ObservationWindow) -> Self {
         // Outside its own spikes the other train gets one more on either side, at the distance of its edge intervals.
-        let m = other.len();
-        let beyond = |j: usize| if m > 1 { other[j + 1] - other[j] } else { 0.0 };
-        let before = window.start.min(other[0] - beyond(0));
-        let after = window.stop.max(other[m - 1] + if m > 1 { beyond(m - 2) } else { 0.0 });
+        let m = reference.len();
+        let beyond = |j: usize| if m > 1 { reference[j + 1] - reference[j] } else { 0.0 };
+        let before = window.start.min(reference[0] - beyond(0));
+        let after = window.stop.max(reference[m - 1] + if m > 1 { beyond(m - 2) } else { 0.0 });
         let mut j = 0;
         let mut nearest = |t: f64| {
-            while j < m && other[j] < t {
+            while j < m && reference[j] < t {
                 j += 1;
             }
-            let earlier = if j > 0 { other[j - 1] } else { before };
-            let later = if j < m { other[j] } else { after };
+            let earlier = if j > 0 { reference[j - 1] } else { before };
+            let later = if j < m { reference[j] } else { after };
             (t - earlier).min(later - t)
         };
         Self { nearest: spikes.iter().map(|&t| nearest(t)).collect(), end: nearest(window.stop) }

@@ -109,10 +109,10 @@ impl Exposure {
         };
         // Points are whole steps from the window's start, or from 0 if the window has none.
         let origin = if self.start.is_finite() { self.start } else { 0.0 };
-        let number = |t: f64| ((t - origin) / step).ceil();
+        let grid_index = |t: f64| ((t - origin) / step).ceil();
         // The stop itself is a point; the time `to` belongs to the following interval.
-        let past = if to <= self.stop { number(to) } else { ((self.stop - origin) / step).floor() + 1.0 };
-        let least = number(first);
+        let past = if to <= self.stop { grid_index(to) } else { ((self.stop - origin) / step).floor() + 1.0 };
+        let least = grid_index(first);
         if least >= past {
             return 0.0;
         }

@@ -45,15 +45,15 @@ impl GridStream {
     /// Adds an input to the state at the first grid point at or after it, at the cost of one exponential and without a
     /// queue.
     pub(super) fn push(&mut self, t: f64, weight: f64, value: f64, out: &mut Vec<OutputSpike>) {
-        let place = self.grid.place(t);
-        let point = place.from();
+        let time = self.grid.locate(t);
+        let point = time.from();
         if point > self.point {
             self.compare(out);
             self.step_through(point - 1.0, out);
             self.jump(point);
         }
         if !self.neuron.loses(t, self.threshold.fired) {
-            let age = self.grid.between(place, GridTime::at(self.point));
+            let age = self.grid.between(time, GridTime::at(self.point));
             if age > 0.0 {
                 self.shape.add(&mut self.state, weight, value, age);
             } else {
@@ -66,12 +66,12 @@ impl GridStream {
     pub(super) fn settle(&mut self, until: f64, out: &mut Vec<OutputSpike>) {
         if self.grid.time(self.point) <= until {
             self.compare(out);
-            self.step_through(self.grid.place(until).until(), out);
+            self.step_through(self.grid.locate(until).until(), out);
         }
     }
 
     pub(super) fn potential(&self, t: f64) -> f64 {
-        let since = self.grid.between(GridTime::at(self.point), self.grid.place(t));
+        let since = self.grid.between(GridTime::at(self.point), self.grid.locate(t));
         // An input exactly at the point contributes nothing at the point itself.
         if since > 0.0 { self.shape.after(self.leaving(), since).b } else { self.state.b }
     }

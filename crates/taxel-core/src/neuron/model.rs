@@ -186,9 +186,9 @@ impl Neuron {
     /// numbers.
     pub(crate) fn ages(&self, start: f64, t: f64) -> impl Fn(f64) -> f64 + use<> {
         let grid = (self.time == Time::Grid).then(|| Grid::new(start, self.step_ms));
-        let place = grid.map(|grid| grid.place(t));
-        move |s| match (grid, place) {
-            (Some(grid), Some(place)) => grid.between(grid.place(s), place),
+        let time = grid.map(|grid| grid.locate(t));
+        move |s| match (grid, time) {
+            (Some(grid), Some(time)) => grid.between(grid.locate(s), time),
             _ => t - s,
         }
     }

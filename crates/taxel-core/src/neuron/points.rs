@@ -68,9 +68,9 @@ impl Grid {
         self.start + point * self.step_ms
     }
 
-    /// The place of a time. The nearest point's rounded time decides whether `t` is before or after it; the distance is
-    /// exact.
-    pub fn place(&self, t: f64) -> GridTime {
+    /// The nearest point to a time, and the distance from it, which is exact. The point's rounded time decides whether
+    /// `t` is before or after it.
+    pub fn locate(&self, t: f64) -> GridTime {
         let since = t - self.start;
         let point = (since / self.step_ms).round();
         let rounded = self.time(point);
@@ -92,12 +92,12 @@ impl Grid {
 
     /// Whether a time is a grid point, within rounding.
     pub fn is_at_point(&self, t: f64) -> bool {
-        self.place(t).rest.abs() <= rounding_ms(t)
+        self.locate(t).rest.abs() <= rounding_ms(t)
     }
 
     /// The first point at or after a time, within rounding.
     pub fn first_from(&self, t: f64) -> f64 {
-        let nearest = self.place(t).point;
+        let nearest = self.locate(t).point;
         if self.has_come(t, nearest) { nearest } else { nearest + 1.0 }
     }
 
@@ -108,8 +108,8 @@ impl Grid {
 
     /// The number of points up to `end`, including a point that is after `end` by rounding alone.
     pub fn points_until(&self, end: f64) -> f64 {
-        let place = self.place(end);
-        let last = if self.time(place.point) <= end + rounding_ms(end) { place.point } else { place.until() };
+        let time = self.locate(end);
+        let last = if self.time(time.point) <= end + rounding_ms(end) { time.point } else { time.until() };
         (last + 1.0).max(0.0)
     }
 

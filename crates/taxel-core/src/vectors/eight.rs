@@ -128,8 +128,8 @@ mod x86 {
         #[inline(always)]
         fn splat(value: f64) -> Self {
             // SAFETY: `kernel!` names this type only where the machine has AVX2 and FMA.
-            let one = unsafe { _mm256_set1_pd(value) };
-            Self(one, one)
+            let lanes = unsafe { _mm256_set1_pd(value) };
+            Self(lanes, lanes)
         }
         #[inline(always)]
         fn load(from: &[f64; LANES]) -> Self {

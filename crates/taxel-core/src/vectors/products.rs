@@ -56,9 +56,9 @@ kernel! {
             return;
         }
         let all = sum.len().min(row.len());
-        let whole = all - all % LANES;
-        add_lines::<V, 1>([lines(&row[..whole])], [factor], lines_mut(&mut sum[..whole]));
-        for (sum, row) in sum[whole..all].iter_mut().zip(&row[whole..all]) {
+        let full = all - all % LANES;
+        add_lines::<V, 1>([lines(&row[..full])], [factor], lines_mut(&mut sum[..full]));
+        for (sum, row) in sum[full..all].iter_mut().zip(&row[full..all]) {
             *sum += factor * row;
         }
     }

@@ -51,8 +51,8 @@ fn stamped(bytes: &[u8]) -> Vec<(usize, i64)> {
     let mut clock = StampClock::default();
     let (mut found, mut latest, mut at) = (vec![], i64::MIN, 0);
     while let Some(word) = bytes.get(at..).and_then(|rest| rest.first_chunk::<WORD_BYTES>()) {
-        let whole = word[0] & FIRST != 0 && word[1..].iter().all(|byte| byte & FIRST == 0);
-        if !whole {
+        let is_word = word[0] & FIRST != 0 && word[1..].iter().all(|byte| byte & FIRST == 0);
+        if !is_word {
             at += 1;
             continue;
         }

@@ -4,9 +4,9 @@
 mod blocks;
 pub(in crate::wire) mod clock;
 mod counts;
+mod fill;
 mod filling;
 mod pairing;
-mod whole;
 
 pub use clock::FARTHEST_BACK;
 pub use counts::Counts;

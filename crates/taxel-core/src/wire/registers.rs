@@ -297,7 +297,7 @@ impl Registers {
                 fits
             });
             match allowed {
-                Some(place) => left.remove(place),
+                Some(index) => left.remove(index),
                 None => return Err(Error::device("no order of writes leads there without a refusal")),
             };
         }

@@ -192,10 +192,10 @@ impl SenderDecoder {
 
     /// Whether only whole words of version 1 have arrived for long enough.
     fn has_changed_back(&mut self, datagram: &[u8], arrived: Option<i64>) -> bool {
-        let whole = !datagram.is_empty()
+        let is_complete = !datagram.is_empty()
             && datagram.len().is_multiple_of(WORD_BYTES)
             && datagram.iter().enumerate().all(|(k, byte)| (byte & FIRST != 0) == k.is_multiple_of(WORD_BYTES));
-        let (true, Some(now)) = (whole, arrived) else {
+        let (true, Some(now)) = (is_complete, arrived) else {
             self.whole_since = None;
             return false;
         };

@@ -219,7 +219,7 @@ impl DatagramHeader {
         if datagram.len() > DATAGRAM_BYTES {
             return Err(Refused::Long);
         }
-        let (rest, sum) = checksum::split(datagram);
+        let (rest, sum) = checksum::split_checksum(datagram);
         if checksum::crc32c(rest) != sum {
             return Err(Refused::Checksum);
         }
@@ -304,12 +304,12 @@ pub(crate) fn before(line: u8, stride: u8) -> i64 {
 /// on a stream.
 #[must_use]
 pub fn begins(bytes: &[u8]) -> bool {
-    let whole = |bytes: &[u8]| {
+    let is_datagram = |bytes: &[u8]| {
         bytes.first() == Some(&MAGIC)
             && (HEADER_BYTES + TRAILER_BYTES..=DATAGRAM_BYTES.min(bytes.len()))
                 .any(|length| DatagramHeader::read(&bytes[..length]).is_ok())
     };
-    whole(bytes) || bytes.get(2..).is_some_and(whole)
+    is_datagram(bytes) || bytes.get(2..).is_some_and(is_datagram)
 }
 
 /// The stride of an array: the fewest bits that can name each of its rows.

@@ -17,8 +17,8 @@ impl Points {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub(super) fn line_below(&self, slope: f64) -> (f64, f64) {
         let mut above: Vec<(f64, f64)> = self.all.iter().map(|&(t, late)| (late - slope * t, t)).collect();
-        let whole = (self.early.floor() as usize).min(above.len() - 1);
-        let (below, &mut (height, at), _) = above.select_nth_unstable_by(whole, |a, b| a.0.total_cmp(&b.0));
+        let rank = (self.early.floor() as usize).min(above.len() - 1);
+        let (below, &mut (height, at), _) = above.select_nth_unstable_by(rank, |a, b| a.0.total_cmp(&b.0));
         let sum: f64 = below.iter().map(|point| point.1).sum();
         (height, sum + self.early.fract() * at)
     }

@@ -21,10 +21,10 @@ impl CommandPort {
     pub(super) fn open(address: Option<SocketAddr>, line: Option<PseudoTerminal>, board: &Board) -> Result<Self> {
         let mut control = Self { listener: None, cable: None, line };
         if let Some(address) = address {
-            let place = |error| Error::socket(format!("TCP {address}"))(error);
-            let listener = TcpListener::bind(address).map_err(place)?;
-            listener.set_nonblocking(true).map_err(place)?;
-            let found = listener.local_addr().map_err(place)?;
+            let with_address = |error| Error::socket(format!("TCP {address}"))(error);
+            let listener = TcpListener::bind(address).map_err(with_address)?;
+            listener.set_nonblocking(true).map_err(with_address)?;
+            let found = listener.local_addr().map_err(with_address)?;
             control.listener = Some((listener, found));
         }
         control.send_greeting(board);

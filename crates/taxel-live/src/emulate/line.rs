@@ -23,7 +23,7 @@ const WAITING: usize = 4096;
 pub(super) struct PseudoTerminal {
     ours: File,
     /// Kept open, so that the line stays up while no other program has it open.
-    _theirs: OwnedFd,
+    _client: OwnedFd,
     link: PathBuf,
     bytes_per_s: f64,
     /// Number of bytes that may be transferred now, in each direction.
@@ -40,29 +40,29 @@ impl PseudoTerminal {
     ///
     /// `File` if no pseudo-terminal is available, or something other than a link exists at `link`.
     pub(super) fn open(link: &Path, baud: u32) -> Result<Self> {
-        let (mut ours, mut theirs) = (-1, -1);
+        let (mut ours, mut client) = (-1, -1);
         let mut name = [0 as libc::c_char; 128];
         // SAFETY: openpty writes two descriptors and a name of some 12 bytes into the buffers given; no settings are
         // passed.
         let opened = unsafe {
-            libc::openpty(&raw mut ours, &raw mut theirs, name.as_mut_ptr(), std::ptr::null(), std::ptr::null())
+            libc::openpty(&raw mut ours, &raw mut client, name.as_mut_ptr(), std::ptr::null(), std::ptr::null())
         };
         if opened != 0 {
             return Err(Error::file(link)(std::io::Error::last_os_error()));
         }
         // SAFETY: both descriptors are open and owned by this function alone; the name ends within its buffer.
-        let (ours, theirs, name) = unsafe {
+        let (ours, client, name) = unsafe {
             let name = std::ffi::CStr::from_ptr(name.as_ptr()).to_string_lossy().into_owned();
-            (File::from_raw_fd(ours), OwnedFd::from_raw_fd(theirs), name)
+            (File::from_raw_fd(ours), OwnedFd::from_raw_fd(client), name)
         };
         // Set to raw mode before a program can open it: otherwise the board's output would be echoed back to it.
         // SAFETY: a descriptor that we own, and settings on our stack.
         let ready = unsafe {
             let mut settings = std::mem::zeroed();
-            libc::tcgetattr(theirs.as_raw_fd(), &raw mut settings) == 0
+            libc::tcgetattr(client.as_raw_fd(), &raw mut settings) == 0
                 && {
                     libc::cfmakeraw(&raw mut settings);
-                    libc::tcsetattr(theirs.as_raw_fd(), libc::TCSANOW, &raw const settings) == 0
+                    libc::tcsetattr(client.as_raw_fd(), libc::TCSANOW, &raw const settings) == 0
                 }
                 && libc::fcntl(ours.as_raw_fd(), libc::F_SETFL, libc::O_NONBLOCK) == 0
         };
@@ -79,7 +79,7 @@ impl PseudoTerminal {
         made.map_err(Error::file(link))?;
         let (link, bytes_per_s) = (link.to_owned(), f64::from(baud) / BITS_A_BYTE);
         let (looked, waiting) = (Instant::now(), VecDeque::new());
-        Ok(Self { ours, _theirs: theirs, link, bytes_per_s, into: 0.0, out: 0.0, looked, waiting })
+        Ok(Self { ours, _client: client, link, bytes_per_s, into: 0.0, out: 0.0, looked, waiting })
     }
 
     /// The bytes received since the last call, limited by the rate of the line.
@@ -173,10 +173,10 @@ mod tests {
 
     #[test]
     fn a_file_is_not_replaced_by_a_line() {
-        let place = std::env::temp_dir().join(format!("taxel-{}-no-line", std::process::id()));
-        std::fs::write(&place, "kept").expect("room");
-        assert!(PseudoTerminal::open(&place, 115_200).is_err());
-        assert_eq!(std::fs::read_to_string(&place).expect("still there"), "kept");
-        std::fs::remove_file(&place).expect("ours");
+        let path = std::env::temp_dir().join(format!("taxel-{}-no-line", std::process::id()));
+        std::fs::write(&path, "kept").expect("room");
+        assert!(PseudoTerminal::open(&path, 115_200).is_err());
+        assert_eq!(std::fs::read_to_string(&path).expect("still there"), "kept");
+        std::fs::remove_file(&path).expect("ours");
     }
 }

@@ -106,8 +106,8 @@ impl BoardRun {
 }
 
 /// Whether so long has passed since `last`, which is then set to now.
-fn is_due(last: &mut Instant, now: Instant, every: Duration) -> bool {
-    let due = now.duration_since(*last) >= every;
+fn is_due(last: &mut Instant, now: Instant, interval: Duration) -> bool {
+    let due = now.duration_since(*last) >= interval;
     if due {
         *last = now;
     }

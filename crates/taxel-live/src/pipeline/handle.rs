@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use crossbeam_channel as channel;
-use taxel_core::encode::Zeroing;
+use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 
 use super::copies::Copies;
 use super::counters::{Counters, LiveSummary};
 use super::options::{LiveOptions, Record};
-use super::recordings::Recordings;
+use super::recording_switch::RecordingSwitch;
 use super::shared::{PipelineRequest, PipelineShared};
 use super::sink::OutputDetection;
 use super::viewer_queue::ViewerEvents;
@@ -26,7 +26,7 @@ const COPIED_WAITING: usize = 1 << 12;
 #[derive(Clone)]
 pub struct Handle {
     pub(super) shared: Arc<PipelineShared>,
-    pub(super) recordings: Arc<Recordings>,
+    pub(super) recording_switch: Arc<RecordingSwitch>,
 }
 
 impl Handle {
@@ -44,8 +44,8 @@ impl Handle {
 
     /// The source of datagrams.
     #[must_use]
-    pub fn place(&self) -> &Origin {
-        self.shared.receiver.place()
+    pub fn origin(&self) -> &Origin {
+        self.shared.receiver.origin()
     }
 
     /// As [`Live::counters`](super::Live::counters).
@@ -111,7 +111,7 @@ impl Handle {
     /// `File` if the file exists or cannot be created: then the one that runs goes on. What ended that one early, or `File`
     /// if its end cannot be written. `Core(Problem)` if all is over.
     pub fn record(&self, record: &Record) -> Result<Option<LiveSummary>> {
-        self.recordings.record(record)
+        self.recording_switch.record(record)
     }
 
     /// Ends the recording that [`Handle::record`] started; returns its summary, with the file if anything arrived.
@@ -120,19 +120,19 @@ impl Handle {
     ///
     /// What ended it early, or `File` if its end cannot be written; `Core(Problem)` if there is none.
     pub fn end_recording(&self) -> Result<LiveSummary> {
-        self.recordings.end()
+        self.recording_switch.end()
     }
 
     /// Whether a recording that [`Handle::record`] started is running, and was not ended by an error.
     #[must_use]
     pub fn records(&self) -> bool {
-        self.recordings.run()
+        self.recording_switch.run()
     }
 
     /// Whether any recording is running, including one from the pipeline's beginning.
     #[must_use]
     pub fn is_recording(&self) -> bool {
-        lock(&self.shared.recording.recorder).is_some()
+        lock(&self.shared.recording.running).is_some()
     }
 
     /// As [`Live::note`](super::Live::note).
@@ -178,6 +178,12 @@ impl Handle {
     #[must_use]
     pub fn rest(&self) -> Vec<Option<f64>> {
         self.shared.published().rest.clone()
+    }
+
+    /// The tare that was measured; `None` before the measurement ends, and where none is measured.
+    #[must_use]
+    pub fn measured_tare(&self) -> Option<Tare> {
+        self.shared.published().tare.clone()
     }
 
     /// Number of zeroings.

@@ -90,10 +90,10 @@ options! {
         /// The board's name among the sources of the recording.
         name: String = "board".to_owned(), "commands" = "record";
         /// Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU
-        /// (serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay).
+        /// (serial:PLACE@BAUD or pipe:PATH, columns=t_us:ax:ay).
         ///
         /// By name, in a `.mcap`, each with its own clock: "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which
-        /// sends to that address of this machine; "serial:PATH@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard
+        /// sends to that address of this machine; "serial:PLACE@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard
         /// input); "given" are numbers that a program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of
         /// a line (default: those of the first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called
         /// `t_us`, `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its
@@ -110,7 +110,7 @@ options! {
         gap_frames: f64 = 1.0, "commands" = "", "minimum" = 0;
         /// Print one line of JSON for each detection, and nothing else.
         lines: bool = false, "flag" = "--json";
-        /// Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD.
+        /// Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD.
         ///
         /// UDP sends a datagram each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab
         /// streaming layer. Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and

@@ -84,11 +84,11 @@ impl DetectionSinks {
             reported_ns,
         };
         self.sinks.iter_mut().try_for_each(|sink| sink.output(&output)).map_err(Error::Sink)?;
-        if let Some(recorder) = &*lock(&shared.recording.recorder) {
+        if let Some(recording) = &*lock(&shared.recording.running) {
             // An error that ends only the recording is found, and reported, by the decoding thread too.
-            recorder
+            recording
                 .detection(&output)
-                .or_else(|error| if recorder.since().is_some() { Ok(()) } else { Err(error) })?;
+                .or_else(|error| if recording.since().is_some() { Ok(()) } else { Err(error) })?;
         }
         shared.preview_around([output.detection.t, output.detection.known]);
         lock(&shared.subscribers).retain(|subscriber| {

@@ -140,8 +140,8 @@ impl RunningReadout {
                     None => {}
                 }
             }
-            Mode::Taring(rest) => {
-                if let Some((stop, inside)) = rest.push(&self.events, end.quiet.map(QuietUntil::certain))? {
+            Mode::Taring(measurement) => {
+                if let Some((stop, inside)) = measurement.push(&self.events, end.quiet.map(QuietUntil::certain))? {
                     self.begin_reading(shared, stop, inside)?;
                 }
             }
@@ -160,8 +160,8 @@ impl RunningReadout {
 
     /// Ends the tare: runs the readout from the first event after it on.
     fn begin_reading(&mut self, shared: &PipelineShared, stop: i64, inside: usize) -> crate::Result<()> {
-        let Mode::Taring(rest) = std::mem::replace(&mut self.mode, Mode::Idle) else { return Ok(()) };
-        let (tare, stream) = rest.finish(stop, self.frames)?;
+        let Mode::Taring(measurement) = std::mem::replace(&mut self.mode, Mode::Idle) else { return Ok(()) };
+        let (tare, stream) = measurement.finish(stop, self.frames)?;
         let mut readout = SpeculativeReadout::new(Box::new(stream));
         readout.push(self.events.view().piece(inside..self.events.len()), &mut self.found)?;
         self.mode = Mode::Reading(readout);

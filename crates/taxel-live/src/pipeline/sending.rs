@@ -8,9 +8,8 @@ use std::fmt::{self, Display, Formatter};
 use std::fs::File;
 use std::io::{self, ErrorKind, Write};
 use std::net::{SocketAddr, UdpSocket};
-use std::os::fd::{AsRawFd, RawFd};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -21,6 +20,7 @@ use taxel_core::problem;
 
 use super::sink::{OutputDetection, Sink};
 use crate::locked::lock;
+use crate::serial_line::{CONNECT, SerialLine, SerialPlace};
 use crate::{Error, Result, address};
 
 /// Capacity of the queue of lines.
@@ -29,21 +29,21 @@ const WAITING: usize = 1024;
 /// Interval at which a failed destination is opened again, and the end is checked.
 const AGAIN: Duration = Duration::from_millis(250);
 
+/// Interval between attempts to write where there was no room.
+const WRITE_EVERY: Duration = Duration::from_millis(2);
+
 /// Longest wait for a slow reader at the end.
 const LAST: Duration = Duration::from_secs(1);
 
-/// Default speed of a serial line, baud.
-pub(super) const BAUD: u32 = 115_200;
-
-/// A destination of detections: `udp:HOST:PORT`, `pipe:PATH` (a named pipe), `serial:PATH` or `serial:PATH@BAUD`.
+/// A destination of detections: `udp:HOST:PORT`, `pipe:PATH` (a named pipe), `serial:PLACE` or `serial:PLACE@BAUD`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Destination {
     /// One datagram per line.
     Udp(SocketAddr),
     /// A named pipe, which must exist; lines are lost while it has no reader.
     Pipe(PathBuf),
-    /// A serial line, 8 data bits, no parity, 1 stop bit; opened again after it was unplugged.
-    Serial(PathBuf, u32),
+    /// A serial line, which is opened again after it was unplugged.
+    Serial(SerialPlace),
 }
 
 impl FromStr for Destination {
@@ -54,16 +54,10 @@ impl FromStr for Destination {
             Some(("udp", place)) => Ok(Self::Udp(address::of_text(place)?)),
             Some(("pipe", place)) if !place.is_empty() => Ok(Self::Pipe(place.into())),
             Some(("serial", place)) if !place.is_empty() => {
-                let (place, baud) = match place.rsplit_once('@') {
-                    None => (place, BAUD),
-                    Some((place, baud)) => match baud.parse() {
-                        Ok(baud) if baud > 0 && !place.is_empty() => (place, baud),
-                        _ => return Err(problem!("send to {text:?}: {baud:?} is no speed, as 115200").into()),
-                    },
-                };
-                Ok(Self::Serial(place.into(), baud))
+                let place = place.parse::<SerialPlace>().map_err(|error| error.in_part(&format!("send to {text:?}")));
+                Ok(Self::Serial(place?))
             }
-            _ => Err(problem!("send to {text:?}: must be udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD").into()),
+            _ => Err(problem!("send to {text:?}: must be udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD").into()),
         }
     }
 }
@@ -73,7 +67,7 @@ impl Display for Destination {
         match self {
             Self::Udp(address) => write!(f, "udp:{address}"),
             Self::Pipe(path) => write!(f, "pipe:{}", path.display()),
-            Self::Serial(path, baud) => write!(f, "serial:{}@{baud}", path.display()),
+            Self::Serial(place) => write!(f, "serial:{place}"),
         }
     }
 }
@@ -118,7 +112,7 @@ struct SendingState {
 enum Device {
     Udp(UdpSocket, SocketAddr),
     File(File),
-    Serial(serialport::TTYPort),
+    Serial(SerialLine),
 }
 
 impl Sending {
@@ -132,8 +126,8 @@ impl Sending {
         let counts = Sent { to: to.to_string(), ..Sent::default() };
         let state = SendingState { device, waiting: VecDeque::new(), gone: 0, counts, closed: false };
         let line = Arc::new(SendingLine { to: to.clone(), state: Mutex::new(state), came: Condvar::new() });
-        let theirs = Arc::clone(&line);
-        let thread = std::thread::Builder::new().name("taxel-send".to_owned()).spawn(move || theirs.send_what_waits());
+        let sender = Arc::clone(&line);
+        let thread = std::thread::Builder::new().name("taxel-send".to_owned()).spawn(move || sender.send_what_waits());
         Ok(Self { line, thread: Some(thread.map_err(Error::socket("thread"))?) })
     }
 
@@ -182,7 +176,7 @@ impl SendingLine {
         Sent { waiting: state.waiting.len() as u64, ..state.counts.clone() }
     }
 
-    /// The sending thread: waits until a line waits, then until there is room for it.
+    /// The sending thread: writes the lines that wait until there was room for all.
     fn send_what_waits(&self) {
         let mut closed_at = None;
         let mut state = lock(&self.state);
@@ -194,24 +188,17 @@ impl SendingLine {
                     return;
                 }
             }
-            match state.device.as_ref().filter(|_| !state.waiting.is_empty()).map(Device::descriptor) {
-                Some(descriptor) => {
-                    drop(state);
-                    wait_for_room(descriptor, Duration::from_millis(20));
-                    state = lock(&self.state);
-                    state.write();
-                }
-                None => {
-                    state = self.came.wait_timeout(state, AGAIN).unwrap_or_else(PoisonError::into_inner).0;
-                    if state.device.is_none() && !state.closed {
-                        // Opening a serial line may take long: the lock is released meanwhile.
-                        drop(state);
-                        let opened = Device::open(&self.to);
-                        state = lock(&self.state);
-                        state.set_device(opened);
-                    }
-                }
+            let writes = state.device.is_some() && !state.waiting.is_empty();
+            let most = if writes { WRITE_EVERY } else { AGAIN };
+            state = self.came.wait_timeout(state, most).unwrap_or_else(PoisonError::into_inner).0;
+            if state.device.is_none() && !state.closed {
+                // Opening a serial line may take long: the lock is released meanwhile.
+                drop(state);
+                let opened = Device::open(&self.to);
+                state = lock(&self.state);
+                state.set_device(opened);
             }
+            state.write();
         }
     }
 }
@@ -230,6 +217,7 @@ impl SendingState {
     fn write(&mut self) {
         while let (Some(device), Some(line)) = (&mut self.device, self.waiting.front()) {
             match device.write(&line[self.gone..]) {
+                Ok(0) => return,
                 Ok(n) if self.gone + n < line.len() => self.gone += n,
                 Ok(_) => {
                     self.waiting.pop_front();
@@ -285,7 +273,7 @@ impl Device {
                     Err(error) => Err(Error::file(path)(error)),
                 }
             }
-            Destination::Serial(path, baud) => Ok(Some(Self::Serial(serial(path, *baud)?))),
+            Destination::Serial(place) => Ok(Some(Self::Serial(SerialLine::open(place, CONNECT)?))),
         }
     }
 
@@ -293,38 +281,9 @@ impl Device {
         match self {
             Self::Udp(socket, address) => socket.send_to(bytes, *address),
             Self::File(file) => file.write(bytes),
-            Self::Serial(port) => port.write(bytes),
+            Self::Serial(line) => line.write(bytes),
         }
     }
-
-    fn descriptor(&self) -> RawFd {
-        match self {
-            Self::Udp(socket, _) => socket.as_raw_fd(),
-            Self::File(file) => file.as_raw_fd(),
-            Self::Serial(port) => port.as_raw_fd(),
-        }
-    }
-}
-
-/// A serial line to which writes never wait.
-pub(super) fn serial(path: &Path, baud: u32) -> Result<serialport::TTYPort> {
-    let place = path.display().to_string();
-    let opened = serialport::new(place, baud).timeout(Duration::ZERO).open_native();
-    let port = opened.map_err(|error| Error::file(path)(error.into()))?;
-    // SAFETY: a descriptor that `port` holds open, and a flag.
-    if unsafe { libc::fcntl(port.as_raw_fd(), libc::F_SETFL, libc::O_NONBLOCK) } != 0 {
-        return Err(Error::file(path)(io::Error::last_os_error()));
-    }
-    Ok(port)
-}
-
-/// Waits until data can be written, or writing will fail; at most `most`.
-fn wait_for_room(descriptor: RawFd, most: Duration) {
-    let mut asked = libc::pollfd { fd: descriptor, events: libc::POLLOUT, revents: 0 };
-    let most = i32::try_from(most.as_millis()).unwrap_or(i32::MAX);
-    // SAFETY: one entry, on our stack. If the descriptor was closed meanwhile, poll reports that, and nothing is done
-    // with it here.
-    unsafe { libc::poll(&raw mut asked, 1, most) };
 }
 
 #[cfg(test)]
@@ -339,6 +298,8 @@ mod tests {
             ("pipe:/tmp/out", "pipe:/tmp/out"),
             ("serial:/dev/ttyACM0", "serial:/dev/ttyACM0@115200"),
             ("serial:/dev/ttyACM0@9600", "serial:/dev/ttyACM0@9600"),
+            ("serial:COM3", "serial:COM3@115200"),
+            ("serial:localhost:5209", "serial:localhost:5209"),
         ] {
             assert_eq!(text.parse::<Destination>().unwrap().to_string(), shown);
         }

@@ -13,7 +13,7 @@ use taxel_core::wire::Registers;
 use super::counters::Counters;
 use super::options::LiveOptions;
 use super::readout_queue::ReadoutQueue;
-use super::recorder::{Host, Recorder};
+use super::running_recording::{Host, RunningRecording};
 use super::sending::SendingLine;
 use super::sink::OutputDetection;
 use super::source::FurtherSource;
@@ -48,7 +48,7 @@ pub(super) struct PublishedState {
 /// The recording that runs, where one does.
 #[derive(Default)]
 pub(super) struct RecordingSlot {
-    pub(super) recorder: Mutex<Option<Recorder>>,
+    pub(super) running: Mutex<Option<RunningRecording>>,
     /// Whether it runs and was begun while the pipeline ran.
     pub(super) runs: AtomicBool,
     /// The error that ended one early which was begun while the pipeline ran.
@@ -82,12 +82,12 @@ pub(super) struct PipelineShared {
 }
 
 /// The recording that was running, if any, and the counters after its last datagram.
-pub(super) type EndedRecording = (Option<Recorder>, Counters);
+pub(super) type EndedRecording = (Option<RunningRecording>, Counters);
 
 /// A request that the decoding thread handles between two batches.
 pub(super) enum PipelineRequest {
     /// Ends the running recording, and records into this one, if there is one, from the next datagram on.
-    Record(Option<Box<Recorder>>, channel::Sender<Result<EndedRecording>>),
+    Record(Option<Box<RunningRecording>>, channel::Sender<Result<EndedRecording>>),
     /// Copies the events for a viewer.
     View(channel::Sender<ViewerEvents>),
     /// Copies the datagrams for another computer.
@@ -154,10 +154,10 @@ impl PipelineShared {
     /// Writes a note, with the current time or without one.
     pub(super) fn note(&self, text: &str, timed: bool) -> Result<()> {
         let board_us = self.published().counters.board.board_us.filter(|_| timed);
-        match &*lock(&self.recording.recorder) {
-            Some(recorder) => {
+        match &*lock(&self.recording.running) {
+            Some(recording) => {
                 self.preview_around(board_us);
-                recorder.note(board_us, text)
+                recording.note(board_us, text)
             }
             None => Err(taxel_core::problem!("a note is kept in a recording: record to a .mcap file").into()),
         }
@@ -173,8 +173,8 @@ impl PipelineShared {
 
 impl Host for PipelineShared {
     fn part(&self, name: &str) -> Result<SourceWriter> {
-        match &*lock(&self.recording.recorder) {
-            Some(recorder) => recorder.track_of(name),
+        match &*lock(&self.recording.running) {
+            Some(recording) => recording.track_of(name),
             None => Err(taxel_core::problem!("source {name}: nothing is recorded").into()),
         }
     }

@@ -14,12 +14,13 @@ use taxel_core::problem;
 
 use super::counters::{Counters, SourceCounts};
 use super::options::LiveOptions;
-use super::record::COUNTS_EVERY;
-use super::recorder::{Host, RecordingPart};
+use super::record_stage::COUNTS_EVERY;
+use super::running_recording::{Host, RecordingPart};
 use super::shared::PipelineShared;
-use super::source::{FurtherSource, LineInput, LineReader, SourceKind, TextLine};
+use super::source::{FurtherSource, LineInput, LineReader, SourceKind};
 use crate::locked::lock;
-use crate::recording::{self, DamageCounts, LeftOut, SourceWriter, StreamColumns, StreamFaults, fields, now_ns};
+use crate::recording::{self, DamageCounts, SourceWriter, StreamColumns, StreamFaults, fields, now_ns};
+use crate::text_lines::{LeftOut, TextLine};
 use crate::{Error, Result};
 
 /// A running stream of numbers.
@@ -160,12 +161,12 @@ impl NumberStream {
 
     /// Reads lines until the end, in a separate thread; a failed line is opened again. `begun` is a reader that was
     /// opened before and has read up to the start of a line.
-    pub(super) fn read(self: &Arc<Self>, place: &LineInput, begun: Option<LineReader>) -> Result<JoinHandle<()>> {
-        let whole = begun.is_some();
-        let (numbers, mut reader) = (Arc::clone(self), begun.map_or_else(|| LineReader::open(place), Ok)?);
+    pub(super) fn read(self: &Arc<Self>, input: &LineInput, begun: Option<LineReader>) -> Result<JoinHandle<()>> {
+        let from_line_start = begun.is_some();
+        let (numbers, mut reader) = (Arc::clone(self), begun.map_or_else(|| LineReader::open(input), Ok)?);
         let thread = std::thread::Builder::new().name("taxel-lines".to_owned());
         let job = move || {
-            if let Err(error) = numbers.read_lines(&mut reader, !whole)
+            if let Err(error) = numbers.read_lines(&mut reader, !from_line_start)
                 && !numbers.ends.load(Ordering::Acquire)
                 && let Some(host) = numbers.part.host.upgrade()
             {
@@ -189,7 +190,7 @@ impl NumberStream {
                 }
             };
             let at_ns = reader.came_ns;
-            while let Some(line) = reader.line(ended) {
+            while let Some(line) = reader.lines.next(ended) {
                 let has_no_beginning = std::mem::take(&mut first) && self.stream.parse(&line.text).is_none();
                 if has_no_beginning && reader.is_serial() {
                     self.count_left_out(LeftOut { unfinished: line.bytes, ..LeftOut::default() })?;
@@ -197,12 +198,13 @@ impl NumberStream {
                     self.line(at_ns, &line)?;
                 }
             }
-            self.count_left_out(reader.take_left_out(ended))?;
             if ended {
-                return Ok(());
+                break;
             }
+            self.count_left_out(reader.lines.take_left_out())?;
         }
-        self.count_left_out(reader.take_left_out(true))
+        reader.lines.discard();
+        self.count_left_out(reader.lines.take_left_out())
     }
 }
 
@@ -249,8 +251,8 @@ impl<Board> Others<Board> {
                 SourceKind::Lines(_, stream, _) | SourceKind::Given(stream) => stream,
             };
             let numbers = Arc::new(NumberStream::new(part, stream.clone(), options.record.is_some()));
-            if let SourceKind::Lines(place, _, opened) = kind {
-                others.threads.push(numbers.read(place, opened.take())?);
+            if let SourceKind::Lines(input, _, opened) = kind {
+                others.threads.push(numbers.read(input, opened.take())?);
             }
             others.numbers.push((name.clone(), numbers));
         }

@@ -9,13 +9,13 @@ use taxel_core::encode::Zeroing;
 use taxel_core::held::UNKNOWN;
 use taxel_core::problem;
 
-use super::decode::DecodeStage;
+use super::decode_stage::DecodeStage;
 use super::observers::Observers;
-use super::read_out::ReadOutStage;
-use super::receive::ReceiveStage;
-use super::record::RecordStage;
-use super::recorder::Recorder;
+use super::readout_stage::ReadoutStage;
+use super::receive_stage::ReceiveStage;
+use super::record_stage::RecordStage;
 use super::running_readout::RunningReadout;
+use super::running_recording::RunningRecording;
 use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
 use crate::Result;
 use crate::capture::Batch;
@@ -43,7 +43,7 @@ pub(super) struct Stages {
     receive: ReceiveStage,
     decode: DecodeStage,
     record: RecordStage,
-    read_out: ReadOutStage,
+    readout: ReadoutStage,
     observers: Observers,
     begun: bool,
 }
@@ -55,7 +55,7 @@ impl Stages {
             receive: ReceiveStage::new(Arc::clone(shared)),
             decode: DecodeStage::new(&shared.options),
             record: RecordStage::new(Arc::clone(shared)),
-            read_out: ReadOutStage::new(readout),
+            readout: ReadoutStage::new(readout),
             observers: Observers::new(Arc::clone(shared)),
             begun: false,
         }
@@ -63,14 +63,14 @@ impl Stages {
 
     /// Detections that do not wait for output yet.
     pub(super) fn pending_detections(&mut self) -> &mut Vec<Detection> {
-        self.read_out.pending_detections()
+        self.readout.pending_detections()
     }
 
     /// Runs until the caller has something to do; an error ends the pipeline.
     pub(super) fn run(&mut self) -> StagesOutcome {
         self.run_steps().unwrap_or_else(|error| {
             self.shared.fail(error);
-            self.read_out.close(&self.shared, None);
+            self.readout.close(&self.shared, None);
             StagesOutcome::Finished
         })
     }
@@ -78,13 +78,13 @@ impl Stages {
     fn run_steps(&mut self) -> Result<StagesOutcome> {
         if !self.begun {
             self.begun = true;
-            self.read_out.begin(&self.shared);
+            self.readout.begin(&self.shared);
             if self.record.runs() {
                 self.move_to_threads()?;
             }
         }
         loop {
-            if let Some(readout) = self.read_out.take_separated() {
+            if let Some(readout) = self.readout.take_separated() {
                 return Ok(StagesOutcome::MoveReadout(readout));
             }
             if !self.pending_detections().is_empty() {
@@ -100,8 +100,8 @@ impl Stages {
 
     /// Moves receiving and reading out to separate threads, because a disk may delay this one.
     fn move_to_threads(&mut self) -> Result<()> {
-        self.receive.move_to_thread(self.read_out.is_on())?;
-        self.read_out.move_to_thread();
+        self.receive.move_to_thread(self.readout.is_on())?;
+        self.readout.move_to_thread();
         Ok(())
     }
 
@@ -110,7 +110,7 @@ impl Stages {
         if version != 0 {
             self.expect_version(version)?;
         }
-        let tick = if self.read_out.is_on() { self.decode.tick() } else { None };
+        let tick = if self.readout.is_on() { self.decode.tick() } else { None };
         let (batch, received) = self.receive.next(self.observers.longest_wait(tick.unwrap_or(IDLE)))?;
         let silent_until = if received {
             self.process(&batch)?;
@@ -118,15 +118,15 @@ impl Stages {
             None
         } else {
             let until = self.receive.silent_until();
-            if let (true, Some(quiet)) = (self.read_out.is_on(), self.decode.quiet_until(until)) {
-                self.read_out.process_silence(&self.shared, quiet);
+            if let (true, Some(quiet)) = (self.readout.is_on(), self.decode.quiet_until(until)) {
+                self.readout.process_silence(&self.shared, quiet);
             }
             until
         };
         self.observers.datagrams(&batch, silent_until);
         self.receive.reuse(batch);
         self.observers.tick(self.decode.held());
-        self.record.previews(self.decode.decoded(), self.decode.held(), false)?;
+        self.record.previews(self.decode.datagram_count(), self.decode.held(), false)?;
         if self.observers.frame(self.decode.held()) {
             self.record.progress()?;
         }
@@ -145,17 +145,17 @@ impl Stages {
                 self.decode.reset(&later);
                 self.observers.reset(self.decode.held());
                 if decoded.info.version == 2 {
-                    self.read_out.reset();
+                    self.readout.reset();
                 }
             }
             let now = now_ns();
-            self.decode.note(&decoded, self.read_out.announced_until());
+            self.decode.note(&decoded, self.readout.announced_until());
             self.record.record_board_change(&decoded.info, decoded.arrived_ns)?;
             self.record.find_origin(bytes, decoded.arrived_ns, self.decode.first_stamps(&decoded))?;
             self.shared.published().decode_latency.note(now - decoded.arrived_ns);
             if self.decode.events().len() >= FLUSH_AFTER {
                 // A batch has this many events only if reading out is slower than they arrive.
-                self.read_out.move_to_thread();
+                self.readout.move_to_thread();
                 self.flush_events()?;
             }
         }
@@ -173,7 +173,7 @@ impl Stages {
             self.decode.publish(&mut published.counters);
         }
         let promised = self.decode.take_promise();
-        self.read_out.push(&self.shared, self.decode.events_mut(), promised);
+        self.readout.push(&self.shared, self.decode.events_mut(), promised);
         self.decode.clear();
         Ok(())
     }
@@ -182,10 +182,10 @@ impl Stages {
     fn finish(&mut self) -> Result<()> {
         self.decode.finish();
         self.flush_events()?;
-        self.record.previews(self.decode.decoded(), self.decode.held(), true)?;
-        let quiet = self.decode.quiet_until(self.receive.silent_until()).filter(|_| self.read_out.is_on());
+        self.record.previews(self.decode.datagram_count(), self.decode.held(), true)?;
+        let quiet = self.decode.quiet_until(self.receive.silent_until()).filter(|_| self.readout.is_on());
         self.observers.finish(self.decode.held());
-        self.read_out.close(&self.shared, quiet);
+        self.readout.close(&self.shared, quiet);
         self.answer()
     }
 
@@ -208,8 +208,8 @@ impl Stages {
         Ok(())
     }
 
-    fn switch_recording(&mut self, next: Option<Box<Recorder>>) -> Result<EndedRecording> {
-        self.record.previews(self.decode.decoded(), self.decode.held(), true)?;
+    fn switch_recording(&mut self, next: Option<Box<RunningRecording>>) -> Result<EndedRecording> {
+        self.record.previews(self.decode.datagram_count(), self.decode.held(), true)?;
         if next.is_some() {
             self.move_to_threads()?;
         }
@@ -237,21 +237,21 @@ impl Stages {
             return Err(problem!("a tare is being taken: zero taxels when that is done").into());
         }
         let now = published.counters.board.offset.map(|offset| offset.board_us(now_ns()));
-        let Some(t) = published.counters.board.board_us.max(self.read_out.announced_until()).max(now) else {
+        let Some(t) = published.counters.board.board_us.max(self.readout.announced_until()).max(now) else {
             return Err(problem!("nothing came yet: no taxel can be zeroed").into());
         };
         let mut zeroings = vec![];
         for &(x, y) in taxels {
             let mut zeroing = Zeroing { t, x, y, rest: 0.0, before: None };
             zeroing.check(array)?;
-            let place = array.index(x, y);
-            let held = self.decode.held().values()[place];
+            let taxel = array.index(x, y);
+            let held = self.decode.held().values()[taxel];
             if held == UNKNOWN {
                 return Err(problem!("taxel at row {y}, column {x}: no event so far, so its value is unknown").into());
             }
             zeroing.rest = held.into();
-            let tared = published.rest.get(place).copied().flatten();
-            zeroing.before = published.zeroed.get(&place).map(|earlier| earlier.rest).or(tared);
+            let tared = published.rest.get(taxel).copied().flatten();
+            zeroing.before = published.zeroed.get(&taxel).map(|earlier| earlier.rest).or(tared);
             zeroings.push(zeroing);
         }
         drop(published);
@@ -262,7 +262,7 @@ impl Stages {
         published.zeroings += 1;
         drop(published);
         self.shared.preview_around([t]);
-        self.read_out.zero(&self.shared, &zeroings);
+        self.readout.zero(&self.shared, &zeroings);
         Ok(zeroings)
     }
 }

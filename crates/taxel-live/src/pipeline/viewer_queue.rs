@@ -161,9 +161,9 @@ impl ViewerQueue {
 
     /// Queues the current piece if it is due; returns false if the receiving end was dropped.
     pub(super) fn tick(&mut self, held: &Held) -> bool {
-        let every = if self.watched.load(Ordering::Relaxed) { WATCHED } else { UNWATCHED };
+        let interval = if self.watched.load(Ordering::Relaxed) { WATCHED } else { UNWATCHED };
         let nothing = self.piece.changes.is_empty() && self.piece.held.is_none() && self.piece.markers.is_empty();
-        if nothing || self.sent.elapsed() < every {
+        if nothing || self.sent.elapsed() < interval {
             return true;
         }
         match self.pieces.try_send(std::mem::take(&mut self.piece)) {

@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use taxel_core::wire::{self, SenderDecoder, StepBack};
 
+use crate::text_lines::LeftOut;
+
 /// What decoding a file found.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
@@ -44,15 +46,6 @@ impl DamageCounts {
         let count = |cause: &str| self.damage.get(cause).copied().unwrap_or(0);
         LeftOut { in_no_line: count(IN_NO_LINE), unfinished: count(UNFINISHED_LINES) }
     }
-}
-
-/// Number of bytes that arrived from a source of lines and that are in no line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct LeftOut {
-    /// Those that cannot be part of a line of numbers.
-    pub in_no_line: u64,
-    /// Those of lines whose end did not arrive, or whose beginning did not.
-    pub unfinished: u64,
 }
 
 /// What a decoder of version 1 could not use, by cause.
@@ -128,14 +121,14 @@ pub(super) const OTHER_BOARD: &str = "datagrams_of_another_board";
 pub(super) const AGAIN: &str = "datagrams_decoded_again";
 /// Jumps of the times of version 1 ahead of the host's clock.
 pub(crate) const JUMPS: &str = "jumps_of_time";
-/// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, stamps that step back,
-/// and how often the clock left that of arrival little by little.
+/// Causes of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, stamps that step
+/// back, and how often the clock left that of arrival little by little.
 pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
 /// Bytes of a stream of numbers that are in no line, and so are lost, and those of lines that have no end or no beginning.
 pub(super) const IN_NO_LINE: &str = "bytes_in_no_line";
 pub(super) const UNFINISHED_LINES: &str = "bytes_of_unfinished_lines";
 pub(super) const ANEW: &str = "clock_began_anew";
-/// Of a stream of numbers: values that a line says are missing (`nan`).
+/// Values of a stream of numbers that a line says are missing (`nan`).
 pub(super) const MISSING: &str = "missing_values";
 pub(super) const BACK: &str = "stamps_out_of_order";
 pub(super) const DRIFTS: &str = "drifts_from_arrival";

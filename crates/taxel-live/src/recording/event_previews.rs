@@ -31,7 +31,7 @@ impl EventPreviews {
     pub fn new(events: EventsView<'_>, around: &[i64]) -> Result<Self> {
         // In a preview, the value of a taxel without any event so far is 0.
         let held = HeldOverTime::new(events, None, vec![0; events.array.len()])?;
-        let ends = |t: i64, every: i64| -(-t).div_euclid(every) * every;
+        let ends = |t: i64, period_us: i64| -(-t).div_euclid(period_us) * period_us;
         let mut times: BTreeSet<i64> = held.times().map(|t| ends(t, EVERY_US)).collect();
         if let (Some(first), Some(&last)) = (held.times().next(), times.last()) {
             let near = around.iter().map(|&t| ends(t, NEAR_US)).flat_map(|t| [t - NEAR_US, t]);

@@ -65,8 +65,8 @@ impl FrameEncoding {
     pub fn choose(values: &[f32]) -> Self {
         // -0.0 is no whole number of this encoding, which has no sign.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let whole = values.iter().all(|&value| f32::from(value as u16).to_bits() == value.to_bits());
-        if whole { Self::Whole } else { Self::Float }
+        let is_integer = values.iter().all(|&value| f32::from(value as u16).to_bits() == value.to_bits());
+        if is_integer { Self::Whole } else { Self::Float }
     }
 
     fn name(self) -> &'static str {

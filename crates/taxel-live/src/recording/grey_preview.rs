@@ -3,8 +3,7 @@
 use std::collections::VecDeque;
 
 use taxel_core::encode::Tare;
-use taxel_core::rest::{NOISE_FLOOR, Rest, Value};
-use taxel_core::tracked_rest::TrackedRest;
+use taxel_core::rest::{NOISE_FLOOR, Rest, TrackedRest, Value};
 
 /// White is the largest value of this period, us.
 const SCALE_US: i64 = 10_000_000;
@@ -72,8 +71,8 @@ impl GreyScale {
             *self = Self::new(held.len());
         }
         if !self.tared {
-            let begin = || TrackedRest::new(columns, NOISE_FLOOR, vec![f64::NO_REST; held.len()]);
-            let tracked = self.tracked.get_or_insert_with(begin);
+            let fresh_rest = || TrackedRest::new(columns, NOISE_FLOOR, vec![f64::NO_REST; held.len()]);
+            let tracked = self.tracked.get_or_insert_with(fresh_rest);
             tracked.take(t_us, held.iter().map(|&value| if value == 0 { f32::NAN } else { value.into() }));
             for (taxel, rest) in tracked.rests().enumerate() {
                 self.rest.track(taxel, rest.unwrap_or(f64::NO_REST));

@@ -49,9 +49,9 @@ impl LsaWriter {
     ///
     /// As [`LsaWriter::create`].
     pub(crate) fn reserve(path: &Path, overwrite: bool) -> Result<OutputFile> {
-        let done = done(path);
-        if !overwrite && done.exists() {
-            return Err(Error::file(&done)(std::io::Error::from_raw_os_error(libc::EEXIST)));
+        let marker = completion_marker(path);
+        if !overwrite && marker.exists() {
+            return Err(Error::file(&marker)(std::io::Error::from_raw_os_error(libc::EEXIST)));
         }
         OutputFile::open(path, overwrite)
     }
@@ -63,9 +63,9 @@ impl LsaWriter {
     /// `File` if the file, or an earlier `.lss`, cannot be replaced.
     pub(crate) fn begin(file: OutputFile) -> Result<Self> {
         file.begin()?;
-        let done = done(file.path());
-        match std::fs::remove_file(&done) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(Error::file(&done)(error)),
+        let marker = completion_marker(file.path());
+        match std::fs::remove_file(&marker) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(Error::file(&marker)(error)),
             _ => {}
         }
         Ok(Self { out: BufWriter::new(RawFile(file)), bytes: 0 })
@@ -116,8 +116,8 @@ impl LsaWriter {
     /// As [`LsaWriter::end`]; no `.lss` is created then.
     pub fn finish(mut self) -> Result<()> {
         self.end()?;
-        let done = done(self.path());
-        File::create(&done).map(drop).map_err(Error::file(&done))
+        let marker = completion_marker(self.path());
+        File::create(&marker).map(drop).map_err(Error::file(&marker))
     }
 
     /// Ends an empty recording: removes a new file.
@@ -178,7 +178,7 @@ pub fn decode_lsa(
         limits::in_memory(path, "events", length + events.size() as u64, memory)?;
     }
     decoder.finish_into(&mut events);
-    Ok(DecodedLsa { bytes, events, counts: *decoder.counts(), complete: done(path).exists() })
+    Ok(DecodedLsa { bytes, events, counts: *decoder.counts(), complete: completion_marker(path).exists() })
 }
 
 /// The name of a recording in automatic mode: an index is appended to the name, before the extension.
@@ -194,6 +194,6 @@ pub fn numbered(path: &Path, index: u32) -> PathBuf {
 }
 
 /// The path of the `.lss` of a `.lsa`.
-fn done(path: &Path) -> PathBuf {
+fn completion_marker(path: &Path) -> PathBuf {
     path.with_extension("lss")
 }

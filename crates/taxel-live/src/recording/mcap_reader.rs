@@ -167,7 +167,7 @@ impl Reader {
         walk.magic()?;
         walk.records()?;
         let FileWalk { begin, end, ending, ends, blocks, skipped, summary, rebuilt, .. } = walk;
-        let blocks = Blocks { path: path.to_owned(), file, length, places: blocks, skipped, summary };
+        let blocks = Blocks { path: path.to_owned(), file, length, blocks, skipped, summary };
         // The copy of the header in the chunk of the datagrams' channel has a checksum; the other copies have none.
         let Some(header) = blocks.header()?.or(end).or(begin) else {
             return Err(Error::format(
@@ -202,7 +202,7 @@ impl Reader {
                 let silent = self.is_silent(source).then(RecordingCounts::default);
                 self.ends.get(name).cloned().or(silent).map(|counts| FileEnding::Finished { counts })
             }
-            whole => whole.clone(),
+            ending => ending.clone(),
         };
         Ok(Self { source, ending, ..self.clone() })
     }
@@ -214,8 +214,8 @@ impl Reader {
     }
 
     /// Refuses more bytes of a source than may be in memory.
-    fn fits(&self, what: &str, size: usize) -> Result<()> {
-        limits::in_memory(&self.blocks.path, what, size as u64, self.memory)
+    fn fits(&self, subject: &str, size: usize) -> Result<()> {
+        limits::in_memory(&self.blocks.path, subject, size as u64, self.memory)
     }
 
     /// Whether the summary lists no datagram, line or frame of a source.
@@ -268,9 +268,9 @@ impl Reader {
             // Arrival numbers tell which datagrams are there twice, unless who wrote the file gave all of them one number.
             let again = match topic {
                 Topic::Datagrams if !remarks.numbers.are_one() => remarks.numbers.repeated(),
-                _ if topic == data => recorded(topic).or(total).map_or(0, |whole| read.saturating_sub(whole)),
+                _ if topic == data => recorded(topic).or(total).map_or(0, |listed| read.saturating_sub(listed)),
                 // Another program may have added some.
-                _ => total.map_or(0, |whole| read.saturating_sub(whole)),
+                _ => total.map_or(0, |listed| read.saturating_sub(listed)),
             };
             repeated += again;
             let listed = unread.messages.get(&topic).copied().unwrap_or(0);
@@ -305,12 +305,12 @@ impl Reader {
     }
 
     /// The messages of this source that message indexes list beyond those that were read; not known without such indexes.
-    fn unread_chunks(&self, place: &ReadPosition, indexed: Option<&IndexedChunks>, read: &IndexedChunks) -> Unread {
+    fn unread_chunks(&self, position: &ReadPosition, indexed: Option<&IndexedChunks>, read: &IndexedChunks) -> Unread {
         let mut unread = Unread { unknown: true, ..Unread::default() };
         for (channel, n) in indexed.into_iter().flatten() {
             let n = n.saturating_sub(read.get(channel).copied().unwrap_or(0));
             unread.unknown &= n == 0;
-            if let Some(topic) = self.topic(place, *channel).filter(|_| n > 0) {
+            if let Some(topic) = self.topic(position, *channel).filter(|_| n > 0) {
                 *unread.messages.entry(topic).or_default() += n;
             }
         }
@@ -318,8 +318,8 @@ impl Reader {
     }
 
     /// The topic of a channel, if it belongs to this source.
-    fn topic(&self, place: &ReadPosition, channel: u16) -> Option<Topic> {
-        place.topics.get(&channel).copied().unwrap_or_else(|| Topic::of_number(channel, self.source))
+    fn topic(&self, position: &ReadPosition, channel: u16) -> Option<Topic> {
+        position.topics.get(&channel).copied().unwrap_or_else(|| Topic::of_number(channel, self.source))
     }
 
     /// Passes all messages to `take` in the order of the file; skips bad chunks, and returns what was not read.
@@ -328,10 +328,10 @@ impl Reader {
     ///
     /// `File` if the file cannot be read, `Core` if `take` returns it or the caller stops.
     pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<Unread> {
-        let (mut place, mut unread) = (ReadPosition::default(), Unread::default());
+        let (mut position, mut unread) = (ReadPosition::default(), Unread::default());
         for block in 0..self.blocks() {
             stop.check()?;
-            unread.add(&self.block(block, &mut place, &mut take)?);
+            unread.add(&self.block(block, &mut position, &mut take)?);
         }
         Ok(unread)
     }
@@ -339,10 +339,10 @@ impl Reader {
     /// Number of blocks (chunks).
     #[must_use]
     pub fn blocks(&self) -> usize {
-        self.blocks.places.len()
+        self.blocks.blocks.len()
     }
 
-    /// Passes the messages of one block to `take`; `place` is the state after earlier blocks, all or some of them.
+    /// Passes the messages of one block to `take`; `position` is the state after earlier blocks, all or some of them.
     /// Returns what of the block, and of what was skipped behind it, was not read.
     ///
     /// # Errors
@@ -351,13 +351,13 @@ impl Reader {
     pub fn block(
         &self,
         block: usize,
-        place: &mut ReadPosition,
+        position: &mut ReadPosition,
         mut take: impl FnMut(Message<'_>) -> Result<()>,
     ) -> Result<Unread> {
         let skipped = self.blocks.skipped.binary_search_by_key(&(block + 1), |(before, _)| *before);
         let allowed = if self.allowed { self.memory } else { 0 };
-        let (block, most) = (self.blocks.places[block], limits::datagrams(self.blocks.length).max(allowed));
-        let ReadPosition { topics, last, in_datagrams, bytes } = place;
+        let (block, most) = (self.blocks.blocks[block], limits::datagrams(self.blocks.length).max(allowed));
+        let ReadPosition { topics, last, in_datagrams, bytes } = position;
         let (mut wrong, mut read) = (None, IndexedChunks::new());
         let sound = self.blocks.records(block, bytes, |record| {
             match record {
@@ -399,10 +399,10 @@ impl Reader {
             return Err(wrong);
         }
         let mut unread = match (skipped, sound) {
-            (Ok(k), _) => self.unread_chunks(place, self.blocks.skipped[k].1.as_ref(), &read),
+            (Ok(k), _) => self.unread_chunks(position, self.blocks.skipped[k].1.as_ref(), &read),
             (Err(_), true) => Unread::default(),
             (Err(_), false) => match self.blocks.message_indexes(block)? {
-                Some(indexed) => Unread { unknown: false, ..self.unread_chunks(place, Some(&indexed), &read) },
+                Some(indexed) => Unread { unknown: false, ..self.unread_chunks(position, Some(&indexed), &read) },
                 None => Unread { unknown: true, ..Unread::default() },
             },
         };

@@ -57,7 +57,7 @@ pub struct SourceWriter {
     stream: Option<StreamColumns>,
     /// Number of columns of the array.
     columns: usize,
-    /// Number of places in the array.
+    /// Number of cells in the array.
     taxels: usize,
     grey_scale: Mutex<GreyScale>,
 }
@@ -344,7 +344,7 @@ impl SourceWriter {
     }
 
     /// Subtracts a tare's rest from the previews from now on; without a tare it is the
-    /// rest that [`TrackedRest`](taxel_core::tracked_rest::TrackedRest) finds.
+    /// rest that [`TrackedRest`](taxel_core::rest::TrackedRest) finds.
     pub fn tare(&self, tare: &Tare) {
         self.grey_scale().tare(tare);
     }

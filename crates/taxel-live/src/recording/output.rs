@@ -103,7 +103,7 @@ impl OutputFile {
             return Ok(());
         }
         let text = format!("was removed, renamed or replaced while it was recorded; LOST: {}", written());
-        Err(Error::file(&self.path)(IoError::new(ErrorKind::NotFound, text)))
+        Err(Error::file(&self.path)(IoError::other(text)))
     }
 
     /// Removes the file where it is new: nothing is to stay in it. An earlier one stays.

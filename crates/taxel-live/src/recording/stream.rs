@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use taxel_core::problem;
 
-use super::damage::{DamageCounts, IN_NO_LINE, LeftOut, MISSING, STRANGE, UNFINISHED_LINES};
+use super::damage::{DamageCounts, IN_NO_LINE, MISSING, STRANGE, UNFINISHED_LINES};
 use super::limits;
+use crate::text_lines::LeftOut;
 use clock::StreamClock;
 
 /// The columns of a source's lines.
@@ -327,14 +328,14 @@ mod tests {
     fn one_damaged_stamp_moves_no_other_and_is_no_restart() {
         let stream = stream(&["t_us", "a"]);
         let truth: Vec<i64> = (0..100).map(|k| 10_000_000 + k * 20_000).collect();
-        for (place, wrong) in [(50, 18_000_000), (50, 1 << 31), (50, 3), (1, 90_000_000), (98, 0)] {
+        for (index, wrong) in [(50, 18_000_000), (50, 1 << 31), (50, 3), (1, 90_000_000), (98, 0)] {
             let mut stamps: Vec<(f64, i64)> = truth.iter().map(|&t| (t as f64, t * 1000)).collect();
-            stamps[place].0 = f64::from(wrong);
+            stamps[index].0 = f64::from(wrong);
             let (mut t, counted) = times(&stream, &stamps);
-            let before = truth[place - 1];
-            assert_eq!(counted, Counted { jumps: 1, after: Some(before), ..Counted::default() }, "{wrong} at {place}");
-            t[place] = truth[place];
-            assert_eq!(t, truth, "{wrong} at {place}");
+            let before = truth[index - 1];
+            assert_eq!(counted, Counted { jumps: 1, after: Some(before), ..Counted::default() }, "{wrong} at {index}");
+            t[index] = truth[index];
+            assert_eq!(t, truth, "{wrong} at {index}");
         }
     }
 

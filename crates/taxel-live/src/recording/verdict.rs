@@ -65,7 +65,8 @@ pub struct Verdict {
     pub doubtful_after_us: Option<i64>,
     /// Where times step back, in the order of arrival; of many the largest steps.
     pub steps_back: Vec<StepBack>,
-    /// Of a stretch of a recording the name of the whole, whose losses these are: several stretches have them once.
+    /// The name of the recording that this is a stretch of: the losses are those of the recording, and several stretches
+    /// have them once.
     pub stretch_of: Option<String>,
     /// The verdicts of the recordings or sources that this one is made of, by name.
     pub parts: Vec<(String, Verdict)>,
@@ -86,7 +87,7 @@ pub struct RecordingCounts {
     /// Whether datagrams came several a message (`UDP_GRO`), so that the kernel may have dropped several at once.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub several_a_message: bool,
-    /// Of a file without its end: datagrams or lines whose arrival numbers it lacks, but for those dropped by the queue.
+    /// Datagrams or lines whose arrival numbers a file without its end lacks, but for those dropped by the queue.
     #[serde(skip)]
     pub left_out: u64,
     /// Arrival number of the first datagram or line recorded.
@@ -365,9 +366,9 @@ impl Verdict {
         ];
         let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
         for (cause, n) in found() {
-            // Of version 2 each is decoded once.
-            let place = if cause == REPEATED { &mut self.noted } else { &mut self.damaged };
-            place.insert(cause.clone(), *n);
+            // Version 2 decodes each datagram once.
+            let counts = if cause == REPEATED { &mut self.noted } else { &mut self.damaged };
+            counts.insert(cause.clone(), *n);
         }
         if !self.damaged.is_empty() {
             self.status = self.status.max(RecordingStatus::Damaged);
@@ -412,21 +413,21 @@ impl Verdict {
 
     /// As [`Self::combine`], of stretches of one recording: what all of them lost is what the whole lost, and counts once.
     fn of_stretches(parts: Vec<(String, Self)>) -> Self {
-        let mut whole = Self::combine(parts.clone());
+        let mut combined = Self::combine(parts.clone());
         let all = parts.iter().map(|(_, part)| [&part.lost, &part.damaged, &part.noted]);
-        for (k, sums) in [&mut whole.lost, &mut whole.damaged, &mut whole.noted].into_iter().enumerate() {
+        for (k, sums) in [&mut combined.lost, &mut combined.damaged, &mut combined.noted].into_iter().enumerate() {
             for (cause, sum) in sums {
                 let least = all.clone().map(|numbers| numbers[k].get(cause).copied().unwrap_or(0)).min();
                 *sum -= least.unwrap_or(0) * (parts.len() as u64).saturating_sub(1);
             }
         }
-        for k in (1..whole.steps_back.len()).rev() {
-            if whole.steps_back[..k].contains(&whole.steps_back[k]) {
-                whole.steps_back.remove(k);
+        for k in (1..combined.steps_back.len()).rev() {
+            if combined.steps_back[..k].contains(&combined.steps_back[k]) {
+                combined.steps_back.remove(k);
             }
         }
-        whole.stretch_of = parts.into_iter().find_map(|(_, part)| part.stretch_of);
-        whole
+        combined.stretch_of = parts.into_iter().find_map(|(_, part)| part.stretch_of);
+        combined
     }
 
     fn combine_with(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
@@ -436,13 +437,15 @@ impl Verdict {
         {
             return first.clone();
         }
-        let mut whole = Self { status: RecordingStatus::Complete, ..Self::default() };
+        let mut combined = Self { status: RecordingStatus::Complete, ..Self::default() };
         let mut named: Vec<(String, Self)> = vec![];
         for (name, part) in parts {
-            whole.status = whole.status.max(part.status);
-            for (sums, counts) in
-                [(&mut whole.lost, &part.lost), (&mut whole.damaged, &part.damaged), (&mut whole.noted, &part.noted)]
-            {
+            combined.status = combined.status.max(part.status);
+            for (sums, counts) in [
+                (&mut combined.lost, &part.lost),
+                (&mut combined.damaged, &part.damaged),
+                (&mut combined.noted, &part.noted),
+            ] {
                 for (cause, n) in counts {
                     let sum = sums.entry(cause.clone()).or_default();
                     *sum = add(cause, *sum, *n);
@@ -453,13 +456,13 @@ impl Verdict {
             let name = if taken(&name) { unique.unwrap_or_default() } else { name };
             named.push((name, part));
         }
-        whole.change(|verdict| {
+        combined.change(|verdict| {
             // The earliest of those that there are.
             verdict.doubtful_after_us = named.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
             verdict.steps_back = named.iter().flat_map(|(_, part)| part.steps_back.clone()).collect();
             verdict.parts = named;
         });
-        whole
+        combined
     }
 
     /// The verdict on the recording whose times are later by so many us.
@@ -503,8 +506,8 @@ impl Verdict {
 }
 
 /// A number and what it counts, in the plural unless it is 1.
-fn counted(n: u64, what: &str) -> String {
-    numbered(n, &format!("{what}s"))
+fn counted(n: u64, noun: &str) -> String {
+    numbered(n, &format!("{noun}s"))
 }
 
 /// A number and what it counts, which is given in the plural: of 1 the first word that ends in s, its noun, is in the singular.
@@ -516,9 +519,9 @@ fn numbered(n: u64, plural: &str) -> String {
 
 /// What the text says of the bytes of lines that have no end or no beginning.
 const OF_UNFINISHED_LINES: &str = "bytes of unfinished lines";
-/// Of a recording that began while its board was received: the jumps of time before it, since which all times are doubtful.
+/// The jumps of time before a recording that began while its board was received: all times since are doubtful.
 pub(crate) const JUMPED_BEFORE: &str = "jumps_of_time_before_it";
-/// Of a file without its end: what it lacks by its arrival numbers.
+/// What a file without its end lacks by its arrival numbers.
 const LEFT_OUT: &str = "dropped_or_left_out";
 /// Damage that is of a file as a whole, and that each of its sources has.
 const OF_THE_FILE: [&str; 7] =

@@ -1,9 +1,9 @@
 //! Counts by taxel from which dead, stuck and noisy ones are found.
 
 use taxel_core::Array;
+use taxel_core::health::TouchCounts;
 use taxel_core::held::UNKNOWN;
 use taxel_core::rest::Value;
-use taxel_core::touch_counts::TouchCounts;
 use taxel_live::pipeline::TaxelChange;
 
 /// Events and held values of each taxel so far.

@@ -7,21 +7,20 @@ use std::sync::Arc;
 
 use taxel_core::Array;
 use taxel_core::array::Places;
-use taxel_core::frame_noise::FrameNoise;
 use taxel_core::held::UNKNOWN;
-use taxel_core::rest::above_noise;
+use taxel_core::rest::{FrameNoise, above_noise};
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::Remarks;
 
-pub use super::stepped_frames::{FramePlace, FrameRest, FrameSource};
+pub use super::stepped_frames::{FrameArea, FrameRest, FrameSource};
 use super::stepped_frames::{SteppedFrames, ValueSteps};
 use super::{ChangeReader, FrameSources, KeyframeIndex, ReadOutcome};
 use crate::array_state::{Keyframe, RestSource};
-use crate::centre::Coordinates;
+use crate::load::Coordinates;
 use crate::load::Load;
+use crate::load::Weights;
 use crate::time_columns::{COLUMN_US, MISSING, MISSING_SUM, OF_SOURCE, TimeColumns, column_of};
-use crate::weights::Weights;
 
 /// Memory that the curves may take, bytes.
 const TIME_COLUMN_BYTES: usize = 256 << 20;
@@ -29,7 +28,7 @@ const TIME_COLUMN_BYTES: usize = 256 << 20;
 /// Bins of the overview.
 const BINS: i64 = 1000;
 
-/// Of so many sources at most each has a curve of its sum.
+/// Maximum number of sources that each have a curve of their sum.
 const MOST_SOURCES: usize = 4;
 
 /// Number of changes that are read at once.
@@ -82,15 +81,15 @@ pub struct FrameIndex {
 type Cursor = Vec<usize>;
 
 impl FrameIndex {
-    /// Indexes frames of sources that have places in `array`.
+    /// Indexes frames of sources that have areas in `array`.
     #[must_use]
     pub fn new(array: Array, file: FrameFile, sources: Vec<FrameSource<'_>>) -> Self {
-        let steps = ValueSteps::of(sources.iter().map(|source| source.values), array.len());
+        let steps = ValueSteps::fitting(sources.iter().map(|source| source.values), array.len());
         let floor = sources.iter().map(|source| source.floor(steps)).max().unwrap_or(0);
         let sources: Vec<SteppedFrames> = sources.into_iter().map(|source| SteppedFrames::new(source, steps)).collect();
         let first = sources.iter().filter_map(|source| source.t.first()).min();
         let last = sources.iter().filter_map(|source| source.t.last()).max();
-        let (weights, newtons) = Weights::of(&array, &file.unit);
+        let (weights, newtons) = Weights::new(&array, &file.unit);
         let mut index = Self {
             file,
             step: steps.size,
@@ -108,9 +107,9 @@ impl FrameIndex {
         index
     }
 
-    /// The places of its sources, where the rest of each comes from, whether its values fall from it, and where something lay then.
-    pub fn places(&self) -> impl Iterator<Item = (&FramePlace, RestSource, bool, &str)> {
-        self.sources.iter().map(|source| (&source.place, source.rest_source, source.falls, source.preload_at.as_str()))
+    /// The areas of its sources, where the rest of each comes from, whether its values fall from it, and where something lay then.
+    pub fn areas(&self) -> impl Iterator<Item = (&FrameArea, RestSource, bool, &str)> {
+        self.sources.iter().map(|source| (&source.area, source.rest_source, source.falls, source.preload_at.as_str()))
     }
 
     /// Column and row of the taxels that flicker, which never count as above rest.
@@ -118,8 +117,8 @@ impl FrameIndex {
         let columns = usize::from(self.array.columns);
         let places_of = move |source: &SteppedFrames| {
             let taxels: Vec<usize> = source.taxels(self.array.columns).collect();
-            let places = source.flickering.iter().map(|&cell| (taxels[cell] % columns, taxels[cell] / columns));
-            places.collect::<Vec<_>>()
+            let positions = source.flickering.iter().map(|&cell| (taxels[cell] % columns, taxels[cell] / columns));
+            positions.collect::<Vec<_>>()
         };
         self.sources.iter().flat_map(places_of)
     }
@@ -188,7 +187,7 @@ impl FrameIndex {
                 columns.set_values(column, &values);
             }
         }
-        let whole = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
+        let complete = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
         // Noise is what is above a rest that was found: above a given one any value is load.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let most = |(source, noise): (&SteppedFrames, FrameNoise)| match source.rest_source {
@@ -196,7 +195,7 @@ impl FrameIndex {
             RestSource::Given | RestSource::None => 0,
         };
         let noise = self.sources.iter().zip(noise).map(most).collect();
-        self.time_columns = whole.then(|| columns.with_noise(noise));
+        self.time_columns = complete.then(|| columns.with_noise(noise));
     }
 
     /// The number of sources that have a curve each.
@@ -302,7 +301,7 @@ impl FrameSources for FrameIndex {
             return Arc::default();
         }
         // An empty column between two sources counts as of the one before.
-        let source = |x| self.sources.partition_point(|source| source.place.left <= x).saturating_sub(1);
+        let source = |x| self.sources.partition_point(|source| source.area.left <= x).saturating_sub(1);
         (0..self.array.columns).map(source).collect()
     }
 
@@ -310,12 +309,12 @@ impl FrameSources for FrameIndex {
         let sensor = |source: &SteppedFrames| {
             let taxels: Vec<usize> = source.taxels(self.array.columns).collect();
             let part = |values: &[f64]| taxels.iter().map(|&taxel| values[taxel]).collect::<Vec<f64>>();
-            let place = &source.place;
+            let area = &source.area;
             Array {
-                rows: place.rows,
-                columns: place.columns,
+                rows: area.rows,
+                columns: area.columns,
                 pitch_mm: self.array.pitch_mm,
-                name: place.name.clone(),
+                name: area.name.clone(),
                 exists: self.array.exists.as_ref().map(|exists| taxels.iter().map(|&taxel| exists[taxel]).collect()),
                 places: self.array.places.as_ref().map(|places| Places {
                     x: part(&places.x),
@@ -404,11 +403,11 @@ impl KeyframeIndex for Arc<FrameIndex> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::player::{Player, ViewOptions};
+    use crate::view::player::{Player, ViewOptions};
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
-    fn place(name: &str, left: u16) -> FramePlace {
-        FramePlace { name: name.to_owned(), left, rows: 2, columns: 3 }
+    fn area(name: &str, left: u16) -> FrameArea {
+        FrameArea { name: name.to_owned(), left, rows: 2, columns: 3 }
     }
 
     fn index(left: &(Vec<i64>, Vec<f32>), right: &(Vec<i64>, Vec<f32>)) -> Arc<FrameIndex> {
@@ -422,10 +421,10 @@ mod tests {
             flickering: vec![],
             preload_at: String::new(),
         };
-        let source = |place, (t, values): &'_ (Vec<i64>, Vec<f32>)| (place, t.clone(), values.clone());
-        let all = [source(place("left", 0), left), source(place("right", 4), right)];
-        let sources = all.iter().map(|(place, t, values)| FrameSource {
-            place: place.clone(),
+        let source = |area, (t, values): &'_ (Vec<i64>, Vec<f32>)| (area, t.clone(), values.clone());
+        let all = [source(area("left", 0), left), source(area("right", 4), right)];
+        let sources = all.iter().map(|(area, t, values)| FrameSource {
+            area: area.clone(),
             t: t.clone(),
             values,
             rest: rest.clone(),
@@ -548,7 +547,7 @@ mod tests {
                 preload_at: String::new(),
             };
             let sources = values.iter().zip([("left", 0), ("right", 5)]).map(|(values, (name, left))| FrameSource {
-                place: FramePlace { name: name.to_owned(), left, rows: 4, columns: 4 },
+                area: FrameArea { name: name.to_owned(), left, rows: 4, columns: 4 },
                 t: (0..600).map(|k| 10_000 * k).collect(),
                 values,
                 rest: rest.clone(),
@@ -578,7 +577,7 @@ mod tests {
                 preload_at: String::new(),
             };
             let sources = [("left", 0, 0), ("right", 4, late)].map(|(name, left, begin)| FrameSource {
-                place: place(name, left),
+                area: area(name, left),
                 t: (0..600).map(|k| begin + 10_000 * k).collect(),
                 values: &values,
                 rest: rest.clone(),

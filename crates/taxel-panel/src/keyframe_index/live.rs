@@ -122,11 +122,11 @@ impl LiveIndex {
         let from = self.range().map_or(0, |(_, latest)| latest - SPAN * column_us);
         let (number, held, since) = {
             let ring = self.ring();
-            let place = ring.keyframe_at(from).unwrap_or(0);
-            let stored = ring.pieces.get(place);
+            let index = ring.keyframe_at(from).unwrap_or(0);
+            let stored = ring.pieces.get(index);
             let held = stored.and_then(|stored| stored.piece.held.as_ref());
             (
-                ring.first + place as u64,
+                ring.first + index as u64,
                 held.map_or(UNKNOWN, |held| held[taxel as usize]),
                 stored.and_then(|k| k.piece.since),
             )
@@ -155,10 +155,12 @@ impl LiveIndex {
 impl Ring {
     /// Index of the last piece with a keyframe at or before `t`, or of the first one.
     fn keyframe_at(&self, t: i64) -> Option<usize> {
-        let whole = |stored: &Arc<StoredPiece>| stored.piece.held.is_some();
-        let last =
-            self.pieces.iter().rposition(|stored| whole(stored) && stored.piece.since.is_none_or(|since| since <= t));
-        last.or_else(|| self.pieces.iter().position(whole))
+        let has_values = |stored: &Arc<StoredPiece>| stored.piece.held.is_some();
+        let last = self
+            .pieces
+            .iter()
+            .rposition(|stored| has_values(stored) && stored.piece.since.is_none_or(|since| since <= t));
+        last.or_else(|| self.pieces.iter().position(has_values))
     }
 }
 
@@ -211,12 +213,12 @@ impl KeyframeIndex for LiveIndex {
 
     fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)> {
         let ring = self.ring();
-        let place = ring.keyframe_at(t).ok_or_else(|| problem!("no events yet"))?;
-        let stored = &ring.pieces[place];
+        let index = ring.keyframe_at(t).ok_or_else(|| problem!("no events yet"))?;
+        let stored = &ring.pieces[index];
         let held = stored.piece.held.clone().unwrap_or_default();
         let rest = stored.rest.as_ref().map_or_else(|| held.clone(), |rest| rest.to_vec());
         let keyframe = Keyframe { latest: stored.piece.since, events: stored.piece.before, held, rest, tracked: None };
-        let number = ring.first + place as u64;
+        let number = ring.first + index as u64;
         drop(ring);
         Ok((keyframe, Box::new(LiveChanges { index: self.clone(), number, held_returned: Some(number) })))
     }
@@ -237,7 +239,7 @@ impl KeyframeIndex for LiveIndex {
 
     fn events_before(&self, t: i64) -> u64 {
         let ring = self.ring();
-        ring.keyframe_at(t).map_or(0, |place| ring.pieces[place].piece.before)
+        ring.keyframe_at(t).map_or(0, |index| ring.pieces[index].piece.before)
     }
 }
 
@@ -247,8 +249,8 @@ mod tests {
 
     use super::*;
     use crate::keyframe_index::recording::tests::held_at;
-    use crate::player::{Player, ViewOptions};
     use crate::time_columns::COLUMN_US;
+    use crate::view::player::{Player, ViewOptions};
 
     #[test]
     fn a_minute_is_stored_and_a_view_of_the_past_equals_what_was_decoded() {

@@ -17,7 +17,7 @@ use super::{Activity, ChangeReader, KeyframeIndex, ReadOutcome};
 use crate::array_state::{ArrayState, Keyframe};
 use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
-use taxel_core::preload::{LOADED_TICKS, place, preload};
+use taxel_core::rest::{LOADED_TICKS, preload, preload_text};
 use taxel_live::clock::{BoardClock, Pace, leaves};
 use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::{
@@ -57,7 +57,7 @@ enum RecordingDecoder {
 #[derive(Debug)]
 struct Key {
     block: usize,
-    place: ReadPosition,
+    position: ReadPosition,
     decoding: RecordingDecoder,
     keyframe: Keyframe,
 }
@@ -164,7 +164,7 @@ impl RecordingIndex {
     fn block(
         &self,
         k: usize,
-        place: &mut ReadPosition,
+        position: &mut ReadPosition,
         decoding: &mut RecordingDecoder,
         events: &mut Events,
         mut beside: Option<&mut Contents>,
@@ -175,7 +175,7 @@ impl RecordingIndex {
         let frame_us = self.header.registers.map_or(0, |registers| registers.frame_us() as i64);
         match (&self.source, &mut *decoding) {
             (OpenedFile::Mcap(reader), RecordingDecoder::Datagrams(decoder)) => {
-                let unread = reader.block(k, place, |message| {
+                let unread = reader.block(k, position, |message| {
                     if message.topic == Topic::Datagrams {
                         let before = events.len();
                         let info = decoder.push(message.data, Some(message.at_ns / 1000), events);
@@ -253,9 +253,9 @@ impl RecordingIndex {
         let contents = std::thread::scope(|scope| {
             let decoding = scope.spawn(move || index.decode_all(&decoded));
             for DecodedBlock { key, thin, held, changes } in blocks {
-                keys.extend(key.map(|(block, place, decoding)| Key {
+                keys.extend(key.map(|(block, position, decoding)| Key {
                     block,
-                    place,
+                    position,
                     decoding,
                     keyframe: state.keyframe(),
                 }));
@@ -286,19 +286,19 @@ impl RecordingIndex {
         self.verdict = contents.verdict;
         self.pace = contents.clock.pace();
         let columns = usize::from(self.header.array.columns);
-        self.preload_at = place(&preload(&state.rests_less(), columns, LOADED_TICKS), columns, (0, 0));
+        self.preload_at = preload_text(&preload(&state.rests_less(), columns, LOADED_TICKS), columns, (0, 0));
         state.update_curve();
         let columns = state.time_columns().clone();
-        let whole =
+        let complete =
             columns.reach().zip(contents.first).is_none_or(|((begin, _), first)| begin <= column_of(first, COLUMN_US));
-        self.time_columns = whole.then_some(columns);
+        self.time_columns = complete.then_some(columns);
         Ok(())
     }
 
     /// Decodes the whole file, block by block.
     fn decode_all(&self, to: &channel::Sender<DecodedBlock>) -> Result<Contents> {
         let taxels = self.header.array.len();
-        let (mut decoding, mut place) = (self.decoding(), ReadPosition::default());
+        let (mut decoding, mut position) = (self.decoding(), ReadPosition::default());
         // Beside the held values and how the rest is tracked, a decoder of version 2 stores the last 65 536 sequence
         // numbers.
         let each = 64 * taxels + (80 << 10);
@@ -317,14 +317,14 @@ impl RecordingIndex {
             let mut piece = DecodedBlock { key: None, thin: false, held: None, changes: vec![] };
             if since >= spacing {
                 (since, keys) = (0, keys + 1);
-                piece.key = Some((k, place.clone_counts(), decoding.clone()));
+                piece.key = Some((k, position.clone_counts(), decoding.clone()));
                 if keys * each > KEYFRAME_BYTES {
                     (piece.thin, keys, spacing) = (true, keys.div_ceil(2), 2 * spacing);
                 }
             }
             events.clear();
             let held_before = contents.remarks.held.is_some();
-            let bytes = self.block(k, &mut place, &mut decoding, &mut events, Some(&mut contents))?;
+            let bytes = self.block(k, &mut position, &mut decoding, &mut events, Some(&mut contents))?;
             since = since.saturating_add(bytes);
             if !held_before {
                 piece.held = contents.remarks.held.clone().filter(|held| held.len() == taxels);
@@ -397,7 +397,7 @@ struct Contents {
 struct RecordingChanges {
     index: Arc<RecordingIndex>,
     block: usize,
-    place: ReadPosition,
+    position: ReadPosition,
     decoding: RecordingDecoder,
     events: Events,
 }
@@ -408,7 +408,7 @@ impl ChangeReader for RecordingChanges {
             return Ok(ReadOutcome::End);
         }
         self.events.clear();
-        self.index.block(self.block, &mut self.place, &mut self.decoding, &mut self.events, None)?;
+        self.index.block(self.block, &mut self.position, &mut self.decoding, &mut self.events, None)?;
         self.block += 1;
         self.index.changes(&self.events, out);
         Ok(ReadOutcome::Changes)
@@ -429,14 +429,14 @@ impl KeyframeIndex for Arc<RecordingIndex> {
     }
 
     fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)> {
-        let place = self.keys.partition_point(|key| key.keyframe.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
-        let Some(Key { block, place, decoding, keyframe }) = self.keys.get(place) else {
+        let index = self.keys.partition_point(|key| key.keyframe.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
+        let Some(Key { block, position, decoding, keyframe }) = self.keys.get(index) else {
             return Err(problem!("{}: holds no events", self.path.display()).into());
         };
         let reader = RecordingChanges {
             index: Arc::clone(self),
             block: *block,
-            place: place.clone(),
+            position: position.clone(),
             decoding: decoding.clone(),
             events: Events::empty(self.header.array.clone()),
         };
@@ -452,8 +452,8 @@ impl KeyframeIndex for Arc<RecordingIndex> {
     }
 
     fn events_before(&self, t: i64) -> u64 {
-        let place = self.keys.partition_point(|key| key.keyframe.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
-        self.keys.get(place).map_or(0, |key| key.keyframe.events)
+        let index = self.keys.partition_point(|key| key.keyframe.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
+        self.keys.get(index).map_or(0, |key| key.keyframe.events)
     }
 }
 

@@ -1,8 +1,7 @@
 //! The frames of the sources of a recording, their values in whole steps of the unit.
 
 use taxel_core::held::UNKNOWN;
-use taxel_core::rest::NOISE_FLOOR;
-use taxel_core::tracked_rest::TrackedRest;
+use taxel_core::rest::{NOISE_FLOOR, TrackedRest};
 
 use crate::array_state::RestSource;
 
@@ -14,7 +13,7 @@ const REST_MOVED: f64 = 0.5;
 
 /// Where a source's frames are in the array of the recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FramePlace {
+pub struct FrameArea {
     /// Name of the source.
     pub name: String,
     /// Its first column in the array of the recording.
@@ -48,7 +47,7 @@ pub struct FrameRest {
 #[derive(Debug, Clone)]
 pub struct FrameSource<'a> {
     /// Where they are in the array.
-    pub place: FramePlace,
+    pub area: FrameArea,
     /// Their times, us, ascending.
     pub t: Vec<i64>,
     /// Their values row by row, frame after frame; NaN where one is missing.
@@ -69,7 +68,7 @@ impl FrameSource<'_> {
             RestSource::Quiet => {}
         }
         let begins: Vec<f64> = values.iter().map(|rest| rest * ticks_by_unit).collect();
-        let mut tracked = TrackedRest::new(self.place.columns.into(), NOISE_FLOOR, begins);
+        let mut tracked = TrackedRest::new(self.area.columns.into(), NOISE_FLOOR, begins);
         if *falls {
             tracked = tracked.falling();
         }
@@ -100,7 +99,7 @@ impl FrameSource<'_> {
 /// The frames of a source, in steps.
 #[derive(Debug, Clone)]
 pub(super) struct SteppedFrames {
-    pub(super) place: FramePlace,
+    pub(super) area: FrameArea,
     pub(super) t: Vec<i64>,
     /// Row by row, frame after frame; [`UNKNOWN`] where a value is missing.
     ticks: Vec<u16>,
@@ -120,7 +119,7 @@ impl SteppedFrames {
             // No value is above the greatest; a taxel without a rest would get that of its first value.
             flickering.iter().for_each(|&cell| rest[cell] = UNKNOWN - 1);
         }
-        Self { place: from.place, t: from.t, ticks, rest_source, falls, flickering, preload_at, rests }
+        Self { area: from.area, t: from.t, ticks, rest_source, falls, flickering, preload_at, rests }
     }
 
     /// The rest of its cells at a frame; before the first one, that of the first.
@@ -134,7 +133,7 @@ impl SteppedFrames {
     }
 
     pub(super) fn cells(&self) -> usize {
-        usize::from(self.place.rows) * usize::from(self.place.columns)
+        usize::from(self.area.rows) * usize::from(self.area.columns)
     }
 
     pub(super) fn frame(&self, k: usize) -> &[u16] {
@@ -148,8 +147,8 @@ impl SteppedFrames {
 
     /// The taxels of its cells in an array of `columns` columns, row by row.
     pub(super) fn taxels(&self, columns: u16) -> impl Iterator<Item = usize> + use<> {
-        let (left, width, columns) = (self.place.left, self.place.columns, usize::from(columns));
-        (0..usize::from(self.place.rows))
+        let (left, width, columns) = (self.area.left, self.area.columns, usize::from(columns));
+        (0..usize::from(self.area.rows))
             .flat_map(move |y| (0..usize::from(width)).map(move |x| y * columns + usize::from(left) + x))
     }
 }
@@ -164,16 +163,16 @@ pub(super) struct ValueSteps {
 impl ValueSteps {
     /// Steps for these values: of 1 where all are whole and not too far apart, else as small as 16 bits allow.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub(super) fn of<'a>(values: impl Iterator<Item = &'a [f32]>, taxels: usize) -> Self {
-        let (mut least, mut most, mut whole) = (0.0_f32, 0.0_f32, true);
+    pub(super) fn fitting<'a>(values: impl Iterator<Item = &'a [f32]>, taxels: usize) -> Self {
+        let (mut least, mut most, mut integers) = (0.0_f32, 0.0_f32, true);
         for &value in values.flatten().filter(|value| value.is_finite()) {
             (least, most) = (least.min(value), most.max(value));
-            whole &= value.fract() == 0.0;
+            integers &= value.fract() == 0.0;
         }
         let (least, range) = (f64::from(least), f64::from(most) - f64::from(least));
         // The sum over the array has 32 bits.
         let steps = MOST_STEPS.min(u32::MAX as usize / taxels.max(1)) as f64;
-        let size = if whole && range <= MOST_STEPS as f64 { 1.0 } else { range / steps };
+        let size = if integers && range <= MOST_STEPS as f64 { 1.0 } else { range / steps };
         Self { size, zero: (-least / size).ceil() as u16 }
     }
 

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket};
 
-use crate::messages::Message as Sent;
+use crate::protocol::messages::Message as Sent;
 
 /// A client that does not read a message within this time is disconnected.
 const SEND_WITHIN: Duration = Duration::from_secs(5);

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::limits::MOST_CREDITS;
+use crate::protocol::limits::MOST_CREDITS;
 
 /// Minimum time from frame to frame.
 pub(super) const FRAME_TIME: Duration = Duration::from_micros(16_000);

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use taxel_live::Result;
 use taxel_live::locked::lock;
 
-use crate::encoded_spikes::EncodedSpikes;
-use crate::frame::{self, About};
-use crate::live_source::LiveSource;
-use crate::player::{Player, ViewOptions};
+use crate::hub::live_source::LiveSource;
+use crate::protocol::refusal::{Answer, Refusal};
 use crate::readout_encoders::ViewEncoder;
-use crate::refusal::{Answer, Refusal};
 use crate::taxel_history::TaxelHistory;
 use crate::time_columns::{COLUMN_US, column_of};
+use crate::view::encoded_spikes::EncodedSpikes;
+use crate::view::frame::{self, About};
+use crate::view::player::{Player, ViewOptions};
 
 /// Narrow columns that lag this far behind restart from the last keyframe, which is less to decode, us.
 const NARROW_LAG_US: i64 = 1_000_000;

@@ -7,11 +7,11 @@ use serde_json::Value;
 use tokio::sync::{Semaphore, mpsc};
 
 use crate::hub::Hub;
-use crate::indexed::OpenRecording;
-use crate::limits::MOST_BYTES;
-use crate::messages::Message;
-use crate::refusal::Refusal;
-use crate::request::Request;
+use crate::hub::indexed::OpenRecording;
+use crate::protocol::limits::MOST_BYTES;
+use crate::protocol::messages::Message;
+use crate::protocol::refusal::Refusal;
+use crate::protocol::request::Request;
 use crate::requests::carry_out;
 
 /// Maximum number of pending requests, but for those that change labels: a person's work is not refused.
@@ -59,7 +59,7 @@ impl PendingRequests {
         &self,
         hub: &Arc<Hub>,
         id: Value,
-        what: String,
+        kind: String,
         request: Request,
         bytes: usize,
         shown: Option<OpenRecording>,
@@ -70,7 +70,7 @@ impl PendingRequests {
         };
         let Ok(permit) = Arc::clone(permits).try_acquire_many_owned(count as u32) else {
             let refusal = Refusal::from("too many requests at a time: wait for their answers");
-            return Some(Message::refused(id, what, refusal));
+            return Some(Message::refused(id, kind, refusal));
         };
         let (hub, answers) = (Arc::clone(hub), self.answers.clone());
         tokio::spawn(async move {
@@ -85,7 +85,7 @@ impl PendingRequests {
                     }
                     Message::Done { id }
                 }
-                Err(refusal) => Message::refused(id, what, refusal),
+                Err(refusal) => Message::refused(id, kind, refusal),
             };
             let _ = answers.send(last).await;
             drop(permit);

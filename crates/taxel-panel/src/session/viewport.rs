@@ -4,27 +4,26 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Map, Value};
+use taxel_core::problem;
 use taxel_live::locked::lock;
 
 use super::delivered::Delivered;
 use super::following::Following;
 use super::playback::Playback;
-use crate::encoded_spikes::EncodedSpikes;
-use crate::folder::size;
-use crate::frame::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
 use crate::hub::Hub;
-use crate::indexed::OpenRecording;
+use crate::hub::folder::size;
+use crate::hub::indexed::OpenRecording;
+use crate::hub::live_source::LiveSource;
 use crate::keyframe_index::KeyframeIndex;
-use crate::label_requests;
-use crate::live_source::LiveSource;
-use crate::messages::{Message, ViewState};
-use crate::opening;
-use crate::player::{Player, ViewOptions};
+use crate::protocol::messages::{Message, ViewState};
+use crate::protocol::refusal::{Answer, Refusal, words};
+use crate::protocol::request::Taxel;
 use crate::readout_encoders::{ReadoutEncoders, ViewEncoder};
-use crate::refusal::{Answer, Refusal};
-use crate::request::Taxel;
-use crate::requests::readout_of;
+use crate::requests::{labels, opening, readout_of};
 use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
+use crate::view::encoded_spikes::EncodedSpikes;
+use crate::view::frame::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
+use crate::view::player::{Player, ViewOptions};
 
 /// Where in its source a view is.
 enum Position {
@@ -146,7 +145,7 @@ impl Viewport {
     /// Board time of the view, us.
     fn t(&self) -> Option<i64> {
         match &self.position {
-            Position::At(Some(place)) => Some(place.player.t()),
+            Position::At(Some(position)) => Some(position.player.t()),
             Position::At(None) => None,
             Position::Following => self.live.as_ref().and_then(|live| lock(&live.state).latest()),
         }
@@ -165,12 +164,12 @@ impl Viewport {
     /// Moves a playing view on; returns whether it has arrived to the end of its recording.
     pub(super) async fn play_on(&mut self) -> bool {
         let Some(t) = self.playback.now() else { return false };
-        let moved = self.with_place(move |place| {
+        let moved = self.with_position(move |position| {
             // A window that the view leaves moves with it.
-            if let Some(window) = place.window.as_mut().filter(|window| window.t() < t) {
+            if let Some(window) = position.window.as_mut().filter(|window| window.t() < t) {
                 window.advance(t)?;
             }
-            place.player.advance(t)
+            position.player.advance(t)
         });
         match moved.await {
             Ok(more) => {
@@ -222,8 +221,8 @@ impl Viewport {
         let needs_rest = |rests: u64| self.delivered.needs_rest(rests, moves != 0);
         let (bytes, last, rests) = match &mut self.position {
             Position::Following => self.following.frame(self.live.as_ref()?, about, needs_rest),
-            Position::At(place) => {
-                let SourcePosition { player, window } = &mut **place.as_mut()?;
+            Position::At(position) => {
+                let SourcePosition { player, window } = &mut **position.as_mut()?;
                 let rests = Some(player.state().rests()).filter(|rests| needs_rest(*rests));
                 let about = About { with_rest: rests.is_some(), ..about };
                 let (bytes, last) = frame::of_player(player, window.as_mut(), about);
@@ -239,12 +238,12 @@ impl Viewport {
         self.options.encoder.as_ref()?;
         let spikes = match &mut self.position {
             Position::Following => self.following.encode(self.live.as_ref()?),
-            Position::At(place) => {
-                let place = place.as_mut()?;
-                place.window.as_mut().unwrap_or(&mut place.player).spikes_mut()
+            Position::At(position) => {
+                let position = position.as_mut()?;
+                position.window.as_mut().unwrap_or(&mut position.player).spikes_mut()
             }
         }?;
-        let (message, failed) = (spikes.message(), spikes.failed().map(str::to_owned));
+        let (message, failed) = (spikes.message(), spikes.failed().map(|error| words(&error.clone().into())));
         if let Some(reason) = failed {
             (self.options.encoder, self.requested_encoder) = (None, None);
             self.following.stop_encoding();
@@ -255,20 +254,20 @@ impl Viewport {
 
     // ------------------------------------------------------------------------------------------ moving
 
-    /// Works on the place in another thread: a disk may be slow.
-    async fn with_place<T: Send + 'static>(
+    /// Works on the position in another thread: a disk may be slow.
+    async fn with_position<T: Send + 'static>(
         &mut self,
         work: impl FnOnce(&mut SourcePosition) -> taxel_live::Result<T> + Send + 'static,
     ) -> Answer<T> {
-        let Position::At(place) = &mut self.position else { return Err("the view follows the newest".into()) };
-        let Some(mut place) = place.take() else { return Err("the view is gone: open it again".into()) };
+        let Position::At(position) = &mut self.position else { return Err("the view follows the newest".into()) };
+        let Some(mut position) = position.take() else { return Err("the view is gone: open it again".into()) };
         let worked = tokio::task::spawn_blocking(move || {
-            let outcome = work(&mut place);
-            (place, outcome)
+            let outcome = work(&mut position);
+            (position, outcome)
         });
         match worked.await {
-            Ok((place, outcome)) => {
-                self.position = Position::At(Some(place));
+            Ok((position, outcome)) => {
+                self.position = Position::At(Some(position));
                 Ok(outcome?)
             }
             Err(_) => {
@@ -282,19 +281,19 @@ impl Viewport {
     async fn seek(&mut self, t: i64) -> Answer {
         let index = self.index()?;
         if let Err(error) = self.choose_encoder(&index) {
-            self.warnings.push(error.to_string());
+            self.warnings.push(words(&error));
         }
         // For the past of a live source at wide columns, the shared state has them all.
         let live = self.live.as_ref().filter(|_| self.recording.is_none() && self.options.column_us > COLUMN_US);
-        let whole = live.map(|live| {
+        let all_columns = live.map(|live| {
             let mut state = lock(&live.state);
             state.update_curve();
             Arc::new(state.time_columns().clone())
         });
-        let options = ViewOptions { whole, ..self.options.clone() };
+        let options = ViewOptions { all_columns, ..self.options.clone() };
         // A window whose columns the client has already stays as it is.
         let same = match &mut self.position {
-            Position::At(Some(place)) if !self.delivered.is_restart() => place.window.take(),
+            Position::At(Some(position)) if !self.delivered.is_restart() => position.window.take(),
             _ => None,
         };
         let end = self.window_us;
@@ -309,11 +308,11 @@ impl Viewport {
             let window = same.map_or_else(|| Player::open(index, end, options), Ok)?;
             Ok(SourcePosition { player, window: Some(window) })
         });
-        let place = opened.await.map_err(|_| Refusal::bug("the view")).and_then(|opened| Ok(opened?));
-        if place.is_err() {
+        let position = opened.await.map_err(|_| Refusal::bug("the view")).and_then(|opened| Ok(opened?));
+        if position.is_err() {
             self.restart();
         }
-        self.position = Position::At(Some(Box::new(place?)));
+        self.position = Position::At(Some(Box::new(position?)));
         self.delivered.invalidate_rest();
         self.dirty = true;
         self.following.stop_encoding();
@@ -348,7 +347,7 @@ impl Viewport {
         });
         if let Err(error) = started {
             (self.options.encoder, self.requested_encoder) = (None, None);
-            self.warnings.push(error.to_string());
+            self.warnings.push(words(&error));
         }
     }
 
@@ -357,15 +356,22 @@ impl Viewport {
     fn choose_encoder(&mut self, index: &Arc<dyn KeyframeIndex>) -> taxel_live::Result<()> {
         self.options.encoder = None;
         let Some(request) = self.requested_encoder.take() else { return Ok(()) };
-        let encoders = match (&self.recording, &self.live) {
-            (None, Some(live)) => &live.encoders,
-            _ => &self.recording_encoders,
+        let live = self.live.as_ref().filter(|_| self.recording.is_none());
+        let encoder = match live {
+            Some(live) => ViewEncoder::requested(&request, &live.encoders())?,
+            None => ViewEncoder::requested(&request, &self.recording_encoders)?,
         };
-        let encoder = ViewEncoder::requested(&request, encoders)?;
-        match index.frames() {
-            Some(frames) => EncodedSpikes::of_frames(&encoder, &frames, COLUMN_US, None)?.check()?,
-            None => drop(encoder.encoder.stream(index.array())?),
+        let stream = match index.frames() {
+            Some(frames) => EncodedSpikes::of_frames(&encoder, &frames, COLUMN_US, None)?.check(),
+            None => encoder.encoder.stream(index.array()).map(drop).map_err(Into::into),
+        };
+        if stream.is_err() && encoder.of_readout && live.is_some_and(|live| live.measures_tare()) {
+            let name = encoder.name;
+            return Err(
+                problem!("encoder {name}: the readout measures its tare; choose the encoder again after that").into()
+            );
         }
+        stream?;
         (self.options.encoder, self.requested_encoder) = (Some(encoder), Some(request));
         Ok(())
     }
@@ -403,7 +409,10 @@ impl Viewport {
         let array = index.array();
         let (rows, columns) = (array.rows, array.columns);
         if taxel.is_some_and(|(x, y)| x >= columns || y >= rows) {
-            return Err(Refusal::of("taxel", format!("must be [x, y] on {rows} rows x {columns} columns, or null")));
+            return Err(Refusal::of_field(
+                "taxel",
+                format!("must be [x, y] on {rows} rows x {columns} columns, or null"),
+            ));
         }
         self.options.watched = taxel.and_then(|(x, y)| u32::try_from(array.index(x, y)).ok());
         if !matches!(self.position, Position::Following) {
@@ -421,7 +430,7 @@ impl Viewport {
             let index = self.index()?;
             self.requested_encoder = encoder;
             let chosen = self.choose_encoder(&index);
-            chosen.map_err(|error| Refusal { reason: error.to_string(), field: Some("encoder".to_owned()) })?;
+            chosen.map_err(|error| Refusal { reason: words(&error), field: Some("encoder".to_owned()) })?;
         }
         self.reopen().await
     }
@@ -429,7 +438,7 @@ impl Viewport {
     pub(super) async fn zoom(&mut self, column_us: i64, end_us: Option<i64>) -> Answer {
         if !is_column(column_us) {
             let (least, most) = COLUMNS_US;
-            return Err(Refusal::of("column_us", format!("must be {least} times a power of two, up to {most}")));
+            return Err(Refusal::of_field("column_us", format!("must be {least} times a power of two, up to {most}")));
         }
         self.options.column_us = column_us;
         self.window_us = end_us.filter(|_| !matches!(self.position, Position::Following));
@@ -471,13 +480,13 @@ impl Viewport {
         self.pause().await?;
         for _ in 0..steps.unsigned_abs() {
             let moved = if steps > 0 {
-                self.with_place(|place| {
-                    let next = place.player.next_stamp()?;
-                    next.map_or(Ok(None), |t| place.player.advance(t).map(|_| Some(t)))
+                self.with_position(|position| {
+                    let next = position.player.next_stamp()?;
+                    next.map_or(Ok(None), |t| position.player.advance(t).map(|_| Some(t)))
                 })
                 .await?
             } else {
-                let before = self.with_place(|place| place.player.last_stamp()).await?;
+                let before = self.with_position(|position| position.player.last_stamp()).await?;
                 if let Some(t) = before {
                     self.seek(t).await?;
                 }
@@ -525,9 +534,9 @@ impl Viewport {
     ) -> Answer<Vec<Message>> {
         let begun = Instant::now();
         // The reason names the file.
-        let refused = |error: taxel_live::Error| Refusal { reason: error.to_string(), field: Some("name".to_owned()) };
+        let refused = |error: taxel_live::Error| Refusal { reason: words(&error), field: Some("name".to_owned()) };
         let indexed = opening::index(hub, &name, trial.as_deref()).await.map_err(refused)?;
-        let labels = label_requests::read(hub, &name, indexed.us()).await;
+        let labels = labels::read(hub, &name, indexed.us()).await;
         let bytes = size(&hub.folder.file(&name).map_err(refused)?).map_err(refused)?;
         let (file, out) =
             (hub.folder.file(&name).map_err(refused)?, hub.folder.file(&readout_of(&name)).map_err(refused)?);
@@ -557,7 +566,7 @@ mod tests {
     use taxel_core::encode::{ChangeEvents, Composite, Encoder, Fa1};
 
     use super::*;
-    use crate::indexed::Indexed;
+    use crate::hub::indexed::Indexed;
     use crate::keyframe_index::recording::{RecordingIndex, tests::recorded};
 
     /// The `spikes` message, and whether it is of the readout's encoder.

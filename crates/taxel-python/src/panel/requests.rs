@@ -13,7 +13,7 @@ use taxel_core::rest::Value;
 use taxel_core::wire::Command;
 use taxel_live::recording::{self, Remarks};
 use taxel_panel::{
-    Activity, BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, FrameFile, FrameIndex, FramePlace,
+    Activity, BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, FrameArea, FrameFile, FrameIndex,
     FrameRest, FrameSource, FramesRead, LabelConflict, LabelEdit, LabelRequests, LabelRow, LabelTable, Opening,
     PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers, RestSource, TrainingRequests, TrainingResult,
     UnhealthyTaxels, UserPreset, UserPresets,
@@ -59,8 +59,8 @@ impl BoardRequests for PythonHandler {
         Ok(BoardLines { lines, resets })
     }
 
-    fn connect(&self, place: Option<&str>) -> Reply<()> {
-        self.call(|handler| handler.call_method1("connect", (place,)).map(drop))
+    fn connect(&self, address: Option<&str>) -> Reply<()> {
+        self.call(|handler| handler.call_method1("connect", (address,)).map(drop))
     }
 
     fn listen(&self, host: &str, port: u16) -> Reply<()> {
@@ -104,10 +104,10 @@ impl FileRequests for PythonHandler {
     }
 
     fn read(&self, path: &Path, trial: Option<&str>, opening: Opening) -> Reply<ReadFile> {
-        let whole = opening == Opening::Whole;
+        let is_whole = opening == Opening::Whole;
         self.call(|handler| {
             let (events, frames): (Option<PathBuf>, Option<ReadFrames<'_>>) =
-                handler.call_method1("read", (path, trial, whole))?.extract()?;
+                handler.call_method1("read", (path, trial, is_whole))?.extract()?;
             match (events, frames) {
                 (_, Some(frames)) => Ok(ReadFile::Frames(FramesRead(Box::new(to_index(handler.py(), frames)?)))),
                 (Some(path), None) => Ok(ReadFile::Events(path)),
@@ -364,8 +364,8 @@ fn to_index(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<FrameIndex> {
             flickering: rest.flickering.clone(),
             preload_at: rest.preload_at.clone(),
         };
-        let place = FramePlace { name: name.clone(), left: *left, rows: *rows, columns: *columns };
-        placed.push(FrameSource { place, t: t.to_vec(), values, rest });
+        let area = FrameArea { name: name.clone(), left: *left, rows: *rows, columns: *columns };
+        placed.push(FrameSource { area, t: t.to_vec(), values, rest });
     }
     enter(py, |_| Ok::<_, taxel_core::Error>(FrameIndex::new(array, file, placed)))
 }

@@ -76,27 +76,27 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
     >>> chosen(Frames([[[0.0] * 6] * 6], [0], unit="V"), ["soft", "hard"])
     ('touch', 'kinds of touch on a grid of 6 x 6 taxels')
     """
-    every = {name: read(name) for name in names()}
-    of = {kind: name for name, values in every.items() for kind in values.get("fits", ())}
+    recipes = {name: read(name) for name in names()}
+    recipe_for = {kind: name for name, values in recipes.items() for kind in values.get("fits", ())}
     if not isinstance(source, Frames):
-        return (of["events"], "events of a board") if "events" in of else (_ANY, "no other fits events")
-    array, grids = source.array, of.get("grids")
+        return (recipe_for["events"], "events of a board") if "events" in recipe_for else (_ANY, "no other fits events")
+    array, grids = source.array, recipe_for.get("grids")
     if grids is None or not labels or array.taxels < 2 or not array._has_neighbours:
-        grids, what = None, counted(array.taxels, "channel" if array.is_channels else "taxel")
+        grids, sensor = None, counted(array.taxels, "channel" if array.is_channels else "taxel")
     else:
-        what = f"a grid of {array.rows} x {array.columns} taxels"
-        others = [label for label in labels if _own(every[grids], label) is None]
-        known = any(_own(values, label) for label in others for values in every.values())
+        sensor = f"a grid of {array.rows} x {array.columns} taxels"
+        others = [label for label in labels if _own(recipes[grids], label) is None]
+        known = any(_own(values, label) for label in others for values in recipes.values())
         if not known and not any(_OF_STEPS & set(_plain(label).split("_")) for label in others):
-            return grids, f"{'kinds of touch' if others else ' and '.join(labels)} on {what}"
+            return grids, f"{'kinds of touch' if others else ' and '.join(labels)} on {sensor}"
     many = array.taxels > _MOST_CHANNELS
     for unit in (f"many {source.unit}",) * (many or not array.is_channels) + (source.unit,):
-        if unit in of:
-            return of[unit], f"frames in {source.unit}"
+        if unit in recipe_for:
+            return recipe_for[unit], f"frames in {source.unit}"
     if grids is not None and many and not known:
         # The levels of `_ANY`, 22 trains a taxel, take minutes.
-        return grids, what
-    return _ANY, f"{what} in {source.unit}"
+        return grids, sensor
+    return _ANY, f"{sensor} in {source.unit}"
 
 
 def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
@@ -113,16 +113,16 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
     >>> read("gait_insole")["encoder"]["levels"]
     [5.0, 10.0, 20.0, 30.0, 40.0, 50.0]
     """
-    place = Path(checked_path("recipe", recipe))
+    file = Path(checked_path("recipe", recipe))
     if isinstance(recipe, str) and not {".", "/", os.sep} & set(recipe):
         if recipe not in names():
             raise ProblemError(
                 f"recipe {shown(recipe)}: there are {', '.join(names())}; the path of a file holds a dot or a slash"
             )
-        place = Path(__file__).parent / f"{recipe}.toml"
-    values = read_json(place) if place.suffix.lower() == ".json" else read_toml(place)
+        file = Path(__file__).parent / f"{recipe}.toml"
+    values = read_json(file) if file.suffix.lower() == ".json" else read_toml(file)
     if not isinstance(values, dict):
-        raise FormatError(f"{place}: holds no recipe, which is values by name")
+        raise FormatError(f"{file}: holds no recipe, which is values by name")
     return values
 
 

@@ -96,10 +96,10 @@ class Bag:
         from rosbags.interfaces import Nodetype  # noqa: PLC0415  an extra
 
         for _, described in self.store.fielddefs[name][1]:
-            kind, of = described
+            kind, inner = described
             if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
-                kind, of = of[0]
-            missing = self.undefined(str(of)) if kind == Nodetype.NAME else ""
+                kind, inner = inner[0]
+            missing = self.undefined(str(inner)) if kind == Nodetype.NAME else ""
             if missing:
                 return missing
         return ""

@@ -15,7 +15,8 @@ from taxel.formats.ros.fields import grid, leaves
 
 __all__ = ["Topic", "topics"]
 
-#: Of so many lengths of a topic's messages, in bytes, the first message is held; of clouds and texts each may differ.
+#: How many lengths of a topic's messages are looked at, in bytes, by the first message of each: lengths of clouds and
+#: texts may all differ.
 _MOST_LENGTHS = 32
 
 
@@ -92,14 +93,14 @@ def _of_topic(bag: Bag, topic: str) -> list[Topic]:
             found = list(leaves(first))
         except FormatError as error:
             return [Topic(topic, kind, "", (), "", sum(c.msgcount for c in connections), None, str(error))]
-        if any(held.size > 1 for _, held in found):
+        if any(content.size > 1 for _, content in found):
             break
     else:
         return []
     span = (max(times) - min(times)) / 1e9
     rate = (len(times) - 1) / span if span > 0 else None
     return [
-        Topic(topic, kind, field, grid(first, field) or held.shape, held.dtype.name, len(times), rate)
-        for field, held in found
-        if held.size > 1
+        Topic(topic, kind, field, grid(first, field) or content.shape, content.dtype.name, len(times), rate)
+        for field, content in found
+        if content.size > 1
     ]

@@ -108,17 +108,17 @@ def read(path: Path, chosen: Sequence[Chosen], types: Path | None = None, ros: s
     """
     with open_bag(path, types, ros) as bag:
         connections = {choice.topic: bag.of_topic(choice.topic) for choice in chosen}
-        held = [_Held(bag, choice) for choice in chosen]
+        topics = [_Held(bag, choice) for choice in chosen]
         for connection, at, data in bag.messages([c for each in connections.values() for c in each]):
             try:
                 message = bag.decoded(connection, data)
             except Exception as error:  # rosbags' own, and those of bytes that it does not expect
                 raise FormatError(f"{path}: a message of topic {connection.topic} at {at} ns: {error}") from None
-            for held_topic in held:
+            for held_topic in topics:
                 if held_topic.topic == connection.topic:
                     held_topic.add(message, at)
         unread = tuple(sorted(bag.topics() - connections.keys()))
-        return [topic.read(connections[topic.topic][0].msgtype, unread) for topic in held]
+        return [topic.read(connections[topic.topic][0].msgtype, unread) for topic in topics]
 
 
 class _Shape(NamedTuple):
@@ -137,7 +137,7 @@ class _Held:
         self.topic, self.field = chosen.topic, chosen.field
         #: The shape of each message's numbers, and all numbers one after the other.
         self.values: list[_Shape] = []
-        self.numbers = Growing(self.place, numbers=((), np.float32))
+        self.numbers = Growing(self.location, numbers=((), np.float32))
         self.bag_ns: list[int] = []
         self.stamps_ns: list[int | None] = []
         self.grids: list[tuple[int, int] | None] = []
@@ -146,7 +146,7 @@ class _Held:
         self.trouble = ""
 
     @property
-    def place(self) -> str:
+    def location(self) -> str:
         return f"{self.bag.path}: topic {self.topic}" + f", field {self.field}" * bool(self.field)
 
     def add(self, message: Any, at: int) -> None:
@@ -157,12 +157,12 @@ class _Held:
             # Before a first reading there may be no field to choose by; such messages are of another length.
             numbers = np.empty(0) if self.field is None else self._numbers(message, self.field)
         except FormatError as error:
-            raise FormatError(f"{self.place}: {error}") from None
+            raise FormatError(f"{self.location}: {error}") from None
         self.grids.append(None if self.field is None else grid(message, self.field))
         self.are_whole.append(numbers.dtype.kind in "ui")
         if numbers.dtype.kind == "f" and (np.abs(numbers) > VALUE).any():
             raise FormatError(
-                f"{self.place}, message {len(self.values)}: a value is infinite, or too large for 32 bits"
+                f"{self.location}, message {len(self.values)}: a value is infinite, or too large for 32 bits"
             )
         self.values.append(_Shape(numbers.shape, numbers.size, numbers.ndim))
         self.numbers.add(numbers=numbers.reshape(-1))
@@ -191,16 +191,16 @@ class _Held:
     def read(self, kind: str, unread: tuple[str, ...]) -> Read:
         """Return the frames of the messages."""
         if not self.values:
-            raise FormatError(f"{self.place}: holds no message")
+            raise FormatError(f"{self.location}: holds no message")
         if self.trouble and not any(value.size for value in self.values):
-            raise FormatError(f"{self.place}: {self.trouble}")
-        array = sensor(self.place, self.array or self._stated())
+            raise FormatError(f"{self.location}: {self.trouble}")
+        array = sensor(self.location, self.array or self._stated())
         fits = np.array([_fits(value, array) for value in self.values])
         if not fits.any():
             some = next((value for value in self.values if value.size), self.values[0])
             size = " x ".join(map(str, some.shape)) if some.ndim == 2 else f"{some.size}"
             raise FormatError(
-                f"{self.place}: its messages hold {size} values; the array has {array.rows} x {array.columns}"
+                f"{self.location}: its messages hold {size} values; the array has {array.rows} x {array.columns}"
             )
         bag = np.array(self.bag_ns, np.int64)[fits]
         stamps = [stamp for stamp, fit in zip(self.stamps_ns, fits, strict=True) if fit]
@@ -209,7 +209,9 @@ class _Held:
         has_stamps = None not in stamps
         t, by_the_bag = _times(np.array(stamps, np.int64)[order], bag) if has_stamps else (bag, 0)
         if np.abs(t).max() // 1000 > TIME_US:
-            raise FormatError(f"{self.place}: a message at {t[np.abs(t).argmax()]} ns; must lie within 142 years of 0")
+            raise FormatError(
+                f"{self.location}: a message at {t[np.abs(t).argmax()]} ns; must lie within 142 years of 0"
+            )
         return Read(
             self.topic,
             self.field or "",
@@ -230,19 +232,19 @@ class _Held:
         numbers, size = self.numbers.column("numbers"), array.rows * array.columns
         if (np.diff(chosen) > 0).all():
             numbers.setflags(write=True)
-            held = numbers[: len(chosen) * size]
+            chosen_values = numbers[: len(chosen) * size]
         else:
-            held = np.empty(len(chosen) * size, np.float32)
+            chosen_values = np.empty(len(chosen) * size, np.float32)
         for k, begin in enumerate(begins[chosen]):
-            if held is not numbers or begin != k * size:
-                held[k * size : (k + 1) * size] = numbers[begin : begin + size]
-        return held.reshape(-1, *array.shape)
+            if chosen_values is not numbers or begin != k * size:
+                chosen_values[k * size : (k + 1) * size] = numbers[begin : begin + size]
+        return chosen_values.reshape(-1, *array.shape)
 
     def _stated(self) -> Array:
         """Return the most frequent length: in rows and columns as most of its messages state them, else in one row."""
         lengths = Counter(value.shape for value in self.values if value.size)
         if not lengths:
-            raise FormatError(f"{self.place}: its messages hold no values")
+            raise FormatError(f"{self.location}: its messages hold no values")
         ((most, _),) = lengths.most_common(1)
         stated = Counter(g for value, g in zip(self.values, self.grids, strict=True) if g and value.shape == most)
         rows, columns = stated.most_common(1)[0][0] if stated else (1, most[0])
@@ -250,7 +252,7 @@ class _Held:
             return Array(rows, columns, name=self.topic)
         except ProblemError as error:
             raise FormatError(
-                f"{self.place}: its messages hold {math.prod(most)} values: {first_line(error)}"
+                f"{self.location}: its messages hold {math.prod(most)} values: {first_line(error)}"
             ) from None
 
 
@@ -287,8 +289,8 @@ def _times(stamps: NDArray[np.int64], bag: NDArray[np.int64]) -> tuple[NDArray[n
     wrong = np.setdiff1d(np.arange(len(stamps)), sound)
     for run in np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1) if len(wrong) else ():
         before, after = t[: run[0]][-1:], stamps[run[-1] + 1 :][:1]
-        held = [np.concatenate([before, bag[run] - less, after]) for less in (0, late)]
-        fits = next((stamps for stamps in held if (np.diff(stamps) > 0).all()), None)
+        candidates = [np.concatenate([before, bag[run] - less, after]) for less in (0, late)]
+        fits = next((stamps for stamps in candidates if (np.diff(stamps) > 0).all()), None)
         low, high = before[0] if len(before) else None, after[0] if len(after) else None
         t[run] = np.clip(bag[run] - late, low, high) if fits is None else fits[len(before) :][: len(run)]
     return t, len(wrong)

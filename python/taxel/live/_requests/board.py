@@ -71,12 +71,12 @@ class BoardRequests:
         with reasons(), self._lock:
             return ([], 0) if self._cable is None else (self._cable.take_lines(), self._cable.resets)
 
-    def connect(self, place: str | None) -> None:
+    def connect(self, address: str | None) -> None:
         """Connect the serial line to another place, or disconnect it."""
         self.close()
-        if place is not None:
+        if address is not None:
             with reasons():
-                cable = Cable(place)
+                cable = Cable(address)
             with self._lock:
                 self._cable = cable
 

@@ -11,9 +11,9 @@ from taxel import _core
 from taxel.array import Array
 from taxel.live._requests.reasons import reasons
 from taxel.live._shown_files import Opening, ReadFrames, ShownFiles
+from taxel.recording.analysis.health import TaxelStatistics, Touches, judge
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
-from taxel.recording.health import TaxelStatistics, Touches, judge
 
 #: Taxels as (column, row).
 _Taxels = list[tuple[int, int]]
@@ -57,7 +57,7 @@ class FileRequests:
         activity, repeated, *known = (
             np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, *(values or ()))
         )
-        result = judge(sensor, TaxelStatistics(activity, repeated, Touches.of(*touches), *known))
+        result = judge(sensor, TaxelStatistics(activity, repeated, Touches.from_counts(*touches), *known))
         taxels = result.named()
         return taxels["dead"], taxels["stuck"], taxels["noisy"], int(np.count_nonzero(result.untested))
 
@@ -66,7 +66,7 @@ class FileRequests:
         with reasons():
             return [file.name for file in folder.iterdir() if self._opening.is_recording(file)]
 
-    def read(self, path: Path, trial: str | None, whole: bool) -> tuple[Path | None, ReadFrames | None]:
+    def read(self, path: Path, trial: str | None, entire: bool) -> tuple[Path | None, ReadFrames | None]:
         """Read a recording that is no file of a board's events.
 
         Parameters
@@ -74,7 +74,7 @@ class FileRequests:
         path : path
         trial : str or None
             Of a file with several; default: the first.
-        whole : bool
+        entire : bool
             Whether all of a large text table is read, not only its beginning.
 
         Returns
@@ -85,7 +85,7 @@ class FileRequests:
             Frames, as the compiled part reads them.
         """
         with reasons():
-            return self._files.read(path, trial, whole=whole)
+            return self._files.read(path, trial, entire=entire)
 
     def health_of_frames(self, path: Path, trial: str | None) -> tuple[_Taxels, _Taxels, _Taxels, int]:
         """Return the taxels of a recording of frames that are dead, stuck, noisy, and how many cannot be judged."""

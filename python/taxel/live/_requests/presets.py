@@ -26,20 +26,20 @@ class PresetRequests:
 
     def read(self) -> tuple[Path, dict[str, dict[str, object]]]:
         """Return the file of the user's presets, and the presets: value by register name."""
-        place = _path()
+        path = _path()
         with reasons():
-            presets = read_toml(place) if place.exists() else {}
-        return place, {name: values for name, values in presets.items() if isinstance(values, dict)}
+            presets = read_toml(path) if path.exists() else {}
+        return path, {name: values for name, values in presets.items() if isinstance(values, dict)}
 
     def write(self, presets: Mapping[str, Mapping[str, object]]) -> None:
         """Write the user's presets."""
-        place = _path()
+        path = _path()
         lines = ["# Presets of the panel: a table each, every register in its own unit (taxel's docs, registers)."]
         for name, values in sorted(presets.items()):
             # A basic string of TOML has the escapes of JSON.
             lines += ["", f"[{json.dumps(name)}]"]
             lines += [f"{register} = {json.dumps(value)}" for register, value in values.items()]
         with reasons(), self._lock:
-            place.parent.mkdir(parents=True, exist_ok=True)
-            with whole_file(place, overwrite=True) as part:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with whole_file(path, overwrite=True) as part:
                 part.write_text("\n".join(lines) + "\n", "utf-8")

@@ -17,7 +17,6 @@ from taxel._core import ProblemError
 from taxel.detect import Readout, load
 from taxel.live._requests.reasons import reasons
 from taxel.live._shown_files import Opening, ShownFiles
-from taxel.tasks import detect
 
 #: Code with which a task ends that was stopped.
 _INTERRUPTED = 130
@@ -132,6 +131,8 @@ class TrainingRequests:
             The readout's labels; its encoder, as JSON, with the tare that it read with (none for several sensors, each
             of which has its own); the detections: label, time, when known, in order of the last.
         """
+        from taxel.tasks import detect  # noqa: PLC0415  the command line starts quickly
+
         with reasons():
             loaded = load(readout)
             opened, _ = self._files.opened(recording, trial)

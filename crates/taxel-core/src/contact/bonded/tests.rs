@@ -11,14 +11,14 @@ fn linear(modulus_kpa: f64, thickness_mm: f64, poisson: f64) -> Foam {
     Foam { modulus_kpa, thickness_mm, poisson, yield_strain: 0.9, densification_strain: 0.99, ..Foam::default() }
 }
 
-/// Cells below a height over the place (x, y), sunk by a depth; and those that the layer may bulge to.
+/// Cells below a height over the point (x, y), sunk by a depth; and those that the layer may bulge to.
 fn cells(layer: &Bonded, depth: f64, height: impl Fn(f64, f64) -> f64) -> Vec<Cell> {
     let (rows, columns) = layer.shape();
     let above = -layer.bulge() * depth;
     let mut found = vec![];
     for y in 0..rows {
         for x in 0..columns {
-            let sunk_mm = depth - height(layer.place_mm(x), layer.place_mm(y));
+            let sunk_mm = depth - height(layer.cell_mm(x), layer.cell_mm(y));
             if sunk_mm > above {
                 found.push(Cell { x: x as u32, y: y as u32, sunk_mm });
             }
@@ -122,7 +122,7 @@ fn no_cell_outside_the_candidates_is_entered() {
             layer.waves.convolve(&surface, Stop::never()).unwrap();
             for y in 0..rows {
                 for x in 0..columns {
-                    let gap = layer.waves.plane[y * layer.wide + x] + shape(layer.place_mm(x), layer.place_mm(y));
+                    let gap = layer.waves.plane[y * layer.wide + x] + shape(layer.cell_mm(x), layer.cell_mm(y));
                     assert!(gap > (1.0 - 2e-3) * depth, "nu {nu}, R {radius}: {} at {x}, {y}", gap - depth);
                 }
             }
@@ -142,7 +142,7 @@ fn a_wide_flat_touch_follows_the_foams_own_law() {
         let pressure = layer.press(&found, Stop::never()).unwrap().to_vec();
         let centre = found
             .iter()
-            .position(|c| layer.place_mm(c.x as usize) == 60.0 && layer.place_mm(c.y as usize) == 60.0)
+            .position(|c| layer.cell_mm(c.x as usize) == 60.0 && layer.cell_mm(c.y as usize) == 60.0)
             .unwrap();
         let law = 1e-3 * foam.stress_kpa(depth / foam.thickness_mm);
         assert!((pressure[centre] / law - 1.0).abs() < 2e-3, "{depth} mm: {} against {law}", pressure[centre]);

@@ -1,7 +1,7 @@
 //! One ball that moves straight up and down on columns, as the taxels sense it.
 
 use super::super::{BodyShape, Footprint, Scene, Taxels, Track, pitch_of};
-use super::groups::{GROUPS, place};
+use super::groups::{GROUPS, steps_before};
 use crate::{Array, Result};
 
 /// The ball's track, where its force arrives, and which taxels it can reach, by group of lines.
@@ -54,8 +54,8 @@ impl BallOnColumns {
     /// Writes what the board reads in a frame into `clean`.
     pub fn show(&mut self, frame: usize, frame_us: f64, taxels: &Taxels, clean: &mut [f32]) {
         for group in 0..GROUPS {
-            let place = place(frame, group, frame_us);
-            let (before, share) = ((place as usize).min(self.track.force_n.len() - 2), place.fract() as f32);
+            let steps = steps_before(frame, group, frame_us);
+            let (before, share) = ((steps as usize).min(self.track.force_n.len() - 2), steps.fract() as f32);
             let between = |v: &[f32]| v[before] + share * (v[before + 1] - v[before]);
             let force = between(&self.track.force_n);
             if force == 0.0 && !self.pressed[group] {

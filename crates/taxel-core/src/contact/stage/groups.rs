@@ -7,7 +7,7 @@ pub const GROUPS: usize = 4;
 const FABRIC_US: f64 = 50.0;
 
 /// When a group of lines is read that shows the touch of `GROUPS` steps a frame.
-pub fn place(frame: usize, group: usize, frame_us: f64) -> f64 {
+pub fn steps_before(frame: usize, group: usize, frame_us: f64) -> f64 {
     let lag = FABRIC_US / (frame_us / GROUPS as f64) - 0.5;
     ((GROUPS * frame + group) as f64 - lag).max(0.0)
 }

@@ -3,7 +3,7 @@
 use super::super::bonded::MOST_SWEPT;
 use super::super::push::Sinking;
 use super::super::{BodyShape, Bonded, Motion, Scene, Taxels};
-use super::groups::{GROUPS, place};
+use super::groups::{GROUPS, steps_before};
 use crate::{Array, Result, Stop};
 
 /// Stress that no taxel senses, MPa: a millionth of a newton on it, a hundred-thousandth of what the thesis could detect.
@@ -20,7 +20,7 @@ pub(super) struct LayerScene {
     pub motion: Motion,
     sinking: Sinking,
     /// From one solution to the next, in steps of the motion.
-    every: usize,
+    interval: usize,
     /// The latest solutions, by their number; the newest last.
     solved: Vec<Solved>,
     pressure: Vec<f64>,
@@ -36,7 +36,7 @@ struct Solved {
     base: Vec<f32>,
 }
 
-/// So many frames lie between two solutions where a whole array is touched.
+/// Number of frames between two solutions where a whole array is touched.
 const SELDOM: usize = 4;
 
 impl LayerScene {
@@ -48,7 +48,7 @@ impl LayerScene {
             shapes,
             motion,
             sinking: Sinking::default(),
-            every: GROUPS,
+            interval: GROUPS,
             solved: vec![],
             pressure: vec![],
             pressed: [false; GROUPS],
@@ -56,7 +56,7 @@ impl LayerScene {
         };
         let most = (0..stress.motion.len()).step_by(50 * GROUPS).map(|k| stress.sink(k)).max().unwrap_or(0);
         if most > MOST_SWEPT {
-            stress.every = SELDOM * GROUPS;
+            stress.interval = SELDOM * GROUPS;
         }
         stress.layer.forget();
         stress
@@ -83,7 +83,7 @@ impl LayerScene {
             return Ok(());
         }
         let mut solved = if self.solved.len() < 3 { Solved::default() } else { self.solved.remove(0) };
-        let k = (number * self.every).min(self.motion.len() - 1);
+        let k = (number * self.interval).min(self.motion.len() - 1);
         solved.number = number;
         solved.touches = self.sink(k) > 0;
         if solved.touches {
@@ -121,13 +121,13 @@ impl LayerScene {
         clean: &mut [f32],
         stop: Stop<'_>,
     ) -> Result<()> {
-        (0..GROUPS).try_for_each(|group| self.group(group, place(frame, group, frame_us), taxels, clean, stop))
+        (0..GROUPS).try_for_each(|group| self.group(group, steps_before(frame, group, frame_us), taxels, clean, stop))
     }
 
-    /// Writes what a group of lines reads, `place` steps after the start, into `clean`.
-    fn group(&mut self, group: usize, place: f64, taxels: &Taxels, clean: &mut [f32], stop: Stop<'_>) -> Result<()> {
-        let number = place as usize / self.every;
-        let share = (place / self.every as f64 - number as f64) as f32;
+    /// Writes what a group of lines reads, `steps` steps after the start, into `clean`.
+    fn group(&mut self, group: usize, steps: f64, taxels: &Taxels, clean: &mut [f32], stop: Stop<'_>) -> Result<()> {
+        let number = steps as usize / self.interval;
+        let share = (steps / self.interval as f64 - number as f64) as f32;
         self.solve(number, stop)?;
         self.solve(number + 1, stop)?;
         let frame = |number: usize| self.solved.iter().find(|solved| solved.number == number).expect("solved above");

@@ -22,14 +22,14 @@ impl Readout {
 
     /// As [`Readout::from_json`], from the contents of the file without format and version.
     pub(in crate::detect) fn from_parts(parts: Value) -> Result<Self> {
-        let format = |message: String| Error::format(message);
+        let invalid = |error: Error| error.in_part("readout").into_format();
         // An encoder nested in another value would lose the parameter names from its errors, so it is read by itself
         // first.
         if let Some(encoder) = parts.get("encoder") {
-            Encoder::from_json(&encoder.to_string()).map_err(|e| format(format!("readout: {e}")))?;
+            Encoder::from_json(&encoder.to_string()).map_err(invalid)?;
         }
-        let readout: Self = reading::from_value(parts).map_err(|unfit| format(unfit.text("readout")))?;
-        readout.check().map_err(|e| format(format!("readout: {e}")))?;
+        let readout: Self = reading::from_value(parts).map_err(|unfit| Error::format(unfit.text("readout")))?;
+        readout.check().map_err(invalid)?;
         Ok(readout)
     }
 

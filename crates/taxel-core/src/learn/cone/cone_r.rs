@@ -109,15 +109,15 @@ pub struct Shares {
     pub values: Vec<f64>,
 }
 
-/// The slopes of the tangents below the terms of 6.14 that prove the gap of a fit: the nonzero ones, 1/mV. Of CONE-X
-/// (6.11) the rows are hard, and their multipliers take the place of D and C.
+/// The slopes of the tangents below the terms of 6.14 that prove the gap of a fit: the nonzero ones, 1/mV. In CONE-X
+/// (6.11) the rows are hard, and have multipliers instead of D and C.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct GapMultipliers {
-    /// Of D and C, or of hard rows.
+    /// The multipliers of D and C, or of hard rows.
     pub rows: Vec<(Row, f64)>,
-    /// Of B, by pattern and target.
+    /// The multipliers of B, by pattern and target.
     pub behind: Vec<((usize, usize), f64)>,
-    /// Of the l2 term, one per synapse, zeros included.
+    /// The multipliers of the l2 term, one per synapse, zeros included.
     pub pull: Vec<f64>,
 }
 
@@ -376,7 +376,7 @@ impl ConeRProblem {
         let (silent, all) = (self.rows.silent.len(), self.rows());
         let mut shares = vec![0.0; all];
         for (&row, &share) in multipliers.rows.iter().zip(&multipliers.values) {
-            let Some(place) = shares.get_mut(row) else {
+            let Some(entry) = shares.get_mut(row) else {
                 return Err(problem!("start"; ": a multiplier of row {row}, there are {all} rows"));
             };
             let low = if row < silent { 0.0 } else { objective.kink_of_c().1 };
@@ -386,7 +386,7 @@ impl ConeRProblem {
                     low + 1.0
                 ));
             }
-            *place = share;
+            *entry = share;
         }
         Ok(WarmStart { weights, shares: Some(shares) })
     }

@@ -1,6 +1,6 @@
 //! CONE-X (6.9 to 6.11): weights that satisfy every row of targets and silence exactly, or a proof that no weights do.
 //!
-//! Of a million silent instants, a few hundred are binding. Each round solves the problem over a working set of rows,
+//! A few hundred of a million silent instants are binding. Each round solves the problem over a working set of rows,
 //! evaluates silence everywhere at the resulting weights, and adds the worst instant of each interval in which it is
 //! violated. A dual active set finds the shortest weights (l2 alone, or no objective), with a lower bound at every
 //! step, and also decides feasibility. Other objectives continue from its weights.

@@ -14,7 +14,7 @@ use crate::{Result, Stop};
 /// cannot be raised takes 16.
 const MOST_PARTS: usize = 16;
 
-/// A target's row that is to be raised: its place among the targets, the potential wanted there, and the rise to it, mV.
+/// A target's row that is to be raised: its index among the targets, the potential wanted there, and the rise to it, mV.
 struct RaisedRow {
     target: usize,
     wanted: f64,
@@ -41,18 +41,18 @@ impl Exact {
             return Ok(None);
         }
         wanted.sort_by(|a, b| a.rise.total_cmp(&b.rise));
-        let every: Vec<&RaisedRow> = wanted.iter().collect();
-        let all = self.solution_with(weights, &every, &KeptRows::default())?;
+        let rows: Vec<&RaisedRow> = wanted.iter().collect();
+        let all = self.solution_with(weights, &rows, &KeptRows::default())?;
         // Weights that are no solution themselves would need more than a rise by a rounding error.
         if all.is_some() || self.find_unmet(weights)?.is_some() {
             return Ok(all);
         }
         let kept = self.kept(weights)?;
-        let all = self.solution_with(weights, &every, &kept)?;
-        if all.is_some() || every.len() == 1 {
+        let all = self.solution_with(weights, &rows, &kept)?;
+        if all.is_some() || rows.len() == 1 {
             return Ok(all);
         }
-        let (smaller, larger) = every.split_at(every.len() / 2);
+        let (smaller, larger) = rows.split_at(rows.len() / 2);
         let (mut raised, mut best, mut untried) = (vec![], None, vec![larger, smaller]);
         for _ in 0..MOST_PARTS {
             let Some(part) = untried.pop().filter(|_| !stop.asked()) else { break };

@@ -201,7 +201,7 @@ impl<'a> Lagrangian<'a> {
         engine.sigma = if warm { 500.0 } else { 1.0 } * size / width;
         engine.rho = if warm { 1e-3 } else { 0.1 } * size / width;
         if warm {
-            engine.hold_still();
+            engine.balance_multipliers();
         }
         engine
     }
@@ -288,8 +288,8 @@ impl<'a> Lagrangian<'a> {
         (slope, held, at)
     }
 
-    /// Sets the multipliers of l1 and bounds to balance all other slopes for weights that are at 0 or at a bound.
-    fn hold_still(&mut self) {
+    /// Sets the multipliers of l1 and of the bounds so that the gradient is 0 at weights that are 0 or at a bound.
+    fn balance_multipliers(&mut self) {
         self.slope();
         for n in 0..self.weights.len() {
             let (w, o) = (self.weights[n], self.objective);

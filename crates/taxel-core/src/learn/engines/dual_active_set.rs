@@ -74,9 +74,9 @@ pub struct DualActiveSet {
     /// The products of rows by slot and slot, `gram_stride` numbers per row.
     gram: Aligned,
     gram_stride: usize,
-    /// The slots of the active rows in the order of the factor, and the place of each slot in that order.
+    /// The slots of the active rows in the order of the factor, and the position of each slot in that order.
     active: Vec<usize>,
-    place: Vec<Option<usize>>,
+    positions: Vec<Option<usize>>,
     factor: CholeskyFactor,
     /// Multipliers by slot, 0 where not active.
     multipliers: Vec<f64>,
@@ -118,7 +118,7 @@ impl DualActiveSet {
             gram: Aligned::default(),
             gram_stride: 0,
             active: Vec::new(),
-            place: Vec::new(),
+            positions: Vec::new(),
             factor: CholeskyFactor::default(),
             multipliers: Vec::new(),
             weights: vec![0.0; stride],
@@ -171,7 +171,7 @@ impl DualActiveSet {
         for at in (0..self.live.len()).rev() {
             let slot = self.live[at];
             match self.rows[slot].kind {
-                _ if self.place[slot].is_some() => continue,
+                _ if self.positions[slot].is_some() => continue,
                 ConstraintKind::Inequality(id) => dropped.push(id),
                 ConstraintKind::Lower(n) => self.bounds[n][0] = None,
                 ConstraintKind::Upper(n) => self.bounds[n][1] = None,
@@ -310,7 +310,7 @@ impl DualActiveSet {
                     ConstraintKind::Equality(_) if since < 0.0 => (-1.0, -since),
                     _ => (1.0, since),
                 };
-                if self.place[slot].is_some() || violation <= self.rows[slot].tolerance() {
+                if self.positions[slot].is_some() || violation <= self.rows[slot].tolerance() {
                     continue;
                 }
                 if let Some(ray) = self.step(slot, sign, violation) {

@@ -140,13 +140,13 @@ impl Relaxed {
                 |round, rows, _, _| progress(rounds + round, rows, best.parts.sum(), best.gap(proof.bound));
             let found = small.augmented(objective, 0.3 * tolerance, from, &mut report, stop);
             rounds += found.rounds;
-            let place = |k: usize| live.get(k).copied().unwrap_or(silent + k - live.len().min(k));
+            let index = |k: usize| live.get(k).copied().unwrap_or(silent + k - live.len().min(k));
             for (k, &share) in found.shares.iter().enumerate() {
-                shares[place(k)] = share;
+                shares[index(k)] = share;
             }
             let mut multipliers = vec![0.0; shares.len()];
             for (k, &multiplier) in found.proof.multipliers.iter().enumerate() {
-                multipliers[place(k)] = multiplier;
+                multipliers[index(k)] = multiplier;
             }
             proof.improve(RelaxedProof { multipliers, ..found.proof });
             let point = self.point(objective, found.best.weights);

@@ -239,21 +239,21 @@ impl Relaxed {
         let targets = self.targets.names.iter().zip(&self.targets.times);
         let near: Vec<_> = targets.map(|(name, &t)| self.silent.before(name.0, t, START_NEAR_MS)).collect();
         let of_a_target = near.iter().map(|rows| rows.len().div_ceil(stride)).max().unwrap_or(0) + 1;
-        let every = (self.targets.len() * of_a_target).div_ceil(START_ROWS).max(1);
+        let spacing = (self.targets.len() * of_a_target).div_ceil(START_ROWS).max(1);
         let mut rows = Vec::new();
-        for before in near.iter().step_by(every) {
+        for before in near.iter().step_by(spacing) {
             rows.extend(before.clone().rev().step_by(stride).filter(|&row| self.silent.limit[row].is_finite()));
         }
         rows.sort_unstable();
         rows.dedup();
         let mixed = objective.mixed_factor();
-        let mut weight = vec![objective.d * (stride * every) as f64; rows.len()];
+        let mut weight = vec![objective.d * (stride * spacing) as f64; rows.len()];
         let mut linear = vec![0.0; self.trains];
         for (k, target) in self.targets.iter().enumerate() {
-            if k % every == 0 {
+            if k % spacing == 0 {
                 rows.push(self.silent.len() + k);
-                weight.push(objective.kink_of_c().0 * every as f64);
-                add(&mut linear, -objective.c * every as f64, target.at);
+                weight.push(objective.kink_of_c().0 * spacing as f64);
+                add(&mut linear, -objective.c * spacing as f64, target.at);
             }
             add(&mut linear, mixed * target.threshold, target.behind);
         }

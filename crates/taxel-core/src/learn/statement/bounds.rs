@@ -86,8 +86,8 @@ pub(crate) fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
     for n in 0..each.unwrap_or(1) {
         let (low, high) = (lb.at(n), ub.at(n));
         if !(is_weight(low) && is_weight(high) && low <= high) {
-            let place = if each.is_some() { format!("bounds of synapse {n}:") } else { "bounds".to_owned() };
-            return Err(problem!("{place} {low} to {high} mV: lb must not lie above ub, both within 1e100"));
+            let bounds = if each.is_some() { format!("bounds of synapse {n}:") } else { "bounds".to_owned() };
+            return Err(problem!("{bounds} {low} to {high} mV: lb must not lie above ub, both within 1e100"));
         }
     }
     Ok(())

@@ -131,11 +131,11 @@ impl SilentRows {
             if k % 4096 == 0 {
                 stop.check()?;
             }
-            let place = grid.place(t);
+            let time = grid.locate(t);
             // An input exactly at a point acts after it; with a kernel that jumps at 0, from the next point on.
-            let acts_at = if self.shape.input().b == 0.0 { place.from() } else { place.behind() };
+            let acts_at = if self.shape.input().b == 0.0 { time.from() } else { time.behind() };
             if acts_at < points as f64 && !is_lost(neuron, targets, t, grid.time(acts_at)) {
-                let age = grid.between(place, GridTime::at(acts_at)).max(0.0);
+                let age = grid.between(time, GridTime::at(acts_at)).max(0.0);
                 let mut unit = KernelSum::default();
                 self.shape.add(&mut unit, 1.0, f64::from(value), age);
                 inputs.push(GridInput { point: acts_at as u32, train, a: unit.a, b: unit.b });
@@ -144,7 +144,7 @@ impl SilentRows {
         inputs.sort_by_key(|i| i.point);
         let resets = match neuron.after_spike {
             AfterSpike::Reset => {
-                let behind = targets.iter().map(|&t| grid.place(t).behind());
+                let behind = targets.iter().map(|&t| grid.locate(t).behind());
                 behind.filter(|&point| point < points as f64).map(|point| point as u32).collect()
             }
             AfterSpike::Keep | AfterSpike::Ignore => vec![],
@@ -158,7 +158,7 @@ impl SilentRows {
     /// The numbers of the rows from `near_ms` before `t` up to and including `t`.
     pub(crate) fn before(&self, pattern: usize, t: f64, near_ms: f64) -> std::ops::Range<usize> {
         let Lane { first, points, grid, .. } = self.lanes[pattern];
-        let after = (grid.place(t).behind() as usize).min(points);
+        let after = (grid.locate(t).behind() as usize).min(points);
         let near = (near_ms / self.step_ms).ceil() as usize;
         first + after.saturating_sub(near + 1)..first + after
     }
@@ -334,15 +334,15 @@ impl SilentRows {
             return rows.iter().flat_map(|row| &written[row * n..(row + 1) * n]).copied().collect();
         }
         let mut out = vec![0.0; rows.len() * n];
-        let mut place = 0;
+        let mut index = 0;
         for lane in &self.lanes {
-            if place == rows.len() || rows[place] >= lane.first + lane.points {
+            if index == rows.len() || rows[index] >= lane.first + lane.points {
                 continue;
             }
             let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
             let (mut jump, mut input, mut at) = (0, 0, 0_u32);
-            while place < rows.len() && rows[place] < lane.first + lane.points {
-                let point = (rows[place] - lane.first) as u32;
+            while index < rows.len() && rows[index] < lane.first + lane.points {
+                let point = (rows[index] - lane.first) as u32;
                 let next = jump + lane.jumps[jump..].partition_point(|s| s.point <= point);
                 let passed = &lane.jumps[jump..next];
                 if let Some(reset) = passed.iter().rposition(|s| s.reset) {
@@ -364,8 +364,8 @@ impl SilentRows {
                     b[i.train as usize] += now.b;
                 }
                 (jump, input, at) = (next, end, point);
-                out[place * n..(place + 1) * n].copy_from_slice(&b);
-                place += 1;
+                out[index * n..(index + 1) * n].copy_from_slice(&b);
+                index += 1;
             }
         }
         out

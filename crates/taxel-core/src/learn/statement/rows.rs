@@ -402,8 +402,8 @@ impl Statement {
     }
 
     /// Whether two patterns have the same inputs and the same targets before `t`.
-    pub(crate) fn is_same_before(&self, t: f64, pattern: usize, other: usize) -> bool {
-        let [a, b] = [pattern, other].map(|p| &self.examples[p]);
+    pub(crate) fn is_same_before(&self, t: f64, pattern: usize, second: usize) -> bool {
+        let [a, b] = [pattern, second].map(|p| &self.examples[p]);
         let fired = |example: &'_ Example| example.targets.partition_point(|&target| target < t);
         let raised = self.neuron.first_threshold == FirstThreshold::Base || a.start == b.start;
         raised && a.before(t) == b.before(t) && a.targets[..fired(a)] == b.targets[..fired(b)]
@@ -416,7 +416,7 @@ impl Statement {
 
     /// Whether `t` is a point of the grid.
     pub(crate) fn is_point(&self, example: &Example, t: f64) -> bool {
-        Grid::new(example.start, self.neuron.step_ms).place(t).is_point()
+        Grid::new(example.start, self.neuron.step_ms).locate(t).is_point()
     }
 
     /// Whether `t` is in a window of silence, and neither a target nor in the refractory time after one.

@@ -94,7 +94,7 @@ fn against<V: Vector, const SIDE: usize>(
     stop: Stop<'_>,
 ) -> Result<usize> {
     let (times, cost) = (rows::<SIDE>(&block.times), rows_mut::<SIDE>(cost));
-    let (one, q) = (V::splat(1.0), V::splat(q));
+    let (unit, q) = (V::splat(1.0), V::splat(q));
     cost[0] = [[0.0; LANES]; SIDE];
     let (mut lo, mut hi) = (0, 0);
     for (i, &t) in a.iter().enumerate() {
@@ -104,7 +104,7 @@ fn against<V: Vector, const SIDE: usize>(
         while hi < block.first.len() && block.first[hi] <= t + reach {
             let (done, next) = cost.split_at_mut(hi + 1);
             for (from, to) in done[hi].iter().zip(&mut next[0]) {
-                V::load(from).plus(one).store(to);
+                V::load(from).plus(unit).store(to);
             }
             hi += 1;
         }
@@ -112,17 +112,17 @@ fn against<V: Vector, const SIDE: usize>(
             lo += 1;
         }
         let from = V::splat(t);
-        let (mut diagonal, mut left) = ([one; SIDE], [one; SIDE]);
+        let (mut diagonal, mut left) = ([unit; SIDE], [unit; SIDE]);
         for (s, above) in cost[lo].iter_mut().enumerate() {
             diagonal[s] = V::load(above);
-            left[s] = diagonal[s].plus(one);
+            left[s] = diagonal[s].plus(unit);
             left[s].store(above);
         }
         for (to, above) in times[lo..hi].iter().zip(&mut cost[lo + 1..=hi]) {
             for s in 0..SIDE {
                 let moved = diagonal[s].plus(q.times(from.away(V::load(&to[s]))));
                 diagonal[s] = V::load(&above[s]);
-                left[s] = moved.lesser(diagonal[s].lesser(left[s]).plus(one));
+                left[s] = moved.lesser(diagonal[s].lesser(left[s]).plus(unit));
                 left[s].store(&mut above[s]);
             }
         }

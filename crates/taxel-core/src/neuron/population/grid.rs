@@ -92,7 +92,7 @@ impl Script {
     pub(super) fn new(neuron: &Neuron, trains: &SpikeTrains, threshold: f64, stop: Stop<'_>) -> Result<Self> {
         let (shape, step_ms, start) = (neuron.shape(), neuron.step_ms, trains.start);
         let (grid, spikes) = (Grid::new(start, step_ms), trains.by_time(stop)?);
-        let last = grid.place(trains.stop).until();
+        let last = grid.locate(trains.stop).until();
         let mut inputs: Vec<Input> = Vec::with_capacity(spikes.len());
         let (mut points, mut rest) = (vec![], spikes.iter().peekable());
         let mut point = 0.0;
@@ -102,8 +102,8 @@ impl Script {
             }
             let t = grid.time(point);
             let mut arriving = vec![];
-            while let Some(spike) = rest.next_if(|s| grid.place(s.t).from() <= point) {
-                let age = grid.between(grid.place(spike.t), GridTime::at(point));
+            while let Some(spike) = rest.next_if(|s| grid.locate(s.t).from() <= point) {
+                let age = grid.between(grid.locate(spike.t), GridTime::at(point));
                 let mut unit_state = KernelSum::default();
                 shape.add(&mut unit_state, 1.0, f64::from(spike.value), age.max(0.0));
                 let to = if age > 0.0 { &mut inputs } else { &mut arriving };

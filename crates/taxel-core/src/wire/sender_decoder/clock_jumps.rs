@@ -1,6 +1,6 @@
 //! Detects where the times of version 1 jump ahead of the host's clock, as they do after a damaged stamp: the stamps that
-//! follow seem to lie a turn of the 16-bit counter later, and all times since are 6.5536 s too late. So they do after a reset of
-//! the board, by what was left of the turn.
+//! follow seem to lie a turn of the 16-bit counter later, and all times since are 6.5536 s too late. A reset of the board has
+//! the same effect: times are late by the rest of the turn.
 
 use crate::events::FARTHEST_BACK_US;
 
@@ -71,15 +71,15 @@ mod tests {
     #[test]
     fn a_damaged_stamp_makes_times_doubtful_from_there_on() {
         for flipped in [1 << 11, 1 << 14, 1 << 15] {
-            for place in 0..3 {
+            for word in 0..3 {
                 let mut datagrams: Vec<_> = regular(1, 100).collect();
-                datagrams[50].0[place] ^= flipped;
+                datagrams[50].0[word] ^= flipped;
                 let (decoder, events) = decode(datagrams);
-                assert_eq!(decoder.totals().jumps, 1, "{flipped} at {place}");
+                assert_eq!(decoder.totals().jumps, 1, "{flipped} at {word}");
                 let after = decoder.totals().doubtful_after.unwrap();
-                let (wrong, at) = (events.t[150 + place], events.t[149]);
-                assert!(wrong != 510_000 + 100 * place as i64);
-                assert_eq!(after, at, "{flipped} at {place}");
+                let (wrong, at) = (events.t[150 + word], events.t[149]);
+                assert!(wrong != 510_000 + 100 * word as i64);
+                assert_eq!(after, at, "{flipped} at {word}");
                 assert!(events.t[299] - events.t[0] > 7_000_000, "a turn too late");
             }
         }

@@ -14,9 +14,9 @@ pub(super) const EVEN: usize = 64;
 
 /// A datagram's bytes but for its checksum, and that checksum; it must have four bytes.
 #[inline(always)]
-pub(super) fn split(datagram: &[u8]) -> (&[u8], u32) {
-    let (summed, sum) = datagram.split_at(datagram.len() - 4);
-    (summed, u32::from_le_bytes([sum[0], sum[1], sum[2], sum[3]]))
+pub(super) fn split_checksum(datagram: &[u8]) -> (&[u8], u32) {
+    let (body, sum) = datagram.split_at(datagram.len() - 4);
+    (body, u32::from_le_bytes([sum[0], sum[1], sum[2], sum[3]]))
 }
 
 /// The CRC-32C of bytes.
@@ -58,7 +58,7 @@ static BEFORE_ZEROS: [u32; EVEN - REGISTER + 1] = {
     out
 };
 
-/// Indices for `pshufb`: those from place `16 - k` on move a register's bytes back by `k` places, with zeros before
+/// Indices for `pshufb`: those from index `16 - k` on move a register's bytes back by `k` bytes, with zeros before
 /// them.
 #[cfg(target_arch = "x86_64")]
 static TO_BACK: [u8; 2 * REGISTER] = {
@@ -86,7 +86,7 @@ pub(super) unsafe fn even(bytes: &[u8]) -> u32 {
     for at in (0..EVEN).step_by(REGISTER) {
         let (from, moved) = (at.saturating_sub(zeros), zeros.saturating_sub(at).min(REGISTER));
         // SAFETY: `from` is at least 0 and at most 16 bytes before the end of `bytes`, as `at` is before the end of the
-        // 64 bytes; the table has 16 bytes from each of its places 0 to 16 on.
+        // 64 bytes; the table has 16 bytes from each of its indices 0 to 16 on.
         let lanes = unsafe {
             let lanes = _mm_loadu_si128(bytes.as_ptr().add(from).cast());
             _mm_shuffle_epi8(lanes, _mm_loadu_si128(TO_BACK.as_ptr().add(REGISTER - moved).cast()))

@@ -9,7 +9,7 @@ mod run_totals;
 mod session;
 mod words;
 
-use super::checksum::split;
+use super::checksum::split_checksum;
 use super::counts::{BoardTotals, Counts};
 use super::{DIFFERENCES, DROPPED, DatagramHeader, FRAME_SYNC, Refused};
 use crate::events::FARTHEST_BACK_US;
@@ -65,7 +65,7 @@ pub struct Decoder {
     sessions: Vec<BoardSession>,
     /// Missing sequence numbers of sessions that are no longer kept.
     missed_before: u64,
-    /// Of these sessions, by how much fewer numbers were missing when they were dropped than when a recording began.
+    /// Missing numbers of these sessions when a recording began, less those when they were dropped.
     filled_before: i64,
     /// The host's clock when the last datagram arrived, and the latest time at that moment, us.
     last_arrival: Option<(i64, i64)>,
@@ -241,7 +241,7 @@ impl Decoder {
         if *self.board.get_or_insert(header.board) != header.board {
             return self.refuse_other_board();
         }
-        let sum = split(datagram).1;
+        let sum = split_checksum(datagram).1;
         let (index, reset) = match self.sessions.last() {
             // The usual case.
             Some(last) if last.is_next(header) && last.unlike == 0 => (self.sessions.len() - 1, false),
@@ -336,7 +336,7 @@ impl Decoder {
         RunTotals::default()
     }
 
-    /// The session of a datagram with this sum, and whether the datagram begins it.
+    /// The index of the session that a datagram with this checksum belongs to, and whether it is the session's first datagram.
     fn session(&mut self, header: &DatagramHeader, sum: u32, arrived: Option<i64>) -> (usize, bool) {
         // The latest session with this number, in case two resets drew the same one.
         if let Some(index) = self.sessions.iter().rposition(|session| session.number == header.session) {
@@ -363,13 +363,13 @@ impl Decoder {
         };
         // After its reset the board compares with 0, and sends every taxel whose value differs. If its first datagrams
         // are lost, or if it only changed from version 1 without a reset, the other taxels' values are unknown.
-        let whole = header.sequence == 0 && !(began && self.goes_on);
-        if whole || !began {
-            self.held.forget(whole.then_some(0));
+        let from_start = header.sequence == 0 && !(began && self.goes_on);
+        if from_start || !began {
+            self.held.forget(from_start.then_some(0));
         }
         self.counts.resets += u64::from(!began);
         self.status_number = i64::MIN;
-        self.dropped_before = whole.then_some(0);
+        self.dropped_before = from_start.then_some(0);
         if self.sessions.len() == SESSIONS {
             let session = self.sessions.remove(0);
             self.missed_before += session.missing();

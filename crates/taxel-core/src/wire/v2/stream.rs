@@ -66,12 +66,12 @@ fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, sink: &mut impl DatagramSink
         let likely = (HEADER_BYTES + TRAILER_BYTES..=DATAGRAM_BYTES).contains(&length)
             && DatagramHeader::likely(&rest[LENGTH_BYTES..]);
         if likely {
-            let whole = rest.get(LENGTH_BYTES..LENGTH_BYTES + length);
-            if whole.is_none() && !ends {
+            let datagram = rest.get(LENGTH_BYTES..LENGTH_BYTES + length);
+            if datagram.is_none() && !ends {
                 return at;
             }
             if let Some((datagram, (header, body))) =
-                whole.and_then(|bytes| Some((bytes, DatagramHeader::read(bytes).ok()?)))
+                datagram.and_then(|bytes| Some((bytes, DatagramHeader::read(bytes).ok()?)))
             {
                 sink.take(datagram, &header, body);
                 at += LENGTH_BYTES + length;

@@ -37,8 +37,8 @@ pub(super) struct Blocks {
     pub(super) path: PathBuf,
     pub(super) file: File,
     pub(super) length: u64,
-    pub(super) places: Vec<FileBlock>,
-    /// Of each place where something was skipped, the number of blocks before it and what the message indexes around it list.
+    pub(super) blocks: Vec<FileBlock>,
+    /// For each offset where something was skipped: the number of blocks before it, and what the message indexes around it list.
     pub(super) skipped: Vec<(usize, Option<IndexedChunks>)>,
     pub(super) summary: Option<FileSummary>,
 }
@@ -47,7 +47,7 @@ impl Blocks {
     /// The header's copy in the first chunk that has one.
     pub(super) fn header(&self) -> Result<Option<Header>> {
         let (mut bytes, mut header) = (Vec::new(), None);
-        for block in &self.places {
+        for block in &self.blocks {
             self.records(*block, &mut bytes, |record| {
                 if let Record::Channel(channel) = record {
                     header = channel.metadata.get("header").and_then(|text| serde_json::from_str(text).ok());

@@ -187,7 +187,7 @@ pub fn begin_with(decoder: &mut wire::SenderDecoder, data: &[u8]) {
 
 /// The zeroing that a note states; `None` of any other note.
 fn zeroing(t_us: Option<i64>, value: &Value) -> Option<Zeroing> {
-    let whole = |key: &str| value[key].as_u64().and_then(|n| u16::try_from(n).ok());
-    let (t, x, y) = (t_us?, whole("x")?, whole("y")?);
+    let number = |key: &str| value[key].as_u64().and_then(|n| u16::try_from(n).ok());
+    let (t, x, y) = (t_us?, number("x")?, number("y")?);
     Some(Zeroing { t, x, y, rest: value["rest"].as_f64()?, before: value["before"].as_f64() })
 }

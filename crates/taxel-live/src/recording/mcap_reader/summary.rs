@@ -31,7 +31,7 @@ impl FileSummary {
             .with_validate_summary_section_crc(true)
             .with_record_length_limit(usize::try_from(limits::METADATA).ok()?);
         let mut reader = LinearReader::new_with_options(options);
-        let (mut summary, mut names, mut counts, mut whole) = (Self::default(), BTreeMap::new(), None, false);
+        let (mut summary, mut names, mut counts, mut complete) = (Self::default(), BTreeMap::new(), None, false);
         while let Some(event) = reader.next_event() {
             match event.ok()? {
                 LinearReadEvent::ReadRequest(wanted) => {
@@ -50,7 +50,7 @@ impl FileSummary {
                 LinearReadEvent::Record { opcode: op::METADATA_INDEX, data } => {
                     summary.finished |= data.get(20..) == Some(END.as_bytes());
                 }
-                LinearReadEvent::Record { opcode: op::FOOTER, .. } => whole = true,
+                LinearReadEvent::Record { opcode: op::FOOTER, .. } => complete = true,
                 LinearReadEvent::Record { .. } => {}
             }
         }
@@ -60,7 +60,7 @@ impl FileSummary {
             summary.messages = Some(by_name.collect());
         }
         summary.end = at;
-        whole.then_some(summary)
+        complete.then_some(summary)
     }
 }
 

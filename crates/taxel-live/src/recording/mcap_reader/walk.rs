@@ -44,7 +44,7 @@ pub(super) struct FileWalk<'a> {
     /// The final counts of the other sources.
     pub(super) ends: BTreeMap<String, RecordingCounts>,
     pub(super) blocks: Vec<FileBlock>,
-    /// Of each place where something was skipped, the number of blocks before it and what the message indexes between these
+    /// For each offset where something was skipped: the number of blocks before it, and what the message indexes between these
     /// blocks and the next one list; none where bytes are missing or too many, as these indexes may be of other chunks.
     pub(super) skipped: Vec<(usize, Option<IndexedChunks>)>,
     /// What message indexes list since the last block, and what was skipped since.
@@ -273,7 +273,7 @@ impl<'a> FileWalk<'a> {
             op::METADATA => {
                 length < limits::METADATA && self.bytes(at + RECORD_HEAD + 4, BEGIN.len() as u64)? == BEGIN.as_bytes()
             }
-            // A footer behind the data names the place where its summary begins.
+            // A footer behind the data names the offset where its summary begins.
             op::DATA_END => {
                 let footer = self.bytes(self.length.saturating_sub(FOOTER), FOOTER)?;
                 footer.first() == Some(&op::FOOTER) && number(&footer, 9).is_some_and(|begin| begin == next)
@@ -291,11 +291,11 @@ impl<'a> FileWalk<'a> {
                 if !matches!(byte, op::CHUNK | op::MESSAGE_INDEX | op::METADATA | op::DATA_END) {
                     continue;
                 }
-                let place = at + k as u64;
-                if let Some((opcode, length, _)) = self.readable_record(place)?
-                    && self.resumes(place, opcode, length)?
+                let offset = at + k as u64;
+                if let Some((opcode, length, _)) = self.readable_record(offset)?
+                    && self.resumes(offset, opcode, length)?
                 {
-                    return Ok(Some(place));
+                    return Ok(Some(offset));
                 }
             }
             at += window.len() as u64;
@@ -350,9 +350,9 @@ fn packed_range(head: &[u8]) -> Option<(u64, u64)> {
     Some(((NAME + 4 + name_bytes + 8) as u64, number(head, NAME + 4 + name_bytes)?))
 }
 
-/// The 64-bit number at `place`.
-fn number(bytes: &[u8], place: usize) -> Option<u64> {
-    bytes.get(place..place + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes)
+/// The 64-bit number at `offset`.
+fn number(bytes: &[u8], offset: usize) -> Option<u64> {
+    bytes.get(offset..offset + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes)
 }
 
 /// The 32-bit number in four bytes.

@@ -16,7 +16,7 @@ pub(super) struct RecordFile {
     waiting: Vec<u8>,
     written: u64,
     /// End of the last whole record in the file.
-    whole: u64,
+    complete: u64,
     at_disk: Arc<AtomicBool>,
 }
 
@@ -40,14 +40,14 @@ impl Write for RecordFile {
 
     fn flush(&mut self) -> io::Result<()> {
         self.hand_over()?;
-        self.whole = self.written;
+        self.complete = self.written;
         Ok(())
     }
 }
 
 impl RecordFile {
     pub(super) fn new(file: OutputFile, at_disk: &Arc<AtomicBool>) -> Self {
-        Self { file, waiting: Vec::new(), written: 0, whole: 0, at_disk: Arc::clone(at_disk) }
+        Self { file, waiting: Vec::new(), written: 0, complete: 0, at_disk: Arc::clone(at_disk) }
     }
 
     /// Waits until everything is on the disk.
@@ -77,8 +77,8 @@ impl RecordFile {
     pub(super) fn salvage(self, why: &str) {
         let mut file = self.file.file();
         let mut close = |end: &[u8]| -> io::Result<()> {
-            file.set_len(self.whole)?;
-            file.seek(SeekFrom::Start(self.whole))?;
+            file.set_len(self.complete)?;
+            file.seek(SeekFrom::Start(self.complete))?;
             file.write_all(end)
         };
         let with_reason = [stop_record(why).as_slice(), CLOSING].concat();

@@ -320,8 +320,8 @@ impl WriteFailure {
     fn new(error: McapError) -> Self {
         match error {
             McapError::Io(error) => {
-                let whole = error.to_string();
-                let text = whole.split(" (os error").next().unwrap_or(&whole).to_owned();
+                let message = error.to_string();
+                let text = message.split(" (os error").next().unwrap_or(&message).to_owned();
                 Self { code: error.raw_os_error(), text }
             }
             other => Self { code: None, text: other.to_string() },

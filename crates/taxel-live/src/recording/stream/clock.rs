@@ -35,7 +35,7 @@ pub struct StreamClock {
 #[derive(Debug, Clone, Copy)]
 struct State {
     /// Whether all stamps so far are whole numbers, so that they may be those of a counter.
-    whole: bool,
+    integers: bool,
     /// Added to stamps, us.
     added: f64,
     /// The last time, with this addition, us, and its arrival time, ns.
@@ -94,7 +94,7 @@ enum StampStep {
     Fits(f64),
     /// Behind it, by less than a restart.
     Back,
-    /// So far behind that the clock has begun anew: what it lacks, us.
+    /// Farther behind, so the clock has begun anew: what it lacks, us.
     Anew(f64),
     /// Farther ahead than the time that has passed.
     Ahead,
@@ -112,7 +112,7 @@ impl State {
         let turns = (lacks / turn).round();
         // Arrival times determine the elapsed time within a second, or within a hundredth of a pause if that is longer.
         let near = STEP_US.max(passed.abs() * DRIFT);
-        if self.whole && turns >= 1.0 && (lacks - turns * turn).abs() <= near {
+        if self.integers && turns >= 1.0 && (lacks - turns * turn).abs() <= near {
             StampStep::Fits(turns * turn)
         } else if t < last - STEP_US && lacks > near {
             StampStep::Anew(lacks)
@@ -134,7 +134,7 @@ impl State {
 impl StreamClock {
     /// The clock of stamps in this unit, us.
     pub fn new(unit_us: f64) -> Self {
-        let state = State { whole: true, added: 0.0, last: None, anchor: None };
+        let state = State { integers: true, added: 0.0, last: None, anchor: None };
         Self { unit_us, state, before: None, resets: 0, back: 0, jumps: 0, drifts: 0, after: None }
     }
 
@@ -177,7 +177,7 @@ impl StreamClock {
                 self.jumped(state.last);
             }
         }
-        self.state.whole &= stamp.fract() == 0.0 && (0.0..TURN).contains(&stamp);
+        self.state.integers &= stamp.fract() == 0.0 && (0.0..TURN).contains(&stamp);
         let t = stamp_us + self.state.added;
         self.compare(state.last, (t, at_ns), anew);
         self.state.last = Some((t, at_ns));

@@ -109,16 +109,16 @@ impl Verdict {
         }
         lost.retain(|_, n| *n > 0);
         for (topic, n) in &lost {
-            if let Some((cause, what)) = topic.lost_in_file() {
+            if let Some((cause, noun)) = topic.lost_in_file() {
                 *verdict.lost.entry(cause.to_owned()).or_default() += *n;
-                bad.push(format!("{} lost", counted(*n, what)));
+                bad.push(format!("{} lost", counted(*n, noun)));
             }
         }
         let lost_here = !lost.is_empty();
         if unknown {
             bad.push("what else was there is not known".to_owned());
         }
-        let whole = why.is_none() || rebuilt.no_end;
+        let has_end = why.is_none() || rebuilt.no_end;
         if (why.is_some() || lost_here) && verdict.status == RecordingStatus::NothingArrived {
             // It may have come after what is left of the file, or is lost there.
             verdict.status = RecordingStatus::Complete;
@@ -126,7 +126,7 @@ impl Verdict {
         if !bad.is_empty() || rebuilt.no_end {
             verdict.status = verdict.status.max(RecordingStatus::Damaged);
         }
-        if !whole || rebuilt.torn_bytes > 0 {
+        if !has_end || rebuilt.torn_bytes > 0 {
             verdict.status = verdict.status.max(RecordingStatus::Unfinished);
         }
         if lost_here {

@@ -6,11 +6,11 @@ use taxel_core::encode::{ChangeEvents, Encoder};
 use taxel_core::wire::{Command, Registers};
 
 use super::*;
-use crate::encoded_spikes::EncodedSpikes;
-use crate::frame::{About, of_player};
-use crate::player::{Player, ViewOptions};
 use crate::readout_encoders::ViewEncoder;
 use crate::time_columns::SPAN;
+use crate::view::encoded_spikes::EncodedSpikes;
+use crate::view::frame::{About, of_player};
+use crate::view::player::{Player, ViewOptions};
 use taxel_live::recording::{Writer, WriterOptions};
 
 /// The taxel whose history is shown.
@@ -206,11 +206,10 @@ fn steps_go_from_stamp_to_stamp_both_ways_and_through_silence() {
     stamps.dedup();
     let mut random = StdRng::seed_from_u64(8);
     for _ in 0..20 {
-        let place = random.random_range(1..stamps.len() - 1);
-        let mut player =
-            Player::open(Arc::new(Arc::clone(&index)), stamps[place], ViewOptions::plain(COLUMN_US)).unwrap();
-        assert_eq!(player.last_stamp().unwrap(), Some(stamps[place - 1]));
-        assert_eq!(player.next_stamp().unwrap(), Some(stamps[place + 1]));
+        let n = random.random_range(1..stamps.len() - 1);
+        let mut player = Player::open(Arc::new(Arc::clone(&index)), stamps[n], ViewOptions::plain(COLUMN_US)).unwrap();
+        assert_eq!(player.last_stamp().unwrap(), Some(stamps[n - 1]));
+        assert_eq!(player.next_stamp().unwrap(), Some(stamps[n + 1]));
     }
     std::fs::remove_file(&path).unwrap();
 }

@@ -48,7 +48,7 @@ impl DualActiveSet {
     /// Activates these rows with multiplier 0, except rows that (nearly) depend on others.
     pub(super) fn activate(&mut self, slots: &[usize]) {
         for block in slots.chunks(BLOCK) {
-            let block: Vec<usize> = block.iter().copied().filter(|&slot| self.place[slot].is_none()).collect();
+            let block: Vec<usize> = block.iter().copied().filter(|&slot| self.positions[slot].is_none()).collect();
             let stride = self.factor.padded_length();
             let mut g = vec![0.0; stride * block.len()];
             let mut inner_products = vec![0.0; block.len() * block.len()];
@@ -63,7 +63,7 @@ impl DualActiveSet {
             }
             let limits: Vec<f64> = block.iter().map(|&slot| self.rows[slot].limit).collect();
             for k in self.factor.append(&mut g, stride, &mut inner_products, &limits, DOUBTFUL, self.lower.len()) {
-                self.place[block[k]] = Some(self.active.len());
+                self.positions[block[k]] = Some(self.active.len());
                 self.active.push(block[k]);
             }
         }
@@ -74,13 +74,13 @@ impl DualActiveSet {
     pub(super) fn restore(&mut self, slots: &[usize], multipliers: &[f64]) {
         self.activate(slots);
         for &slot in slots {
-            if self.place[slot].is_none() {
+            if self.positions[slot].is_none() {
                 let mut d = self.products(slot);
                 self.factor.forward(&mut d);
                 let (pivot, _) = self.pivot(slot, &d);
                 if pivot > DEPENDENT[self.dependent] && self.active.len() < self.lower.len() {
                     self.factor.push(&d, pivot.sqrt(), self.rows[slot].limit);
-                    self.place[slot] = Some(self.active.len());
+                    self.positions[slot] = Some(self.active.len());
                     self.active.push(slot);
                 }
             }
@@ -131,12 +131,12 @@ impl DualActiveSet {
             let mut length = if dependent { f64::INFINITY } else { violation / pivot };
             let mut against = None;
             let largest = r.iter().fold(0.0, |largest: f64, r| largest.max(r.abs()));
-            for (place, (&held, r)) in self.active.iter().zip(&r).enumerate() {
+            for (position, (&held, r)) in self.active.iter().zip(&r).enumerate() {
                 let r = sign * r;
                 if r > 1e-13 * largest && !self.is_equality(held) {
                     let until = self.multipliers[held].max(0.0) / r;
                     if until < length {
-                        (length, against) = (until, Some(place));
+                        (length, against) = (until, Some(position));
                     }
                 }
             }
@@ -152,14 +152,14 @@ impl DualActiveSet {
                 self.multipliers[held] -= length * sign * r;
             }
             self.multipliers[slot] += length * sign;
-            let Some(place) = against else {
+            let Some(position) = against else {
                 self.factor.push(&d, pivot.sqrt(), self.rows[slot].limit);
-                self.place[slot] = Some(self.active.len());
+                self.positions[slot] = Some(self.active.len());
                 self.active.push(slot);
                 return None;
             };
             violation -= length * pivot;
-            self.deactivate(&[place], Some(&mut d));
+            self.deactivate(&[position], Some(&mut d));
         }
     }
 }

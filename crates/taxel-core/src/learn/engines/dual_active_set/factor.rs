@@ -107,10 +107,10 @@ impl CholeskyFactor {
             for d in &mut *column {
                 *d /= pivot;
             }
-            for (i, other) in after.chunks_exact_mut(rows).enumerate() {
+            for (i, later) in after.chunks_exact_mut(rows).enumerate() {
                 let by = column[i];
                 limits[k + 1 + i] -= by * limit;
-                for (product, d) in other[k + 1 + i..].iter_mut().zip(&column[i..]) {
+                for (product, d) in later[k + 1 + i..].iter_mut().zip(&column[i..]) {
                     *product -= by * d;
                 }
             }
@@ -122,29 +122,29 @@ impl CholeskyFactor {
             }
             column[self.inverse.len()..width].fill(0.0);
         }
-        for (j, (column, &other)) in self.l.chunks_exact_mut(self.stride).skip(m).zip(&taken).enumerate() {
+        for (j, (column, &row)) in self.l.chunks_exact_mut(self.stride).skip(m).zip(&taken).enumerate() {
             for (to, &k) in column[m + j..width].iter_mut().zip(&taken[j..]) {
-                *to = inner_products[other * rows + k];
+                *to = inner_products[row * rows + k];
             }
             column[self.inverse.len()..width].fill(0.0);
         }
         taken
     }
 
-    /// Removes the rows at these places (ascending); `d`, the vector of a row not yet pushed, is rotated with the rest.
-    pub(super) fn remove(&mut self, places: &[usize], mut d: Option<&mut Vec<f64>>) {
-        let Some(&first) = places.first() else { return };
+    /// Removes the rows at these positions (ascending); `d`, the vector of a row not yet pushed, is rotated with the rest.
+    pub(super) fn remove(&mut self, positions: &[usize], mut d: Option<&mut Vec<f64>>) {
+        let Some(&first) = positions.first() else { return };
         let (m, stride) = (self.len(), self.stride);
-        let left = m - places.len();
+        let left = m - positions.len();
         let width = m.next_multiple_of(LANES);
         for column in self.l.chunks_exact_mut(stride).take(first) {
-            close_up(column, m, places);
+            close_up(column, m, positions);
         }
-        let mut carries: Vec<Vec<f64>> = Vec::with_capacity(places.len());
-        let mut tails = Vec::with_capacity(places.len());
+        let mut carries: Vec<Vec<f64>> = Vec::with_capacity(positions.len());
+        let mut tails = Vec::with_capacity(positions.len());
         for k in first..m {
             let column = &mut self.l[k * stride..][..width];
-            if places.get(carries.len()) == Some(&k) {
+            if positions.get(carries.len()) == Some(&k) {
                 carries.push(column.to_vec());
                 tails.push((d.as_ref().map_or(0.0, |d| d[k]), self.limits[k]));
                 continue;
@@ -167,10 +167,10 @@ impl CholeskyFactor {
             }
             self.limits[to] = self.limits[k];
             let diagonal = column[k];
-            close_up(column, m, &places[carries.len()..]);
-            // Rows k and later must move up by `carries.len()` places; entries above the diagonal are undefined anyway.
+            close_up(column, m, &positions[carries.len()..]);
+            // Rows k and later must move up by `carries.len()` positions; entries above the diagonal are undefined anyway.
             let shift = carries.len();
-            self.l.copy_within(k * stride + k..k * stride + m - (places.len() - shift), to * stride + to);
+            self.l.copy_within(k * stride + k..k * stride + m - (positions.len() - shift), to * stride + to);
             self.l[to * stride + left..][..left.next_multiple_of(LANES) - left].fill(0.0);
             self.inverse[to] = 1.0 / diagonal;
         }
@@ -203,14 +203,14 @@ impl CholeskyFactor {
     }
 }
 
-/// Removes the entries at `places` from a column of `m` and sets the freed entries to 0.
-fn close_up(column: &mut [f64], m: usize, places: &[usize]) {
-    let Some(&first) = places.first() else { return };
+/// Removes the entries at `positions` from a column of `m` and sets the freed entries to 0.
+fn close_up(column: &mut [f64], m: usize, positions: &[usize]) {
+    let Some(&first) = positions.first() else { return };
     let mut to = first;
-    for (i, &place) in places.iter().enumerate() {
-        let end = places.get(i + 1).copied().unwrap_or(m);
-        column.copy_within(place + 1..end, to);
-        to += end - place - 1;
+    for (i, &position) in positions.iter().enumerate() {
+        let end = positions.get(i + 1).copied().unwrap_or(m);
+        column.copy_within(position + 1..end, to);
+        to += end - position - 1;
     }
     column[to..m].fill(0.0);
 }

@@ -6,24 +6,24 @@ impl DualActiveSet {
     /// Deactivates every row.
     pub(super) fn deactivate_all(&mut self) {
         for slot in std::mem::take(&mut self.active) {
-            self.place[slot] = None;
+            self.positions[slot] = None;
             self.multipliers[slot] = 0.0;
         }
         self.factor.clear();
     }
 
-    /// Deactivates the rows at these places (ascending); `d`, the vector of a row not yet active, is rotated with them.
-    pub(super) fn deactivate(&mut self, places: &[usize], d: Option<&mut Vec<f64>>) {
-        self.factor.remove(places, d);
-        for &place in places {
-            let slot = self.active[place];
-            self.place[slot] = None;
+    /// Deactivates the rows at these positions (ascending); `d`, the vector of a row not yet active, is rotated with them.
+    pub(super) fn deactivate(&mut self, positions: &[usize], d: Option<&mut Vec<f64>>) {
+        self.factor.remove(positions, d);
+        for &position in positions {
+            let slot = self.active[position];
+            self.positions[slot] = None;
             self.multipliers[slot] = 0.0;
         }
-        let place = &self.place;
-        self.active.retain(|&slot| place[slot].is_some());
-        for (place, &slot) in self.active.iter().enumerate() {
-            self.place[slot] = Some(place);
+        let positions = &self.positions;
+        self.active.retain(|&slot| positions[slot].is_some());
+        for (position, &slot) in self.active.iter().enumerate() {
+            self.positions[slot] = Some(position);
         }
     }
 

@@ -172,7 +172,7 @@ fn a_cut_takes_the_place_of_one_that_it_hardly_differs_from() {
         stated.inequalities.push((row, limit));
         let fresh = solver.extend_gram();
         solver.replace_similar(&fresh);
-        assert_eq!(solver.place[fresh[0]].is_some(), exchanged, "it is held at once where one is near");
+        assert_eq!(solver.positions[fresh[0]].is_some(), exchanged, "it is held at once where one is near");
         assert_eq!(solver.active.len(), 3 + usize::from(exchanged), "in the place of that");
         assert_eq!(solver.solve(Stop::never()).unwrap(), SolveOutcome::Optimal);
     }

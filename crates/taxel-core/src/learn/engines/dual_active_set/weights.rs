@@ -105,7 +105,7 @@ impl DualActiveSet {
             }
         }
         for &slot in &self.live {
-            if self.place[slot].is_none() && !self.is_met(slot) {
+            if self.positions[slot].is_none() && !self.is_met(slot) {
                 found.push((slot, self.excess[slot]));
             }
         }

@@ -33,7 +33,7 @@ impl DualActiveSet {
         let slot = self.free.pop().unwrap_or(self.rows.len());
         if slot == self.rows.len() {
             self.rows.push(row);
-            self.place.push(None);
+            self.positions.push(None);
             self.multipliers.push(0.0);
             self.excess.push(0.0);
             if self.coefficients.len() < self.rows.len() * self.stride {
@@ -85,9 +85,9 @@ impl DualActiveSet {
             for (&slot, sums) in fresh.iter().zip(sums.chunks_exact(slots)) {
                 self.gram[slot * self.gram_stride..][..slots].copy_from_slice(sums);
             }
-            for other in 0..slots {
+            for partner in 0..slots {
                 for (k, &slot) in fresh.iter().enumerate() {
-                    self.gram[other * self.gram_stride + slot] = sums[k * slots + other];
+                    self.gram[partner * self.gram_stride + slot] = sums[k * slots + partner];
                 }
             }
         }
@@ -108,10 +108,10 @@ impl DualActiveSet {
         self.bounds[n][usize::from(upper)] = Some(slot);
         self.coefficients[slot * self.stride + n] = sign;
         self.enlarge_gram();
-        for other in 0..self.rows.len() {
-            let product = sign * self.coefficients[other * self.stride + n];
-            self.gram[slot * self.gram_stride + other] = product;
-            self.gram[other * self.gram_stride + slot] = product;
+        for partner in 0..self.rows.len() {
+            let product = sign * self.coefficients[partner * self.stride + n];
+            self.gram[slot * self.gram_stride + partner] = product;
+            self.gram[partner * self.gram_stride + slot] = product;
         }
         self.excess[slot] = sign * self.weights[n] - limit;
         slot

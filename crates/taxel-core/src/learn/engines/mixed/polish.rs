@@ -88,8 +88,8 @@ impl<'a> Polish<'a> {
 
     /// Sets the weights that the guess fixes to their values.
     fn snap(&mut self) {
-        for (k, place) in self.guess.places.iter().enumerate() {
-            match place {
+        for (k, state) in self.guess.states.iter().enumerate() {
+            match state {
                 WeightState::Free => {}
                 WeightState::Zero => self.w[k] = 0.0,
                 WeightState::Lower => self.w[k] = self.program.lower[k],
@@ -135,7 +135,7 @@ impl<'a> Polish<'a> {
     fn solve(&mut self) -> Option<()> {
         let program = self.program;
         let n = program.width();
-        let free: Vec<usize> = (0..n).filter(|&k| self.guess.places[k] == WeightState::Free).collect();
+        let free: Vec<usize> = (0..n).filter(|&k| self.guess.states[k] == WeightState::Free).collect();
         let binding: Vec<usize> = (0..program.limit.len()).filter(|&i| self.guess.binding[i]).collect();
         let (f, p) = (free.len(), program.equal_to.len());
         let size = f + p + binding.len();
@@ -232,8 +232,8 @@ impl<'a> Polish<'a> {
                 continue;
             }
             let split = program.l1 > 0.0 && lower < 0.0 && upper > 0.0;
-            let place = self.guess.places[k];
-            let next = match place {
+            let state = self.guess.states[k];
+            let next = match state {
                 WeightState::Free if self.w[k] < lower => WeightState::Lower,
                 WeightState::Free if self.w[k] > upper => WeightState::Upper,
                 WeightState::Free if split && self.w[k] * self.sign[k] < 0.0 => WeightState::Zero,
@@ -251,8 +251,8 @@ impl<'a> Polish<'a> {
                 }
                 same => same,
             };
-            if next != place {
-                self.guess.places[k] = next;
+            if next != state {
+                self.guess.states[k] = next;
                 changed += 1;
             }
         }

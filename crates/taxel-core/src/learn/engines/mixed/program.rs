@@ -49,7 +49,7 @@ pub(super) struct Iterate {
 /// A guess of the binding rows and bounds.
 #[derive(Debug, Clone)]
 pub(super) struct Guess {
-    pub(super) places: Vec<WeightState>,
+    pub(super) states: Vec<WeightState>,
     pub(super) binding: Vec<bool>,
 }
 
@@ -268,7 +268,7 @@ impl Program {
     /// The rows and bounds that appear to bind at the weights and multipliers of any solver.
     pub(super) fn guess(&self, point: &PrimalDualPoint) -> Guess {
         const NEAR: f64 = 1e-7;
-        let place = |(w, (l, u)): (&f64, (&f64, &f64))| match *w {
+        let state = |(w, (l, u)): (&f64, (&f64, &f64))| match *w {
             w if w - l <= NEAR => WeightState::Lower,
             w if u - w <= NEAR => WeightState::Upper,
             w if self.l1 > 0.0 && w.abs() <= NEAR => WeightState::Zero,
@@ -277,7 +277,7 @@ impl Program {
         let below = times(&self.below, &point.weights);
         let rows = below.iter().zip(&self.limit).zip(&point.inequality);
         Guess {
-            places: point.weights.iter().zip(self.lower.iter().zip(&self.upper)).map(place).collect(),
+            states: point.weights.iter().zip(self.lower.iter().zip(&self.upper)).map(state).collect(),
             binding: rows.map(|((u, limit), z)| limit - u < *z).collect(),
         }
     }

@@ -18,12 +18,12 @@ const fn fetch(bytes: [Option<u8>; 2]) -> [[u8; 16]; 3] {
     let mut shuffles = [[0x80; 16]; 3];
     let mut load = 0;
     while load < 3 {
-        let places: [u8; 16] = indices(bytes, LOADS[load] as i32, 16, 0x80);
+        let bytes_of_load: [u8; 16] = indices(bytes, LOADS[load] as i32, 16, 0x80);
         // The words that are read from this load; each word is read from one load only.
         let words = [[0, 3], [3, 6], [6, 8]][load];
         let mut k = 2 * words[0];
         while k < 2 * words[1] {
-            shuffles[load][k] = places[k];
+            shuffles[load][k] = bytes_of_load[k];
             k += 1;
         }
         load += 1;
@@ -32,7 +32,7 @@ const fn fetch(bytes: [Option<u8>; 2]) -> [[u8; 16]; 3] {
 }
 
 static LOW: [[u8; 16]; 3] = fetch([Some(2), Some(1)]);
-static PLACE: [[u8; 16]; 3] = fetch([Some(3), Some(4)]);
+static POSITION: [[u8; 16]; 3] = fetch([Some(3), Some(4)]);
 static HEAD: [[u8; 16]; 3] = fetch([Some(0), None]);
 
 /// Mask of the low byte of each 16-bit lane, in a mask with one bit per byte.
@@ -90,9 +90,9 @@ fn mask(lanes: __m256i) -> u32 {
 /// Whether each 32-bit lane holds two words of the same taxel.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn paired_lanes(place: __m256i) -> bool {
-    let other = _mm256_or_si256(_mm256_slli_epi32::<16>(place), _mm256_srli_epi32::<16>(place));
-    _mm256_movemask_epi8(_mm256_cmpeq_epi16(place, other)) == -1
+fn paired_lanes(position: __m256i) -> bool {
+    let swapped = _mm256_or_si256(_mm256_slli_epi32::<16>(position), _mm256_srli_epi32::<16>(position));
+    _mm256_movemask_epi8(_mm256_cmpeq_epi16(position, swapped)) == -1
 }
 
 /// See [`super::blocks`].
@@ -112,26 +112,26 @@ pub(super) unsafe fn blocks(
     // SAFETY: each table is 16 bytes long.
     let table = |t: &[u8; 16]| unsafe { _mm256_broadcastsi128_si256(_mm_loadu_si128(t.as_ptr().cast())) };
     let low_from = [table(&LOW[0]), table(&LOW[1]), table(&LOW[2])];
-    let place_from = [table(&PLACE[0]), table(&PLACE[1]), table(&PLACE[2])];
+    let position_from = [table(&POSITION[0]), table(&POSITION[1]), table(&POSITION[2])];
     let head_from = [table(&HEAD[0]), table(&HEAD[1]), table(&HEAD[2])];
     let sevens = _mm256_set1_epi16(i16::from_le_bytes([1, 128]));
     let (last_column, last_row) =
         (_mm256_set1_epi16(columns.min(64) as i16 - 1), _mm256_set1_epi16(rows.min(64) as i16 - 1));
     let low_bits = |v: __m256i| _mm256_movemask_epi8(v) as u32;
-    let (zero, one) = (_mm256_setzero_si256(), _mm256_set1_epi16(1));
+    let (zero, ones) = (_mm256_setzero_si256(), _mm256_set1_epi16(1));
     let last_lane = _mm256_set1_epi16(i16::from_le_bytes([14, 15]));
 
     // State from the word before a block: its taxel, and whether it is a change whose intensity may be the block's
     // first word. That intensity is written with the next block, or after the last one.
     let (x, y) = if filling.open { filling.last_taxel() } else { (0, 0) };
-    let mut place_before = _mm256_set1_epi16((x | y << 8) as i16);
+    let mut position_before = _mm256_set1_epi16((x | y << 8) as i16);
     let mut open = u32::from(filling.open);
 
     let mut at = 0;
     while at + BYTES <= bytes.len() {
         // SAFETY: `at + 80 <= bytes.len()`; the loads of the two halves end at 40 and 80.
-        let load = |place: usize| unsafe {
-            let half = bytes.as_ptr().add(at + place);
+        let load = |start: usize| unsafe {
+            let half = bytes.as_ptr().add(at + start);
             let (first, second) = (_mm_loadu_si128(half.cast()), _mm_loadu_si128(half.add(BYTES / 2).cast()));
             _mm256_set_m128i(second, first)
         };
@@ -140,20 +140,20 @@ pub(super) unsafe fn blocks(
             let parts = [0, 1, 2].map(|k| _mm256_shuffle_epi8(loads[k], from[k]));
             _mm256_or_si256(_mm256_or_si256(parts[0], parts[1]), parts[2])
         };
-        let (low, place, head) = (gather(&low_from), gather(&place_from), gather(&head_from));
+        let (low, position, head) = (gather(&low_from), gather(&position_from), gather(&head_from));
 
-        let in_place = low_bits(head) == FIRSTS && low_bits(_mm256_or_si256(low, place)) == 0;
+        let in_place = low_bits(head) == FIRSTS && low_bits(_mm256_or_si256(low, position)) == 0;
         let markers = low_bits(_mm256_slli_epi16::<4>(head)) & FIRSTS;
-        let place = _mm256_and_si256(place, _mm256_set1_epi16(0x3f3f));
-        let x = _mm256_and_si256(place, _mm256_set1_epi16(0x3f));
-        let y = _mm256_srli_epi16::<8>(place);
+        let position = _mm256_and_si256(position, _mm256_set1_epi16(0x3f3f));
+        let x = _mm256_and_si256(position, _mm256_set1_epi16(0x3f));
+        let y = _mm256_srli_epi16::<8>(position);
         let outside = _mm256_or_si256(_mm256_cmpgt_epi16(x, last_column), _mm256_cmpgt_epi16(y, last_row));
         if !in_place || markers | low_bits(outside) != 0 {
             break;
         }
         let values = _mm256_or_si256(_mm256_maddubs_epi16(sevens, low), _mm256_slli_epi16::<14>(head));
         let intensities = low_bits(_mm256_slli_epi16::<2>(head)) & FIRSTS;
-        let polarity = _mm256_and_si256(_mm256_srli_epi16::<6>(head), one);
+        let polarity = _mm256_and_si256(_mm256_srli_epi16::<6>(head), ones);
         let base = state.latest as u16;
         let ahead = _mm256_sub_epi16(values, _mm256_set1_epi16(base as i16));
         let start = _mm256_set1_epi64x(state.latest * STAMP_US);
@@ -192,7 +192,7 @@ pub(super) unsafe fn blocks(
             }
             filling.rows = first + WORDS;
             open = 1;
-        } else if intensities == ALTERNATE && paired_lanes(place) {
+        } else if intensities == ALTERNATE && paired_lanes(position) {
             let changes = |lanes: __m256i| {
                 let low = _mm256_and_si256(lanes, _mm256_set1_epi32(0xffff));
                 _mm_packus_epi32(_mm256_castsi256_si128(low), _mm256_extracti128_si256::<1>(low))
@@ -241,7 +241,7 @@ pub(super) unsafe fn blocks(
                 break;
             }
             // An intensity is paired if the word before it is a change of the same taxel.
-            let same = _mm256_cmpeq_epi16(place, shift_lane_up(place_before, place));
+            let same = _mm256_cmpeq_epi16(position, shift_lane_up(position_before, position));
             let behind_change = shift_lane_up(_mm256_set1_epi16(-(open as i16)), change);
             let pair = _mm256_and_si256(_mm256_and_si256(intensity, behind_change), same);
             let pairs = mask(pair);
@@ -255,9 +255,9 @@ pub(super) unsafe fn blocks(
                 filling.begin_pairs();
             }
             let rows = SelectedLanes::new(changes);
-            let ([t_early, t_late], [early, late]) = (rows.look_up(ahead), rows.look_up(place));
+            let ([t_early, t_late], [early, late]) = (rows.look_up(ahead), rows.look_up(position));
             let [p_early, p_late] = rows.look_up(polarity);
-            let (columns, row_bits) = (_mm_set1_epi16(0x3f), |place| _mm_srli_epi16::<8>(place));
+            let (columns, row_bits) = (_mm_set1_epi16(0x3f), |position| _mm_srli_epi16::<8>(position));
             // SAFETY: at least 16 words are left, so 16 rows fit after `first`: up to 8 for each half.
             unsafe {
                 let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
@@ -295,7 +295,7 @@ pub(super) unsafe fn blocks(
             state.intensities += u64::from(found);
             state.unpaired += u64::from(WORDS as u32 - changes.count_ones() - found);
         }
-        place_before = place;
+        position_before = position;
         state.latest += i64::from(farthest);
         at += BYTES;
     }

@@ -40,7 +40,7 @@ impl Fetch {
 
 /// 16-bit lanes: the low 14 bits of the value as two groups of seven, row and column, and the first byte.
 static LOW: Fetch = Fetch::new([Some(2), Some(1)]);
-static PLACE: Fetch = Fetch::new([Some(3), Some(4)]);
+static POSITION: Fetch = Fetch::new([Some(3), Some(4)]);
 static HEAD: Fetch = Fetch::new([Some(0), None]);
 
 /// For each 16-bit lane, the index of the lane below it, and of the lane above it.
@@ -75,7 +75,7 @@ pub(super) unsafe fn blocks(
     // SAFETY: each is 64 bytes long.
     let table = |t: &[u8; 64]| unsafe { _mm512_loadu_si512(t.as_ptr().cast()) };
     let (low_front, low_back) = (table(&LOW.front), table(&LOW.back));
-    let (place_front, place_back) = (table(&PLACE.front), table(&PLACE.back));
+    let (position_front, position_back) = (table(&POSITION.front), table(&POSITION.back));
     let (head_front, head_back) = (table(&HEAD.front), table(&HEAD.back));
     let sevens = _mm512_set1_epi16(i16::from_le_bytes([1, 128]));
     let (last_column, last_row) =
@@ -96,18 +96,18 @@ pub(super) unsafe fn blocks(
         };
         let low = _mm512_maskz_permutex2var_epi8(LOW.from_front, a, low_front, b);
         let low = _mm512_mask_permutexvar_epi8(low, LOW.from_back, low_back, c);
-        let place = _mm512_maskz_permutex2var_epi8(PLACE.from_front, a, place_front, b);
-        let place = _mm512_mask_permutexvar_epi8(place, PLACE.from_back, place_back, c);
+        let position = _mm512_maskz_permutex2var_epi8(POSITION.from_front, a, position_front, b);
+        let position = _mm512_mask_permutexvar_epi8(position, POSITION.from_back, position_back, c);
         let head = _mm512_maskz_permutex2var_epi8(HEAD.from_front, a, head_front, b);
         let head = _mm512_mask_permutexvar_epi8(head, HEAD.from_back, head_back, c);
 
         // Exactly the first bytes have their top bit set. No word is a marker, so none is contradictory either.
         let in_place = _mm512_test_epi16_mask(head, _mm512_set1_epi16(0x80)) == u32::MAX
-            && _mm512_movepi8_mask(_mm512_or_si512(low, place)) == 0;
+            && _mm512_movepi8_mask(_mm512_or_si512(low, position)) == 0;
         let markers = _mm512_test_epi16_mask(head, _mm512_set1_epi16(0x08));
-        let place = _mm512_and_si512(place, _mm512_set1_epi16(0x3f3f));
-        let x = _mm512_and_si512(place, _mm512_set1_epi16(0x3f));
-        let y = _mm512_srli_epi16::<8>(place);
+        let position = _mm512_and_si512(position, _mm512_set1_epi16(0x3f3f));
+        let x = _mm512_and_si512(position, _mm512_set1_epi16(0x3f));
+        let y = _mm512_srli_epi16::<8>(position);
         let outside = _mm512_cmpgt_epi16_mask(x, last_column) | _mm512_cmpgt_epi16_mask(y, last_row);
         if !in_place || markers | outside != 0 {
             break;
@@ -147,8 +147,8 @@ pub(super) unsafe fn blocks(
         let first = filling.rows;
         if intensities != 0 {
             // An intensity is paired if the word before it is a change of the same taxel.
-            let place_before = _mm512_permutexvar_epi16(one_up, place);
-            let same = _mm512_cmpeq_epi16_mask(place, place_before) & !1;
+            let position_before = _mm512_permutexvar_epi16(one_up, position);
+            let same = _mm512_cmpeq_epi16_mask(position, position_before) & !1;
             let mut paired = intensities & (changes << 1) & same;
             let taxel = (u16::from(bytes[at + 3] & 0x3f), u16::from(bytes[at + 4] & 0x3f));
             if intensities & 1 != 0 && filling.open && filling.last_taxel() == taxel {

@@ -32,16 +32,16 @@ pub(super) fn value(bytes: &[u8], at: usize) -> u16 {
     u16::from(bytes[at]) << 14 | u16::from(bytes[at + 1]) << 7 | u16::from(bytes[at + 2])
 }
 
-/// The index of byte `j` of a stride-5 word: `place(k)` for 16-bit lanes, with `otherwise` for `None`.
+/// The index of byte `j` of a stride-5 word: `indices[k]` for 16-bit lanes, with `otherwise` for `None`.
 #[cfg(target_arch = "x86_64")]
 pub(super) const fn indices<const N: usize>(bytes: [Option<u8>; 2], first: i32, below: i32, otherwise: u8) -> [u8; N] {
     let mut out = [otherwise; N];
     let mut k = 0;
     while k < N {
         if let Some(j) = bytes[k % 2] {
-            let place = (k as i32 / 2) * WORD_BYTES as i32 + j as i32 - first;
-            if place >= 0 && place < below {
-                out[k] = place as u8;
+            let index = (k as i32 / 2) * WORD_BYTES as i32 + j as i32 - first;
+            if index >= 0 && index < below {
+                out[k] = index as u8;
             }
         }
         k += 1;

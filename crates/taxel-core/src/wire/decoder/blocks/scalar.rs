@@ -17,9 +17,9 @@ pub(super) fn words(
     let (first, paired, mut open) = (filling.rows, filling.paired, filling.open);
     let mut last = if open { filling.last_taxel() } else { (0, 0) };
     // The rows that can be written from here on: there are never more rows than words.
-    let place = first..first + words;
-    let (t, p) = (&mut filling.room.t[place.clone()], &mut filling.room.p[place.clone()]);
-    let (x, y) = (&mut filling.room.x[place.clone()], &mut filling.room.y[place]);
+    let range = first..first + words;
+    let (t, p) = (&mut filling.room.t[range.clone()], &mut filling.room.p[range.clone()]);
+    let (x, y) = (&mut filling.room.x[range.clone()], &mut filling.room.y[range]);
     // The first word may be the intensity of the row before.
     let back = usize::from(first > 0);
     let ticks = &mut filling.room.ticks[first - back..first + words];

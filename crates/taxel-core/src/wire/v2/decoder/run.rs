@@ -9,7 +9,7 @@ use super::run_totals::RunTotals;
 use super::session::BoardSession;
 use super::words::{EIGHT, Eight, FULL};
 use crate::wire::columns::Room;
-use crate::wire::v2::checksum::{EVEN, even, split};
+use crate::wire::v2::checksum::{EVEN, even, split_checksum};
 use crate::wire::v2::counts::Counts;
 use crate::wire::v2::{BodyKind, DatagramHeader, HEADER_BYTES, TRAILER_BYTES};
 
@@ -90,9 +90,9 @@ impl<'a> RunDecoder<'a> {
                 && (VALUE == 0 || t >= self.held.newest)
                 && body.len().is_multiple_of(if VALUE == 16 { 4 } else { 2 })
                 && room.len() - row >= ROWS;
-            let (summed, sum) = split(datagram);
+            let (content, checksum) = split_checksum(datagram);
             // SAFETY: `short` has checked that there are 20 to 64 bytes.
-            if !plain || unsafe { even(summed) } != sum {
+            if !plain || unsafe { even(content) } != checksum {
                 break;
             }
             // SAFETY: the machine has the features, `new` has checked the array, and the loop above has checked that
@@ -100,7 +100,7 @@ impl<'a> RunDecoder<'a> {
             let Some(rows) = (unsafe { self.words::<VALUE>(datagram, start as u16, t, room, row, paired) }) else {
                 break;
             };
-            self.session.note(number, sum);
+            self.session.note(number, checksum);
             self.session.latest = self.session.latest.max(header.base);
             *self.latest = (*self.latest).max(t + i64::from(header.span));
             row += rows;

@@ -79,14 +79,14 @@ impl BoardSession {
 
     /// Whether the datagram of a number was received: one within the window, and at most the highest.
     pub(super) fn has(&self, number: i64) -> bool {
-        let (word, bit) = place(number);
+        let (word, bit) = bit_of(number);
         self.received_bits[word] & bit != 0
     }
 
     /// Whether a number came before, with other contents.
     pub(super) fn differs(&self, number: i64, sum: u32) -> bool {
-        let within = (self.highest - WINDOW as i64 + 1..=self.highest).contains(&number);
-        within && self.has(number) && self.sums.get(self.place_of_sum(number)) != Some(&(sum as u16))
+        let in_window = (self.highest - WINDOW as i64 + 1..=self.highest).contains(&number);
+        in_window && self.has(number) && self.sums.get(self.index_of_sum(number)) != Some(&(sum as u16))
     }
 
     /// Whether as many datagrams differ as came at all, and more than another board sends by chance in that order.
@@ -114,7 +114,7 @@ impl BoardSession {
     /// numbers are missing.
     #[inline(always)]
     fn note_ahead(&mut self, number: i64, sum: u32) {
-        let (word, bit) = place(number);
+        let (word, bit) = bit_of(number);
         let between = (number - self.highest - 1) as u32;
         let in_word = between.min(bit.trailing_zeros());
         // Masks of the bits just below the number's bit, and at the top of the word before.
@@ -140,7 +140,7 @@ impl BoardSession {
         if self.has(number) {
             return if self.differs(number, sum) { Noted::Unlike } else { Noted::Again };
         }
-        let (word, bit) = place(number);
+        let (word, bit) = bit_of(number);
         self.store(number, sum);
         self.received_bits[word] |= bit;
         self.received += 1;
@@ -151,29 +151,29 @@ impl BoardSession {
     }
 
     #[inline(always)]
-    fn place_of_sum(&self, number: i64) -> usize {
+    fn index_of_sum(&self, number: i64) -> usize {
         (number - self.first) as usize % WINDOW
     }
 
     /// Stores half of a checksum: two contents that differ have one in 65 536 times.
     #[inline(always)]
     fn store(&mut self, number: i64, sum: u32) {
-        let place = self.place_of_sum(number);
-        if place >= self.sums.len() {
-            self.make_room(place);
+        let index = self.index_of_sum(number);
+        if index >= self.sums.len() {
+            self.make_room(index);
         }
-        self.sums[place] = sum as u16;
+        self.sums[index] = sum as u16;
     }
 
     #[cold]
-    fn make_room(&mut self, place: usize) {
-        self.sums.resize((place + 1).next_power_of_two().max(1024), 0);
+    fn make_room(&mut self, index: usize) {
+        self.sums.resize((index + 1).next_power_of_two().max(1024), 0);
     }
 
     /// Clears the bits from `first` to `last`, at most a window of them, a word at a time because many may be missing.
     fn clear(&mut self, mut first: i64, last: i64) {
         while first <= last {
-            let (word, bit) = place(first);
+            let (word, bit) = bit_of(first);
             let numbers = (64 - i64::from(bit.trailing_zeros())).min(last + 1 - first);
             self.received_bits[word] &= !(bit.wrapping_mul(u64::MAX >> (64 - numbers)));
             first += numbers;
@@ -181,7 +181,7 @@ impl BoardSession {
     }
 }
 
-fn place(number: i64) -> (usize, u64) {
+fn bit_of(number: i64) -> (usize, u64) {
     let at = number.rem_euclid(WINDOW as i64) as usize;
     (at / 64, 1 << (at % 64))
 }

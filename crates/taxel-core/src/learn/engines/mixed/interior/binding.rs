@@ -15,7 +15,7 @@ impl Interior<'_> {
         let (far, force) = (typical(&state.x).clamp(1e-3, 1.0), typical(&state.low).max(1.0));
         let (room, press) = (typical(&state.slack).clamp(1e-3, 1.0), typical(&state.inequality).max(1.0));
         let mut at_low = vec![true; n];
-        let mut places: Vec<WeightState> = program
+        let mut states: Vec<WeightState> = program
             .lower
             .iter()
             .zip(&program.upper)
@@ -27,19 +27,19 @@ impl Interior<'_> {
                 at_low[k] = false;
             }
             if (part.range - state.x[j]) / far < state.high[j] / force {
-                places[k] = if part.sign > 0.0 { WeightState::Upper } else { WeightState::Lower };
+                states[k] = if part.sign > 0.0 { WeightState::Upper } else { WeightState::Lower };
             }
         }
-        for (k, place) in places.iter_mut().enumerate() {
-            if at_low[k] && *place == WeightState::Free {
+        for (k, state) in states.iter_mut().enumerate() {
+            if at_low[k] && *state == WeightState::Free {
                 let split = program.l1 > 0.0 && program.lower[k] < 0.0 && program.upper[k] > 0.0;
-                *place = if split { WeightState::Zero } else { WeightState::Lower };
+                *state = if split { WeightState::Zero } else { WeightState::Lower };
             }
         }
         let binding = state.slack.iter().zip(&state.inequality).map(|(s, z)| s / room < z / press).collect();
         let pull = if self.normed { state.dual.1.iter().map(|y| -y).collect() } else { vec![0.0; n] };
         let (equality, inequality) = (state.equality.clone(), state.inequality.clone());
         let point = PrimalDualPoint { weights, equality, inequality, pull };
-        Iterate { point, guess: Guess { places, binding } }
+        Iterate { point, guess: Guess { states, binding } }
     }
 }

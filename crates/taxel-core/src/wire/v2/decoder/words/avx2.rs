@@ -25,7 +25,7 @@ pub(super) unsafe fn blocks<const VALUE: u32>(
         }
         let passed = (body.position + 1) as u16;
         // SAFETY: the body has eight words from there on; the caller guarantees the condition on the array.
-        let eight = unsafe { Eight::whole::<VALUE>(body.bytes.as_ptr().add(body.at), passed, held) };
+        let eight = unsafe { Eight::read_unaligned::<VALUE>(body.bytes.as_ptr().add(body.at), passed, held) };
         let Some(eight) = eight.filter(|eight| eight.passed < FULL) else { return };
         // SAFETY: as the caller guarantees, 8 rows fit after the rows so far; the events are on the array, and so in
         // `held`.

@@ -24,13 +24,13 @@ const fn lanes(sixteenth: bool) -> [u16; WORDS] {
 }
 
 /// The index of each lane.
-static LANE: [u16; WORDS] = every(1, 0);
+static LANE: [u16; WORDS] = stepped(1, 0);
 
 /// Lanes of the low and of the high halves of 32-bit words.
-static LOW_HALVES: [u16; WORDS] = every(2, 0);
-static HIGH_HALVES: [u16; WORDS] = every(2, 1);
+static LOW_HALVES: [u16; WORDS] = stepped(2, 0);
+static HIGH_HALVES: [u16; WORDS] = stepped(2, 1);
 
-const fn every(step: u16, first: u16) -> [u16; WORDS] {
+const fn stepped(step: u16, first: u16) -> [u16; WORDS] {
     let mut out = [0; WORDS];
     let mut k = 0;
     while k < WORDS {
@@ -136,14 +136,14 @@ impl Constants {
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
     fn sums<const VALUE: u32>(&self, words: &Words, taken: u32, advances: u32, few: bool) -> __m512i {
         let Words { skip, value, .. } = *words;
-        let one = _mm512_set1_epi16(1);
-        let mut steps = _mm512_maskz_add_epi16(taken, skip, one);
+        let ones = _mm512_set1_epi16(1);
+        let mut steps = _mm512_maskz_add_epi16(taken, skip, ones);
         // Branch-free for small words: a processor cannot predict which block of a scene has an advance.
         if VALUE == 8 || advances != 0 {
             let advance = if VALUE == 8 {
-                _mm512_slli_epi16::<6>(_mm512_add_epi16(value, one))
+                _mm512_slli_epi16::<6>(_mm512_add_epi16(value, ones))
             } else {
-                let small = _mm512_slli_epi16::<14>(_mm512_add_epi16(value, one));
+                let small = _mm512_slli_epi16::<14>(_mm512_add_epi16(value, ones));
                 let large = _mm512_cmpgt_epu16_mask(value, _mm512_set1_epi16(2));
                 _mm512_mask_mov_epi16(small, large, _mm512_set1_epi16(-1))
             };
@@ -187,20 +187,20 @@ impl Constants {
         // Lanes without an event repeat the last one, so that the loop has one of two lengths, which a processor can
         // predict.
         let repeated = _mm512_min_epu16(_mm512_set1_epi16(found.n as i16 - 1), self.lane);
-        let places = _mm512_permutexvar_epi16(repeated, found.position);
+        let indices = _mm512_permutexvar_epi16(repeated, found.position);
         let values = _mm512_permutexvar_epi16(repeated, found.ticks);
         if found.n > EIGHT {
             let (mut at, mut ticks) = (WordLanes([0; WORDS]), WordLanes([0; WORDS]));
             // SAFETY: both arrays are 64 bytes long and aligned to cache lines; the positions are those of events.
             unsafe {
-                _mm512_store_si512(at.0.as_mut_ptr().cast(), places);
+                _mm512_store_si512(at.0.as_mut_ptr().cast(), indices);
                 _mm512_store_si512(ticks.0.as_mut_ptr().cast(), values);
                 store_many(&at, &ticks, t, held);
             }
             return;
         }
         // SAFETY: the positions are those of events.
-        unsafe { store_eight(_mm512_castsi512_si128(places), _mm512_castsi512_si128(values), t, held) }
+        unsafe { store_eight(_mm512_castsi512_si128(indices), _mm512_castsi512_si128(values), t, held) }
     }
 }
 
@@ -208,12 +208,12 @@ impl Constants {
 ///
 /// The positions must be in `held`.
 #[inline(never)]
-unsafe fn store_many(places: &WordLanes, values: &WordLanes, t: i64, held: &mut ValuesByLine) {
-    for (&place, &value) in places.0.iter().zip(&values.0) {
+unsafe fn store_many(indices: &WordLanes, values: &WordLanes, t: i64, held: &mut ValuesByLine) {
+    for (&index, &value) in indices.0.iter().zip(&values.0) {
         // SAFETY: the caller guarantees this.
         unsafe {
-            *held.values.get_unchecked_mut(usize::from(place)) = value;
-            *held.since.get_unchecked_mut(usize::from(place)) = t;
+            *held.values.get_unchecked_mut(usize::from(index)) = value;
+            *held.since.get_unchecked_mut(usize::from(index)) = t;
         }
     }
 }

@@ -53,7 +53,7 @@ impl<'a> BodyReader<'a> {
         (self.bytes.len() - self.at) >> self.layout.bytes.trailing_zeros()
     }
 
-    /// The offset at a place, us; none if the body ends before it, or if it is later than any valid offset.
+    /// The offset at an index, us; none if the body ends before it, or if it is later than any valid offset.
     #[inline(always)]
     pub(super) fn offset<const BYTES: usize>(&self, at: usize) -> Option<u32> {
         let offset = (self.bytes.len() - at >= BYTES).then(|| word::<BYTES>(self.bytes, at))?;
@@ -61,7 +61,7 @@ impl<'a> BodyReader<'a> {
     }
 }
 
-/// The word at a place, of 2 or 4 bytes.
+/// The word at an index, of 2 or 4 bytes.
 #[inline(always)]
 pub(super) fn word<const BYTES: usize>(bytes: &[u8], at: usize) -> u32 {
     let mut word = [0; 4];

@@ -17,7 +17,7 @@ const _: () = assert!(HEADER_BYTES >= REGISTER);
 /// Positions count from 1 in 16 bits, and sums saturate at this value; words that reach it are decoded one by one.
 pub(crate) const FULL: u16 = u16::MAX;
 
-/// Indices for `pshufb`: those from place `k` on move the first `16 - k` bytes of a register to the front, with zeros
+/// Indices for `pshufb`: those from index `k` on move the first `16 - k` bytes of a register to the front, with zeros
 /// after them.
 static TO_START: [u8; 2 * REGISTER] = {
     let mut out = [0x80; 2 * REGISTER];
@@ -29,7 +29,7 @@ static TO_START: [u8; 2 * REGISTER] = {
     out
 };
 
-/// Masks: from place `8 - k` on, `k` lanes of ones, then zeros.
+/// Masks: from index `8 - k` on, `k` lanes of ones, then zeros.
 static FIRST_LANES: [u32; 2 * EIGHT] = {
     let mut out = [0; 2 * EIGHT];
     let mut k = 0;
@@ -74,7 +74,7 @@ impl Eight {
         let count = count.min(EIGHT);
         // SAFETY: of words of 4 bytes only the lanes of those words are read, by a mask of eight of 16 entries from 0
         // to 8 on. Of words of 2 bytes, the 16 bytes up to the last word's end are read; bytes before the first word
-        // belong to the header. The shuffle's table has 16 bytes from each place 0 to 16 on.
+        // belong to the header. The shuffle's table has 16 bytes from each index 0 to 16 on.
         unsafe {
             let words = datagram.as_ptr().add(at);
             let lanes = _mm_cmpgt_epi16(_mm_set1_epi16(count as i16), _mm_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7));
@@ -95,7 +95,11 @@ impl Eight {
     /// As for [`Self::read`]; eight words must be readable at `words`.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
-    pub(super) unsafe fn whole<const VALUE: u32>(words: *const u8, passed: u16, held: &ValuesByLine) -> Option<Self> {
+    pub(super) unsafe fn read_unaligned<const VALUE: u32>(
+        words: *const u8,
+        passed: u16,
+        held: &ValuesByLine,
+    ) -> Option<Self> {
         let lanes = _mm_set1_epi16(-1);
         // SAFETY: eight words of 4 or 2 bytes are readable, as the caller guarantees.
         unsafe {
@@ -126,7 +130,7 @@ impl Eight {
         passed: u16,
         held: &ValuesByLine,
     ) -> Option<Self> {
-        let (zero, one) = (_mm_setzero_si128(), _mm_set1_epi16(1));
+        let (zero, ones) = (_mm_setzero_si128(), _mm_set1_epi16(1));
         let (control, skip, value) = if VALUE == 8 {
             let seven = _mm_set1_epi16(0x7f);
             (seven, _mm_and_si128(_mm_srli_epi16::<8>(head), seven), _mm_and_si128(head, _mm_set1_epi16(0xff)))
@@ -140,13 +144,13 @@ impl Eight {
         }
         // Branch-free: a processor cannot predict which datagram of a scene has an advance.
         let advance = if VALUE == 8 {
-            _mm_slli_epi16::<6>(_mm_add_epi16(value, one))
+            _mm_slli_epi16::<6>(_mm_add_epi16(value, ones))
         } else {
             let small = _mm_cmpeq_epi16(_mm_subs_epu16(value, _mm_set1_epi16(2)), zero);
-            _mm_blendv_epi8(_mm_set1_epi16(-1), _mm_slli_epi16::<14>(_mm_add_epi16(value, one)), small)
+            _mm_blendv_epi8(_mm_set1_epi16(-1), _mm_slli_epi16::<14>(_mm_add_epi16(value, ones)), small)
         };
         // Sums saturate, and no position of the arrays allowed here equals the saturated value.
-        let steps = _mm_blendv_epi8(_mm_add_epi16(skip, one), advance, advances);
+        let steps = _mm_blendv_epi8(_mm_add_epi16(skip, ones), advance, advances);
         let mut sums = _mm_and_si128(steps, lanes);
         sums = _mm_adds_epu16(sums, _mm_bslli_si128::<2>(sums));
         sums = _mm_adds_epu16(sums, _mm_bslli_si128::<4>(sums));
@@ -157,7 +161,7 @@ impl Eight {
         let events = _mm_movemask_epi8(_mm_packs_epi16(_mm_andnot_si128(advances, lanes), zero)) as usize;
         // SAFETY: the mask has eight bits, and each entry of the table 16 bytes.
         let front = unsafe { _mm_loadu_si128(TO_FRONT.as_ptr().add(events & 0xff).cast()) };
-        let position = _mm_shuffle_epi8(_mm_sub_epi16(sums, one), front);
+        let position = _mm_shuffle_epi8(_mm_sub_epi16(sums, ones), front);
         let ticks = _mm_shuffle_epi8(value, front);
         let p = _mm_shuffle_epi8(_mm_srli_epi16::<15>(head), front);
         let x = _mm_srl_epi16(position, _mm_cvtsi32_si128(i32::from(held.stride)));
@@ -239,19 +243,19 @@ impl Eight {
 ///
 /// # Safety
 ///
-/// The machine must have SSE 4.1; all eight places must be in `held`.
+/// The machine must have SSE 4.1; all eight indices must be in `held`.
 #[inline]
 #[target_feature(enable = "sse4.1")]
-pub(super) unsafe fn store_eight(places: __m128i, values: __m128i, t: i64, held: &mut ValuesByLine) {
+pub(super) unsafe fn store_eight(indices: __m128i, values: __m128i, t: i64, held: &mut ValuesByLine) {
     // Extracts the lanes from registers: loads from memory would wait for the store.
     let halves = |lanes| [_mm_cvtsi128_si64(lanes) as u64, _mm_extract_epi64::<1>(lanes) as u64];
-    for (places, values) in halves(places).into_iter().zip(halves(values)) {
+    for (indices, values) in halves(indices).into_iter().zip(halves(values)) {
         for shift in [0, 16, 32, 48] {
-            let place = usize::from((places >> shift) as u16);
+            let index = usize::from((indices >> shift) as u16);
             // SAFETY: the caller guarantees this.
             unsafe {
-                *held.values.get_unchecked_mut(place) = (values >> shift) as u16;
-                *held.since.get_unchecked_mut(place) = t;
+                *held.values.get_unchecked_mut(index) = (values >> shift) as u16;
+                *held.since.get_unchecked_mut(index) = t;
             }
         }
     }

@@ -47,12 +47,12 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
         let (x, y) = (x as u16, y as u16);
         let (mut p, mut ticks, mut known) = (p, value, VALUE > 0);
         if VALUE > 0 {
-            let place = held.place(x, y);
-            let newest = t >= held.since[place];
+            let index = held.index(x, y);
+            let newest = t >= held.since[index];
             match body.meaning {
                 Meaning::Changes => {}
                 Meaning::Differences => {
-                    let from = held.get(place).or(held.unheard);
+                    let from = held.get(index).or(held.initial);
                     known = from.is_some();
                     counts.unknown_value += u64::from(!known);
                     ticks =
@@ -60,7 +60,7 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
                 }
                 Meaning::States => {
                     counts.states += 1;
-                    let before = held.get(place);
+                    let before = held.get(index);
                     if !newest {
                         counts.stale += 1;
                         continue;
@@ -78,7 +78,7 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
                 }
             }
             if known && (newest || body.meaning == Meaning::Differences) {
-                held.set(place, ticks, t);
+                held.set(index, ticks, t);
             }
         }
         latest = latest.max(t);

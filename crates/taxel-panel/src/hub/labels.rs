@@ -1,0 +1,238 @@
+//! The labels of recordings, as the clients see them: each with a number that holds while the server runs.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+
+use taxel_live::locked::lock;
+use tokio::sync::{OwnedMutexGuard, oneshot};
+
+use crate::handler::{LabelConflict, LabelEdit, LabelRow, LabelTable};
+use crate::protocol::messages::{Conflict, Label, Message};
+use crate::protocol::refusal::Answer;
+
+/// A change of the labels of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum LabelChange {
+    Mark(LabelRow),
+    Rename { id: u64, label: String },
+    Move { id: u64, t_us: i64 },
+    Delete { id: u64 },
+}
+
+impl LabelRow {
+    /// Whether it only states that a note of the recording counts no more.
+    fn is_removal(&self) -> bool {
+        self.label.is_empty()
+    }
+}
+
+impl LabelChange {
+    /// The time that it sets, us.
+    pub(crate) fn t_us(&self) -> Option<i64> {
+        match self {
+            Self::Mark(row) => Some(row.t_us),
+            Self::Move { t_us, .. } => Some(*t_us),
+            Self::Rename { .. } | Self::Delete { .. } => None,
+        }
+    }
+
+    /// The same change at a whole multiple of `us`: at a frame, where frames are numbered.
+    pub(crate) fn at_whole(self, us: i64) -> Self {
+        let rounded = |t: i64| t.div_euclid(us) * us;
+        match self {
+            Self::Mark(row) => Self::Mark(LabelRow { t_us: rounded(row.t_us), ..row }),
+            Self::Move { id, t_us } => Self::Move { id, t_us: rounded(t_us) },
+            change => change,
+        }
+    }
+
+    /// The change of the table's rows. `labels` are those as this and the changes before it leave them.
+    fn edit(self, labels: &mut Vec<Label>) -> Result<NumberedEdit, String> {
+        let (id, index) = match self {
+            Self::Mark(row) => return Ok((None, LabelEdit { old: None, new: Some(row) })),
+            Self::Rename { id, .. } | Self::Move { id, .. } | Self::Delete { id } => (id, index_of(labels, id)?),
+        };
+        let old = labels[index].row.clone();
+        let new = match self {
+            Self::Rename { label, .. } => Some(LabelRow { label, ..old.clone() }),
+            Self::Move { t_us, .. } => Some(LabelRow { t_us, host_ns: None, ..old.clone() }),
+            // Without the row that replaces it, its note would count again.
+            _ => old.replaces_us.map(|_| LabelRow { label: String::new(), ..old.clone() }),
+        };
+        set(labels, id, new.clone());
+        Ok((Some(id), LabelEdit { old: Some(old), new }))
+    }
+}
+
+/// An edit, and the number of the label that it changes.
+pub(crate) type NumberedEdit = (Option<u64>, LabelEdit);
+
+fn index_of(labels: &[Label], id: u64) -> Result<usize, String> {
+    labels.iter().position(|label| label.label_id == id && !label.row.is_removal()).ok_or_else(|| {
+        format!("label_id: there is no label {id}; it was deleted or changed, perhaps by another client or program")
+    })
+}
+
+/// Gives a label another row, or removes it.
+fn set(labels: &mut Vec<Label>, id: u64, row: Option<LabelRow>) {
+    match row {
+        Some(row) => labels.iter_mut().filter(|label| label.label_id == id).for_each(|label| label.row = row.clone()),
+        None => labels.retain(|label| label.label_id != id),
+    }
+}
+
+/// A request that waits to be written with others.
+pub(crate) struct WaitingChanges {
+    pub(crate) changes: Vec<LabelChange>,
+    pub(crate) answer: oneshot::Sender<Answer>,
+}
+
+/// The labels of the recordings that clients have opened, by the recordings' names.
+#[derive(Default)]
+pub(crate) struct LabelTables(Mutex<Tables>);
+
+#[derive(Default)]
+struct Tables {
+    tables: HashMap<String, KnownTable>,
+    last_id: u64,
+    last_conflict: u64,
+}
+
+/// A table as it was read last.
+#[derive(Default)]
+struct KnownTable {
+    /// `None` where there is no table, or none was read.
+    labels: Option<Vec<Label>>,
+    conflict: LabelConflict,
+    conflict_id: u64,
+    /// What [`LabelRequests::stamp`](crate::LabelRequests::stamp) returned, or its reason, before it was read.
+    stamp: String,
+    /// One us of the file in the view.
+    us: i64,
+    waiting: Vec<WaitingChanges>,
+    turn: Arc<tokio::sync::Mutex<()>>,
+}
+
+/// Name of the file that holds the labels of a recording.
+pub(crate) fn file_of(recording: &str) -> String {
+    let stem = recording.rsplit_once('.').map_or(recording, |(stem, _)| stem);
+    format!("{stem}.notes.csv")
+}
+
+impl LabelTables {
+    fn with<T>(&self, recording: &str, action: impl FnOnce(&mut KnownTable) -> T) -> T {
+        action(lock(&self.0).tables.entry(recording.to_owned()).or_default())
+    }
+
+    /// Number of labels of a recording, once they have been read.
+    pub(crate) fn count(&self, recording: &str) -> Option<usize> {
+        let counted = |labels: &Vec<Label>| labels.iter().filter(|label| !label.row.is_removal()).count();
+        lock(&self.0).tables.get(recording)?.labels.as_ref().map(counted)
+    }
+
+    /// The recordings whose tables were opened, with one us of their files in the view.
+    pub(crate) fn opened(&self) -> Vec<(String, i64)> {
+        let known = lock(&self.0);
+        known.tables.iter().filter(|(_, table)| table.us > 0).map(|(name, table)| (name.clone(), table.us)).collect()
+    }
+
+    /// Waits until no other request reads or writes the table of a recording.
+    pub(crate) async fn turn(&self, recording: &str) -> OwnedMutexGuard<()> {
+        let turn = self.with(recording, |table| Arc::clone(&table.turn));
+        turn.lock_owned().await
+    }
+
+    pub(crate) fn stamp(&self, recording: &str) -> String {
+        self.with(recording, |table| table.stamp.clone())
+    }
+
+    /// Notes that a table is read now, with its stamp.
+    pub(crate) fn opens(&self, recording: &str, stamp: String, us: i64) {
+        self.with(recording, |table| (table.stamp, table.us) = (stamp, us));
+    }
+
+    /// Notes that a table that was written is followed from now on, as of a recording that runs.
+    pub(crate) fn follows(&self, recording: &str, us: i64) {
+        self.with(recording, |table| table.us = us);
+    }
+
+    /// Adds changes to those that are written next.
+    pub(crate) fn wait(&self, recording: &str, waiting: WaitingChanges) {
+        self.with(recording, |table| table.waiting.push(waiting));
+    }
+
+    pub(crate) fn take_waiting(&self, recording: &str) -> Vec<WaitingChanges> {
+        self.with(recording, |table| std::mem::take(&mut table.waiting))
+    }
+
+    /// The edits of requests, each made on what those before it leave.
+    pub(crate) fn edits(&self, recording: &str, waiting: &[WaitingChanges]) -> Vec<Result<Vec<NumberedEdit>, String>> {
+        let mut labels = self.with(recording, |table| table.labels.clone().unwrap_or_default());
+        let mut edits = |waiting: &WaitingChanges| {
+            let before = labels.clone();
+            let made = waiting.changes.iter().map(|change| change.clone().edit(&mut labels)).collect();
+            if Result::<Vec<NumberedEdit>, _>::is_err(&made) {
+                labels = before;
+            }
+            made
+        };
+        waiting.iter().map(&mut edits).collect()
+    }
+
+    /// Notes the rows that labels have now, before [`LabelTables::replace`], so that they keep their numbers.
+    pub(crate) fn renumber(&self, recording: &str, rows: impl IntoIterator<Item = (u64, Option<LabelRow>)>) {
+        self.with(recording, |table| {
+            let Some(labels) = &mut table.labels else { return };
+            rows.into_iter().for_each(|(id, row)| set(labels, id, row));
+        });
+    }
+
+    /// Replaces the labels of a recording by those of its table, `None` where there is none; unchanged ones keep their numbers.
+    /// Returns whether anything has changed.
+    pub(crate) fn replace(&self, recording: &str, read: Option<LabelTable>) -> bool {
+        let mut known = lock(&self.0);
+        let Tables { tables, last_id, last_conflict } = &mut *known;
+        let table = tables.entry(recording.to_owned()).or_default();
+        let (rows, conflict) = read.map(|read| (Some(read.rows), read.conflict)).unwrap_or_default();
+        let mut before = table.labels.clone().unwrap_or_default();
+        let mut number = |row: LabelRow| {
+            let same = before.iter().position(|label| label.row == row);
+            let id = same.map(|index| before.remove(index).label_id).unwrap_or_else(|| {
+                *last_id += 1;
+                *last_id
+            });
+            Label { label_id: id, row }
+        };
+        let labels: Option<Vec<Label>> = rows.map(|rows| rows.into_iter().map(&mut number).collect());
+        let same = table.labels == labels && table.conflict == conflict;
+        if table.conflict != conflict {
+            *last_conflict += 1;
+            table.conflict_id = *last_conflict;
+        }
+        (table.labels, table.conflict) = (labels, conflict);
+        !same
+    }
+
+    /// The conflict of this number; `None` if it is over or is another by now.
+    pub(crate) fn conflict(&self, recording: &str, conflict_id: u64) -> Option<LabelConflict> {
+        self.with(recording, |table| {
+            let holds = table.conflict_id == conflict_id && !table.conflict.is_empty();
+            holds.then(|| table.conflict.clone())
+        })
+    }
+
+    /// The `labels` message.
+    pub(crate) fn message(&self, recording: &str) -> Message {
+        self.with(recording, |table| {
+            let shown = table.labels.iter().flatten().filter(|label| !label.row.is_removal());
+            let LabelConflict { missing, returned, new } = table.conflict.clone();
+            let conflict_id = table.conflict_id;
+            Message::Labels {
+                name: recording.to_owned(),
+                path: file_of(recording),
+                labels: shown.cloned().collect(),
+                conflict: (!table.conflict.is_empty()).then_some(Conflict { conflict_id, missing, returned, new }),
+            }
+        })
+    }
+}

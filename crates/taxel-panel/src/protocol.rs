@@ -1,0 +1,7 @@
+//! The messages of the web socket (docs/panel-protocol.md): requests with their limits and refusals, and what the server sends.
+
+pub(super) mod limited;
+pub(super) mod limits;
+pub(super) mod messages;
+pub(super) mod refusal;
+pub(super) mod request;

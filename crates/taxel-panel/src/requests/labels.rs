@@ -1,0 +1,186 @@
+//! Requests that change labels. Those that wait for the same table are written together, each whole or not at all; a table
+//! that another window or program has changed is read again.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::oneshot;
+
+use crate::handler::{EditOutcome, LabelRow, LabelTable};
+use crate::hub::Hub;
+use crate::hub::clients::Broadcast;
+use crate::hub::indexed::OpenRecording;
+use crate::hub::labels::{LabelChange, NumberedEdit, WaitingChanges, file_of};
+use crate::protocol::limited::{OneOrMore, Text};
+use crate::protocol::limits::MOST_MARKS;
+use crate::protocol::messages::Message;
+use crate::protocol::refusal::{Answer, Refusal};
+use crate::protocol::request::{Keep, MarkedTimes};
+
+/// How often the tables that were opened are checked for changes of other programs.
+const FOLLOW_EVERY: Duration = Duration::from_millis(300);
+
+// ---------------------------------------------------------------------------------------------- reading
+
+/// Reads the labels of a recording from their file; one us of the file is `us` in the view
+/// ([`Indexed::us`](crate::hub::indexed::Indexed::us)).
+pub(crate) async fn read(hub: &Hub, recording: &str, us: i64) -> Answer {
+    let stamp = stamp(hub, recording).await;
+    let known = hub.labels.count(recording).is_some();
+    if reread(hub, recording, stamp, us).await? && known {
+        // The other clients that show it have an older list.
+        hub.clients.send(Broadcast::Labels(recording.to_owned()));
+    }
+    Ok(())
+}
+
+/// What changes with the table; the reason where that cannot be determined.
+async fn stamp(hub: &Hub, recording: &str) -> String {
+    match hub.folder.file(&file_of(recording)) {
+        Ok(table) => hub.ask(move |handlers| handlers.labels.stamp(&table)).await.unwrap_or_else(|reason| reason),
+        Err(error) => error.to_string(),
+    }
+}
+
+/// Returns whether the labels or their conflict have changed.
+async fn reread(hub: &Hub, recording: &str, stamp: String, us: i64) -> Answer<bool> {
+    let _turn = hub.labels.turn(recording).await;
+    // Also where it cannot be read now: it is read again when it has changed.
+    hub.labels.opens(recording, stamp, us);
+    let table = hub.folder.file(&file_of(recording))?;
+    let name = recording.to_owned();
+    let (read, exists) =
+        hub.ask(move |handlers| Ok((handlers.labels.read(&table, &name, us)?, table.exists()))).await?;
+    let there = exists || !read.conflict.is_empty();
+    Ok(hub.labels.replace(recording, there.then_some(read)))
+}
+
+/// Reads tables again that have changed; never returns.
+pub(crate) async fn follow(hub: Arc<Hub>) {
+    loop {
+        tokio::time::sleep(FOLLOW_EVERY).await;
+        for (recording, us) in hub.labels.opened() {
+            let stamp = stamp(&hub, &recording).await;
+            if hub.labels.stamp(&recording) == stamp {
+                continue;
+            }
+            match reread(&hub, &recording, stamp, us).await {
+                Ok(true) => hub.clients.send(Broadcast::Labels(recording)),
+                Ok(false) => {}
+                Err(refusal) => hub.clients.send_message(&Message::warning(refusal.reason)),
+            }
+        }
+    }
+}
+
+// ---------------------------------------------------------------------------------------------- changing
+
+/// A label of the trial that is shown.
+pub(crate) fn row(shown: Option<&OpenRecording>, label: Text<200>, t_us: i64, source: Option<Text<64>>) -> LabelRow {
+    let source = source.map(|source| source.0).unwrap_or_default();
+    let trial = shown.and_then(|shown| shown.indexed.trial()).unwrap_or_default().to_owned();
+    LabelRow { label: label.0, t_us, source, trial, replaces_us: None, host_ns: None }
+}
+
+/// The changes of `marks`: several labels, each at one time or more.
+pub(crate) fn marks(shown: Option<&OpenRecording>, labels: Vec<MarkedTimes>) -> Answer<Vec<LabelChange>> {
+    let mut changes = vec![];
+    for MarkedTimes { label, t_us: OneOrMore(times), source, replaces_us } in labels {
+        if replaces_us.as_ref().is_some_and(|replaced| replaced.0.len() != times.len()) {
+            return Err(Refusal::of_field("replaces_us", "must have one time for each of t_us"));
+        }
+        if changes.len() + times.len() > MOST_MARKS {
+            return Err(Refusal::of_field("labels", format!("must be at most {MOST_MARKS} labels at a time")));
+        }
+        let row = row(shown, label, 0, source);
+        changes.extend(times.iter().enumerate().map(|(k, t_us)| {
+            let replaces_us = replaces_us.as_ref().map(|replaced| replaced.0[k].0);
+            LabelChange::Mark(LabelRow { t_us: t_us.0, replaces_us, ..row.clone() })
+        }));
+    }
+    Ok(changes)
+}
+
+/// The recording that is shown or being recorded, and one us of its file in the view.
+fn recording_of(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<(String, i64)> {
+    let name = shown.map(|shown| shown.name.clone()).or_else(|| hub.recorder.file());
+    let name = name.ok_or("a label belongs to a recording: open one, or record")?;
+    Ok((name, shown.map_or(1, |shown| shown.indexed.us())))
+}
+
+/// Changes labels of the recording that is shown or being recorded; returns when the table with all of the changes is on the disk.
+pub(crate) async fn change(hub: &Hub, shown: Option<&OpenRecording>, changes: Vec<LabelChange>) -> Answer {
+    let (name, us) = recording_of(hub, shown)?;
+    let changes: Vec<_> = changes.into_iter().map(|change| change.at_whole(us)).collect();
+    for (shown, t_us) in changes.iter().filter_map(|change| shown.zip(change.t_us())) {
+        let outside = |reason| Refusal { reason, field: Some("t_us".to_owned()) };
+        shown.indexed.check_label(&name, t_us).map_err(outside)?;
+    }
+    let (answer, written) = oneshot::channel();
+    hub.labels.wait(&name, WaitingChanges { changes, answer });
+    {
+        let _turn = hub.labels.turn(&name).await;
+        write_waiting(hub, &name, us).await;
+    }
+    written.await.unwrap_or_else(|_| Err(Refusal::bug("labels:")))
+}
+
+/// Writes all changes that wait for a table, and answers them.
+async fn write_waiting(hub: &Hub, name: &str, us: i64) {
+    let waiting = hub.labels.take_waiting(name);
+    // Another request may have written them with its own.
+    if waiting.is_empty() {
+        return;
+    }
+    let edits = hub.labels.edits(name, &waiting);
+    let answers = match write(hub, name, us, edits).await {
+        Ok(answers) => answers,
+        Err(refusal) => vec![Err(refusal); waiting.len()],
+    };
+    for (changes, answer) in waiting.into_iter().zip(answers) {
+        // The client may have left in the meantime.
+        let _ = changes.answer.send(answer);
+    }
+}
+
+async fn write(hub: &Hub, name: &str, us: i64, edits: Vec<Result<Vec<NumberedEdit>, String>>) -> Answer<Vec<Answer>> {
+    let table = hub.folder.file(&file_of(name))?;
+    let of_request = |edits: &Vec<NumberedEdit>| edits.iter().map(|(_, edit)| edit.clone()).collect();
+    let requests: Vec<Vec<_>> = edits.iter().flatten().map(of_request).collect();
+    let recording = name.to_owned();
+    let (outcomes, read): (Vec<EditOutcome>, LabelTable) =
+        hub.ask(move |handlers| handlers.labels.change(&table, &recording, us, &requests)).await?;
+    let mut outcomes = outcomes.into_iter();
+    let mut answers = vec![];
+    for request in edits {
+        let outcome = request.map(|numbered| (numbered, outcomes.next().unwrap_or_else(|| Err("failed".to_owned()))));
+        answers.push(match outcome {
+            Ok((numbered, Ok(rows))) => {
+                let numbers = numbered.into_iter().map(|(id, _)| id);
+                hub.labels.renumber(name, numbers.zip(rows).filter_map(|(id, row)| Some((id?, row))));
+                Ok(())
+            }
+            Ok((_, Err(reason))) | Err(reason) => Err(reason.into()),
+        });
+    }
+    hub.labels.replace(name, Some(read));
+    hub.labels.follows(name, us);
+    hub.clients.send(Broadcast::Labels(name.to_owned()));
+    Ok(answers)
+}
+
+/// Ends the conflict of this number as the client chose.
+pub(crate) async fn settle(hub: &Hub, shown: Option<&OpenRecording>, id: u64, keep: Keep) -> Answer {
+    let (name, us) = recording_of(hub, shown)?;
+    let restore = keep == Keep::Acknowledged;
+    let table = hub.folder.file(&file_of(&name))?;
+    let _turn = hub.labels.turn(&name).await;
+    let conflict = hub.labels.conflict(&name, id).ok_or_else(|| {
+        Refusal::of_field("conflict_id", "this conflict is settled, or the file has changed since: look at it again")
+    })?;
+    let recording = name.clone();
+    let read = hub.ask(move |handlers| handlers.labels.settle(&table, &recording, us, &conflict, restore)).await?;
+    hub.labels.replace(&name, Some(read));
+    hub.clients.send(Broadcast::Labels(name));
+    Ok(())
+}

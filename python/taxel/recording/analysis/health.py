@@ -1,0 +1,311 @@
+"""Detection of dead, stuck and noisy taxels in a recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._base.arguments import shown
+from taxel._base.columns import frozen
+from taxel._base.drawing import draw
+from taxel._base.errors import refused
+from taxel._base.messages import counted
+from taxel.array import Array
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recorded import Recorded
+from taxel.recorded import recorded as held_by
+from taxel.recording.analysis.rest import FORCE_UNITS, flickering, ticks_by_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Reading: a taxel is dead, or stuck, if its place was touched at least this number of times (`_core`, *touch counts*)
+#: and it never changed meanwhile, if it has this number of neighbours: beyond the edge of an insole nothing presses ...
+TOUCHED_FROM, NEIGHBOURS_FROM = 3, 5
+#: ... or if it is known to hold 0 while the least value of its neighbours (median) was at least this number of ticks
+#: and this share of the largest value of the array ...
+REST_FROM, REST_SHARE = 10, 0.2
+#: ... or if it had no event while the median of its neighbours had at least this number, and most of the array is so
+#: noisy that hardly any taxel had few events: among taxels with active neighbours, at most this share of the number of
+#: silent ones ...
+LOUD_FROM, QUIET_SHARE = 10, 0.1
+#: ... It is stuck if it had at least this number of events, all with one value ...
+STUCK_FROM = 3
+#: ... It is noisy if it changed by itself in at least this number of bins of 50 ms, which are at least this share of
+#: those in which it changed, and at most this share of its changes went on in the direction of the one before: a touch
+#: goes on, noise turns back.
+NOISY_FROM, NOISY_SHARE, NOISY_ON = 10, 0.5, 0.45
+
+#: A taxel that was not touched enough works if it had at least this number of events, or was once pressed itself.
+WORKS_FROM = 10
+
+#: Number of taxels whose neighbours are computed at once.
+_AT_ONCE = 1 << 17
+#: Row and column offsets of a taxel's neighbours.
+_OFFSETS = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Health:
+    """Hold which taxels are dead, stuck or noisy.
+
+    Parameters
+    ----------
+    array : Array
+    activity : int64, shape (rows, columns)
+        Number of events (or changes of the frame) at each taxel.
+    dead, stuck, noisy : bool, shape (rows, columns)
+    untested : bool, shape (rows, columns)
+        Not touched enough to say: neither named nor seen to work.
+    """
+
+    array: Array
+    activity: NDArray[np.int64]
+    dead: NDArray[np.bool_]
+    stuck: NDArray[np.bool_]
+    noisy: NDArray[np.bool_]
+    untested: NDArray[np.bool_]
+
+    def named(self) -> dict[str, list[tuple[int, int]]]:
+        """Return column and row (x, y) of the taxels that are dead, stuck and noisy."""
+        masks = {"dead": self.dead, "stuck": self.stuck, "noisy": self.noisy}
+        return {name: [(int(x), int(y)) for y, x in np.argwhere(mask)] for name, mask in masks.items()}
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the activity of each taxel, with those marked that are dead, stuck or noisy."""
+        return draw("health_map", self, ax)  # type: ignore[no-any-return]
+
+    def _repr_html_(self) -> str:
+        return draw("html", self)  # type: ignore[no-any-return]
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{len(places)} {name}" for name, places in self.named().items())
+        untested = int(np.count_nonzero(self.untested))
+        return (
+            f"Health({counted(self.array.taxels, 'taxel')}: {counts}"
+            + f", {untested} not touched enough to say" * bool(untested)
+            + ")"
+        )
+
+
+def health(recorded: Events | Frames | Recorded) -> Health:
+    """Return which taxels are dead, stuck or noisy, each compared with its neighbours.
+
+    A recording cannot show whether taxels work in a region that was never touched: a taxel is named dead or stuck only
+    if its neighbours were touched three times or more. One that was touched less and did nothing is *untested*. States
+    of wire version 2 (`Events.repaired`) and the values held at the beginning count as held values, but not as changes
+    of the taxel. Without neighbours, as in one channel, no taxel is named.
+
+    Parameters
+    ----------
+    recorded : Events, Frames or Recording
+        In frames each change of a value counts as an event.
+
+    Returns
+    -------
+    Health
+
+    Raises
+    ------
+    ProblemError : none of these
+
+    Notes
+    -----
+    *Reading* (the thesis defines none). A place is touched while three in four of its up to 8 neighbours are 8 ticks
+    above their rest, until all but one in four are back; in frames 150 ticks are the range of the values. Dead: three
+    touches or more and no change in any of them, with 5 neighbours or more; or no event and known to hold 0, while the
+    median of the least values of its neighbours is 10 ticks or more and a fifth of the array's largest value; or no
+    event in noise so strong that, over half of the array or more, the taxels with 1 to 9 events are at most a tenth as
+    many as the silent ones. Stuck: like a dead one, but known to hold a value other than 0; or 3 events or more, all
+    with one intensity, while its neighbours show more than one. Noisy: in 10 bins of 50 ms or more, half of all in
+    which it changes, it has 3 changes or more, and more than 8 times those of all but one of the 24 taxels around it;
+    and at most 45 % of its changes go on in the direction of the one before. Of frames, too, one that jumps for less
+    than two frames at a time, 10 times or more, more than half as far from its median as ever, while all but one of
+    its neighbours move less than an eighth as much.
+
+    Examples
+    --------
+    >>> touch = np.array([0, 40, 80, 40, 0])[:, None, None] * np.ones((3, 3))
+    >>> values = np.concatenate([touch] * 3) + 50
+    >>> values[:, 1, 1] = 0
+    >>> health(Frames(values, np.arange(15) * 100_000, unit="ticks"))
+    Health(9 taxels: 1 dead, 0 stuck, 0 noisy)
+    """
+    # A missing value is no reading that could show what a taxel does.
+    table = held_by(recorded, hold=False)
+    if isinstance(table, Events):
+        return judge(table.array, _statistics_of_events(table))
+    if not isinstance(table, Frames):
+        raise refused("recorded", f" is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
+    activity, moved = (
+        grid.astype(np.int64).reshape(table.array.shape) for grid in _core.changes_of_frames(table._parts())
+    )
+    # The values of frames count from the least one.
+    scale, least = ticks_by_unit(table), np.fmin.reduce(table.values, axis=None, initial=np.inf)
+    ticks = table
+    if np.isfinite(least):
+        # Values at both ends of single precision are infinitely far apart.
+        with np.errstate(over="ignore"):
+            values = table.values - least
+            ticks = Frames(frozen(np.multiply(values, scale, out=values)), table.t, array=table.array)
+    counts = _core.touches_of_frames(ticks._parts(), 0.0 if table.unit in FORCE_UNITS else np.nan)
+    result = judge(table.array, TaxelStatistics(activity, moved, Touches.from_counts(*counts)), loud=False)
+    if not len(table):
+        return result
+    # In frames a taxel that never changes is dead or stuck, depending on its value.
+    loaded = table.values[0] > least
+    noisy = result.noisy | flickering(table)
+    dead, stuck = (grid & ~noisy for grid in (result.dead & ~loaded, result.stuck | result.dead & loaded))
+    return replace(result, dead=dead, stuck=stuck, noisy=noisy, untested=result.untested & ~noisy)
+
+
+class Touches(NamedTuple):
+    """Touches of each taxel that had a value, counted at it and at its neighbours, shape (taxels,)."""
+
+    taxels: NDArray[np.uint32]
+    """Their indices."""
+    touches: NDArray[np.uint32]
+    """Number of touches of its place, as its neighbours show them."""
+    missed: NDArray[np.uint32]
+    """Those in which it did not change."""
+    pressed: NDArray[np.uint32]
+    """Number of bins in which it was touched itself."""
+    changed: NDArray[np.uint32]
+    """Number of bins in which it changed."""
+    by_itself: NDArray[np.uint32]
+    """Those in which hardly any taxel around it did."""
+
+    @classmethod
+    def from_counts(cls, taxels: NDArray[np.uint32], counts: NDArray[np.uint32]) -> Touches:
+        """Return what the core gives: the taxels, and rows of five counts one after the other."""
+        return cls(taxels, *counts.reshape(-1, 5).T)
+
+
+class TaxelStatistics(NamedTuple):
+    """Statistics of each taxel's events and held values; whole numbers, shape (rows, columns) but for touches."""
+
+    activity: NDArray[np.int64]
+    """Number of events."""
+    moved: NDArray[np.int64]
+    """Number of events with the polarity of the taxel's event before."""
+    touches: Touches
+    values: NDArray[np.signedinteger] | None = None
+    """Number of different intensities of its events: 0, 1, or 2 for more; None if events have none."""
+    least: NDArray[np.signedinteger] | None = None
+    """The least value that it is known to have held, ticks; -1 for a taxel without any event."""
+    greatest: NDArray[np.signedinteger] | None = None
+    """The greatest value that it is known to have held, ticks; -1 for a taxel without any event."""
+
+
+def judge(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> Health:
+    """Return the health of taxels with these statistics, by the rules of `health`; `loud`: that of noise too."""
+    exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
+    activity, touches = statistics.activity, statistics.touches
+    silent = exists & (activity == 0)
+
+    def where(selected: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        grid = np.zeros(array.shape, bool)
+        grid.reshape(-1)[touches.taxels[selected]] = True
+        return grid
+
+    enough = where(touches.touches >= TOUCHED_FROM) & (_neighbours(exists) >= NEIGHBOURS_FROM)
+    dead = exists & enough & where(touches.missed == touches.touches)
+    if loud:
+        # A median reaches a bound only if a neighbour reaches it, so all other taxels are skipped.
+        among = _reaches(activity, exists, (_neighbours(exists & (activity >= LOUD_FROM)) > 0) & exists, LOUD_FROM)
+        quiet = np.count_nonzero(among & (activity > 0) & (activity < LOUD_FROM))
+        alone = quiet <= QUIET_SHARE * np.count_nonzero(among & silent)
+        if alone and 2 * np.count_nonzero(among) > np.count_nonzero(exists):
+            dead |= silent & among
+    stuck = np.zeros(array.shape, bool)
+    if statistics.least is not None and statistics.greatest is not None:
+        least = max(REST_FROM, REST_SHARE * int(statistics.greatest.max(initial=0)))
+        known = exists & (statistics.least >= 0)
+        at_zero = silent & (statistics.greatest == 0) & (_neighbours(known & (statistics.least >= least)) > 0)
+        dead |= _reaches(statistics.least, known, at_zero, least)
+        stuck = dead & (statistics.greatest > 0)
+    if statistics.values is not None:
+        still = exists & (activity >= STUCK_FROM) & (statistics.values == 1)
+        stuck |= _reaches(statistics.values, exists & (activity > 0), still, 1, above=True)
+    noisy = exists & where((touches.by_itself >= NOISY_FROM) & (touches.by_itself >= NOISY_SHARE * touches.changed))
+    noisy &= ~stuck & (statistics.moved <= NOISY_ON * activity)
+    # A channel has no neighbours that would show what it should do.
+    noisy &= min(array.shape) > 1
+    dead &= ~stuck
+    works = enough | where(touches.pressed > 0) | (activity >= WORKS_FROM)
+    untested = exists & ~dead & ~stuck & ~noisy & ~works
+    return Health(array, activity, dead, stuck, noisy, untested)
+
+
+def _statistics_of_events(events: Events) -> TaxelStatistics:
+    """Return the statistics of each taxel; an event that a state repaired counts for the held value only."""
+    sent = np.ones(len(events), bool) if events.repaired is None else ~events.repaired
+    index = events.array.index(events.x, events.y).astype(np.int64)
+    activity, moved = _ways(index[sent], np.where(events.p[sent], 1, -1), events.array)
+    touches = Touches.from_counts(*_core.touches_of_events(events.sorted()._parts()))
+    if events.intensity is None or events.present is None:
+        return TaxelStatistics(activity, moved, touches)
+    shape, size = events.array.shape, events.array.rows * events.array.columns
+    pairs = np.unique(index[events.present & sent] * 65_536 + events.intensity[events.present & sent].astype(np.int64))
+    values = np.bincount(pairs // 65_536, minlength=size).astype(np.int32)
+    ticks = events.intensity[events.present].astype(np.int32)
+    least, greatest = np.full(size, 65_536, np.int32), np.full(size, -1, np.int32)
+    np.minimum.at(least, index[events.present], ticks)
+    np.maximum.at(greatest, index[events.present], ticks)
+    least[greatest < 0] = -1
+    grids = (grid.reshape(shape) for grid in (values, least, greatest))
+    return TaxelStatistics(activity, moved, touches, *grids)
+
+
+def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return how many changes each taxel has, and how many of them have the direction of the one before."""
+    order = np.argsort(index, kind="stable")
+    taxel, way = index[order], way[order]
+    again = taxel[1:][(taxel[1:] == taxel[:-1]) & (way[1:] == way[:-1])]
+    size = array.rows * array.columns
+    counts = (np.bincount(taxels, minlength=size).reshape(array.shape) for taxels in (taxel, again))
+    activity, moved = counts
+    return activity, moved
+
+
+def _neighbours(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return how many of the up to 8 neighbours of each taxel a mask has."""
+    rows, columns = mask.shape
+    padded = np.pad(mask, 1)
+    number = np.zeros(mask.shape, np.uint8)
+    for i, j in _OFFSETS:
+        number += padded[1 + i : 1 + i + rows, 1 + j : 1 + j + columns]
+    return number
+
+
+def _reaches(
+    grid: NDArray[Any], counts: NDArray[np.bool_], where: NDArray[np.bool_], bound: float, *, above: bool = False
+) -> NDArray[np.bool_]:
+    """Return for which taxels the median of the neighbours that count is at least a bound, or above it."""
+    reached = np.zeros(grid.shape, bool)
+    places = np.flatnonzero(where)
+    medians = _around(grid, counts, places)
+    reached.reshape(-1)[places] = medians > bound if above else medians >= bound
+    return reached
+
+
+def _around(grid: NDArray[Any], counts: NDArray[np.bool_], places: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the median of the neighbours that count, for taxels by index; 0 if none counts.
+
+    numpy.nanmedian does the same for one taxel at a time and is a hundred times slower.
+    """
+    padded = np.pad(np.where(counts, grid, np.nan), 1, constant_values=np.nan)
+    medians = np.empty(len(places))
+    for first in range(0, len(places), _AT_ONCE):
+        y, x = np.divmod(places[first : first + _AT_ONCE], grid.shape[1])
+        # Neighbours that do not count are NaN, which is sorted last.
+        around = np.sort([padded[1 + y + i, 1 + x + j] for i, j in _OFFSETS], axis=0)
+        count = np.count_nonzero(~np.isnan(around), axis=0)
+        middle = np.stack([np.maximum(count - 1, 0) // 2, count // 2])
+        medians[first : first + _AT_ONCE] = np.where(count, np.take_along_axis(around, middle, axis=0).mean(axis=0), 0)
+    return medians

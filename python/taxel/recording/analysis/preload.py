@@ -1,0 +1,81 @@
+"""The tare of a recording that began with something on the array, which was taken away later."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.frames import Frames
+from taxel.recorded import recorded
+from taxel.recording.analysis.pressure import readings
+from taxel.recording.analysis.rest import Rest, of_quiet
+from taxel.recording.recording import Recording
+from taxel.tare import Tare
+
+#: A tare lasts so long at least, us, and so many frames.
+_LEAST_US, _LEAST_FRAMES = 10_000, 20
+
+
+def without_preload(recording: Recording, first_us: int) -> tuple[Tare | None, str]:
+    """Return the tare of a time without what lay on the array before a time, us, and the line that says so.
+
+    The time is the longest one before that time, else that of a later quiet stretch. None and "" where nothing lay;
+    None and a line where there is no such time.
+    """
+    source = recorded(recording)
+    read = (source, of_quiet(source)) if isinstance(source, Frames) else readings(recording)
+    if read is None or not read[1].preload_at or read[1].quiet_us is None or read[1].quiet_us[0] >= first_us:
+        return None, ""
+    span = _without(read[0], read[1], first_us)
+    tare = None if span is None else Tare.take(source, start_us=span[0], stop_us=span[1], note=str(recording.path))
+    return tare, _line(recording, read[1], found=span is not None)
+
+
+def free_of_preload(recording: Recording, rest: Rest) -> tuple[tuple[int, int] | None, str]:
+    """Return a quiet stretch, us, without what lay on the array in that of a rest, and the line that says so.
+
+    Without one it is that of the rest.
+    """
+    source = recorded(recording)
+    read = (source,) if isinstance(source, Frames) else readings(recording)
+    assert read is not None  # a rest is of values
+    free = _free(read[0], rest)
+    span = _later(read[0], free) if len(free) else None
+    return rest.quiet_us if span is None else span, _line(recording, rest, found=span is not None)
+
+
+def _line(recording: Recording, rest: Rest, *, found: bool) -> str:
+    """Return the line on a tare beside a rest with something on the array, where a time without it was found or not."""
+    without = "so the tare is of a time without it"
+    lacks = "and there is no other rest, so the tare holds it; give a tare's file"
+    return f"{recording.path}: the rest is {rest}, {without if found else lacks}"
+
+
+def _free(frames: Frames, rest: Rest) -> NDArray[np.int64]:
+    """Return the numbers of the frames without what lay on the array in the quiet stretch of a rest."""
+    assert rest.quiet_us is not None
+    assert rest.preload is not None
+    is_loaded = rest.preload > 0
+    values = frames.values.reshape(len(frames), -1)[:, is_loaded]
+    quiet = values[slice(*np.searchsorted(frames.t, rest.quiet_us))].mean(axis=0, dtype=np.float64)
+    return np.flatnonzero((values < quiet - rest.preload[is_loaded] / 2).all(axis=1))
+
+
+def _later(frames: Frames, free: NDArray[np.int64]) -> tuple[int, int] | None:
+    """Return the first quiet stretch from the first of these frames on, us, unless something lies on the array."""
+    later = of_quiet(frames.between(frames.t[free[0]], np.inf))
+    return None if later.preload_at else later.quiet_us
+
+
+def _without(frames: Frames, rest: Rest, first_us: int) -> tuple[int, int] | None:
+    """Return the longest time before the first label without what lay on the array, else a later quiet one, us."""
+    free = _free(frames, rest)
+    if not len(free):
+        return None
+    runs = np.split(free, np.flatnonzero(np.diff(free) > 1) + 1)
+    spans = [(int(frames.t[run[0]]), min(int(frames.t[run[-1]]), first_us)) for run in runs]
+    begin, end = max(spans, key=lambda span: span[1] - span[0])
+    count = np.count_nonzero((frames.t >= begin) & (frames.t < end))
+    if end - begin >= _LEAST_US and count >= _LEAST_FRAMES:
+        return begin, end
+    return _later(frames, free)

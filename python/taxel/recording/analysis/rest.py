@@ -1,0 +1,323 @@
+"""The rest of a recording's taxels: what they read while nothing touches them, and where that is known from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._base.times import beginning_us
+from taxel._core import FormatError
+from taxel.formats.layout import Layout, or_given
+from taxel.frames import Frames
+from taxel.tare import Tare
+
+#: Units of force and pressure: an unloaded taxel reads 0 in them.
+FORCE_UNITS = ("N", "mN", "kPa", "Pa", "N/cm2")
+#: The note of a tare that was not measured.
+BY_UNIT = "0, by the unit"
+#: Reading: a noise floor is so many standard deviations of the noise, so that two neighbours rarely exceed it together,
+#: and its noise is what this share of the taxels has at most: of the others some may be bad.
+TIMES_NOISE, SHARE = 6.0, 0.9
+#: Reading: the noise floor of the board's fast presets, ticks ...
+NOISE_FLOOR = 3.0
+#: ... in another unit, the range of a recording's values counts as so many ticks.
+RANGE_TICKS = 150.0
+
+#: Reading: what a taxel reads in a quiet stretch is not its rest, but a load that stood still, if in more than this
+#: share of all frames it reads less by so many ticks.
+LOADED_SHARE, LOADED_TICKS = 0.1, _core.LOADED_TICKS
+#: Values fall from a rest if they go so many times as far below it as above it, in the taxel that does so third most:
+#: bad taxels move alone or in pairs. In ...
+_FALLS, _THIRD = 3.0, 3
+#: ... a smaller array the first counts.
+_SMALL = 9
+#: Reading: a taxel of frames flickers if it is more than half as far from its median as it ever is so many times or
+#: more, for less than two frames at a time, while all but one of its neighbours move less than this share of it.
+#: At most one in so many taxels is taken for one.
+_FLICKERS, _ALONE, _FEW = 10, 1 / 8, 16
+#: So many frames or fewer give a taxel's median.
+_MEDIAN_OF = 2000
+
+#: Values in a block of frames.
+_BLOCK = 1 << 16
+
+#: Frames in order: their times, us, and their values by taxel, NaN where a taxel has none.
+FrameBlock = tuple[NDArray[np.int64], NDArray[np.float32]]
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """Hold what taxels read at rest, and where it is known from.
+
+    Parameters
+    ----------
+    source : {"tare", "calibration", "unit", "quiet", "none"}
+        A given tare; the calibration's own rest; 0, as the values are force or pressure; a quiet stretch; nothing.
+    values : float64, one a taxel, in the sensor's unit
+        NaN for a taxel whose rest is not known. That of a quiet stretch is where the rest is tracked from.
+    quiet_us : (int, int), us, optional
+        The quiet stretch.
+    begin_us : int, us
+        The time that text counts the quiet stretch from (`taxel._base.times`).
+    zeroed : int
+        Number of taxels that were zeroed while recording: from then on their rest is what was given.
+    falls : bool
+        Whether values of frames go further below the rest of a quiet stretch than above it, and come back: less may
+        mean more pressure.
+    preload : float64, one a taxel, in the sensor's unit, optional
+        Of a grid: how much more than at rest a taxel read in the quiet stretch, where something lay on it then and was
+        taken away; 0 elsewhere.
+    preload_at : str
+        Where that was, for people; empty where nothing lay there.
+    """
+
+    source: str
+    values: NDArray[np.float64]
+    quiet_us: tuple[int, int] | None = None
+    begin_us: int = 0
+    zeroed: int = 0
+    falls: bool = False
+    preload: NDArray[np.float64] | None = None
+    preload_at: str = ""
+
+    def __str__(self) -> str:
+        """Return the line of ``taxel info``."""
+        return self.text()
+
+    def text(self, path: Path | None = None) -> str:
+        """Return the line of ``taxel info``; of the recording of a path it names the layout file."""
+        words = {
+            "tare": "the given tare",
+            "calibration": "the calibration's",
+            "unit": "0, as the values are force or pressure",
+            "none": "not known, as no half second was quiet with nothing on it; a tare can be given",
+        }
+        text = words.get(self.source, "")
+        if self.quiet_us is not None:
+            first, end = ((us - self.begin_us) / 1e6 for us in self.quiet_us)
+            text = f"a quiet stretch, {first:.3f} to {end:.3f} s, tracked from there"
+            text += f"; something lay on {self.preload_at} in it" * bool(self.preload_at)
+        if self.falls:
+            text += f"; {self.fall(path)}"
+        return text + f"; {self.zeroed} zeroed" * bool(self.zeroed)
+
+    @staticmethod
+    def fall(path: Path | None = None) -> str:
+        """Return what to do of values that fall; of the recording of a path it names the layout file."""
+        file = None if path is None else Layout.beside(path)
+        with suppress(FormatError, OSError):
+            if file is not None and Layout.read(file).turned is not None:
+                return f"values fall from their rest as {file.name} turns them: leave falls out of it, if that is wrong"
+        where = "" if path is None else f" {or_given(path)}"
+        return f"values fall from their rest: if less means more pressure, say falls = true in a layout file{where}"
+
+    def described(self) -> dict[str, object]:
+        """Return source, quiet stretch, number of zeroed taxels and whether values fall, as JSON values."""
+        return {"source": self.source, "quiet_us": self.quiet_us, "zeroed": self.zeroed, "falls": self.falls}
+
+
+def by_unit(frames: Frames) -> Tare | None:
+    """Return the tare of frames in a unit of force or pressure: 0, with the noise of a quiet stretch; None of others.
+
+    The noise of a taxel is 1.4826 times how much the third quartile of what it reads there is above the median: the
+    standard deviation of normal noise, also where a sensor cuts off what is below 0, and in a stretch of which less
+    than a quarter is a press. 0 where none is quiet, and of a taxel without a value.
+    """
+    if frames.unit not in FORCE_UNITS or not len(frames):
+        return None
+    quiet = _of_rising(frames, ticks_by_unit(frames)).quiet_us
+    still = np.zeros((1, *frames.array.shape)) if quiet is None else frames.between(*quiet).values
+    middle, above = np.nanquantile(np.where(np.isnan(still).all(axis=0), 0.0, still), (0.5, 0.75), axis=0)
+    noise = 1.4826 * np.asarray(above - middle, np.float64)
+    nothing = Frames(np.zeros((2, *frames.array.shape)), [0, 1], unit=frames.unit, array=frames.array)
+    document = json.loads(Tare.take(nothing, note=BY_UNIT).to_json())
+    return Tare.from_json(json.dumps(document | {"noise": noise.reshape(-1).tolist()}))
+
+
+def loaded_from(frames: Frames, rest: Rest) -> float:
+    """Return from how much above its rest on a taxel of frames counts as loaded, in their unit.
+
+    Of force and pressure that is more than the noise of a quiet stretch, or than 0 without one; of a rest that a quiet
+    stretch shows, more than the noise floor of the board; of any other rest, more than 0.
+    """
+    if rest.source == "unit" and (tare := by_unit(frames)) is not None:
+        return TIMES_NOISE * float(np.quantile(tare.noise, SHARE))
+    if rest.source != "quiet":
+        return 0.0
+    return float(_core.touched_above(NOISE_FLOOR)) / ticks_by_unit(frames)
+
+
+def ticks_by_unit(frames: Frames) -> float:
+    """Return the ticks by the unit of frames: the range of their values counts as that of a board's ramp.
+
+    The values of taxels that flicker (`flickering`) are left out.
+    """
+    if frames.unit == "ticks":
+        return 1.0
+    least, most = _extremes(frames.values)
+    flickers = flickering(frames)
+    least[flickers] = most[flickers] = np.nan
+    span = float(np.fmax.reduce(most, axis=None, initial=np.nan)) - float(
+        np.fmin.reduce(least, axis=None, initial=np.nan)
+    )
+    return RANGE_TICKS / span if span > 0 else 1.0
+
+
+def flickering(frames: Frames) -> NDArray[np.bool_]:
+    """Return which taxels of frames jump again and again for one frame, alone, shape (rows, columns)."""
+    values, found = frames.values, np.zeros(frames.array.shape, bool)
+    if min(found.shape) == 1 or found.size < _SMALL:
+        return found
+    least, most = _extremes(values)
+    spans = np.nan_to_num(most.astype(np.float64) - least)
+    for _ in range(found.size // _FEW):
+        y, x = np.unravel_index(np.argmax(spans), found.shape)
+        series = values[:, y, x]
+        if not spans[y, x] or not np.isfinite(series).all():
+            return found
+        apart = np.abs(series - np.median(series))
+        far = apart > apart.max() / 2
+        times = np.count_nonzero(far[1:] & ~far[:-1])
+        if times < _FLICKERS or np.count_nonzero(far) >= 2 * times:
+            return found
+        rows, columns = (slice(max(0, at - 1), at + 2) for at in (y, x))
+        around = values[:, rows, columns].reshape(len(values), -1)
+        around = around[:, np.isfinite(around).all(axis=0)]
+        moves = np.sort(np.median(np.abs(around[far] - np.median(around, axis=0)), axis=0))
+        # The last is the taxel's own.
+        if len(moves) < _THIRD or moves[-_THIRD] >= _ALONE * moves[-1]:
+            return found
+        found[y, x], spans[y, x] = True, 0
+    return found
+
+
+def _extremes(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return each taxel's least and greatest finite value, NaN for one without any."""
+    least, most = (reduction.reduce(values, axis=0, initial=np.nan) for reduction in (np.fmin, np.fmax))
+    if np.isinf(least).any() or np.isinf(most).any():
+        values = np.where(np.isfinite(values), values, np.nan)
+        least, most = (reduction.reduce(values, axis=0, initial=np.nan) for reduction in (np.fmin, np.fmax))
+    return least, most
+
+
+def find_rest(
+    blocks: Callable[[], Iterable[FrameBlock]],
+    taxels: int,
+    columns: int,
+    scale: float = 1.0,
+    *,
+    falls: bool = False,
+    corner: tuple[int, int] = (0, 0),
+    stands_for: NDArray[np.int64] | None = None,
+) -> Rest:
+    """Return the rest that a quiet stretch of frames shows (`_core.TrackedRest`), or none.
+
+    Parameters
+    ----------
+    blocks : function
+        Returns the frames in order, each time it is called.
+    taxels, columns : int
+    scale : float
+        Ticks by the sensor's unit.
+    falls : bool
+        Whether values fall from the rest with pressure.
+    corner : (int, int)
+        Row and column of the first taxel, for text.
+    stands_for : int64, shape (frames,), optional
+        How many equal frames each one is; default 1.
+    """
+    rest = _core.TrackedRest(columns, NOISE_FLOOR, np.full(taxels, np.nan), falls)
+    begin_us = None
+    for t, values in blocks():
+        begin_us = beginning_us(t) if begin_us is None else begin_us
+        rest.above(t, np.ascontiguousarray(values * np.float32(scale)).reshape(-1))
+    unknown = np.full(taxels, np.nan)
+    if rest.quiet is None:
+        return Rest("none", unknown)
+    begins, known = rest.begins / scale, np.zeros(taxels, np.int64)
+    released, less, quiet, in_quiet = known.copy(), np.zeros(taxels), np.zeros(taxels), known.copy()
+    first = 0
+    for t, values in blocks():
+        weights = np.ones((len(t), 1), np.int64) if stands_for is None else stands_for[first : first + len(t), None]
+        first += len(t)
+        load = begins - values if falls else values - begins
+        far = load < -LOADED_TICKS / scale
+        released += (far * weights).sum(axis=0)
+        less -= (np.where(far, load, 0.0) * weights).sum(axis=0)
+        is_known = ~np.isnan(load)
+        known += (is_known * weights).sum(axis=0)
+        within = slice(*np.searchsorted(t, rest.quiet))
+        quiet += (np.where(is_known, load, 0.0) * weights)[within].sum(axis=0)
+        in_quiet += (is_known * weights)[within].sum(axis=0)
+    loaded = released > LOADED_SHARE * known
+    begins[loaded] = np.nan
+    if np.isnan(begins).all():
+        return Rest("none", unknown)
+    loads = quiet / np.maximum(in_quiet, 1) + np.where(loaded, less / np.maximum(released, 1), 0.0)
+    preload, where = _core.preload(np.where(known > 0, loads, np.nan), columns, LOADED_TICKS / scale, corner)
+    return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls, preload=preload, preload_at=where)
+
+
+def of_frames(frames: Frames) -> Rest:
+    """Return the rest of frames without a tare: 0 of force or pressure, else what a quiet stretch shows, or none."""
+    if frames.unit in FORCE_UNITS:
+        return Rest("unit", np.zeros(frames.array.rows * frames.array.columns))
+    return of_quiet(frames)
+
+
+def of_quiet(frames: Frames) -> Rest:
+    """Return the rest of frames that a quiet stretch of them shows, or none."""
+    scale = ticks_by_unit(frames)
+    rest = _of_rising(frames, scale)
+    if rest.quiet_us is None or not _fall(frames, rest.quiet_us, scale):
+        return rest
+    fallen = _of_rising(frames, scale, falls=True)
+    # Without a rest of their own the values are tracked from their first ones on. What they rise by is no load.
+    return replace(rest, values=fallen.values, falls=True, preload=None, preload_at="")
+
+
+def _of_rising(frames: Frames, scale: float, *, falls: bool = False) -> Rest:
+    """Return the rest that a quiet stretch of frames shows if their values rise with pressure, or if they fall."""
+    blocks, columns = _blocks(frames), frames.array.columns
+    return find_rest(lambda: blocks, frames.array.rows * columns, columns, scale, falls=falls)
+
+
+def _blocks(frames: Frames) -> list[FrameBlock]:
+    """Return frames in blocks that a processor's cache holds."""
+    taxels = frames.array.rows * frames.array.columns
+    values, block = frames.values.reshape(len(frames), taxels), max(1, _BLOCK // max(1, taxels))
+    return [(frames.t[k : k + block], values[k : k + block]) for k in range(0, len(frames), block)]
+
+
+def _fall(frames: Frames, quiet_us: tuple[int, int], scale: float) -> bool:
+    """Return whether values go further below their rest than above it, and come back.
+
+    The rest is here that of the quiet stretch itself: a tracked one follows values that fall and stay for a while. A
+    taxel that is loaded half of the time or more has its lower one; one that never comes back was loaded before.
+    """
+    values = frames.held().values.reshape(len(frames), -1)
+    first, end = np.searchsorted(frames.t, quiet_us)
+    rest = np.median(values[:: 1 + len(values) // _MEDIAN_OF], axis=0)
+    rest = np.minimum(rest, values[first:end].mean(axis=0, dtype=np.float64))
+    lowest = values.min(axis=0)
+    down, up = rest - lowest, values.max(axis=0) - rest
+    back = np.array([values[k:, taxel].max() for taxel, k in enumerate(values.argmin(axis=0))])
+    down[back < rest - down / _FALLS] = 0
+    rank = _THIRD if down.size >= _SMALL else 1
+    deepest, most = (np.partition(moves, -rank)[-rank] for moves in (down, up))
+    return bool(deepest > max(_FALLS * most, 2 * LOADED_TICKS / scale))
+
+
+def frames_above(rest: Rest, blocks: Iterable[FrameBlock], columns: int, scale: float = 1.0) -> Iterable[FrameBlock]:
+    """Yield frames above a rest that is tracked, from a quiet stretch or from the first values; 0 below it."""
+    at = _core.TrackedRest(columns, NOISE_FLOOR, rest.values * scale, rest.falls)
+    for t, values in blocks:
+        above = at.above(t, np.ascontiguousarray(values * np.float32(scale)).reshape(-1))
+        yield t, above.reshape(values.shape) / np.float32(scale)

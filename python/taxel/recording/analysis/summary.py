@@ -1,0 +1,174 @@
+"""Summary of a recording: its size and rates, pressure, dead taxels, and losses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.clock import doubt
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recording.analysis.health import health
+from taxel.recording.analysis.pressure import Series
+from taxel.recording.recording import Recording
+
+#: The interval over which the highest rate is measured, us.
+_PEAK_US = 10_000
+#: Reading: frames are apart by a gap if by so many median intervals.
+_GAP = 2.5
+#: Reading: a taxel was at full scale if it read the greatest value in so many frames, of at least so many levels.
+_AT_TOP, _LEVELS = 3, 50
+#: Reading: readings are cut off if the greatest value is so many times as frequent as each of so many values below it.
+_TIMES, _BELOW = 2, 3
+#: At most so many places of taxels are listed that were not touched enough: a large sensor may have millions.
+_PLACES = 100
+
+
+def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
+    """Return everything that `taxel info` prints, as JSON values.
+
+    Parameters
+    ----------
+    recording : Recording
+    pressed : Series, optional
+        Its pressure over time (`taxel.recording.analysis.pressure.series`), if it has intensities.
+    """
+    array = recording.array
+    table: Events | Frames = recording.events if recording.has_events else recording.frames()
+    span = (int(table.t.min()), int(table.t.max())) if len(table) and recording.timed else None
+    seconds = (span[1] - span[0]) / 1e6 if span else 0.0
+    facts: dict[str, Any] = {
+        "file": recording.title,
+        "kind": recording.kind,
+        "source": recording.source,
+        "array": {name: value for name, value in array._geometry().items() if name != "exists"},
+        "side": recording.side,
+        "heel": recording.heel,
+        "array_assumed": recording.kind in ("csv", "lsa") and recording.has_events,
+        "timed": recording.timed,
+        "from_us": span[0] if span else None,
+        "to_us": span[1] if span else None,
+        "seconds": seconds,
+    }
+    if isinstance(table, Events):
+        events = table
+        facts["events"] = len(events)
+        facts["intensities"] = 0 if events.present is None else int(events.present.sum())
+        facts["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
+        facts["events_per_s_board"] = len(events) / seconds if seconds else None
+        facts["peak_events_per_s_board"], facts["peak_before_start"] = _peak(events)
+    else:
+        facts["frames"], facts["unit"] = len(table), table.unit
+        facts["frames_per_s"] = (len(table) - 1) / seconds if seconds else None
+        facts["missing"] = {"values": table.missing, "of": table.values.size}
+        facts["full_scale"] = _full_scale(table)
+        facts["gaps"] = _gaps(table.t) if recording.timed else None
+    clock = recording.clock
+    if clock is not None and len(clock.board_us) > 1:
+        host = (int(clock.arrived_ns.max()) - int(clock.arrived_ns.min())) / 1e9
+        late = np.percentile(clock.delay_us, [50, 99])
+        facts |= {
+            "seconds_host": host,
+            "events_per_s_host": facts["events"] / host if host and "events" in facts else None,
+            "datagrams_per_s_host": recording.counts.get("datagrams", len(clock.arrived_ns)) / host if host else None,
+            "drift_ppm": clock.drift_ppm,
+            "delay_us": {"median": float(late[0]), "p99": float(late[1])},
+            "clock_doubt": doubt(clock.drift_ppm, float(late[1]), float(late[0])),
+        }
+    calibration = recording.calibration
+    facts["calibration"] = None if calibration is None else calibration.described()
+    facts["rest"] = None if pressed is None else {**pressed.rest.described(), "text": pressed.rest.text(recording.path)}
+    # Above the rest of readings that fall is nothing but noise.
+    facts["pressure"] = None if pressed is None or pressed.rest.falls else _pressure(pressed)
+    of_taxels = health(table)
+    return facts | {
+        "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
+        "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
+        "registers": None if recording.registers is None else recording.registers._held,
+        "taxels": of_taxels.named(),
+        "taxels_untested": int(np.count_nonzero(of_taxels.untested)),
+        "taxels_untested_at": [
+            (int(k % array.columns), int(k // array.columns)) for k in np.flatnonzero(of_taxels.untested)[:_PLACES]
+        ],
+        "counts": recording.counts,
+        "truncated": recording.truncated,
+        "rebuilt": recording.rebuilt,
+        "lost": list(recording.lost),
+        "verdict": recording.verdict,
+        "verdict_details": recording.verdict.to_dict(),
+        "remarks": list(recording.remarks),
+    }
+
+
+def _pressure(pressed: Series) -> dict[str, Any] | None:
+    """Return the largest contact area, peak and sum with their times, and the path of the centre, as far as known."""
+    if not len(pressed.t):
+        return None
+    facts: dict[str, Any] = {"unit": pressed.unit, "above": pressed.above}
+    largest = pressed if pressed.largest is None else pressed.largest
+    curves: dict[str, Any] = {
+        f"area_{largest.area_unit}": largest.area,
+        "peak": largest.peak,
+        "sum": largest.total,
+        "force_n": largest.force,
+    }
+    for name, values in curves.items():
+        if values is not None:
+            # A frame of missing values alone has no peak.
+            k = int(np.where(np.isnan(values), -np.inf, values).argmax())
+            facts[name] = {"most": float(values[k]), "t_us": int(largest.t[k])}
+    if pressed.centre is None:
+        return facts
+    centre = pressed.centre[~np.isnan(pressed.centre).any(axis=1)]
+    limits = {"x": [float(v) for v in (centre[:, 0].min(), centre[:, 0].max())]} if len(centre) else None
+    if limits is not None:
+        limits["y"] = [float(v) for v in (centre[:, 1].min(), centre[:, 1].max())]
+    return facts | {f"centre_{pressed.centre_unit}": limits}
+
+
+def _full_scale(frames: Frames) -> dict[str, Any] | None:
+    """Return how many readings are at full scale, and of which value; None where the readings show none.
+
+    It is the greatest value if two taxels or more read exactly that one in several frames, and other values too.
+    Readings of few levels reach their greatest one by chance, and in the tail of noise each value is rarer than the one
+    below it.
+    """
+    values = frames.values
+    if not values.size:
+        return None
+    least, top = (float(reduction.reduce(values, axis=None)) for reduction in (np.fmin, np.fmax))
+    if not np.isfinite(top - least) or (top - least < _LEVELS and not np.any(values % 1)):
+        return None
+    below, tail = top, list[int]()
+    while len(tail) < _BELOW and below > least:
+        below = float(np.max(values, where=values < below, initial=least))
+        tail.append(int(np.count_nonzero(values == below)))
+    at_top = np.count_nonzero(values == top, axis=0)
+    # A taxel that is always there is stuck.
+    at_top[(at_top < _AT_TOP) | (at_top == np.count_nonzero(~np.isnan(values), axis=0))] = 0
+    taxels, readings = int(np.count_nonzero(at_top)), int(at_top.sum())
+    cut_off = taxels > 1 and readings > _TIMES * np.mean(tail)
+    return {"value": top, "readings": readings, "taxels": taxels} if cut_off else None
+
+
+def _gaps(t: NDArray[np.int64]) -> dict[str, int] | None:
+    """Return the number of gaps between frames, and the length (us) and begin of the longest; None without any."""
+    apart = np.diff(t)
+    gaps = np.flatnonzero(apart > _GAP * np.median(apart)) if len(apart) else apart
+    if not len(gaps):
+        return None
+    longest = int(apart.argmax())
+    return {"count": len(gaps), "longest_us": int(apart[longest]), "t_us": int(t[longest])}
+
+
+def _peak(events: Events) -> tuple[float | None, bool]:
+    """Return the highest rate in 10 ms of board time, events/s, and whether most of it is before the start marker."""
+    if not len(events):
+        return None, False
+    interval_of = events.t // _PEAK_US
+    intervals, counts = np.unique(interval_of, return_counts=True)
+    busiest = events.t[interval_of == intervals[counts.argmax()]]
+    start_us = min((t for t, start in events.markers if start), default=int(busiest.min()))
+    return len(busiest) / (_PEAK_US / 1e6), bool(np.median(busiest) < start_us)

@@ -1,0 +1,45 @@
+"""Reads files of the board's raw bytes (.lsa), as the manual defines them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from taxel import _core
+from taxel._base import limits
+from taxel.array import Array
+from taxel.events import Events
+from taxel.recording.contents import BoardSource
+from taxel.recording.once import known
+from taxel.recording.sections import EventTable, Losses, Origin, Sensor, Wire
+from taxel.recording.verdict import Verdict
+
+
+def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> BoardSource:
+    """Return the contents of a .lsa.
+
+    Parameters
+    ----------
+    path : Path
+    array : Array
+        The sensor, which the file does not hold.
+    pairing : {"direct", "taxel"}
+    differences : bool
+        Whether intensities are differences.
+
+    Raises
+    ------
+    FormatError : more than may be read, or wire version 2
+    OSError : the file cannot be read
+    """
+    memory = limits.memory(limits.given())
+    read = _core.read_lsa(path, array._parts(), pairing, differences, memory)
+    unmarked = None if read.complete else path.with_suffix(".lss").name
+    losses = Losses(
+        known({"bytes": len(read.payload), "decoder": read.counts}),
+        known(Verdict._of({"raw": [unmarked, read.damage]})),
+        ("times after a silence of more than 6.45 s are short by whole turns of 6.5536 s",),
+        truncated=not read.complete,
+    )
+    events = known(Events._from_parts(read.events, array))
+    wire = Wire(payload=read.payload, differences=differences)
+    return BoardSource(Origin(path, path.name, "lsa"), Sensor(array), EventTable(events), wire, losses=losses)

@@ -1,0 +1,338 @@
+"""Recognition of what a path is, by which all readers are chosen: by its first bytes, its ending and its layout."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+from taxel import _core, formats
+from taxel._base import limits
+from taxel._base.archive import stored_names
+from taxel._base.arguments import checked_path
+from taxel._base.files import open_file
+from taxel._core import FormatError
+from taxel.formats.layout import Layout, advice
+from taxel.formats.ros import is_bag
+from taxel.recording.kinds import ENDINGS, LABELS
+from taxel.recording.readers.csv import check_head, names_in
+from taxel.recording.readers.foreign import ARRAYS
+from taxel.recording.readers.h5 import is_h5_of_taxel
+from taxel.recording.readers.without_layout import refuse_without_layout
+
+#: The endings of tables of text, also compressed by gzip.
+_TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+
+#: The magic bytes of taxel's own kinds of files.
+_MAGIC = {
+    b"\x89MCAP0\r\n": "mcap",
+    b"PK\x03\x04": "npz",
+    b"PK\x05\x06": "npz",
+    b"\x89HDF\r\n\x1a\n": "h5",
+}
+#: The first bytes of well-known files of other kinds, and advice for the error.
+_STRANGERS = {
+    b"\x1f\x8b": "gzip; unpack it first",
+    b"\x28\xb5\x2f\xfd": "zstd; unpack it first",
+    b"\x04\x22\x4d\x18": "lz4; unpack it first",
+    b"BZh": "bzip2; unpack it first",
+    b"\xfd7zXZ": "xz; unpack it first",
+    b"\x89PNG": "a PNG picture, no recording",
+    b"%PDF": "a PDF document, no recording",
+    b"\x93NUMPY": "a single NumPy array; say in NAME.layout.toml what it holds",
+}
+
+
+#: A layout, the path of one, or None for the layout file beside a recording, if there is one.
+GivenLayout: TypeAlias = str | os.PathLike[str] | Layout | None
+
+
+@dataclass(frozen=True)
+class TaxelFile:
+    """A file of a kind that taxel writes: "mcap", "lsa", "npz", "csv" or "h5"."""
+
+    kind: str
+
+
+@dataclass(frozen=True)
+class FormatFile:
+    """A file, or a folder of files, of a format of `taxel.formats`."""
+
+    format: str
+
+
+@dataclass(frozen=True)
+class RosBag:
+    """A ROS bag."""
+
+
+@dataclass(frozen=True)
+class ForeignFile:
+    """A table or arrays of another program, with a layout that describes them or without one."""
+
+    has_layout: bool
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """No recording, and why; a companion is a file of taxel that may lie beside recordings."""
+
+    error: FormatError
+    is_companion: bool = False
+
+
+def recognise(path: Path, layout: GivenLayout = None) -> TaxelFile | FormatFile | RosBag | ForeignFile | Refusal:
+    """Return what a path is.
+
+    Parameters
+    ----------
+    path : Path
+    layout : path or Layout, optional
+        Default: the layout file beside it, if there is one. It is read only where the names of arrays alone leave open
+        whether taxel wrote them.
+
+    Raises
+    ------
+    OSError : the path is not there, or cannot be read
+    """
+    ending, has_layout = path.suffix.lower(), _has_layout(path, layout)
+    if is_bag(path):
+        return RosBag()
+    if why := _companion(path, has_layout=has_layout):
+        return Refusal(FormatError(f"{path}{why}"), is_companion=True)
+    if (ending == ".csv" and _is_table_of_taxel(path)) or (ending == ".h5" and is_h5_of_taxel(path)):
+        return TaxelFile(ENDINGS[ending])
+    if found := formats_of(path):
+        return FormatFile(next(iter(found)))
+    # The reader of a .npz reports one that is damaged.
+    is_damaged = ending == ".npz" and not stored_names(path)
+    if _is_of_another_program(path, layout) and (has_layout or not is_damaged):
+        return ForeignFile(has_layout)
+    return _by_first_bytes(path)
+
+
+def recognise_recording(path: Path, layout: GivenLayout = None) -> TaxelFile | FormatFile | RosBag | ForeignFile:
+    """Return what a recording is; arguments are those of `recognise`.
+
+    Raises
+    ------
+    FormatError : no recording, or a table or arrays that no layout describes
+    OSError : the path is not there, or cannot be read
+    """
+    found = recognise(path, layout)
+    if found == ForeignFile(has_layout=False):
+        _refuse_table(path)
+        found = _by_first_bytes(path)
+    if isinstance(found, Refusal):
+        raise found.error
+    return found
+
+
+def refuse_undescribed(path: Path) -> None:
+    """Refuse spike trains, and a table or arrays of another program that no layout describes.
+
+    Raises
+    ------
+    FormatError : it is such a file
+    OSError : the path is not there, or cannot be read
+    """
+    found = recognise(path)
+    if isinstance(found, Refusal) and are_spike_trains(path):
+        raise found.error
+    if found == ForeignFile(has_layout=False):
+        _refuse_table(path)
+
+
+def _refuse_table(path: Path) -> None:
+    """Refuse a table or arrays that no layout describes, or what is not of the kind that its name says."""
+    found = _by_first_bytes(path)
+    if isinstance(found, Refusal) and path.suffix.lower() in (".csv", ".h5", ".hdf5"):
+        raise found.error
+    refuse_without_layout(path)
+
+
+def is_recording(path: Path, layout: GivenLayout = None) -> bool:
+    """Return whether a path is a recording; what is damaged inside shows only when it is opened."""
+    try:
+        found = recognise(path, layout) if path.is_file() or path.is_dir() else None
+    except (FormatError, OSError):
+        return False
+    return isinstance(found, TaxelFile | FormatFile | RosBag) or found == ForeignFile(has_layout=True)
+
+
+def check_recording(path: Path, layout: GivenLayout = None) -> None:
+    """Refuse a path that is no recording by its name, its first bytes, and its layout file.
+
+    Raises
+    ------
+    FormatError : no recording (names the kind of file if it is known); an invalid layout file; a table or arrays of
+        another program that no layout file describes
+    """
+    match recognise_recording(path, layout_of(path, layout)):
+        case TaxelFile("mcap"):
+            _core.RecordingReader(path, limits.memory(None), False)
+        case TaxelFile("csv"):
+            check_head(path)
+
+
+def is_folder(path: Path) -> bool:
+    """Return whether a path is a folder, and no ROS bag."""
+    return path.is_dir() and not is_bag(path)
+
+
+def recordings_in(folder: Path, layout: GivenLayout = None) -> list[Path]:
+    """Return what of a folder is a recording, ROS bags last, in the order of their names: 2 before 10.
+
+    Tables and arrays of other programs are those that `layout`, or a layout file beside them, describes; they count in
+    a folder that holds nothing else.
+    """
+    files = files_in(folder)
+    bags = bags_of(files)
+    of_formats = sorted({file for found in formats_of(folder).values() for file in found}, key=natural_order)
+    found = recorded_by_taxel(files, layout) or of_formats or ([] if bags else described_tables(files, layout))
+    return [*found, *bags]
+
+
+def files_in(folder: Path) -> list[Path]:
+    """Return the files and folders in a folder but its table of labels, in the order of their names: 2 before 10."""
+    found = (file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir()))
+    return sorted(found, key=natural_order)
+
+
+def recorded_by_taxel(files: Iterable[Path], layout: GivenLayout = None) -> list[Path]:
+    """Return the files with an ending that taxel gives; no companion, and no file of others with the same ending."""
+    return [file for file in files if file.suffix.lower() in ENDINGS and file.is_file() and _is_of_taxel(file, layout)]
+
+
+def _is_of_taxel(file: Path, layout: GivenLayout) -> bool:
+    try:
+        found = recognise(file, layout)
+    except OSError:
+        # Opening it raises the error.
+        return True
+    return isinstance(found, TaxelFile) or (isinstance(found, Refusal) and not found.is_companion)
+
+
+def bags_of(files: Iterable[Path]) -> list[Path]:
+    """Return the ROS bags among files that can be read."""
+    return [file for file in files if os.access(file, os.R_OK) and is_bag(file)]
+
+
+def described_tables(files: Iterable[Path], layout: GivenLayout) -> list[Path]:
+    """Return the tables and arrays of other programs of which a layout says how to read them."""
+    tables = (file for file in files if not file.name.endswith(".notes.csv") and _has_layout(file, layout))
+    return [file for file in tables if _is_of_another_program(file, layout)]
+
+
+def formats_of(path: Path) -> dict[str, list[Path]]:
+    """Return the files of other formats, of a file or within a folder, by the names of the formats."""
+    return {name: files for name, kind in formats.FORMATS.items() if (files := kind.files(path))}
+
+
+def layout_of(path: Path, layout: GivenLayout) -> Layout | None:
+    """Return what the given layout file says, or the one beside a recording; None if there is none."""
+    if isinstance(layout, Layout):
+        return layout
+    file = Layout.beside(path) if layout is None else Path(checked_path("layout", layout))
+    return None if file is None else Layout.read(file)
+
+
+def _has_layout(path: Path, layout: GivenLayout) -> bool:
+    return layout is not None or Layout.beside(path) is not None
+
+
+def is_label_table(path: Path) -> bool:
+    """Return whether a .csv is a table of labels (`taxel.Labels`): by its first line, or empty by its name."""
+    names = _first_line(path)
+    is_named = path.name == LABELS or path.name.endswith(".notes.csv")
+    return {"label", "t_us"} <= set(names) or (names == [""] and is_named)
+
+
+def are_spike_trains(path: Path) -> bool:
+    """Return whether a file holds the arrays that `SpikeTrains.save` writes."""
+    is_npz = path.suffix.lower() == ".npz" and path.is_file()
+    return is_npz and {"times", "offsets", "start", "stop"} <= set(stored_names(path))
+
+
+def natural_order(path: Path) -> list[tuple[bool, int, str]]:
+    """Return the sort key of a name in natural order: 2 before 10."""
+    return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in re.split(r"([0-9]+)", str(path))]
+
+
+def _companion(path: Path, *, has_layout: bool) -> str:
+    """Return what a file of taxel is that may lie beside recordings, as the end of an error; "" of another file."""
+    if path.suffix.lower() == ".csv" and is_label_table(path):
+        return ", line 1: a table of labels (docs/command-line.md), no recording"
+    if are_spike_trains(path) and not has_layout:
+        return (
+            ": spike trains, as taxel encode writes them, no recording; taxel info describes them, and "
+            "taxel.SpikeTrains.load reads them"
+        )
+    return ""
+
+
+def _is_table_of_taxel(path: Path) -> bool:
+    """Return whether the first line of a .csv begins as taxel's own recordings do, which are separated by commas."""
+    names = _first_line(path)
+    return names[0] == "t_us" and len(names) > 1
+
+
+def _first_line(path: Path) -> list[str]:
+    """Return the names in the first line of a table, as far as they are within 64 kB."""
+    with open_file(path) as table:
+        return names_in(table.readline(1 << 16))
+
+
+def _is_of_another_program(path: Path, layout: GivenLayout) -> bool:
+    """Return whether a file is a table or holds arrays that taxel did not write; false for a file that is not there.
+
+    Arrays that a layout names are those of another program, also where they have names that taxel gives.
+    """
+    ending = Path(path.name.removesuffix(".gz")).suffix.lower()
+    if not path.is_file() or ending not in (*_TABLES, *ARRAYS):
+        return False
+    if ending == ".npz":
+        names = set(stored_names(path))
+        if "about" in names or not ("t" in names and names & {"x", "y", "p", "values"}):
+            return "about" not in names
+        # Other programs name their times t too.
+        stated = layout_of(path, layout)
+        return stated is not None and stated.data is not None and stated.data.array in names
+    if ending == ".h5":
+        return not is_h5_of_taxel(path)
+    return ending != ".csv" or not (_is_table_of_taxel(path) or is_label_table(path))
+
+
+def _by_first_bytes(path: Path) -> TaxelFile | Refusal:
+    """Return the kind of a file by its first bytes and its ending, which must not contradict each other."""
+    with open_file(path) as file:
+        head = file.read(16)
+    ending = ENDINGS.get(path.suffix.lower())
+    by_magic = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), None)
+    begins = " ".join(f"{byte:02X}" for byte in head[:4]) or "nothing"
+    if by_magic is not None and ending in (None, by_magic):
+        return TaxelFile(by_magic)
+    if ending == "lsa":
+        # Raw bytes may begin with anything.
+        return TaxelFile(ending)
+    stranger = next((kind for magic, kind in _STRANGERS.items() if head.startswith(magic)), None)
+    expected = {"mcap": "the MCAP magic", "npz": "the magic of a .npz", "csv": "the names of columns"}
+    expected["h5"] = "the magic of HDF5"
+    if by_magic is not None:
+        stranger = f"a .{by_magic} file; rename it"
+    starts = f"{path}, byte 0: starts with {begins}"
+    if stranger is not None:
+        right = expected[ending] if ending else "a recording"
+        kind, _, then = stranger.partition("; ")
+        return Refusal(FormatError(f"{starts} ({kind}), not with {right}" + f"; {then}" * bool(then)))
+    if ending is None:
+        describes = advice(path, "describes a table or an array of another program")
+        return Refusal(FormatError(f"{starts}: no recording; there are {', '.join(ENDINGS)}; {describes}"))
+    if ending in {"npz", "h5"}:
+        magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]
+        return Refusal(FormatError(f"{starts}, not with {expected[ending]} ({magic})"))
+    # The compiled reader raises the errors of a .mcap, and the reader of tables those of a .csv.
+    return TaxelFile(ending)

@@ -1,0 +1,1 @@
+"""Writers of recordings, one module for each kind of file."""

@@ -1,0 +1,61 @@
+"""Writes tables of text: a .csv of events or of frames, as `taxel.recording.readers.csv` reads them."""
+
+from __future__ import annotations
+
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.array import Array
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recording.readers.csv import EVENTS, MORE, sensor_of
+from taxel.recording.readers.npz import around
+
+#: Number of frames that are written at once.
+_FRAMES = 4096
+
+
+def array_in_csv(table: Events | Frames) -> Array:
+    """Return the sensor that a reader of the .csv assumes: the file holds neither name nor pitch."""
+    if isinstance(table, Events):
+        return around(table.x, table.y)
+    return sensor_of(*np.array(_places(table.array)).reshape(-1, 2).T)
+
+
+def write_csv(file: BinaryIO, table: Events | Frames) -> None:
+    """Write a .csv."""
+    if isinstance(table, Frames):
+        places = _places(table.array)
+        names = ",".join(["t_us", *(f"x{x}y{y}" for x, y in places)])
+        file.write(names.encode() + b"\n")
+        x, y = np.array(places).T
+        for k in range(0, len(table), _FRAMES):
+            values = table.values[k : k + _FRAMES, y, x]
+            # Each value is written once; as bits, because 0 equals -0.
+            bits, positions = np.unique(values.view(np.uint32), return_inverse=True)
+            # str of a float32 is the shortest text that reads back as the same value.
+            texts = np.array([str(value).removesuffix(".0") for value in bits.view(np.float32)], object)
+            rows = texts[positions.reshape(values.shape)].tolist()
+            times = table.t[k : k + _FRAMES].tolist()
+            file.writelines(f"{t},{','.join(row)}\n".encode() for t, row in zip(times, rows, strict=True))
+        return
+    columns: list[NDArray[Any]] = [table.t, table.x, table.y, table.p.astype(np.uint8)]
+    more = [name for name in MORE if getattr(table, name) is not None]
+    file.write(",".join([*EVENTS, *more]).encode() + b"\n")
+    block = 1 << 16
+    for k in range(0, len(table), block):
+        rows = [column[k : k + block].astype(str) for column in columns]
+        if table.intensity is not None and table.present is not None:
+            ticks = table.intensity[k : k + block].astype(str)
+            rows.append(np.where(table.present[k : k + block], ticks, ""))
+        if table.repaired is not None:
+            rows.append(table.repaired[k : k + block].astype(np.uint8).astype(str))
+        file.write("\n".join(map(",".join, zip(*(r.tolist() for r in rows), strict=True))).encode() + b"\n")
+
+
+def _places(array: Array) -> list[tuple[int, int]]:
+    """Return column and row of each taxel that exists, row by row."""
+    exists = np.ones(array.shape, bool) if array.exists is None else array.exists
+    return [(int(x), int(y)) for y, x in np.argwhere(exists)]

@@ -1,0 +1,293 @@
+"""The options of a training, and its result as lines for people and as plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from taxel._base.arguments import finite, flag, integer, mapping
+from taxel._base.errors import refused
+from taxel._base.messages import counted
+from taxel._base.times import beginning_us
+from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained
+from taxel.detect.advice import Advice
+from taxel.detect.recipe import change_values, with_floor
+from taxel.recorded import recorded
+from taxel.recording import Recording
+from taxel.spikes import to_ms
+from taxel.tasks.rest import GivenTare, check_tare
+
+#: Largest number of unpaired labels that a warning names.
+_NAMED = 5
+#: How a user gets the file of a plain rule, and uses it.
+_RULE_FILE = "--rule FILE writes it, for taxel detect --readout FILE"
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """Hold how a readout is trained.
+
+    Parameters
+    ----------
+    recipe : str, optional
+        The name of a recipe, or the path of a TOML or JSON file. Default: that of the encoder in `changes`; without
+        one, the recipe that fits the recordings and labels.
+    changes : mapping of str to value
+        What differs from the recipe, by dotted keys, as "neurons.contact.kappa", "encoder.name" or "align".
+    tare : Tare, path or float (s), optional
+        The rest of the taxels: a tare, its file, or the seconds at rest at the beginning of each recording. Default:
+        the time before the first label of each.
+    folds : int, optional
+        In how many folds it is scored on held-out data; 0: on the training data. Default: at most 5, as many as the
+        recordings and the rarest label allow.
+    search : bool
+        Whether each neuron's parameters are chosen among those that the recipe lists, on held-out data.
+    window_ms : float, ms
+        Largest distance of a detection from its event.
+
+    Raises
+    ------
+    ProblemError : values that no recordings and labels could make valid; a recipe that is none
+
+    Examples
+    --------
+    >>> TrainOptions("touch", {"neurons.contact.kappa": 1.5}, tare=0.05).changes
+    {'neurons.contact.kappa': 1.5}
+    """
+
+    recipe: str | None = None
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    tare: GivenTare | None = None
+    folds: int | None = None
+    search: bool = False
+    window_ms: float = 50.0
+
+    def __post_init__(self) -> None:
+        """Refuse values that no recordings and labels could make valid, before these are read."""
+        mapping("changes", self.changes)
+        check_tare(self.tare)
+        flag("search", self.search)
+        finite("window_ms", self.window_ms, "ms", least=0.0)
+        if self.folds is not None and integer("folds", self.folds, 0) == 1:
+            raise refused("folds", " is 1: must be 2 or more, or 0 for none")
+        self._plan()
+
+    def _plan(self, labels: Sequence[str] | None = None, noise_floor: float | None = None) -> Recipe | None:
+        """Return the recipe that is named, or that of the encoder that is; None of neither."""
+        if self.recipe is None and "encoder.name" in self.changes:
+            values = change_values({}, self.changes)
+            return Recipe.from_dict(values if noise_floor is None else with_floor(values, noise_floor))
+        return None if self.recipe is None else Recipe.load(self.recipe, self.changes, labels, noise_floor)
+
+
+@dataclass(frozen=True, eq=False)
+class Training:
+    """Hold what a training made, how it scored, and what may help it.
+
+    Attributes
+    ----------
+    options : TrainOptions
+        With the recipe that was chosen.
+    recordings : sequence of Recording
+        Those that were trained on: each sensor is one.
+    made : taxel.detect.Trained
+        The readout, its recipe and learners, and by how much labels were moved.
+    scored : taxel.detect.Judged
+        The scores of each recording and of all, and of the plain rules beside them.
+    why : str
+        Why the scores are those on the training data; empty where they are held out.
+    advice : mapping of str to Advice
+        What may help each label of which many are missed or false, and the cause.
+    outcomes : sequence of taxel.detect.Outcome
+        What the readout detects in its own training data.
+    tares_us : sequence of (int, int, int), us
+        From when to when the tare of each recording was taken from it, and how long it lasts; none of given tares.
+    warned : tuple of str
+        The warnings of the training.
+    """
+
+    options: TrainOptions
+    recordings: Sequence[Recording]
+    made: Trained
+    scored: Judged
+    why: str
+    advice: Mapping[str, Advice]
+    outcomes: Sequence[Outcome]
+    tares_us: Sequence[tuple[int, int, int]]
+    warned: tuple[str, ...] = ()
+
+    @property
+    def readout(self) -> Readout:
+        """The trained readout."""
+        return self.made.readout
+
+    @property
+    def score(self) -> Score:
+        """The score over all recordings."""
+        return self.scored.together
+
+    @property
+    def held_out(self) -> bool:
+        """Whether the score is that of data that the neurons were not trained on."""
+        return not self.why
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings of the training, and the labels that the readout detects no better than one of nothing."""
+        return (*self.warned, *self.unreliable())
+
+    @property
+    def how(self) -> str:
+        """On which data the readout was scored, for the report, which shows its detections in the training data."""
+        if self.why:
+            return "on its own training data"
+        score = self.scored.together
+        counts = f"{score.found} of {score.events} found, {score.missed} missed, {score.false} false"
+        return f"on its own training data; held out ({self.scored.how}): {counts}"
+
+    def __repr__(self) -> str:
+        return f"Training({self.readout!r}; {self.how})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain values for JSON."""
+        result: dict[str, Any] = {
+            "labels": list(self.readout.labels),
+            "recipe": self.options.recipe,
+            "judged_on": self.scored.how,
+            "held_out": self.held_out,
+            "window_ms": self.options.window_ms,
+            "recordings": [
+                {"recording": recording.title, "score": score.to_dict()}
+                for recording, score in zip(self.recordings, self.scored.scores, strict=True)
+            ],
+            "score": self.scored.together.to_dict(),
+            "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
+            "helps": {label: advice.helps for label, advice in self.advice.items()},
+            "options": sorted({advice.option for advice in self.advice.values() if advice.option is not None}),
+            "warnings": list(self.warnings),
+        }
+        if self.made.alignments:
+            result["alignment"] = {label: aligned.to_dict() for label, aligned in self.made.alignments.items()}
+            for aligned in result["alignment"].values():
+                unpaired = aligned["unpaired"]
+                aligned["unpaired"] = [{"recording": self.recordings[k].title, "t_us": t} for k, t in unpaired]
+        if self.options.search:
+            result["neurons"] = {label: dict(self.made.recipe.neurons[label]) for label in self.readout.labels}
+        return result
+
+    def lines(self) -> list[str]:
+        """Return the result as lines for people; the first says whether the scores are held out."""
+        window, recipe = f"(window {self.options.window_ms:g} ms)", self.options.recipe
+        lines = [f"not held out, on its own training data {window}: {self.why}"]
+        if self.held_out:
+            lines = [f"held out: {self.scored.how} {window}"]
+        for label in self.readout.labels:
+            lines += self._scores(label)
+        lines += [*self._better(), *self._advised(), *self._aligned()]
+        if recipe is not None:
+            about = self.made.recipe.about
+            lines += ["", f"recipe {recipe}" + (f": {about}" if about else "")]
+        lines += [*self._tares(), repr(self.readout)]
+        for label in self.readout.labels if self.options.search else ():
+            point = self.made.recipe.neurons[label]
+            chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key not in ("search", "choose"))
+            lines.append(f"{label}, chosen: {chosen}")
+        for recording, each in zip(self.recordings, self.scored.scores, strict=True):
+            lines += ["", f"{recording.title}:", *repr(each).split("\n")]
+        if len(self.scored.scores) > 1:
+            lines += ["", "all recordings:", *repr(self.scored.together).split("\n")]
+        return lines
+
+    def beginning(self) -> str:
+        """Return the seconds at rest at the beginning of each recording, for ``--tare``; "" where none is needed."""
+        if not self.tares_us or any(begin > 0 for begin, *_ in self.tares_us):
+            return "SECONDS" if self.tares_us else ""
+        # More than half of a recording is refused.
+        return f"{min(min(end, lasts // 2) for _, end, lasts in self.tares_us) / 1e6:g}"
+
+    def _tares(self) -> Iterator[str]:
+        """Yield the line of which tares were taken from the recordings."""
+        if not self.tares_us:
+            return
+        lengths = [to_ms(end - begin) for begin, end, _ in self.tares_us]
+        text = f"of each of {len(lengths)} recordings its own, {min(lengths):g} to {max(lengths):g} ms long"
+        if len(lengths) == 1:
+            text = "what the recording holds from {:g} to {:g} ms".format(*map(to_ms, self.tares_us[0][:2]))
+        yield f"tare: {text}; another can be given"
+
+    def _scores(self, label: str) -> Iterator[str]:
+        """Yield how the neuron and the plain rule of a label scored on the same labels."""
+        yield _line(label, "neuron", self.scored.together[label])
+        plain = self.scored.plain
+        rule = None if plain is None else plain.rules[label]
+        if plain is None or plain.together is None:
+            yield f"no plain rule for {label}" + (f": {plain.lacks}" if plain is not None else "")
+        elif rule is None:
+            yield f"no plain rule for {label}: none is better than to detect nothing"
+        else:
+            yield f"{_line(label, 'plain rule', plain.together[label])}; tuned on all: {rule._compared()}"
+
+    def _better(self) -> Iterator[str]:
+        """Yield the labels of which the plain rule is better, or as good and sooner; and the rules that are lacking."""
+        plain = self.scored.plain
+        if plain is None or plain.together is None:
+            return
+        for label in plain.better(self.scored.together):
+            rule, neuron = (scores[label].rank[0] for scores in (plain.together, self.scored.together))
+            yield f"{label}: the plain rule is better: {rule} missed and false, the neuron {neuron}; {_RULE_FILE}"
+        for label in plain.sooner(self.scored.together):
+            rule_score, score = (scores[label] for scores in (plain.together, self.scored.together))
+            yield (
+                f"{label}: the plain rule is as good and knows sooner: {rule_score.rank[0]} missed and false, as the "
+                f"neuron, known {rule_score.delay.median:+.3g} ms after the label (median), the neuron "
+                f"{score.delay.median:+.3g} ms; {_RULE_FILE}"
+            )
+        if plain.lacks:
+            yield plain.lacks
+
+    def _advised(self) -> Iterator[str]:
+        """Yield what may help each label of which many are missed or false."""
+        for label, (helps, because, _) in self.advice.items():
+            score = self.scored.together[label]
+            many = f"{score.missed / score.events:.0%} missed, {score.false / score.events:.0%} false"
+            yield f"{label}: {many}; what may help is {helps}: {because}"
+
+    def unreliable(self) -> Iterator[str]:
+        """Yield the labels that the readout detects no better than one that detects nothing, and what may help."""
+        for label in self.readout.labels:
+            score = self.scored.together[label]
+            if score.rank[0] < score.events:
+                continue
+            labels = "labels that it was trained on" if self.why else "held-out labels"
+            yield (
+                f"{label}: do not rely on this readout: {score.found} of {score.events} {labels} found, {score.false} "
+                "false, no better than to detect nothing"
+                + (f"; what may help is {self.advice[label].helps}" if label in self.advice else "")
+            )
+
+    def _aligned(self) -> Iterator[str]:
+        """Yield by how much labels were moved to what the sensor felt, and which found no pair."""
+        for label, alignment in self.made.alignments.items():
+            if alignment.train is None:
+                yield f"{label}: no input follows the labels, so they were learnt as given"
+                continue
+            yield (
+                f"{label}: labels moved to what the sensor felt: median {alignment.median_ms:+.3g} ms, largest "
+                f"{alignment.largest_ms:+.3g} ms"
+            )
+            unpaired = ((self.recordings[k], t) for k, t in alignment.to_dict()["unpaired"])
+            events = [
+                f"{recording.title} at {(t - beginning_us(recorded(recording, hold=False).t)) / 1e6:.3f} s"
+                for recording, t in unpaired
+            ]
+            if events:
+                more = f" and {len(events) - _NAMED} more" if len(events) > _NAMED else ""
+                labels = counted(len(events), "label")
+                named = ", ".join(events[:_NAMED]) + more
+                yield f"{label}: nothing was felt within 50 ms of {labels}, not learnt: {named}"
+
+
+def _line(label: str, by: str, score: Score) -> str:
+    known = "never known" if not score.found else f"known {score.delay.median:+.3g} ms after the label (median)"
+    return f"{label}, {by}: {score.found} of {score.events} found, {score.missed} missed, {score.false} false, {known}"

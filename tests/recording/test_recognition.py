@@ -1,0 +1,173 @@
+"""What a path is: whoever asks (opening, a folder, a command, the page) gets the same answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formats import bags, making
+
+import taxel
+from taxel import FormatError, ProblemError
+from taxel.formats import FORMATS
+from taxel.recording.recognition import (
+    ForeignFile,
+    FormatFile,
+    Refusal,
+    RosBag,
+    TaxelFile,
+    check_recording,
+    is_recording,
+    recognise,
+    recordings_in,
+)
+
+from .making import some_events, some_frames
+
+Write = Callable[[Path], Path]
+
+
+def of_taxel(name: str, *, frames: bool = False) -> Write:
+    def write(folder: Path) -> Path:
+        taxel.convert(some_frames() if frames else some_events(), folder / name)
+        return folder / name
+
+    return write
+
+
+def without_ending(folder: Path) -> Path:
+    return of_taxel("walk.mcap")(folder).rename(folder / "walk")
+
+
+def bag(name: str) -> Write:
+    return lambda folder: bags.write(folder / name, [("/palm", bags.PALM, 2.0, 0.0, bags.palm(np.zeros(768)))])
+
+
+def content(name: str, data: str | bytes) -> Write:
+    def write(folder: Path) -> Path:
+        (folder / name).write_bytes(data.encode() if isinstance(data, str) else data)
+        return folder / name
+
+    return write
+
+
+def arrays(name: str, **stored: np.ndarray) -> Write:
+    def write(folder: Path) -> Path:
+        np.savez(folder / name, **stored)
+        return folder / name
+
+    return write
+
+
+def spikes(folder: Path) -> Path:
+    return taxel.SpikeTrains.from_lists([[1.0], [2.0]], 0, 50).save(folder / "spikes.npz")
+
+
+def described(write: Write) -> Write:
+    def with_layout(folder: Path) -> Path:
+        (folder / "layout.toml").write_text("rows = 1\ncolumns = 3\nrate_hz = 100\n")
+        return write(folder)
+
+    return with_layout
+
+
+TABLE = "1,2,3\n" * 30
+PLAIN = {"t": np.arange(4), "values": np.ones((4, 1, 3), np.float32)}
+OTHERS = {"a": np.ones((4, 3))}
+FILES: dict[str, tuple[Write, object]] = {
+    **{kind: (of_taxel(f"walk.{kind}"), TaxelFile(kind)) for kind in ("mcap", "lsa", "npz", "csv", "h5")},
+    **{f"frames {kind}": (of_taxel(f"walk.{kind}", frames=True), TaxelFile(kind)) for kind in ("mcap", "npz", "h5")},
+    "without an ending": (without_ending, TaxelFile("mcap")),
+    "plain columns": (arrays("a.npz", **PLAIN), TaxelFile("npz")),
+    "damaged archive": (content("a.npz", b"PK\x03\x04 and no more"), TaxelFile("npz")),
+    **{name: (getattr(making, f"write_{name}"), FormatFile(name)) for name in FORMATS},
+    **{f"bag {name}": (bag(name), RosBag()) for name in ("grasp.bag", "grasp.db3", "grasp.mcap", "grasp")},
+    **{f"table {ending}": (content(f"a{ending}", TABLE), ForeignFile(False)) for ending in (".csv", ".txt", ".dat")},
+    "table with a layout": (described(content("a.csv", TABLE)), ForeignFile(True)),
+    "arrays": (arrays("a.npz", **OTHERS), ForeignFile(False)),
+    "arrays with a layout": (described(arrays("a.npz", **OTHERS)), ForeignFile(True)),
+    "packed table": (content("a.csv", b"\x1f\x8b\x08\x00"), ForeignFile(False)),
+    "prose": (content("a.txt", "of a hand\n"), ForeignFile(False)),
+    "labels": (content("a.csv", "label,t_us\nheel,5\n"), Refusal),
+    "labels whose times come first": (content("a.csv", "t_us,label\n5,heel\n"), Refusal),
+    "no labels": (content("a.notes.csv", ""), Refusal),
+    "spike trains": (spikes, Refusal),
+    "picture": (content("a.mcap", b"\x89PNG\r\n\x1a\n"), Refusal),
+    "program": (content("a.py", "import taxel\n"), Refusal),
+    "empty": (content("a.npz", b""), Refusal),
+}
+
+
+def why(call: Callable[[], object]) -> str | None:
+    """Return the text of the error of a format that a call raises."""
+    try:
+        call()
+    except FormatError as error:
+        return str(error)
+    return None
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_path_is_the_same_for_whoever_asks(name: str, tmp_path: Path) -> None:
+    write, expected = FILES[name]
+    path = write(tmp_path)
+    found = recognise(path)
+    assert isinstance(found, expected) if isinstance(expected, type) else found == expected
+    refused = why(lambda: check_recording(path))
+    assert is_recording(path) == (refused is None)
+    assert is_recording(path) == (not isinstance(found, Refusal) and found != ForeignFile(has_layout=False))
+    if refused is not None:
+        assert why(lambda: taxel.open_all(path)) == refused
+        assert path not in recordings_in(path.parent) or path.suffix in {".mcap", ".npz"}
+
+
+def test_a_folder_leaves_out_what_is_of_others_whatever_its_ending(tmp_path: Path) -> None:
+    own = of_taxel("walk.npz", frames=True)(tmp_path)
+    spikes(tmp_path)
+    arrays("others.npz", **OTHERS)(tmp_path)
+    content("people.csv", "t_us,label\n5,heel\n")(tmp_path)
+    content("table.csv", TABLE)(tmp_path)
+    grasp = bag("grasp.mcap")(tmp_path)
+    assert [recording.path for recording in taxel.open_all(tmp_path)] == [own]
+    assert recordings_in(tmp_path) == [own, grasp]
+    (tmp_path / "others.layout.toml").write_text("rows = 1\ncolumns = 3\nrate_hz = 100\n")
+    with pytest.warns(UserWarning, match=r"others\.npz left out, as beside recordings \(walk\.npz\)"):
+        assert [recording.path for recording in taxel.open_all(tmp_path)] == [own]
+
+
+def test_a_folder_of_described_arrays_and_tables_opens_all_of_them(tmp_path: Path) -> None:
+    (tmp_path / "layout.toml").write_text("rows = 1\ncolumns = 3\nrate_hz = 100\n")
+    paths = [content("a.txt", TABLE)(tmp_path), arrays("b.npz", **OTHERS)(tmp_path)]
+    assert [recording.path for recording in taxel.open_all(tmp_path)] == recordings_in(tmp_path) == paths
+
+
+@pytest.mark.parametrize(("write", "says"), [(spikes, "spike trains"), (arrays("a.npz", **OTHERS), "not written by")])
+def test_a_folder_that_holds_nothing_else_says_what_it_is(write: Write, says: str, tmp_path: Path) -> None:
+    path = write(tmp_path)
+    refused = why(lambda: taxel.open_all(tmp_path))
+    assert refused == why(lambda: taxel.open(path))
+    assert says in str(refused)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_path_is_converted_as_its_recording(name: str, tmp_path: Path) -> None:
+    path, target = getattr(making, f"write_{name}")(tmp_path), tmp_path / "target.npz"
+    opened = taxel.open_all(path)
+    if path.is_dir() or len(opened) > 1:
+        with pytest.raises(ProblemError, match=r"taxel\.open_all opens"):
+            taxel.convert(path, target)
+        return
+    (tmp_path / "again").mkdir()
+    again = tmp_path / "again" / "target.npz"
+    assert taxel.convert(path, target) == taxel.convert(opened[0], again)
+    assert taxel.open(target).frames() == taxel.open(again).frames()
+
+
+def test_a_converted_path_keeps_the_labels_of_its_folder(tmp_path: Path) -> None:
+    path = of_taxel("press.npz", frames=True)(tmp_path)
+    (tmp_path / "labels.csv").write_text("recording,label,t_us\npress,heel,5\n")
+    taxel.convert(path, tmp_path / "target.mcap")
+    (tmp_path / "labels.csv").unlink()
+    assert [(note.text, note.t) for note in taxel.open(tmp_path / "target.mcap").notes] == [("heel", 5)]
