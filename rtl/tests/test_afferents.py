@@ -42,7 +42,8 @@ def test_random_pressures_and_thresholds_give_the_emulated_boards_spikes(
 ):
     rng = drawing(seed, columns, rows, channels)
     options = OFTEN | {"hold_us": 0}  # as of a build of the tests of version 2
-    pair = Pair(columns, rows, channels, previous=previous, intensity=intensity, version_2=options, CSEL_CLOCKS=1)
+    values = {"previous": previous, "intensity": intensity}
+    pair = Pair(columns, rows, channels, version_2=options, CSEL_CLOCKS=1, QUEUE=4096, **values)
     spiking = 0
     ticks = np.zeros(pair.array.shape, np.uint16)
     for _ in range(250):

@@ -79,7 +79,8 @@ def test_random_pressures_and_writes_give_the_emulated_boards_datagrams(
     seed = int(rng.integers(1, 1000))
     # One build looks at what the modules assert.
     asserts = csel_clocks == 8
-    pair = Pair(columns, rows, channels, previous=previous, seed=seed, asserts=asserts, CSEL_CLOCKS=csel_clocks)
+    options = {"previous": previous, "asserts": asserts, "CSEL_CLOCKS": csel_clocks, "QUEUE": 4096}
+    pair = Pair(columns, rows, channels, seed=seed, **options)
     ticks = np.zeros(pair.array.shape, np.uint16)
     for _ in range(200):
         ticks = pressures(rng, pair, ticks)

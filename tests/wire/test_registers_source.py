@@ -49,7 +49,8 @@ def settings(draw):
     step_period = edge(draw.choice([step_read, step_read + 20, 26, 74, 75]))
     line_read = edge(steps * step_period)
     values = {
-        "line_period": edge(draw.choice([line_read, 10 * line_read])),
+        "random_lines": draw.choice([0, 1]),
+        "line_period": edge(draw.choice([line_read, 10 * line_read, 16 * min(columns, 256)])),
         "line_read": line_read,
         "step_period": step_period,
         "step_read": step_read,
@@ -61,6 +62,8 @@ def settings(draw):
     }
     if draw.random() < 0.2:
         values["noise_floor"] = min(255, values["ramp"])
+    if draw.random() < 0.2:
+        values["step_period"] = edge(step_read + 16 * values["lines"] + 20)
     return rows, columns, values
 
 

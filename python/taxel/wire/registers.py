@@ -235,7 +235,7 @@ class Registers:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Values that are allowed but probably mistakes (rules 5 and 6), a line each."""
+        """Values that are allowed but probably mistakes, a line each."""
         return tuple(_core.registers_check(self._json(), self.array._parts()))
 
     def commands_to(self, target: Registers) -> list[Command]:

@@ -51,9 +51,9 @@ def attempt(held, build):
     f = random.choice(FIELDS)
     # Where a rule is just kept, and one beside that.
     edges = {
-        "lines": build["driven_lines"] - 1,
+        "lines": random.choice([build["driven_lines"] - 1, held["line_period"] // 16 - 1]),
         "line_read": random.choice([held["line_period"], build["steps"] * held["step_period"]]),
-        "line_period": held["line_read"],
+        "line_period": random.choice([held["line_read"], 16 * held["lines"] + 16]),
         "step_period": random.choice([held["step_read"], held["line_read"] // build["steps"], build["channels"] + 10]),
         "step_read": random.choice([held["step_period"], (held["ramp"] + 5 + 2) // 3, 4]),
         "ramp": 3 * held["step_read"] - 5,

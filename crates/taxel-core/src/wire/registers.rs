@@ -38,7 +38,7 @@ pub fn fields() -> &'static [Field] {
 pub struct WriteRefusal {
     /// The register that the write addressed.
     pub register: u8,
-    /// Which rule of the reference (5 and 6 only warn).
+    /// Which rule of the reference.
     pub rule: u8,
     /// The rule and the numbers that break it, in one line.
     pub text: String,
