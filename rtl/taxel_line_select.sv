@@ -39,7 +39,7 @@ module taxel_line_select #(
   logic [7:0] on, out, in;
 
   assign data  = insert != 8'd0 && pulses == insert;
-  assign rises = !csel_clk && (start || !waits) && left == '0 && pulses != 8'd0 && csel_din == data;
+  assign rises = !csel_clk && (start || !waits) && left == '0 && pulses != 8'd0;
   assign falls = csel_clk && left == '0;
 
   always_ff @(posedge clk) begin
@@ -91,10 +91,11 @@ module taxel_line_select #(
     end
   end
 
-  // A line is named before it starts, and what leads to it lies within the chain.
+  // A line is named before it starts, so that its data stand by then, and what leads to it lies within the chain.
   always_ff @(posedge clk) begin
     if (!reset) begin
       assert (!(start && (!waits || named || weighed)));
+      assert (!rises || csel_din == data);
       assert (place <= 8'(COLUMNS) && pulses <= 8'(COLUMNS) && insert <= pulses);
     end
   end

@@ -163,20 +163,22 @@ def by_module(fault: Fault, source: Path, until: float) -> str | None:
     return None
 
 
-def by_proof(fault: Fault, source: Path) -> str | None:
+def by_proof(fault: Fault, source: Path, until: float) -> str | None:
     """Run the proofs of the module; return which one caught the fault."""
     for proof in PROOFS:
         if f"{fault.module}.sv" in proof.sources:
             mode = "bmc" if proof.engine.startswith("smtbmc") else "prove"
-            if checked(proof, f"{proof.name}_drawn", mode, source=source) == "FAIL":
+            left = max(until - time.monotonic(), 1)
+            if checked(proof, f"{proof.name}_drawn", mode, source=source, longest=left) == "FAIL":
                 return proof.name
     return None
 
 
-def by_frames(source: Path) -> str | None:
+def by_frames(source: Path, until: float) -> str | None:
     """Compare whole frames with the emulated board; return whether they caught the fault."""
     command = [sys.executable, __file__, "--frames", str(source)]
-    result = subprocess.run(command, capture_output=True, check=False, timeout=LONGEST)
+    left = max(until - time.monotonic(), 1)
+    result = subprocess.run(command, capture_output=True, check=False, timeout=left)
     return "frames" if result.returncode else None
 
 
@@ -190,15 +192,17 @@ def frames(source: Path) -> int:
 def caught(fault: Fault, source: Path) -> str:
     """Return what catches a fault first, or that nothing does."""
     until = time.monotonic() + LONGEST
-    steps = (lambda: by_module(fault, source, until), lambda: by_frames(source), lambda: by_proof(fault, source))
+    steps = (
+        lambda: by_module(fault, source, until),
+        lambda: by_frames(source, until),
+        lambda: by_proof(fault, source, until),
+    )
     for step in steps:
-        if time.monotonic() > until:
-            return "nothing in ten minutes"
         try:
             if found := step():
                 return found
         except subprocess.TimeoutExpired:
-            continue
+            return "nothing in ten minutes"
     return "nothing"
 
 
