@@ -118,6 +118,7 @@ def test_random_pressures_and_writes_in_both_versions(
         # Time for ramps of more than 255 ticks.
         held = pair.board.registers
         pair.write(held.commands_to(held.with_preset("2 kHz")))
+        in_version_2(pair)
     ticks = np.zeros(pair.array.shape, np.uint16)
     for _ in range(250):
         ticks = pressures(rng, pair, ticks)
