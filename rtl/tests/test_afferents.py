@@ -44,6 +44,7 @@ def test_random_pressures_and_thresholds_give_the_emulated_boards_spikes(
     options = OFTEN | {"hold_us": 0}  # as of a build of the tests of version 2
     values = {"previous": previous, "intensity": intensity}
     pair = Pair(columns, rows, channels, version_2=options, CSEL_CLOCKS=1, QUEUE=4096, **values)
+    pair.write([Command(4, 33 << 16 | pair.board.registers.ramp), Command(0, 983 << 16 | 10)])
     spiking = 0
     ticks = np.zeros(pair.array.shape, np.uint16)
     for _ in range(250):

@@ -220,9 +220,9 @@ def test_registers_of_a_board_with_other_rules_open(kind: str, tmp_path: Path) -
 
 def test_registers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     for wrong in ({"line_period": 0}, {"lines": 65}, {"channels": 17}):
-        record(tmp_path / "no.mcap", some_events(), header={"registers": taxel._core.registers_preset("5.2 kHz") | wrong})
-        with pytest.raises(taxel.Error, match="channels|rule 4"):
-            print(taxel.open(tmp_path / "no.mcap").registers)
+        header = {"registers": taxel._core.registers_preset("5.2 kHz") | wrong}
+        with pytest.raises(taxel.DeviceError, match=r"17 channels|rule 4"):
+            record(tmp_path / "no.mcap", some_events(), header=header)
 
 
 @pytest.fixture
