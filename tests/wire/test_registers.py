@@ -89,7 +89,7 @@ def test_a_wrong_order_is_refused_half_way():
         ({"lines": 257}, r"lines 257 does not fit: must be 1 to 256 \(rule 4\)"),
         (
             {"random_lines": True, "line_period": 10.23},
-            r"random_lines: to drive any of 64 lines next takes up to 10.24 us, longer than line_period 10.23 us \(rule 5\)",
+            r"to drive any of 64 lines next takes up to 10.24 us, longer than line_period 10.23 us \(rule 5\)",
         ),
         ({"step_period": 0.73, "step_read": 0.53, "channels": 64}, r"wants 0.74 us \(rule 7\)"),
         ({"array": taxel.Array(65, 64), "wire_version": 1}, r"choose version 2 \(rule 8\)"),
