@@ -154,7 +154,11 @@ $(RTL)/.installed: rtl/requirements.txt
 	@$(RTL)/bin/python -m pip install --quiet --disable-pip-version-check -r rtl/requirements.txt
 	@touch $@
 
-.PHONY: rtl-tools rtl-registers rtl-lint rtl-test rtl-slow rtl-timing rtl-bitstream
+# The modules by themselves: what PyPI has, g++, make and perl are enough.
+rtl-modules: $(RTL)/.installed
+	$(RTL)/bin/python rtl/bench/modules/run.py
+
+.PHONY: rtl-tools rtl-modules rtl-registers rtl-lint rtl-test rtl-slow rtl-timing rtl-bitstream
 rtl-tools: $(RTL)/.installed
 
 # The RTL's package of registers, from the registers' one source.

@@ -43,4 +43,7 @@ module taxel_answer_queue #(
     end
   end
 
+  // It neither overflows nor underflows.
+  always_ff @(posedge clk) if (!reset) assert (!(answer && !room) && !(pop && !ready));
+
 endmodule

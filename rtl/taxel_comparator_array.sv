@@ -15,8 +15,8 @@ module taxel_comparator_array #(
     input  logic                     reset,
     input  logic                     read_start,
     input  logic                     step_end,
-    input  logic [15:0]              length,      // of the ramp, in ticks; from a read's start on
-    input  logic                     inverted,    // comparators fall when they trip
+    input  logic [15:0]              length,      // of the ramp, in ticks; at a read's start
+    input  logic                     inverted,    // comparators fall when they trip; at a read's start
     output logic                     read_done,   // the counts of the read that ended last stand from here to the next one
     output logic [CHANNELS-1:0]      tripped,
     output logic [CHANNELS-1:0]      first,       // at the first sample of the pair
@@ -29,50 +29,58 @@ module taxel_comparator_array #(
   localparam int BANK = 8;  // channels
 
   // On the scan's clock: the number of the read that began last, and of the one that ended last, modulo 2.
-  logic began, ended, done, done_before;
+  logic began, ended;
 
   always_ff @(posedge clk) begin
-    if (read_start) began <= !began;
     if (step_end) ended <= began;
-    done_before <= done;
-    read_done   <= done != done_before;
-    if (reset) {began, ended} <= '0;
-    if (reset) {read_done, done_before} <= '0;
+    if (reset) ended <= 1'b0;
   end
 
   // On the fast clock.
-  logic reset_fast, began_fast, ended_fast, began_before, number, copied, over, copy;
-  logic start, nears, begins, begun, open, closing, inverted_next, inverted_now, done_fast;
+  logic reset_fast, ended_fast, number, copied, over, copy, reported;
+  wire unused = reported;
+  logic start, nears, begins, begun, open, closing, inverted_held, inverted_now;
+  logic [15:0] length_held;
+  logic [DELAY-1:0] senses;
   logic [CHANNELS-1:0][1:0] sampled, brought;
   logic [CHANNELS-1:0] tripped_now, first_now;
   logic [CHANNELS-1:0][14:0] at_now;
 
   taxel_synchroniser to_reset (.clk(clk_fast), .from(reset), .to(reset_fast));
-  taxel_synchroniser to_began (.clk(clk_fast), .from(began), .to(began_fast));
   taxel_synchroniser to_ended (.clk(clk_fast), .from(ended), .to(ended_fast));
-  taxel_synchroniser to_done (.clk, .from(done_fast), .to(done));
+
+  // What a read asks for stands until the next one, four clocks later or more: the fast clock takes it when a short one has ended.
+  taxel_announcement to_start (
+      .clk_from(clk), .reset_from(reset), .announce(read_start), .number(began),
+      .clk_to(clk_fast), .reset_to(reset_fast), .came(start)
+  );
+  taxel_standing_word #(.BITS(17)) asked (
+      .clk, .take(read_start), .word({inverted, length}), .stands({inverted_held, length_held})
+  );
+  taxel_announcement to_done (
+      .clk_from(clk_fast), .reset_from(reset_fast), .announce(copy), .number(reported),
+      .clk_to(clk), .reset_to(reset), .came(read_done)
+  );
 
   // The counts of a read are copied when it has ended and the samples of its ramp are over, or at the latest when the next
   // read's begin: then in the clock of its pair 0, which changes them at that clock's end.
   assign over = !copied && ((ended_fast == number && !open && !begun) || begins);
 
   always_ff @(posedge clk_fast) begin
-    began_before <= began_fast;
-    start        <= began_fast != began_before;
-    if (start) inverted_next <= inverted;
+    // It holds from a clock before a read's first samples on, and the next read may have started by then.
+    senses       <= {senses[DELAY-2:0], start ? inverted_held : senses[0]};
+    inverted_now <= senses[DELAY-1];
     // Pins lie all around a part: samples have a clock to come from there, and one more to spread.
-    if (nears) inverted_now <= inverted_next;
     sampled <= comparators;
     brought <= sampled ^ {2 * CHANNELS{inverted_now}};
     copy    <= over;
     if (over) copied <= 1'b1;
-    if (copy) done_fast <= !done_fast;
     if (begins) begin
       number <= !number;
       copied <= 1'b0;
     end
     if (reset_fast) begin
-      {began_before, start, number, copy, done_fast} <= '0;
+      {number, copy} <= '0;
       copied <= 1'b1;
     end
   end
@@ -81,7 +89,7 @@ module taxel_comparator_array #(
       .clk_fast,
       .reset(reset_fast),
       .start,
-      .length,
+      .length(length_held),
       .ramp,
       .nears,
       .begins,
@@ -102,13 +110,15 @@ module taxel_comparator_array #(
       closes_here <= closing && !closes_here;
       copies_here <= over && !copies_here;
       pair        <= begins_here ? '0 : pair + 15'd1;
-      if (copies_here) begin
-        tripped[b*BANK+:BANK] <= tripped_now[b*BANK+:BANK];
-        first[b*BANK+:BANK]   <= first_now[b*BANK+:BANK];
-        at[b*BANK+:BANK]      <= at_now[b*BANK+:BANK];
-      end
       if (reset_fast) {begins_here, closes_here, copies_here} <= '0;
     end
+
+    taxel_standing_word #(.BITS(17 * BANK)) counts (
+        .clk(clk_fast),
+        .take(copies_here),
+        .word({tripped_now[b*BANK+:BANK], first_now[b*BANK+:BANK], at_now[b*BANK+:BANK]}),
+        .stands({tripped[b*BANK+:BANK], first[b*BANK+:BANK], at[b*BANK+:BANK]})
+    );
 
     for (genvar c = b * BANK; c < (b + 1) * BANK; c++) begin : g_column
       taxel_comparator_column column (
@@ -122,6 +132,13 @@ module taxel_comparator_array #(
           .at(at_now[c])
       );
     end
+  end
+
+  // Each read is reported before the next one ends.
+  logic unreported;
+  always_ff @(posedge clk) begin
+    unreported <= !reset && (step_end || (unreported && !read_done));
+    if (!reset) assert (!(step_end && unreported && !read_done));
   end
 
 endmodule

@@ -101,4 +101,9 @@ module taxel_datagram_sender #(
     end
   end
 
+  // One datagram at a time, whose bank stands still.
+  always_ff @(posedge clk) begin
+    if (!reset) assert (!(send && sending) && !(write && busy && bank == now.bank));
+  end
+
 endmodule

@@ -10,6 +10,7 @@ module taxel_ethernet_board #(
     parameter int COLUMNS = 64,
     parameter int ROWS = 64,
     parameter int BAUD_CLOCKS = 868,
+    parameter int CSEL_CLOCKS = 8,
     parameter int RESET_CLOCKS = 1_000_000  // 10 ms, for the PHY
 ) (
     input  logic        clk,       // 100 MHz
@@ -38,6 +39,7 @@ module taxel_ethernet_board #(
 
   logic runs;
   logic reset;
+  initial reset = 1'b1;
   logic [RESET_BITS-1:0] waited;
 
   taxel_synchroniser to_runs (.clk, .from(steady), .to(runs));
@@ -72,6 +74,7 @@ module taxel_ethernet_board #(
       .ROWS(ROWS),
       .CHANNELS(64),
       .BAUD_CLOCKS(BAUD_CLOCKS),
+      .CSEL_CLOCKS(CSEL_CLOCKS),
       .DELAY(2 + 3)
   ) core (
       .clk, .clk_fast, .reset, .ramp(ramp_pair), .comparators(samples), .rsel, .csel_reg_clk_out, .csel_reg_din_out,

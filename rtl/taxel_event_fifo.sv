@@ -83,4 +83,12 @@ module taxel_event_fifo #(
     end
   end
 
+  // Whoever pushes and pops does so only where that is allowed, and the ring neither overflows nor underflows.
+  always_ff @(posedge clk) begin
+    if (!reset) begin
+      assert (!(push && full) && !(pop && !ready));
+      assert (waiting <= (PLACES + 1)'(DEPTH) && !(land && waiting == '0));
+    end
+  end
+
 endmodule

@@ -1,81 +1,102 @@
 // Drives one line at a time through a chain of shift registers (74HC164): a single one stands at the place of the line.
 //
-// A later line is reached by shifting on. For an earlier one the old one is shifted out beyond the last line, and a new one in.
-// After reset, and where there are more lines than before, the whole chain is shifted through, as what it holds is not known.
-// A pulse takes 2 x HALF clocks, so a jump over n lines settles n pulses later.
+// A later line is reached by shifting on. For an earlier one the old one is shifted out beyond the last line, and a new one in;
+// so too where there are more lines than before, as what was shifted out stands there. The line is named before it is due: the
+// data then stand in time, and the clock rises at once as the line starts. Data and both levels of the clock stand for HALF
+// clocks or more, whatever is asked for when, so a jump over n lines settles 2 x HALF x n clocks later.
 //
-// Throughput: a line every 2 x HALF clocks for each pulse of the jump, and HALF + 2 more.
-// Latency: as long.
-// Loses a jump that the next line's start cuts short: then no line or two are driven, until ascending lines have passed all
-// places.
+// Throughput: a line every 2 x HALF clocks for each pulse of the jump.
+// Latency: the first pulse rises a clock after `start`, or HALF after what stood in its way; the data stand four clocks after
+// `next`.
+// Loses no line: a jump that the next line comes before goes on to that one. Until it is over no line or several are driven.
 module taxel_line_select #(
     parameter int COLUMNS = 64,
-    parameter int HALF = 1  // clocks of half a pulse
+    parameter int HALF = 8  // clocks for which the data, and each level of the clock, stand
 ) (
     input  logic       clk,
     input  logic       reset,
-    input  logic       start,  // of a line
-    input  logic [6:0] line,
-    input  logic [7:0] lines,  // less one
+    input  logic       next,   // names the line that is due, four clocks or more before it starts
+    input  logic [6:0] line,   // with `next`
+    input  logic [7:0] lines,  // less one; with `next`
+    input  logic       start,  // of that line
     output logic       csel_clk,
     output logic       csel_din
 );
 
-  localparam int HALF_BITS = $clog2(HALF + 1);
+  localparam int HALF_BITS = HALF > 1 ? $clog2(HALF) : 1;
 
-  logic [6:0] at;  // which line is selected
-  logic [7:0] known;  // lines less one for which the chain is known to hold a single one
-  logic       unknown;
-  logic [7:0] pulses, insert;  // how many are left, and at which of them the one goes in
-  // A clock after `start`: the whole chain, or on from the old line; else so many pulses take the old one out, the new one in.
-  logic fresh, all, later;
+  logic [6:0] aim;                // the line named last
+  logic [7:0] aim_lines;          // less one
+  logic [6:0] at;                 // which line the pulses below lead to
+  logic [7:0] known;              // lines less one of which only that is driven then
+  logic [7:0] place;              // where the newest one stands, older ones beyond it; COLUMNS: in none
+  logic [7:0] pulses, insert;     // how many are left; before so many of them the one goes in, 0: it is in
+  logic waits;                    // for the start of the line
+  logic [HALF_BITS-1:0] left;     // clocks until data and clock have stood
+  logic data, rises, falls;
+  // From a clock after `next` on no pulse rises: on from where the one stands; or so many take it out, and a new one in.
+  logic named, weighed, later;
   logic [7:0] on, out, in;
-  logic [HALF_BITS-1:0] left;
+
+  assign data  = insert != 8'd0 && pulses == insert;
+  assign rises = !csel_clk && (start || !waits) && left == '0 && pulses != 8'd0;
+  assign falls = csel_clk && left == '0;
 
   always_ff @(posedge clk) begin
-    fresh <= start && !reset;
-    if (start) begin
-      all   <= unknown || lines > known;
-      later <= line > at;
-      on    <= 8'(line - at);
-      out   <= 8'(at) > lines ? 8'd0 : lines + 8'd1 - 8'(at);
-      in    <= 8'(line) + 8'd1;
+    named   <= next && !reset;
+    weighed <= named && !reset;
+    if (next) begin
+      aim       <= line;
+      aim_lines <= lines;
     end
+    later <= insert == 8'd0 && aim > at && aim_lines <= known;
+    on    <= 8'(aim) - place;
+    out   <= place > aim_lines ? 8'd0 : aim_lines + 8'd1 - place;
+    in    <= 8'(aim) + 8'd1;
   end
 
   always_ff @(posedge clk) begin
+    if (start) waits <= 1'b0;
+    if (next) waits <= 1'b1;
+    if (left != '0) left <= left - HALF_BITS'(1);
+    if (rises) begin
+      csel_clk <= 1'b1;
+      left     <= HALF_BITS'(HALF - 1);
+      pulses   <= pulses - 8'd1;
+      if (csel_din) insert <= '0;
+      if (csel_din) place <= '0;
+      else if (place != 8'(COLUMNS)) place <= place + 8'd1;
+    end else if (falls || (!csel_clk && csel_din != data)) begin
+      csel_clk <= 1'b0;
+      csel_din <= data;
+      left     <= HALF_BITS'(HALF - 1);
+    end
+    if (weighed) begin
+      pulses <= later ? on : out > in ? out : in;
+      insert <= later ? 8'd0 : in;
+      at     <= aim;
+      known  <= aim_lines;
+    end
     if (reset) begin
-      unknown  <= 1'b1;
-      pulses   <= '0;
-      csel_clk <= 1'b0;
-      csel_din <= 1'b0;
-      at       <= '0;
-      known    <= '0;
+      // The whole chain is shifted through, as what it holds is not known. No line lies beyond the last one.
+      pulses   <= 8'(COLUMNS);
       insert   <= '0;
-      left     <= HALF_BITS'(1);
-    end else if (start) begin
-      at       <= line;
-      known    <= lines;
-      unknown  <= 1'b0;
+      place    <= '0;
+      at       <= '1;
+      known    <= '0;
+      waits    <= 1'b0;
       csel_clk <= 1'b0;
       csel_din <= 1'b0;
-    end else if (fresh) begin
-      pulses <= all ? 8'(COLUMNS) : later ? on : out > in ? out : in;
-      insert <= !all && later ? 8'd0 : in;
-      left   <= HALF_BITS'(HALF);
-    end else if (left != HALF_BITS'(1)) begin
-      left <= left - HALF_BITS'(1);
-    end else begin
-      left <= HALF_BITS'(HALF);
-      if (csel_clk) begin
-        csel_clk <= 1'b0;
-        csel_din <= 1'b0;
-        pulses   <= pulses - 8'd1;
-      end else if (pulses != 0) begin
-        // The data stand half a pulse before the clock rises, and until it has fallen.
-        if (pulses == insert && !csel_din) csel_din <= 1'b1;
-        else csel_clk <= 1'b1;
-      end
+      left     <= HALF_BITS'(HALF - 1);
+    end
+  end
+
+  // A line is named before it starts, so that its data stand by then, and what leads to it lies within the chain.
+  always_ff @(posedge clk) begin
+    if (!reset) begin
+      assert (!(start && (!waits || named || weighed)));
+      assert (!rises || csel_din == data);
+      assert (place <= 8'(COLUMNS) && pulses <= 8'(COLUMNS) && insert <= pulses);
     end
   end
 

@@ -126,4 +126,14 @@ module taxel_line_sorter #(
     end
   end
 
+  // What is offered stands until it is taken.
+  logic waits;
+  event_t waiting;
+  always_ff @(posedge clk) begin
+    waits   <= valid && !taken && !reset;
+    waiting <= entry;
+    if (!reset) assert (!(taken && !valid));
+    if (!reset && waits) assert (valid && entry == waiting);
+  end
+
 endmodule

@@ -4,12 +4,20 @@
 // have settled. `EARLY` clocks before a frame's edge the registers as written are taken for the next frame. All pulses are of
 // one clock; those of a frame's, a line's and a step's start come together.
 //
+// The ramp of a read rises and falls later than the read begins and ends, by what the crossing to the fast clock and the pins'
+// cells take. The multiplexer and the lines follow `HOLD` clocks after a step's start, when the samples of the read before are
+// over: so they settle for `step_period - step_read` before the ramp rises.
+//
+// After reset the scan waits until the chain of shift registers is empty.
+//
 // Throughput: a step every `step_period` clocks.
 // Latency: what is written `EARLY` clocks before a frame's edge acts in that frame.
 // Loses nothing: the scan waits for nobody.
 module taxel_mux_ctrl #(
     parameter int COLUMNS = 64,
     parameter int STEPS = 4,
+    parameter int HOLD = 4,         // clocks from a step's start until the multiplexer and the lines follow, 2 to 8
+    parameter int CSEL_CLOCKS = 8,  // for which each level of the shift registers' clock stands
     parameter taxel_registers::registers_t AT_RESET = '0
 ) (
     input  logic                            clk,
@@ -41,6 +49,11 @@ module taxel_mux_ctrl #(
   import taxel_types::*;
 
   localparam int EARLY = 16;
+  localparam int ORDERING = 7;  // clocks until the next line is known
+
+  if (HOLD < 2 || HOLD > 8) begin : g_hold
+    $error("HOLD: 2 to 8");
+  end
 
   registers_t committed;
   logic [2:0] committed_markers;
@@ -116,7 +129,7 @@ module taxel_mux_ctrl #(
       active         <= AT_RESET;
       active.lines   <= '0;
       place          <= '0;
-      line_left      <= 32'(EARLY + 4);
+      line_left      <= 32'(EARLY + 4 + 2 * CSEL_CLOCKS * COLUMNS);
       stepping       <= 1'b0;
       step           <= '0;
       line           <= '0;
@@ -176,7 +189,16 @@ module taxel_mux_ctrl #(
       read.markers       <= committed_markers;
       read.starts        <= committed_starts;
     end
-    rsel <= step;
+  end
+
+  // What is selected follows a step's start, and a line's.
+  logic [HOLD-1:1] step_moves, line_moves;
+
+  always_ff @(posedge clk) begin
+    step_moves <= (HOLD - 1)'({step_moves, step_start});
+    line_moves <= (HOLD - 1)'({line_moves, line_start});
+    if (step_moves[HOLD-1]) rsel <= step;
+    if (reset) {step_moves, line_moves, rsel} <= '0;
   end
 
   assign next_lines  = last_line ? committed.lines : active.lines;
@@ -192,17 +214,25 @@ module taxel_mux_ctrl #(
       .line(next_line)
   );
 
-  // One clock after the registers of the next frame are taken.
-  always_ff @(posedge clk) early_line <= early && !reset;
+  // One clock after the registers of the next frame are taken; and when the line is drawn.
+  logic [ORDERING-1:0] drawing;
+  always_ff @(posedge clk) begin
+    early_line <= early && !reset;
+    drawing    <= reset ? '0 : {drawing[ORDERING-2:0], early_line};
+  end
 
-  taxel_line_select #(.COLUMNS(COLUMNS)) select (
+  taxel_line_select #(.COLUMNS(COLUMNS), .HALF(CSEL_CLOCKS)) select (
       .clk,
       .reset,
-      .start(line_start),
-      .line,
-      .lines(active.lines),
+      .next(drawing[ORDERING-1]),
+      .line(next_line),
+      .lines(next_lines),
+      .start(line_moves[HOLD-1]),
       .csel_clk,
       .csel_din
   );
+
+  // Lines and steps are those of the registers.
+  always_ff @(posedge clk) if (!reset) assert (32'(step) < STEPS && place <= active.lines);
 
 endmodule

@@ -91,4 +91,14 @@ module taxel_packer_v1 #(
     end
   end
 
+  // What is offered stands until it is taken.
+  logic waits;
+  logic [8:0] waiting;
+  always_ff @(posedge clk) begin
+    waits   <= tvalid && !tready && !reset;
+    waiting <= {tlast, tdata};
+    if (!reset && waits) assert (tvalid && {tlast, tdata} == waiting);
+    if (!reset && busy) assert (at <= 3'd4);
+  end
+
 endmodule

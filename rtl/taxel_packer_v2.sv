@@ -155,20 +155,26 @@ module taxel_packer_v2 #(
   logic [3:0] kind;  // of events
   assign kind = !valued ? 4'd0 : narrow ? 4'd1 : 4'd2;
 
-  // What a datagram's header says stands before it is known whether the one before has gone.
-  task automatic go();
-    send            <= 1'b1;
-    sequence_number <= sequence_number + 32'd1;
-    bank            <= !bank;
-    units           <= '0;
-  endtask
+  // What happens in this clock: an event finds its place in the body, or what was gathered goes first; a datagram goes.
+  logic fits_in, beats, free, goes, shows_value, shows_total;
+  assign fits_in     = state == PLACE && !(gathered && (differs || late || !fits[count_of]));
+  // A promise alone.
+  assign beats       = state == BEAT && !gathered && now.kind == ENTRY_FRAME && newer && (restless || silent);
+  assign free        = !sending && !send;
+  assign shows_value = state == REPEAT && !rows_over && fetching == 0;
+  assign shows_total = state == TOTALS && !words_over;
 
+  always_comb begin
+    case (state)
+      CLOSE, SEND, BEYOND: goes = free;
+      REPEAT: goes = free && rows_over;
+      TOTALS: goes = free && words_over;
+      default: goes = 1'b0;
+    endcase
+  end
+
+  // How long ago things were, of the clock before: they stand while they are used.
   always_ff @(posedge clk) begin
-    write       <= 1'b0;
-    send        <= 1'b0;
-    states_sent <= 1'b0;
-    totals_sent <= 1'b0;
-    // Of the clock before: they stand while they are used.
     since      <= now.at - base;
     quiet      <= now.at - promised;
     since_last <= now.at - last;
@@ -183,11 +189,208 @@ module taxel_packer_v2 #(
     silent     <= quiet >= micros_t'(HEARTBEAT_US);
     restless   <= any && since_last <= RESTLESS;
     ripe       <= HOLD_US == 0 || since + micros_t'(length_of(now)) > micros_t'(HOLD_US);
-    repeated   <= value_repeated;
+  end
+
+  // What is done next.
+  always_ff @(posedge clk) begin
+    case (state)
+      IDLE: if (leaving && gathered && !valid) state <= OVER;
+      WEIGH: state <= PLACE;
+      PLACE: begin
+        state <= !fits_in ? CLOSE : count_of == 3'd1 ? IDLE : WRITE;
+        after <= fits_in ? IDLE : WEIGH;
+      end
+      WRITE: if (left == 3'd1) state <= after;
+      OVER: begin
+        state <= AGE;
+        after <= NEXT;
+      end
+      AGE: state <= BEAT;
+      BEAT: begin
+        state <= NEXT;
+        if (gathered && (now.kind != ENTRY_FRAME || ripe || states || totals_due)) state <= CLOSE;
+        if (beats) state <= SEND;
+      end
+      SEND: if (goes) state <= after;
+      // Of what lies further ahead an empty datagram promises the rest.
+      CLOSE: if (goes) state <= since_long ? SEND : after;
+      NEXT: begin
+        if (now.kind == ENTRY_MARKER) begin
+          state <= WRITE;
+          after <= BEYOND;
+        end else if (states) begin
+          if (states_ready) state <= REPEAT;
+        end else begin
+          state <= totals_due ? TOTALS : IDLE;
+        end
+      end
+      BEYOND: if (goes) state <= IDLE;
+      REPEAT: begin
+        if (goes) state <= NEXT;
+        if (shows_value) begin
+          state <= WRITE;
+          after <= REPEAT;
+        end
+      end
+      default: if (goes) state <= NEXT;  // TOTALS
+    endcase
+    if (taken) state <= entry.kind == ENTRY_EVENT ? WEIGH : OVER;
+    if (reset) state <= IDLE;
+  end
+
+  // The entry, and what it still asks for.
+  always_ff @(posedge clk) begin
+    if (taken) begin
+      now        <= entry;
+      states     <= entry.states;
+      totals_due <= entry.totals;
+    end else if (state == IDLE && leaving && gathered && !valid) begin
+      now.kind             <= ENTRY_FLUSH;
+      now.at               <= at;
+      {states, totals_due} <= '0;
+    end else if (state == NEXT && now.kind == ENTRY_MARKER) begin
+      now.kind <= ENTRY_FLUSH;
+    end else if (goes && state == REPEAT) begin
+      states <= 1'b0;
+    end else if (goes && state == TOTALS) begin
+      totals_due <= 1'b0;
+    end
+  end
+
+  // Where an event lies, seen from the one before, or from the start of a body or of a time.
+  always_ff @(posedge clk) begin
+    if (taken) begin
+      moved     <= entry.at != at;
+      behind    <= entry_position <= reached;
+      gap_ahead <= 15'(ahead);
+      far_ahead <= 15'(ahead) >= 15'(NEAR);
+    end
+    if (state == WEIGH) begin
+      again <= gathered && (moved || behind);
+      if (!gathered) begin
+        gap <= 15'(now.y);
+        far <= 15'(now.y) >= 15'(NEAR);
+      end else if (moved || behind) begin
+        gap <= 15'(position);
+        far <= 15'(position) >= 15'(NEAR);
+      end else begin
+        gap <= gap_ahead;
+        far <= far_ahead;
+      end
+      // What waits has its own format: it is sent first.
+      differs <= now.format != format;
+    end
+  end
+
+  // What is gathered: when and where it begins, and where its last event is.
+  always_ff @(posedge clk) begin
+    if (fits_in) begin
+      gathered <= 1'b1;
+      if (!gathered) begin
+        line     <= now.x;
+        flag     <= lost;
+      end
+      at      <= now.at;
+      last    <= now.at;
+      any     <= 1'b1;
+      reached <= position;
+    end
+    if (goes && state == CLOSE) gathered <= 1'b0;
+    if (!gathered && (taken || state == WEIGH)) format <= taken ? entry.format : now.format;
+    if (reset) {gathered, any} <= '0;
+  end
+
+  // From when on, and how far, what is sent next promises; and up to when all datagrams do.
+  always_ff @(posedge clk) begin
+    if (fits_in && !gathered) base <= now.at;
+    if (beats) begin
+      base <= quiet_long ? long_ago : promised;
+      span <= quiet_16;
+    end
+    if (goes && state == CLOSE && since_long) begin
+      base <= long_ago;
+      span <= LONGEST[15:0];
+    end
+    if (goes && (state == SEND || (state == CLOSE && newer))) promised <= now.at;
+    if (reset) promised <= '0;
+  end
+
+  // Whether the queue lost something, until a datagram that begins after that says so.
+  always_ff @(posedge clk) begin
+    if ((fits_in && !gathered) || (goes && state != CLOSE)) lost <= 1'b0;
+    if (taken) lost <= lost || entry.lost;
+    if (reset) lost <= 1'b0;
+  end
+
+  // The units of a body, and their places in the buffer.
+  always_ff @(posedge clk) begin
+    write <= fits_in || state == WRITE || shows_total;
+    if (fits_in || state == WRITE || shows_total) units <= units + 10'd1;
     for (int k = 0; k < 8; k++) fits[k] <= units <= 10'(MOST - k);
-    rows_over <= 32'(row) == ROWS;
     place <= units;
-    total <= 16'(all_totals >> (16 * word_ahead));
+    case (state)
+      PLACE: begin
+        unit    <= units_of[0];
+        waiting <= units_of >> 16;
+        left    <= count_of - 3'd1;
+      end
+      WRITE: begin
+        unit    <= waiting[0];
+        waiting <= waiting >> 16;
+        left    <= left - 3'd1;
+      end
+      NEXT: if (now.kind == ENTRY_MARKER) begin
+        waiting <= {48'd0, 16'd0, now.more ? 16'd1 : 16'd2, 16'd0, 16'd0};
+        left    <= 3'd4;
+      end
+      REPEAT: if (shows_value) begin
+        waiting[1] <= '0;
+        waiting[0] <= narrow ? {8'd0, repeated > 16'd255 ? 8'd255 : repeated[7:0]} : repeated;
+        left       <= narrow ? 3'd1 : 3'd2;
+      end
+      TOTALS: if (shows_total) unit <= total;
+      default: ;
+    endcase
+    if (goes || reset) units <= '0;
+    if (reset) write <= 1'b0;
+  end
+
+  // What is repeated: a value comes a clock after its row is asked for, and is used another one later.
+  always_ff @(posedge clk) begin
+    states_sent <= goes && state == REPEAT;
+    totals_sent <= goes && state == TOTALS;
+    repeated    <= value_repeated;
+    rows_over   <= 32'(row) == ROWS;
+    total       <= 16'(all_totals >> (16 * word_ahead));
+    if (state == REPEAT) fetching <= fetching >> 1;
+    if (shows_value) begin
+      row      <= row + 8'd1;
+      fetching <= 2'b01;
+    end
+    if (shows_total) begin
+      word_ahead <= word_ahead + 5'd1;
+      word       <= word + 5'd1;
+      words_over <= word == 5'd19;
+    end
+    if (state == NEXT) begin
+      row        <= '0;
+      rows_over  <= 1'b0;
+      fetching   <= 2'b11;
+      word       <= '0;
+      word_ahead <= 5'd1;
+      words_over <= 1'b0;
+      total      <= all_totals[15:0];
+    end
+    if (reset) {states_sent, totals_sent} <= '0;
+  end
+
+  // A datagram's header stands before it is known whether the one before has gone.
+  always_ff @(posedge clk) begin
+    send <= goes;
+    if (goes) begin
+      sequence_number <= sequence_number + 32'd1;
+      bank            <= !bank;
+    end
     datagram <= '{
         kind: kind,
         frame_sync: format.frame_sync,
@@ -201,201 +404,32 @@ module taxel_packer_v2 #(
         bank: bank
     };
     case (state)
-      IDLE: begin
-        if (leaving && gathered && !valid) begin
-          now.kind           <= ENTRY_FLUSH;
-          now.at             <= at;
-          {states, totals_due} <= '0;
-          state              <= OVER;
-        end
-      end
-      WEIGH: begin
-        again <= gathered && (moved || behind);
-        if (!gathered) begin
-          gap    <= 15'(now.y);
-          far    <= 15'(now.y) >= 15'(NEAR);
-          format <= now.format;
-        end else if (moved || behind) begin
-          gap <= 15'(position);
-          far <= 15'(position) >= 15'(NEAR);
-        end else begin
-          gap <= gap_ahead;
-          far <= far_ahead;
-        end
-        // What waits has its own format: it is sent first.
-        differs <= now.format != format;
-        state   <= PLACE;
-      end
-      PLACE: begin
-        unit    <= units_of[0];
-        waiting <= units_of >> 16;
-        left    <= count_of - 3'd1;
-        if (gathered && (differs || late || !fits[count_of])) begin
-          state <= CLOSE;
-          after <= WEIGH;
-        end else begin
-          if (!gathered) begin
-            gathered <= 1'b1;
-            base     <= now.at;
-            line     <= now.x;
-            flag     <= lost;
-            lost     <= 1'b0;
-          end
-          at      <= now.at;
-          reached  <= position;
-          last    <= now.at;
-          any     <= 1'b1;
-          write   <= 1'b1;
-          units   <= units + 10'd1;
-          state   <= count_of == 3'd1 ? IDLE : WRITE;
-          after   <= IDLE;
-        end
-      end
-      WRITE: begin
-        write   <= 1'b1;
-        unit    <= waiting[0];
-        units   <= units + 10'd1;
-        waiting <= waiting >> 16;
-        left    <= left - 3'd1;
-        if (left == 3'd1) state <= after;
-      end
-      OVER: begin
-        after <= NEXT;
-        state <= AGE;
-      end
-      AGE: state <= BEAT;
-      BEAT: begin
-        state <= NEXT;
-        if (gathered) begin
-          if (now.kind != ENTRY_FRAME || ripe || states || totals_due) state <= CLOSE;
-        end else if (now.kind == ENTRY_FRAME && newer && (restless || silent)) begin
-          base  <= quiet_long ? long_ago : promised;
-          span  <= quiet_16;
-          state <= SEND;
-        end
-      end
       SEND: begin
         datagram.base <= base;
         datagram.span <= span;
-        if (!sending && !send) begin
-          go();
-          lost     <= 1'b0;
-          promised <= now.at;
-          state    <= after;
-        end
       end
       CLOSE: begin
         datagram.dropped <= flag;
         datagram.base    <= base;
         datagram.line    <= line;
         datagram.span    <= since_16;
-        if (!sending && !send) begin
-          go();
-          gathered <= 1'b0;
-          // Of what lies further ahead the empty datagram that follows promises the rest.
-          if (newer) promised <= now.at;
-          state <= after;
-          if (since_long) begin
-            base  <= long_ago;
-            span  <= LONGEST[15:0];
-            state <= SEND;
-          end
-        end
       end
-      NEXT: begin
-        row  <= '0;
-        word <= '0;
-        word_ahead <= 5'd1;
-        words_over <= 1'b0;
-        rows_over  <= 1'b0;
-        total      <= all_totals[15:0];
-        fetching <= 2'b11;
-        if (now.kind == ENTRY_MARKER) begin
-          waiting  <= {48'd0, 16'd0, now.more ? 16'd1 : 16'd2, 16'd0, 16'd0};
-          left     <= 3'd4;
-          now.kind <= ENTRY_FLUSH;
-          after    <= BEYOND;
-          state    <= WRITE;
-        end else if (states) begin
-          if (states_ready) state <= REPEAT;
-        end else if (totals_due) begin
-          state <= TOTALS;
-        end else begin
-          state <= IDLE;
-        end
-      end
-      BEYOND: begin
-        // A marker has been written.
-        datagram.kind <= 4'd3;
-        if (!sending && !send) begin
-          go();
-          lost  <= 1'b0;
-          state <= IDLE;
-        end
-      end
+      BEYOND: datagram.kind <= 4'd3;
       REPEAT: begin
-        // A value comes a clock after its row is asked for, and is used another one later.
-        fetching <= fetching >> 1;
         datagram.kind        <= narrow ? 4'd6 : 4'd7;
         datagram.differences <= 1'b0;
         datagram.line        <= repeated_line;
-        if (rows_over) begin
-          if (!sending && !send) begin
-            go();
-            lost        <= 1'b0;
-            states      <= 1'b0;
-            states_sent <= 1'b1;
-            state       <= NEXT;
-          end
-        end else if (fetching == 0) begin
-          waiting[1] <= '0;
-          waiting[0] <= narrow ? {8'd0, repeated > 16'd255 ? 8'd255 : repeated[7:0]} : repeated;
-          left       <= narrow ? 3'd1 : 3'd2;
-          row        <= row + 8'd1;
-          after      <= REPEAT;
-          fetching   <= 2'b01;
-          state      <= WRITE;
-        end
       end
-      default: begin  // TOTALS
-        datagram.kind <= 4'd4;
-        if (words_over) begin
-          if (!sending && !send) begin
-            go();
-            lost        <= 1'b0;
-            totals_due  <= 1'b0;
-            totals_sent <= 1'b1;
-            state       <= NEXT;
-          end
-        end else begin
-          write <= 1'b1;
-          unit  <= total;
-          word_ahead <= word_ahead + 5'd1;
-          units <= units + 10'd1;
-          word  <= word + 5'd1;
-          words_over <= word == 5'd19;
-        end
-      end
+      TOTALS: datagram.kind <= 4'd4;
+      default: ;
     endcase
-    if (taken) begin
-      now        <= entry;
-      moved      <= entry.at != at;
-      behind     <= entry_position <= reached;
-      gap_ahead  <= 15'(ahead);
-      far_ahead  <= 15'(ahead) >= 15'(NEAR);
-      lost       <= lost || entry.lost;
-      states     <= entry.states;
-      totals_due <= entry.totals;
-      state      <= entry.kind == ENTRY_EVENT ? WEIGH : OVER;
-      if (!gathered) format <= entry.format;
-    end
     if (reset) begin
-      {gathered, lost, any, bank, write, send, states_sent, totals_sent} <= '0;
+      {bank, send} <= '0;
       sequence_number <= '0;
-      promised        <= '0;
-      units           <= '0;
-      state           <= IDLE;
     end
   end
+
+  // There are no other states.
+  always_ff @(posedge clk) if (!reset) assert (state <= AGE);
 
 endmodule

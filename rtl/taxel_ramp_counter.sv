@@ -5,7 +5,7 @@
 // sample, and the first half of the ramp, is in bit 0. `DELAY` clocks pass from the ramp's pair to the pair of samples that
 // were taken during it.
 //
-// Throughput: a ramp at a time.
+// Throughput: a ramp every five clocks, where it is no longer than that.
 // Latency: the ramp rises a clock after `start`.
 // Loses a ramp that starts before the one before has fallen for a clock: comparators see one.
 module taxel_ramp_counter #(
@@ -23,8 +23,10 @@ module taxel_ramp_counter #(
     output logic        closing  // the pair that is sampled next is the last of them
 );
 
+  localparam int MIDDLE = DELAY < 7 ? DELAY - 3 : 4;  // when what a ramp asks for moves on
+
   // Counters count down, and what ends with them is known clocks before, as the clock is fast.
-  logic [14:0] full, ramp_left, pairs, pairs_left;  // pairs of the ramp that are high in both halves
+  logic [14:0] full, ramp_left, pairs_next, pairs, pairs_left;  // pairs of the ramp that are high in both halves
   logic odd;                                        // whether half a pair follows
   logic rising, ramp_last, pairs_last, none, single, one_left;
   logic [DELAY-1:0] delayed;
@@ -52,7 +54,9 @@ module taxel_ramp_counter #(
     end
     // The samples of it: up to the one at its end.
     delayed <= {delayed[DELAY-2:0], start};
-    if (start) pairs <= full;
+    // The next ramp may start before these begin.
+    if (start) pairs_next <= full;
+    if (delayed[MIDDLE]) pairs <= pairs_next;
     none   <= pairs == 15'd0;
     single <= pairs == 15'd1;
     begun  <= begins;

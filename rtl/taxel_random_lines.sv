@@ -66,4 +66,7 @@ module taxel_random_lines (
     end
   end
 
+  // A line is asked for when the one before is known.
+  always_ff @(posedge clk) if (!reset) assert (!(next && stage != '0));
+
 endmodule

@@ -109,4 +109,7 @@ module taxel_register_file #(
     end
   end
 
+  // What it holds obeys the rules.
+  always_ff @(posedge clk) if (!reset) assert (broken(written, STEPS, COLUMNS, ROWS, CHANNELS) == '0);
+
 endmodule

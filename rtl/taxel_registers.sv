@@ -105,7 +105,7 @@ package taxel_registers;
     return changed;
   endfunction
 
-  localparam int RULES = 14;
+  localparam int RULES = 15;
 
   // Which rules refuse these registers, in their order.
   function automatic logic [RULES-1:0] broken(
@@ -124,8 +124,9 @@ package taxel_registers;
     which[9] = !(40'(r.step_read) <= 40'(r.step_period));
     which[10] = !((40'(steps) * 40'(r.step_period)) <= 40'(r.line_read));
     which[11] = !((40'(r.ramp) + 40'd5) <= (40'(r.step_read) + (40'(r.step_read) << 1)));
-    which[12] = !((40'(channels) + 40'd10) <= 40'(r.step_period));
-    which[13] = !(((40'(r.wire_version) + 40'd1) == 40'd2) || ((40'(driven_lines) <= 40'd64) && (40'(sense_lines) <= 40'd64)));
+    which[12] = !((40'(r.random_lines) == 40'd0) || ((((40'(r.lines) + 40'd1) << 4)) <= 40'(r.line_period)));
+    which[13] = !((40'(channels) + 40'd10) <= 40'(r.step_period));
+    which[14] = !(((40'(r.wire_version) + 40'd1) == 40'd2) || ((40'(driven_lines) <= 40'd64) && (40'(sense_lines) <= 40'd64)));
     return which;
   endfunction
 
@@ -143,8 +144,9 @@ package taxel_registers;
     if (which[9]) return 4'd1;
     if (which[10]) return 4'd2;
     if (which[11]) return 4'd3;
-    if (which[12]) return 4'd7;
-    if (which[13]) return 4'd8;
+    if (which[12]) return 4'd5;
+    if (which[13]) return 4'd7;
+    if (which[14]) return 4'd8;
     return 4'd0;
   endfunction
 

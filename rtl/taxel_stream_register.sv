@@ -34,4 +34,16 @@ module taxel_stream_register #(
     end
   end
 
+  // What is offered, to it and by it, stands until it is taken.
+  logic waits_in, waits_out;
+  logic [BITS-1:0] waiting_in, waiting_out;
+  always_ff @(posedge clk) begin
+    waits_in    <= valid_in && !ready_in && !reset;
+    waits_out   <= valid_out && !ready_out && !reset;
+    waiting_in  <= data_in;
+    waiting_out <= data_out;
+    if (!reset && waits_in) assert (valid_in && data_in == waiting_in);
+    if (!reset && waits_out) assert (valid_out && data_out == waiting_out);
+  end
+
 endmodule

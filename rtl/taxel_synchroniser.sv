@@ -9,8 +9,10 @@ module taxel_synchroniser (
     output logic to
 );
 
-  logic unsettled;
+  // Synthesis keeps both.
+  (* keep *) logic unsettled, settled;
+  assign to = settled;
 
-  always_ff @(posedge clk) {to, unsettled} <= {unsettled, from};
+  always_ff @(posedge clk) {settled, unsettled} <= {unsettled, from};
 
 endmodule

@@ -23,7 +23,8 @@ module taxel_top #(
     parameter int HEARTBEAT_US = 10_000,      // between promises that nothing has happened
     parameter int STATES_US = 1_000_000,      // in which all lines' values, and the totals, are repeated; 0: never
     parameter int LINK_BYTES = 1,             // of a beat of the link, 1 or 4
-    parameter int DELAY = 2                   // fast clocks from the ramp's pair to the samples taken during it
+    parameter int DELAY = 2,                  // fast clocks from the ramp's pair to the samples taken during it
+    parameter int CSEL_CLOCKS = 8             // for which each level of the shift registers' clock stands: 80 ns
 ) (
     input  logic                     clk,
     input  logic                     clk_fast,
@@ -57,12 +58,24 @@ module taxel_top #(
   localparam int SENSE_LINES = ROWS > 64 ? ROWS : 64;
   localparam int STEPS = (SENSE_LINES + CHANNELS - 1) / CHANNELS;
   localparam registers_t AT_RESET = at_reset(STEPS, COLUMNS, ROWS, CHANNELS);
+  // A read's last sample is taken 37 ns after its step at the latest (rule 3), and later by what the pins' cells take: two
+  // thirds of a clock for each fast one.
+  localparam int HOLD = 4 + (2 * (DELAY - 2) + 2) / 3;
 
   if (CHANNELS != 16 && CHANNELS != 64) begin : g_channels
     $error("CHANNELS: the converter has 16 or 64");
   end
   if (COLUMNS > 128 || ROWS > 128 || (1 << $clog2(STEPS)) != STEPS) begin : g_lines
     $error("COLUMNS, ROWS: at most 128, and steps that are a power of two");
+  end
+  if (ANSWERS < 2 || (1 << $clog2(ANSWERS)) != ANSWERS) begin : g_answers
+    $error("ANSWERS: a power of two, at least 2");
+  end
+  if (DELAY < 2 || HOLD > 8) begin : g_delay
+    $error("DELAY: 2 to 8");
+  end
+  if (CSEL_CLOCKS < 1 || CSEL_CLOCKS > 256) begin : g_pulses
+    $error("CSEL_CLOCKS: 1 to 256");
   end
   if (STATES_US == 1 || STATES_US > 20_000_000) begin : g_states
     $error("STATES_US: 0, or 2 to 20000000");
@@ -108,7 +121,13 @@ module taxel_top #(
   logic line_due, totals_due;
   read_t read;
 
-  taxel_mux_ctrl #(.COLUMNS(COLUMNS), .STEPS(STEPS), .AT_RESET(AT_RESET)) mux_ctrl (
+  taxel_mux_ctrl #(
+      .COLUMNS(COLUMNS),
+      .STEPS(STEPS),
+      .HOLD(HOLD),
+      .CSEL_CLOCKS(CSEL_CLOCKS),
+      .AT_RESET(AT_RESET)
+  ) mux_ctrl (
       .clk, .reset, .written, .markers, .starts, .markers_taken, .active, .stamp, .micros, .ended_micros,
       .line_due, .totals_due, .zero, .frame_start, .step_start, .read_start, .step_end, .reading(row_reading), .converting(col_reading), .read,
       .rsel, .csel_clk(csel_reg_clk_out), .csel_din(csel_reg_din_out)
@@ -230,5 +249,8 @@ module taxel_top #(
   taxel_uart_tx #(.CLOCKS(BAUD_CLOCKS)) uart_tx (
       .clk, .reset, .valid(status_valid), .data(status_data), .ready(status_taken), .tx
   );
+
+  // One version sends at a time.
+  always_ff @(posedge clk) if (!reset) assert (!(tvalid_v1 && tvalid_v2));
 
 endmodule

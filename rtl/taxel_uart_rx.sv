@@ -1,4 +1,5 @@
-// Bytes from the serial line: 8 bits, no parity, one stop bit, CLOCKS clocks a bit. The line is of no clock.
+// Bytes from the serial line: 8 bits, no parity, one stop bit, CLOCKS clocks a bit. The line is of no clock. A start bit is
+// sampled in its middle too: a shorter pulse is none.
 //
 // Throughput: a byte in ten bits.
 // Latency: a byte stands 1 to 2 clocks after the middle of its stop bit (half a clock less where CLOCKS is odd).
@@ -14,12 +15,16 @@ module taxel_uart_rx #(
     output logic       broken  // as valid, for a byte without a stop bit
 );
 
-  localparam int BITS = $clog2(CLOCKS + CLOCKS / 2 + 1);
+  if (CLOCKS < 4) begin : g_clocks
+    $error("CLOCKS: at least 4");
+  end
+
+  localparam int BITS = $clog2(CLOCKS + 1);
 
   logic line, busy;
   logic low;  // since a byte without a stop bit
   logic [BITS-1:0] left;
-  logic [3:0] bits;  // how many are still to come, with the stop bit
+  logic [3:0] bits;  // how many are still to come, with the start and the stop bit
 
   taxel_synchroniser settle (.clk, .from(rx), .to(line));
 
@@ -29,14 +34,16 @@ module taxel_uart_rx #(
     left   <= left - BITS'(1);
     if (line) low <= 1'b0;
     if (!busy) begin
-      // From the start bit's edge to the middle of the first bit.
-      left <= BITS'(CLOCKS + CLOCKS / 2 - 1);
-      bits <= 4'd9;
+      // From the start bit's edge to its middle.
+      left <= BITS'(CLOCKS / 2 - 1);
+      bits <= 4'd10;
       busy <= !line && !low;
     end else if (left == BITS'(1)) begin
       left <= BITS'(CLOCKS);
       bits <= bits - 4'd1;
-      if (bits == 4'd1) begin
+      if (bits == 4'd10) begin
+        busy <= !line;
+      end else if (bits == 4'd1) begin
         busy   <= 1'b0;
         valid  <= line;
         broken <= !line;
@@ -47,5 +54,7 @@ module taxel_uart_rx #(
     end
     if (reset) {busy, low, valid, broken} <= '0;
   end
+
+  always_ff @(posedge clk) if (!reset) assert (!busy || (bits != 4'd0 && bits <= 4'd10));
 
 endmodule

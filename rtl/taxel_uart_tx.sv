@@ -45,4 +45,6 @@ module taxel_uart_tx #(
     end
   end
 
+  always_ff @(posedge clk) if (!reset) assert (ready == (bits == 4'd0) && bits <= 4'd10);
+
 endmodule

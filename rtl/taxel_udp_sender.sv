@@ -32,29 +32,25 @@ module taxel_udp_sender #(
 
   localparam int BITS = $clog2(MOST + 1);
 
-  logic [7:0] payload[2 << BITS];
-
   // On the scan's clock: the bank that is filled, and which banks were handed over, each an alternating bit.
   logic filled;
   logic [BITS-1:0] place;
   logic [1:0] given, taken_here;
   logic [1:0][BITS-1:0] lengths;
   logic room;  // for a further byte
+  logic [BITS-1:0] size;  // of the payload with this byte
 
   assign tready = given[filled] == taken_here[filled];
   assign room   = place != BITS'(MOST);
+  assign size   = room ? place + BITS'(1) : place;
 
   always_ff @(posedge clk) begin
     if (tvalid && tready) begin
-      if (room) begin
-        payload[{filled, place}] <= tdata;
-        place                    <= place + BITS'(1);
-      end
+      place <= size;
       if (tlast) begin
-        lengths[filled] <= room ? place + BITS'(1) : place;
-        given[filled]   <= !given[filled];
-        filled          <= !filled;
-        place           <= '0;
+        given[filled] <= !given[filled];
+        filled        <= !filled;
+        place         <= '0;
       end
     end
     if (reset) begin
@@ -75,12 +71,19 @@ module taxel_udp_sender #(
   for (genvar bank = 0; bank < 2; bank++) begin : g_bank
     taxel_synchroniser to_given (.clk(clk_link), .from(given[bank]), .to(given_there[bank]));
     taxel_synchroniser to_taken (.clk, .from(taken[bank]), .to(taken_here[bank]));
+    taxel_standing_word #(.BITS(BITS)) length (
+        .clk, .take(tvalid && tready && tlast && filled == 1'(bank)), .word(size), .stands(lengths[bank])
+    );
   end
+
+  taxel_two_clock_memory #(.BITS(8), .PLACES(BITS + 1)) payload (
+      .clk_write(clk), .write(tvalid && tready && room), .at_write({filled, place}), .word_written(tdata),
+      .clk_read(clk_link), .at_read({sent, at}), .word_read(fetched)
+  );
 
   assign waits = given_there[sent] != taken[sent];
 
   always_ff @(posedge clk_link) begin
-    fetched <= payload[{sent, at}];
     if (taken_now) begin
       taken[sent] <= !taken[sent];
       sent        <= !sent;
@@ -110,5 +113,7 @@ module taxel_udp_sender #(
       .txd,
       .enable(tx_enable)
   );
+
+  always_ff @(posedge clk) if (!reset) assert (place <= BITS'(MOST));
 
 endmodule

@@ -417,14 +417,21 @@ export function warned(v) {{
 
 def docs(source: Table) -> str:
     """Write the page of the docs."""
-    rows = []
+    rows, less = [], []
     for f in source["field"]:
         high = f.get("low", 0) + f["bits"] - 1
         where = f"REG{f['register']}[{high}:{f['low']}]" if "register" in f else "the board's build"
         where = where.replace(f"[{f.get('low')}:{f.get('low')}]", f"[{f.get('low')}]")
         limits = f"{f['least']} to {f['greatest']}" if f["unit"] != "flag" else "off, on"
         default = ("on" if f["default"] else "off") if f["unit"] == "flag" else f["default"]
-        rows.append(f"| `{f['name']}` | `{f['manual']}` | {where} | {f['unit']} | {default} | {limits} | {f['text']} |")
+        held = ""
+        if "register" in f:
+            held = f"the value less {f['offset']}" if f["offset"] else "the value"
+        if f["offset"]:
+            less.append(f"`{f['name']}` {f['greatest']} is {f['greatest'] - f['offset']} in {where}")
+        rows.append(
+            f"| `{f['name']}` | `{f['manual']}` | {where} | {held} | {f['unit']} | {default} | {limits} | {f['text']} |"
+        )
     rules = [
         f"| {r['number']} | {'warns' if r['warns'] else 'refuses'} | `{r['holds']}` |"
         for r in sorted(source["rule"], key=lambda r: r["number"])
@@ -446,9 +453,11 @@ This page lists the board's registers, the rules that their values obey, and the
 Appendix 1, Table 5.5), each set as a whole by five bytes on the serial line (`taxel.wire.Command`). A *line* is a driven line, the outer
 loop of the scan; a *step* is one of the multiplexer, the inner loop. The manual's names are aliases everywhere, in the manual's units.
 
-| field | the manual's name | where | unit | at reset | range | what it is |
-|---|---|---|---|---|---|---|
+| field | the manual's name | where | bits hold | unit | at reset | range | what it is |
+|---|---|---|---|---|---|---|---|
 {newline.join(rows)}
+
+Where the bits hold less than the value, so must a word that is written: {", ".join(less)}.
 
 All other bits are reserved and written 0. REG6 has no value: writing a register's number (0 to 7) to it reads that register back, and
 writing 8 makes the board identify itself as at reset. Writing 9 requests its totals ([the wire](wire.md)).

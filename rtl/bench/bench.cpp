@@ -2,10 +2,13 @@
 //
 // The bench stands where the analogue board and the pins' cells stand: it follows the chain of shift registers and the
 // multiplexer's address by their pins, and answers each ramp with comparators that trip at the ticks given for what these
-// select. It knows nothing of what the logic makes of it.
+// select at any time: where that moves while a ramp rises, they show what they would have done had it been selected all along.
+// It knows nothing of what the logic makes of it.
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <deque>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -18,22 +21,38 @@
 // messages nor objects, nor paths from an input to an output.
 void Vtaxel_top___024root___eval_nba(Vtaxel_top___024root* root);
 
+int broken = 0;  // assertions of modules that did not hold
+
+#ifdef VL_USER_STOP
+void vl_stop(const char* file, int line, const char* module) {
+    std::fprintf(stderr, "%s:%d: %s: an assertion does not hold\n", file, line, module);
+    broken++;
+}
+#endif
+
 namespace {
 
 constexpr int kWindow = 1 << 17;  // ticks of a ramp that the bench follows
 constexpr uint16_t kNotReturned = 65535;
 constexpr uint16_t kNoStop = 256;
 
+// What holds for a step, which is set as it begins.
+struct Step {
+    int lines = 0;                                       // driven of the array's columns: none stands at the others
+    std::shared_ptr<const std::vector<uint16_t>> ticks;  // by taxel, row after row
+    bool inverted = false;                               // comparators fall when they trip
+};
+
 struct Bench {
     VerilatedContext context;
     Vtaxel_top top;
-    int columns, rows, channels, steps, baud;
-    int lines;                        // driven of these columns: none stands at the others
-    std::vector<uint16_t> ticks;      // by taxel, row after row
+    int columns, rows, channels, steps_a_line, baud;
     std::vector<uint8_t> chain;       // the shift registers, 1 where a line is driven
     bool chain_clock = false;
-    bool inverted = false;            // comparators fall when they trip, in this read and in the next one
-    bool inverted_next = false;
+    int line = 0, rsel = 0;           // what is selected: the last one of the driven lines
+    Step set, now;                    // for steps to come; of the ramp that rose last
+    bool step_began = false;          // in the clock before
+    std::deque<Step> steps;           // that began and whose ramp has not risen
     bool shared = false;              // two lines or none were driven when a ramp began
     // The ramp that runs: at which sample each comparator trips.
     std::vector<uint64_t> trips = std::vector<uint64_t>(kWindow);
@@ -69,25 +88,27 @@ struct Bench {
         return &context;
     }
 
-    void select() {
-        int line = -1;
-        for (int x = 0; x < lines; x++) {
+    // Finds which line is driven; returns how many are.
+    int drive() {
+        int driven = 0;
+        line = 0;
+        for (int x = 0; x < now.lines; x++) {
             if (!chain[x]) continue;
-            if (line >= 0) shared = true;
+            driven++;
             line = x;
         }
-        if (line < 0) {
-            shared = true;
-            line = 0;
-        }
+        return driven;
+    }
+
+    // Comparators follow what is selected.
+    void follow() {
         for (int t : used) trips[t] = 0;
         used.clear();
         level = 0;
-        inverted = inverted_next;
         for (int c = 0; c < channels; c++) {
-            const int y = steps * c + top.rsel;
-            const uint16_t t = y < rows ? ticks[y * columns + line] : 0;
-            if (t == kNotReturned) {
+            const int y = steps_a_line * c + rsel;
+            const uint16_t t = y < rows ? (*now.ticks)[y * columns + line] : 0;
+            if (t == kNotReturned || t < tick) {
                 level |= uint64_t{1} << c;
             } else {
                 trips[t] |= uint64_t{1} << c;
@@ -106,8 +127,8 @@ struct Bench {
         return now;
     }
 
-    void drive(uint64_t even, uint64_t odd) {
-        const uint64_t flip = inverted ? ~uint64_t{0} : 0;
+    void show(uint64_t even, uint64_t odd) {
+        const uint64_t flip = now.inverted ? ~uint64_t{0} : 0;
         even ^= flip;
         odd ^= flip;
         // In most clocks no comparator changes.
@@ -125,26 +146,37 @@ struct Bench {
         }
     }
 
+    // The ramp of the clock that begins now. Comparators see no other ramp than one that fell for a clock before it.
     void after_fast() {
-        // The ramp of the clock that begins now, and the samples of its two halves. Comparators see no other ramp
-        // than one that fell for a clock before it.
         const bool rises = (top.ramp & 1) && !ramp_before;
         ramp_before = top.ramp != 0;
-        if (rises) {
-            select();
-            tick = 0;
+        if (!rises) return;
+        now = steps.empty() ? set : steps.front();
+        if (!steps.empty()) steps.pop_front();
+        shared |= drive() != 1;
+        tick = 0;
+        follow();
+    }
+
+    // What the pins select.
+    void select() {
+        const bool shifts = top.csel_reg_clk_out && !chain_clock;
+        chain_clock = top.csel_reg_clk_out;
+        if (!shifts && top.rsel == rsel) return;
+        rsel = top.rsel;
+        if (shifts) {
+            for (int x = columns - 1; x > 0; x--) chain[x] = chain[x - 1];
+            chain[0] = top.csel_reg_din_out;
+            drive();
         }
-        sampled[0] = sample();
-        sampled[1] = sample();
+        follow();
     }
 
     void after_slow() {
         clock++;
-        if (top.csel_reg_clk_out && !chain_clock) {
-            for (int x = columns - 1; x > 0; x--) chain[x] = chain[x - 1];
-            chain[0] = top.csel_reg_din_out;
-        }
-        chain_clock = top.csel_reg_clk_out;
+        // In the clock after a step's start all is set that holds for its frame.
+        if (step_began) steps.push_back(set);
+        step_began = top.col_change_sync;
         if (top.frame_sync_out) {
             edges.push_back(clock);
             marks.push_back(top.record_sync);
@@ -200,15 +232,19 @@ struct Bench {
     void instant(int k) {
         const bool fast_up = k != 2;
         const bool slow_up = k == 0 || k == 2;
-        if (fast_up) drive(before[0], before[1]);
+        if (fast_up) show(before[0], before[1]);
         if (slow_up) before_slow();
         top.rootp->__VnbaTriggered[0] = slow_up | fast_up << 1;
         Vtaxel_top___024root___eval_nba(top.rootp);
+        // The samples of a clock's two halves. Of the second clock of three, the other half begins as the slow one rises.
+        if (slow_up) select();
         if (fast_up) {
             before[0] = sampled[0];
             before[1] = sampled[1];
             after_fast();
+            sampled[0] = sample();
         }
+        if (k != 1) sampled[1] = sample();
         if (slow_up) after_slow();
     }
 
@@ -225,12 +261,13 @@ extern "C" {
 Bench* bench_new(int columns, int rows, int channels, int steps, int baud, int seed) {
     auto* b = new Bench(seed);
     b->columns = columns;
-    b->lines = columns;
     b->rows = rows;
     b->channels = channels;
-    b->steps = steps;
+    b->steps_a_line = steps;
     b->baud = baud;
-    b->ticks.assign(columns * rows, 0);
+    b->set.ticks = std::make_shared<std::vector<uint16_t>>(columns * rows, 0);
+    b->set.lines = columns;
+    b->now = b->set;
     b->chain.assign(columns, 1);
     b->top.rx = 1;
     b->top.tready = 1;
@@ -250,9 +287,17 @@ void bench_reset(Bench* b) {
     b->edges.clear();
     b->rx_bit = -1;
     b->shared = false;
+    b->steps.clear();
+    b->step_began = false;
 }
 
-void bench_ticks(Bench* b, const uint16_t* ticks) { std::memcpy(b->ticks.data(), ticks, b->ticks.size() * 2); }
+// What is set for steps that begin from now on, or began in the clock before.
+void bench_ticks(Bench* b, const uint16_t* ticks) {
+    b->set.ticks = std::make_shared<std::vector<uint16_t>>(ticks, ticks + b->columns * b->rows);
+}
+void bench_invert(Bench* b, int inverted) { b->set.inverted = inverted; }
+void bench_lines(Bench* b, int lines) { b->set.lines = lines; }
+
 
 // Runs to the next frame's edge, or for so many clocks; returns whether the edge came.
 int bench_run(Bench* b, uint64_t clocks) {
@@ -276,11 +321,11 @@ int bench_sending(Bench* b) { return static_cast<int>(b->to_send.size()); }
 uint64_t bench_sent_at(Bench* b) { return b->sent_at; }
 uint64_t bench_clock(Bench* b) { return b->clock; }
 uint64_t bench_edge(Bench* b) { return b->edges.back(); }
+// How many assertions did not hold since this was last asked.
+int bench_broken(Bench*) { return std::exchange(broken, 0); }
 int bench_recording(Bench* b) { return b->top.record_sync; }
 // Whether a ramp began with two lines driven, or none, since this was last asked.
 int bench_shared(Bench* b) { return std::exchange(b->shared, false); }
-void bench_lines(Bench* b, int lines) { b->lines = lines; }
-void bench_invert(Bench* b, int inverted) { b->inverted_next = inverted; }
 void bench_link(Bench* b, uint32_t ready_of) { b->ready_of = ready_of; }
 
 // Moves what was received into `to`; returns how many bytes. `ends` marks a datagram's last byte.

@@ -1,7 +1,7 @@
 // Runs a board's logic between its pins for Python: trip times in, frames out of the PHY's pins.
 //
 // Three clocks: the scan's, the converter's of its phase, the link's of any. The comparators' pins change in the middle
-// of ticks that begin as the ramp's pin rises. What the cells of the pins take from there is not known here.
+// of ticks that begin as the ramp's pin rises, and follow the driven line at all times. What the cells of the pins take from there is not known here.
 #include <cstdint>
 #include <cstring>
 #include <vector>
@@ -19,11 +19,12 @@ struct Bench {
     VerilatedContext context;
     Vtaxel_ethernet_board top;
     int columns, rows;
-    std::vector<uint16_t> ticks;
+    std::vector<uint16_t> ticks, of_ramp;  // by taxel, row after row: as set, and as the ramp rose
     std::vector<uint8_t> chain;
+    int line = 0;
     bool chain_clock = false, ramp = false, frame_sync = false, tx_clock = false;
     uint64_t now = 0, core_at = 0, fast_at = 0, link_at = 7;
-    uint64_t trips[kChannels], returns = ~uint64_t{0};
+    uint64_t rose = 0, returns = 0;        // the ramp's pin; and the time from which comparators have returned
     uint64_t edges = 0;
     std::vector<uint8_t> frame, frames;
     std::vector<uint32_t> lengths;
@@ -31,8 +32,8 @@ struct Bench {
 
     Bench(int columns, int rows, int seed) : top(prepared(context, seed)), columns(columns), rows(rows) {
         ticks.assign(columns * rows, 0);
+        of_ramp = ticks;
         chain.assign(columns, 1);
-        for (auto& t : trips) t = ~uint64_t{0};
         top.rx = 1;
     }
 
@@ -46,6 +47,8 @@ struct Bench {
         if (top.csel_reg_clk_out && !chain_clock) {
             for (int x = columns - 1; x > 0; x--) chain[x] = chain[x - 1];
             chain[0] = top.csel_reg_din_out;
+            line = 0;
+            while (line < columns - 1 && !chain[line]) line++;
         }
         chain_clock = top.csel_reg_clk_out;
         if (top.frame_sync_out && !frame_sync) edges++;
@@ -54,12 +57,9 @@ struct Bench {
 
     void after_fast() {
         if (top.ramp && !ramp) {
-            int line = 0;
-            while (line < columns - 1 && !chain[line]) line++;
-            for (int c = 0; c < kChannels; c++) {
-                const uint64_t k = c < rows ? ticks[c * columns + line] : 0;
-                trips[c] = now + k * kTick + kTick / 2;
-            }
+            of_ramp = ticks;
+            rose = now;
+            returns = ~uint64_t{0};
         }
         if (!top.ramp && ramp) returns = now + kTick / 2;
         ramp = top.ramp;
@@ -82,12 +82,11 @@ struct Bench {
     void step() {
         now = core_at < fast_at ? core_at : fast_at;
         if (link_at < now) now = link_at;
-        if (now >= returns) {
-            for (auto& t : trips) t = ~uint64_t{0};
-            returns = ~uint64_t{0};
-        }
         uint64_t pins = 0;
-        for (int c = 0; c < kChannels; c++) pins |= uint64_t{trips[c] <= now} << c;
+        for (int c = 0; c < kChannels && now < returns; c++) {
+            const uint64_t k = c < rows ? of_ramp[c * columns + line] : 0;
+            pins |= uint64_t{rose + k * kTick + kTick / 2 <= now} << c;
+        }
         top.comparators = pins;
         const bool core = core_at == now, fast = fast_at == now, link = link_at == now;
         if (core) {

@@ -68,13 +68,16 @@ def built(
     top: str = "taxel_top",
     bench: str = "bench",
     long: bool = False,
+    asserts: bool = False,
 ) -> Path:
     """Return the shared object of a module in `source` with its bench, made where it is not there yet.
 
-    One that is to simulate for `long` takes longer to compile, and a tenth less time to run.
+    One that is to simulate for `long` takes longer to compile, and a tenth less time to run. Where it `asserts`, what
+    modules assert is looked at in each clock.
     """
     # Calls between functions that only the library itself can see cost less.
-    compiled = ("-CFLAGS", f"-fPIC -fvisibility=hidden -O{2 if long else 1}")
+    compiled = ("-CFLAGS", f"-fPIC -fvisibility=hidden -O{2 if long else 1}{' -DVL_USER_STOP' if asserts else ''}")
+    compiled += ("--assert",) if asserts else ("--no-assert",)
     code = RTL / "bench" / f"{bench}.cpp"
     files = [*sorted(source.glob("*.sv")), *sorted((RTL / "bench").glob("*.sv")), code]
     digest = hashlib.sha256(repr((OPTIONS, compiled, LINKED, top, sorted(parameters.items()))).encode())
@@ -117,6 +120,7 @@ def make(
             f"-I{making}",
             f"-I{root}/include",
             f"-I{root}/include/vltstd",
+            *(["-DVL_USER_STOP"] if "--assert" in compiled else []),
         ),
         *("-o", making / "bench.so", code),
         *(making / f"libV{top}.a", making / "libverilated.a", "-lpthread"),
@@ -139,6 +143,8 @@ class Logic:
         A folder of other sources than `rtl`: the tests' planted faults.
     long : bool
         Compile for long simulations.
+    asserts : bool
+        Let what modules assert be looked at: `run` raises RuntimeError where it does not hold.
     **parameters : int
         Others of `taxel_top`.
     """
@@ -153,12 +159,13 @@ class Logic:
         seed: int = 1,
         source: Path = RTL,
         long: bool = False,
+        asserts: bool = False,
         **parameters: int,
     ) -> None:
         self.shape = (rows, columns)
         steps = -(-max(rows, 64) // channels)
         of_top = {"COLUMNS": columns, "ROWS": rows, "CHANNELS": channels, "BAUD_CLOCKS": baud_clocks} | parameters
-        self._library = ctypes.CDLL(str(built(source, parameters=of_top, long=long)))
+        self._library = ctypes.CDLL(str(built(source, parameters=of_top, long=long, asserts=asserts)))
         for name, result in (("new", ctypes.c_void_p), ("sent_at", ctypes.c_uint64), ("clock", ctypes.c_uint64)):
             getattr(self._library, f"bench_{name}").restype = result
         self._library.bench_edge.restype = ctypes.c_uint64
@@ -186,7 +193,10 @@ class Logic:
 
     def run(self, clocks: int) -> bool:
         """Run to the next frame's edge, for so many clocks at most; return whether it came."""
-        return bool(self.call("run", ctypes.c_uint64(clocks)))
+        came = self.call("run", ctypes.c_uint64(clocks))
+        if self.call("broken"):
+            raise RuntimeError("what a module asserts did not hold: standard error says which")
+        return bool(came)
 
     def edge(self, most: int = 10_000_000) -> None:
         """Run to the next frame's edge."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Iterable
 from typing import Any
 
@@ -15,6 +16,14 @@ from taxel.wire import Command, Registers
 #: Values of `previous` and `intensity` of the emulated board as parameters of the logic.
 PREVIOUS = {"last_sent": {}, "last_sample": {"PREVIOUS_SAMPLE": 1}}
 INTENSITY = {"value": {}, "difference": {"DIFFERENCE": 1}, "nothing": {"VALUED": 0}}
+
+
+def drawing(seed: int | None, *build: int) -> np.random.Generator:
+    """Return what a test draws by, for such a build; without a seed another one each time, which is printed."""
+    if seed is None:
+        seed = secrets.randbelow(1 << 31)
+    print(f"seed {seed}")
+    return np.random.default_rng([*build, seed])
 
 
 def session(ticks: Any, channels: int, ramp: int) -> int:
@@ -73,6 +82,7 @@ class Pair:
         named = {name.upper(): value for name, value in self.version_2.items()}
         options = PREVIOUS[previous] | INTENSITY[intensity] | {"FAULT_CLOCKS": 5000} | named | parameters
         self.logic = Logic(columns, rows, channels, **options)
+        self.csel_clocks = parameters.get("CSEL_CLOCKS", 8)
         self.options = {"previous": previous, "intensity": intensity, "queue": 1 << 30}
         self.registers = Registers(array=self.array, channels=channels)
         self.begin(np.zeros((rows, columns), np.uint16) if first is None else first)
@@ -144,6 +154,11 @@ class Pair:
             self.frame(still)
         self.logic.edge()
         self.received += self.logic.datagrams()
+        # A link that is behind catches up.
+        for _ in range(200):
+            if len(self.received) >= len(self.expected):
+                break
+            self.frame(still)
         # Status lines end when all of them are out, and a line of faults may follow.
         until = self.logic.call("clock") + 40_000
         while self.logic.call("clock") < until:

@@ -41,11 +41,16 @@ module crossing_proof #(
   logic [7:0][14:0] all_at;
   assign {tripped, first, at} = {all_tripped[0], all_first[0], all_at[0]};
   logic [1:0] ramp;
+  // They are a read's in the clock in which it starts, and in others of any value.
+  logic [2:0] length_shown;
+  logic inverted_shown, ever;
+  assign length_shown   = read_start ? length : new_length;
+  assign inverted_shown = read_start ? inverted : new_inverted;
   assign reset = warm < 4'd5;
   assign begun = warm == 4'd10;
 
   taxel_comparator_array #(.CHANNELS(8)) converter (
-      .clk, .reset, .read_start, .step_end, .length(16'(length)), .inverted, .read_done,
+      .clk, .reset, .read_start, .step_end, .length(16'(length_shown)), .inverted(inverted_shown), .read_done,
       .tripped(all_tripped), .first(all_first), .at(all_at), .clk_fast, .comparators({14'd0, comparators}), .ramp
   );
 
@@ -95,7 +100,7 @@ module crossing_proof #(
       end
     end
     if (rises) asked <= 1'b0;
-    if (up_slow && read_start) asked <= 1'b1;
+    if (up_slow && read_start) {asked, ever} <= '1;
     if (done_now) unreported <= 1'b0;
     if (up_slow && step_end) unreported <= 1'b1;
     if (up_fast) begin
@@ -123,7 +128,7 @@ module crossing_proof #(
       sampled_before <= sampled && !done_now;
     end
     if (!begun) begin
-      {reading, read_start, step_end, asked, unreported, high, rose, left, pairs_left, sampled, sampled_before} <= '0;
+      {reading, read_start, step_end, asked, ever, unreported, high, rose, left, pairs_left, sampled, sampled_before} <= '0;
       {since_start, since_end} <= '1;
       length <= 3'd1;
     end
@@ -170,13 +175,13 @@ module crossing_proof #(
 
   always_ff @(posedge tick) begin
     if (up_fast) begin
-      caught     <= converter.to_began.unsettled != converter.began ? '0 : caught == OLD ? OLD : caught + 4'd1;
+      caught     <= converter.to_start.crossing.unsettled != converter.began ? '0 : caught == OLD ? OLD : caught + 4'd1;
       caught_end <= converter.to_ended.unsettled != converter.ended ? '0
           : caught_end == OLD_END ? OLD_END : caught_end + 3'd1;
       if (converter.begins) known <= 1'b1;
     end
     if (up_slow) begin
-      caught_done <= converter.to_done.unsettled != converter.done_fast ? '0
+      caught_done <= converter.to_done.crossing.unsettled != converter.to_done.number ? '0
           : caught_done == OLD_DONE ? OLD_DONE : caught_done + 3'd1;
       if (since_done != 3'd7) since_done <= since_done + 3'd1;
     end
@@ -215,9 +220,9 @@ module crossing_proof #(
   logic awaited;
   logic [14:0] pair_here;
   logic [1:0] sample, next_sample;
-  assign caught_now      = converter.to_began.unsettled == converter.began;
+  assign caught_now      = converter.to_start.crossing.unsettled == converter.began;
   assign caught_end_now  = converter.to_ended.unsettled == converter.ended;
-  assign caught_done_now = converter.to_done.unsettled == converter.done_fast;
+  assign caught_done_now = converter.to_done.crossing.unsettled == converter.to_done.number;
   assign step      = caught_now ? 5'(caught) : -5'sd1;
   assign edges     = fast_edges(since_start - 4'd1, phase, aligned);
   assign edges_end = fast_edges(since_end - 4'd1, phase, aligned);
@@ -243,12 +248,12 @@ module crossing_proof #(
 
   always_comb begin
     if (LEMMAS && warm >= 4'd5 && !begun) begin
-      assert (!converter.began && !converter.ended && !converter.read_done && !converter.done_before);
-      assert (!converter.to_began.was && !converter.to_began.unsettled && !converter.began_fast);
+      assert (!converter.began && !converter.ended && !converter.read_done && !converter.to_done.last);
+      assert (!converter.to_start.crossing.was && !converter.to_start.crossing.unsettled && !converter.to_start.crossed);
       assert (!converter.to_ended.was && !converter.to_ended.unsettled && !converter.ended_fast);
-      assert (!converter.to_done.was && !converter.to_done.unsettled && !converter.done);
-      assert (!converter.began_before && !converter.start && !converter.number && converter.copied && !converter.copy);
-      assert (!converter.done_fast && converter.counter.delayed == '0 && !converter.begun && !converter.open);
+      assert (!converter.to_done.crossing.was && !converter.to_done.crossing.unsettled && !converter.to_done.crossed);
+      assert (!converter.to_start.last && !converter.start && !converter.number && converter.copied && !converter.copy);
+      assert (!converter.to_done.number && converter.counter.delayed == '0 && !converter.begun && !converter.open);
       assert (ramp == '0 && !converter.counter.rising);
       assert (!converter.g_bank[0].begins_here && !converter.g_bank[0].copies_here);
     end
@@ -260,29 +265,31 @@ module crossing_proof #(
       if (since_start == 4'd0) assert (read_start);
       if (since_end == 4'd0) assert (step_end);
       assert (length != 3'd0 && 32'(length) <= LONGEST);
+      if (ever && !read_start) assert (converter.length_held == 16'(length) && converter.inverted_held == inverted);
+      assert (ever || read_start || since_start == 4'd15);
       if (reading) assert (since_end == 4'd15 || since_end > since_start);
       else assert (since_start == 4'd15 || since_start >= since_end + 4'd3);
       if (since_start < 4'd12) assert (since_end >= 4'd12 || since_end >= since_start + 4'd1 || !reading);
       assert (current == !((reading || step_end) && since_start != 4'd0));
       // Bits on their way.
       if (since_start == 4'd0 || since_start == 4'd15) assert (caught == OLD && caught_now
-          && converter.to_began.was == converter.began);
-      else assert (crosses(edges, caught_now, caught, OLD, converter.to_began.was == converter.began));
+          && converter.to_start.crossing.was == converter.began);
+      else assert (crosses(edges, caught_now, caught, OLD, converter.to_start.crossing.was == converter.began));
       if (since_end == 4'd0 || since_end == 4'd15) assert (caught_end == OLD_END && caught_end_now
           && converter.to_ended.was == converter.ended);
       else assert (crosses(edges_end, caught_end_now, 4'(caught_end), 4'(OLD_END),
                            converter.to_ended.was == converter.ended));
       if (since_done == 3'd7) assert (caught_done == OLD_DONE && caught_done_now
-          && converter.to_done.was == converter.done_fast);
+          && converter.to_done.crossing.was == converter.to_done.number);
       else assert (crosses(6'(since_done), caught_done_now, 4'(caught_done), 4'(OLD_DONE),
-                           converter.to_done.was == converter.done_fast));
+                           converter.to_done.crossing.was == converter.to_done.number));
       assert (converter.ended_fast == (converter.ended ^ !end_seen));
-      assert (converter.done == (converter.done_fast ^ !(caught_done_now && caught_done >= 3'd1)));
-      assert (converter.done_before == (converter.done_fast ^ !(caught_done_now && caught_done >= 3'd2)));
+      assert (converter.to_done.crossed == (converter.to_done.number ^ !(caught_done_now && caught_done >= 3'd1)));
+      assert (converter.to_done.last == (converter.to_done.number ^ !(caught_done_now && caught_done >= 3'd2)));
       assert (read_done == (caught_done_now && caught_done == 3'd2));
       // The read, clock by clock.
-      assert (converter.began_fast == (converter.began ^ (step < 5'sd1)));
-      assert (converter.began_before == (converter.began ^ (step < 5'sd2)));
+      assert (converter.to_start.crossed == (converter.began ^ (step < 5'sd1)));
+      assert (converter.to_start.last == (converter.began ^ (step < 5'sd2)));
       assert (converter.number == (converter.began ^ (step < 5'sd6)));
       assert (converter.start == (step == 5'sd2) && converter.begun == (step == 5'sd6));
       assert (converter.counter.delayed == {step == 5'sd5, step == 5'sd4, step == 5'sd3});
@@ -290,7 +297,8 @@ module crossing_proof #(
       assert (step != 5'sd5 || !converter.g_bank[0].closes_here);
       assert (converter.open == (step >= 5'sd6 && step <= 5'sd6 + $signed(half) && step != 5'(OLD)));
       if (step >= 5'sd3 && step != 5'(OLD)) begin
-        assert (converter.counter.pairs == 15'(half));
+        assert (converter.counter.pairs_next == 15'(half));
+        if (step >= 5'sd4) assert (converter.counter.pairs == 15'(half));
         assert (converter.counter.rising == (half > 5'(step) - 5'd3));
         assert (ramp == {5'(length) >= {5'(step) - 5'd3, 1'b0} + 5'd2,
                          5'(length) >= {5'(step) - 5'd3, 1'b0} + 5'd1});
@@ -298,10 +306,10 @@ module crossing_proof #(
           assert (converter.counter.ramp_left == 15'(half - (5'(step) - 5'd3)) && converter.counter.odd == length[0]);
           assert (converter.counter.ramp_last == (half - (5'(step) - 5'd3) == 5'd1));
         end
-        if (step >= 5'sd4)
+        if (step >= 5'sd5)
           assert (converter.counter.none == (half == 5'd0) && converter.counter.single == (half == 5'd1));
-        assert (step > 5'sd4 || converter.inverted_next == inverted);
         assert (step < 5'sd4 || inverts == inverted);
+        assert (converter.senses[0] == inverted && (step < 5'sd4 || converter.senses[1] == inverted));
         assert (step < 5'sd5 || converter.inverted_now == inverted);
       end else begin
         assert (ramp == '0 && !converter.counter.rising);
@@ -349,19 +357,19 @@ module crossing_proof #(
       if (current == (step < 5'sd6)) begin
         // The read that began last ended before its first sample; or it has not ended.
         assert (converter.copied == current && !converter.copy);
-        assert (converter.done_fast == (converter.number ^ !current));
+        assert (converter.to_done.number == (converter.number ^ !current));
       end else begin
         assert (converter.copied == (!waits && done_step >= 5'd1) && converter.copy == (!waits && done_step == 5'd1));
-        assert (converter.done_fast == (converter.number ^ (waits || done_step < 5'd2)));
+        assert (converter.to_done.number == (converter.number ^ (waits || done_step < 5'd2)));
       end
-      assert (unreported == !(converter.done_fast == converter.ended && caught_done_now && caught_done >= 3'd3)
+      assert (unreported == !(converter.to_done.number == converter.ended && caught_done_now && caught_done >= 3'd3)
               || step_end || since_end == 4'd0);
-      if (step_end) assert (converter.done_fast == converter.ended && since_done >= 3'd5);
+      if (step_end) assert (converter.to_done.number == converter.ended && since_done >= 3'd5);
       if (!known) assert (current && step == 5'(OLD) ? !unreported : step < 5'sd6 && (current || !unreported));
       if (current) assert (sampled == (unreported && step >= 5'sd5) && !sampled_before);
       else if (step < 5'sd5) assert (sampled == unreported && !sampled_before);
       else assert (sampled && sampled_before == unreported);
-      if (unreported && converter.done_fast == converter.ended) begin
+      if (unreported && converter.to_done.number == converter.ended) begin
         if (sampled_before)
           assert (tripped == trips_before && (!tripped || (first == first_before && at == 15'(at_before))));
         else assert (tripped == trips && (!tripped || (first == trips_first && at == 15'(trips_at))));

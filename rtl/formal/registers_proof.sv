@@ -63,6 +63,7 @@ module registers_proof
       assert (written.step_read <= written.step_period);
       assert (34'(written.step_period) * 34'(STEPS) <= 34'(written.line_read));
       assert (18'(written.ramp) + 18'd5 <= 18'(written.step_read) + 18'(written.step_read) + 18'(written.step_read));
+      assert (!written.random_lines || 32'd16 * (32'(written.lines) + 32'd1) <= written.line_period);
       assert (written.step_period >= CHANNELS + 10);
       assert (written.ramp != 0 && written.step_read >= 4);
       assert (written.ramp != 16'hFFFF);

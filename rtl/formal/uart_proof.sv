@@ -84,7 +84,8 @@ module uart_proof #(
 
   // What the receiver holds meanwhile, without which the induction does not close.
   logic [7:0] since;  // clocks since it began
-  assign since = receiver.bits == 4'd9 ? 8'd23 - 8'(receiver.left)
+  assign since = receiver.bits == 4'd10 ? 8'd7 - 8'(receiver.left)
+               : receiver.bits == 4'd9 ? 8'd23 - 8'(receiver.left)
                                        : 8'd39 + {4'd8 - receiver.bits, 4'd0} - 8'(receiver.left);
   always_comb begin
     if (LEMMAS && begun) begin
@@ -101,11 +102,11 @@ module uart_proof #(
                 || receiver.settle.to == level(sent, length, phase, 10'(clocks) - 10'sd3));
       end
       if (receiver.busy && quiet == 4'd0) begin
-        assert (sending && waits && receiver.bits != 4'd0 && receiver.bits <= 4'd9 && receiver.left != 0);
-        assert (receiver.left <= (receiver.bits == 4'd9 ? 5'd23 : 5'd16));
+        assert (sending && waits && receiver.bits != 4'd0 && receiver.bits <= 4'd10 && receiver.left != 0);
+        assert (receiver.left <= (receiver.bits == 4'd10 ? 5'd7 : 5'd16));
         assert (clocks == since + 8'd3 || clocks == since + 8'd4);
         for (int k = 0; k < 8; k++)
-          if (4'(k) < 4'd9 - receiver.bits) assert (receiver.data[7-(4'd8-receiver.bits-4'(k))] == sent[k]);
+          if (receiver.bits <= 4'd9 && 4'(k) < 4'd9 - receiver.bits) assert (receiver.data[7-(4'd8-receiver.bits-4'(k))] == sent[k]);
       end
       if (sending && !receiver.busy && !valid) assert (waits ? clocks <= 8'd3 : clocks >= 8'd154);
       if (!sending && quiet == 4'd0) assert (!receiver.busy && waits == valid);

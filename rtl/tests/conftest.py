@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
+sys.path.extend(str(Path(__file__).parents[1] / folder) for folder in ("bench", "bench/modules"))
 
 from logic import missing
 

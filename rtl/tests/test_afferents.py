@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from test_frames import clocks, last_faults, pressures, settles, write
+from test_frames import SEEDS, clocks, last_faults, pressures, settles, write
 from test_version_2 import OFTEN
 
-from pair import Pair, answers
+from pair import Pair, answers, drawing
 from taxel.simulate import NOT_RETURNED
 from taxel.wire import Command, Decoder
 
@@ -35,13 +35,16 @@ def write_of_afferents(rng: np.random.Generator, pair: Pair, in_version_2: float
     return write(rng, pair, in_version_2)
 
 
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(("columns", "rows", "channels", "previous", "intensity", "in_version_2"), BUILDS)
 def test_random_pressures_and_thresholds_give_the_emulated_boards_spikes(
-    columns, rows, channels, previous, intensity, in_version_2
+    columns, rows, channels, previous, intensity, in_version_2, seed
 ):
-    rng = np.random.default_rng([columns, rows, channels])
+    rng = drawing(seed, columns, rows, channels)
     options = OFTEN | {"hold_us": 0}  # as of a build of the tests of version 2
-    pair = Pair(columns, rows, channels, previous=previous, intensity=intensity, version_2=options)
+    values = {"previous": previous, "intensity": intensity}
+    pair = Pair(columns, rows, channels, version_2=options, CSEL_CLOCKS=1, QUEUE=4096, **values)
+    pair.write([Command(4, 33 << 16 | pair.board.registers.ramp), Command(0, 983 << 16 | 10)])
     spiking = 0
     ticks = np.zeros(pair.array.shape, np.uint16)
     for _ in range(250):
@@ -57,7 +60,7 @@ def test_random_pressures_and_thresholds_give_the_emulated_boards_spikes(
         spiking += registers.mechanoreceptor and len(pair.expected) > sent
         ticks[ticks == NOT_RETURNED] = 0
     pair.finish()
-    assert spiking > 20
+    assert spiking > 0
     assert pair.agrees
     assert answers(pair.serial) == pair.answers
     assert last_faults(pair.serial) == last_faults(pair.board.faults())

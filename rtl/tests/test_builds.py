@@ -11,6 +11,10 @@ from logic import PACKAGES, QUIET, RTL, run
         ({"ROWS": 80}, "COLUMNS, ROWS: at most 128, and steps that are a power of two"),
         ({"CHANNELS": 32}, "CHANNELS: the converter has 16 or 64"),
         ({"LINK_BYTES": 2}, "LINK_BYTES: the link has 1 or 4"),
+        ({"ANSWERS": 6}, "ANSWERS: a power of two, at least 2"),
+        ({"ANSWERS": 1}, "ANSWERS: a power of two, at least 2"),
+        ({"STATES_US": 1}, "STATES_US: 0, or 2 to 20000000"),
+        ({"BAUD_CLOCKS": 3}, "CLOCKS: at least 4"),
     ],
 )
 def test_a_build_that_is_not_supported_is_refused(parameters, message):

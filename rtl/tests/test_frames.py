@@ -3,12 +3,20 @@
 import numpy as np
 import pytest
 
-from pair import Pair, answers
+from pair import Pair, answers, drawing
 from taxel.simulate import NOT_RETURNED
 from taxel.wire import Command, Decoder, Registers
 
-#: Columns, rows, channels, and what a value is compared with.
-BUILDS = [(8, 8, 16, "last_sent"), (5, 7, 16, "last_sample"), (9, 64, 16, "last_sent"), (3, 20, 64, "last_sent")]
+#: Columns, rows, channels, what a value is compared with, clocks of half a pulse of the shift registers: lines settle
+#: in random order only where these are short.
+BUILDS = [
+    (8, 8, 16, "last_sent", 1),
+    (5, 7, 16, "last_sample", 8),
+    (9, 64, 16, "last_sent", 1),
+    (3, 20, 64, "last_sent", 8),
+]
+#: Seeds of random pressures and writes: another one each time, and those that once failed.
+SEEDS = [None]
 
 
 def pressures(rng: np.random.Generator, pair: Pair, before: np.ndarray) -> np.ndarray:
@@ -62,10 +70,17 @@ def clocks(registers: Registers) -> int:
     return round(registers.frame_us * 100)
 
 
-@pytest.mark.parametrize(("columns", "rows", "channels", "previous"), BUILDS)
-def test_random_pressures_and_writes_give_the_emulated_boards_datagrams(columns, rows, channels, previous):
-    rng = np.random.default_rng([columns, rows, channels])
-    pair = Pair(columns, rows, channels, previous=previous, seed=int(rng.integers(1, 1000)))
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("columns", "rows", "channels", "previous", "csel_clocks"), BUILDS)
+def test_random_pressures_and_writes_give_the_emulated_boards_datagrams(
+    columns, rows, channels, previous, csel_clocks, seed
+):
+    rng = drawing(seed, columns, rows, channels)
+    seed = int(rng.integers(1, 1000))
+    # One build looks at what the modules assert.
+    asserts = csel_clocks == 8
+    options = {"previous": previous, "asserts": asserts, "CSEL_CLOCKS": csel_clocks, "QUEUE": 4096}
+    pair = Pair(columns, rows, channels, seed=seed, **options)
     ticks = np.zeros(pair.array.shape, np.uint16)
     for _ in range(200):
         ticks = pressures(rng, pair, ticks)
@@ -75,9 +90,11 @@ def test_random_pressures_and_writes_give_the_emulated_boards_datagrams(columns,
             command = b""
         pair.frame(ticks, command, int(rng.integers(0, clocks(registers))) if command else 0)
     pair.finish()
+    # Not every seed draws a write that is refused.
+    pair.write([Command(7, 1)])
     assert not pair.logic.call("shared")
     assert pair.received == pair.expected
-    assert sum(map(len, pair.received)) > 2_000
+    assert sum(map(len, pair.received)) > 200
     assert answers(pair.serial) == pair.answers
     assert pair.answers.count("bad") > 0
     assert pair.answers.count("ok") > 3
@@ -96,7 +113,7 @@ def settles(pair: Pair, command: bytes) -> bool:
     more = written.register == 5 and (written.value >> 16 & 0xFF) + 1 > held.lines
     settling = (words[3] & 0xFFFF) - (words[3] >> 16)
     shifts = more or held.random_lines or words[0] & 1
-    return not shifts or settling > 2 * pair.array.columns + 4
+    return not shifts or settling > 2 * pair.csel_clocks * pair.array.columns + 4
 
 
 def last_faults(lines: str) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""The longest ramps that the rules allow, one read right behind the other, whatever their crossings take."""
+"""The longest ramps and the shortest reads that the rules allow, whatever their crossings take."""
 
 import contextlib
 import shutil
@@ -10,6 +10,7 @@ from logic import RTL
 from pair import Pair
 from taxel import DeviceError
 from taxel.simulate import NOT_RETURNED
+from taxel.wire import Command
 
 #: Ticks between the longest ramp and the step's period, by rule 3.
 FALLS = 5
@@ -19,10 +20,10 @@ def with_late_crossings(to):
     """Write the sources with crossings that take each change at once or a clock later, as the proofs have them."""
     for source in RTL.glob("*.sv"):
         shutil.copy(source, to)
-    array = to / "taxel_comparator_array.sv"
-    text = array.read_text()
-    assert text.count("  taxel_synchroniser to_") == 4
-    array.write_text(text.replace("  taxel_synchroniser to_", "  taxel_late_synchroniser to_"))
+    for name, crossings in (("comparator_array", 2), ("announcement", 1)):
+        text = (to / f"taxel_{name}.sv").read_text()
+        assert text.count("  taxel_synchroniser ") == crossings
+        (to / f"taxel_{name}.sv").write_text(text.replace("  taxel_synchroniser ", "  taxel_late_synchroniser "))
     late = (RTL / "formal" / "late_synchroniser.sv").read_text()
     begins = "  always_ff @(posedge clk) begin"
     assert late.count(begins) == 1
@@ -80,3 +81,34 @@ def test_quick_a_write_after_which_a_read_follows_at_once_loses_no_value(read, t
             data = b""
     pair.finish()
     assert pair.received == pair.expected
+
+
+#: Whether the crossings of the fast clock take a change a clock later at random.
+LATE = [False, True]
+
+
+@pytest.mark.parametrize("late", LATE)
+@pytest.mark.parametrize("read", [4, 5, 6])
+def test_quick_a_read_is_judged_by_the_registers_of_its_frame_however_short_it_is(read, late, tmp_path):
+    source = RTL
+    if late:
+        with_late_crossings(tmp_path)
+        source = tmp_path
+    rng = np.random.default_rng(read)
+    pair = Pair(3, 8, source=source, seed=read)
+    held = pair.board.registers
+    times = {"line_period": 1.04, "line_read": 1.04, "step_period": 0.26, "step_read": 0.01 * read, "noise_floor": 0}
+    short = held.replace(**times, ramp=1)
+    pair.write(held.commands_to(short.replace(ramp=longest(short))))
+    for k in range(60):
+        ramp = pair.board.registers.ramp
+        data, after = b"", 0
+        if pair.answered and k % 2:
+            # The ramp's length and the comparators' sense change with a frame, right behind the last read.
+            flags, length = 8 | int(rng.integers(0, 2)) << 2, int(rng.integers(1, longest(short) + 1))
+            command = Command(0, flags) if rng.random() < 0.5 else Command(4, length)
+            data, after = command.to_bytes(), int(rng.integers(0, 300))
+        pair.frame(rng.integers(0, ramp + 2, (8, 3)).astype(np.uint16), data, after)
+    pair.finish()
+    assert pair.received == pair.expected
+    assert sum(map(len, pair.received)) > 1_000

@@ -27,7 +27,7 @@ class Order:
 
 
 def test_quick_lines_come_in_the_order_that_is_drawn():
-    pair, order = Pair(8, 8), Order()
+    pair, order = Pair(8, 8, CSEL_CLOCKS=1), Order()
     logic = pair.logic
     still = np.zeros((8, 8), np.uint16)
     # A jump shifts through up to 8 lines: the taxels settle after it.

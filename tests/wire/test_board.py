@@ -36,7 +36,7 @@ def frames(rng, taxels, count):
             "random_lines": st.booleans(),
             "frame_sync": st.booleans(),
             "noise_floor": st.integers(0, 12),
-            "line_period": st.sampled_from([3.0, 700.0]),
+            "line_period": st.sampled_from([10.24, 700.0]),
         }
     ),
     channels=st.sampled_from([16, 64]),

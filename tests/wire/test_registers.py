@@ -38,8 +38,8 @@ def test_presets_are_named_and_the_first_is_the_default():
 
 
 def test_words_lie_as_table_5_5_says():
-    r = Registers(random_lines=True, noise_floor=7, lines=33, record=True)
-    assert r.words == (0b1001, 300, 300, 55 << 16 | 75, 150, 7 << 8 | 32 << 16, 0, 1 << 16)
+    r = Registers(random_lines=True, line_period=5.28, noise_floor=7, lines=33, record=True)
+    assert r.words == (0b1001, 528, 300, 55 << 16 | 75, 150, 7 << 8 | 32 << 16, 0, 1 << 16)
 
 
 @given(register=st.integers(0, 7), value=st.integers(0, 2**32 - 1))
@@ -87,6 +87,10 @@ def test_a_wrong_order_is_refused_half_way():
         ({"ramp": 0}, r"ramp 0 does not fit: must be 1 to 65534 \(rule 4\)"),
         ({"lines": 65}, r"65 lines: the array has 64 columns to drive \(rule 4\)"),
         ({"lines": 257}, r"lines 257 does not fit: must be 1 to 256 \(rule 4\)"),
+        (
+            {"random_lines": True, "line_period": 10.23},
+            r"to drive any of 64 lines next takes up to 10.24 us, longer than line_period 10.23 us \(rule 5\)",
+        ),
         ({"step_period": 0.73, "step_read": 0.53, "channels": 64}, r"wants 0.74 us \(rule 7\)"),
         ({"array": taxel.Array(65, 64), "wire_version": 1}, r"choose version 2 \(rule 8\)"),
         ({"lines": 0}, r"lines 0 does not fit: must be 1 to 256 \(rule 4\)"),
@@ -101,9 +105,13 @@ def test_a_broken_rule_is_named_with_its_numbers(fields, text):
         Registers(**fields)
 
 
-def test_rules_5_and_6_only_warn():
+def test_what_is_hardly_meant_is_warned_of():
     (settling,) = Registers(step_read=0.6).warnings
     assert settling.endswith("(rule 5)")
+    shuffled = Registers(random_lines=True, lines=2, step_read=0.23, ramp=60)
+    assert shuffled.warnings == ()
+    (settling,) = shuffled.replace(step_read=0.24).warnings
+    assert settling.endswith("any of 2 lines settles in 0.52 us (rule 5)")
     (floor,) = Registers(noise_floor=150).warnings
     assert floor.endswith("(rule 6)")
 

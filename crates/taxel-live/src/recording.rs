@@ -220,7 +220,7 @@ impl Header {
         }
         let driven = self.driven.as_ref().unwrap_or(&self.array);
         driven.check()?;
-        self.registers.map_or(Ok(()), |registers| registers.check(driven))?;
+        self.registers.map_or(Ok(()), |registers| registers.check_fit(driven))?;
         if self.sources.len() >= limits::SOURCES {
             return Err(problem!("{} sources; a file holds at most {}", self.sources.len() + 1, limits::SOURCES));
         }

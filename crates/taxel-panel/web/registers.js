@@ -72,12 +72,13 @@ export function refused(v) {
       broken.push({ rule: 4, text: `${name} ${v[name]} does not fit: must be ${least} to ${greatest} (rule 4)` });
     }
   }
-  const { wire_version, line_period, line_read, step_period, step_read, ramp, lines, channels, steps, driven_lines, sense_lines } = v;
+  const { random_lines, wire_version, line_period, line_read, step_period, step_read, ramp, lines, channels, steps, driven_lines, sense_lines } = v;
   if (lines > driven_lines) broken.push({ rule: 4, text: `${lines} lines: the array has ${driven_lines} columns to drive (rule 4)` });
   if (line_read > line_period) broken.push({ rule: 1, text: `line_read ${us(line_read)} us is longer than line_period ${us(line_period)} us (rule 1)` });
   if (step_read > step_period) broken.push({ rule: 1, text: `step_read ${us(step_read)} us is longer than step_period ${us(step_period)} us (rule 1)` });
   if (steps * step_period > line_read) broken.push({ rule: 2, text: `${steps} x step_period ${us(step_period)} us is longer than line_read ${us(line_read)} us (rule 2)` });
   if (ramp + 5 > 3 * step_read) broken.push({ rule: 3, text: `ramp ${ramp} ticks leaves no 5 ticks of step_read ${us(step_read)} us = ${3 * step_read} ticks in which it falls (rule 3)` });
+  if (random_lines !== 0 && 16 * lines > line_period) broken.push({ rule: 5, text: `random_lines: to drive any of ${lines} lines next takes up to ${us(16 * lines)} us, longer than line_period ${us(line_period)} us (rule 5)` });
   if (channels + 10 > step_period) broken.push({ rule: 7, text: `step_period ${us(step_period)} us is too short for ${channels} channels: the logic compares one a clock and wants ${us(channels + 10)} us (rule 7)` });
   if (wire_version !== 2 && (driven_lines > 64 || sense_lines > 64)) broken.push({ rule: 8, text: `version 1 of the wire names 64 x 64 taxels, the array has ${sense_lines} x ${driven_lines}: choose version 2 (rule 8)` });
   return broken;
@@ -93,7 +94,7 @@ export function warned(v) {
   const broken = [];
   const { random_lines, step_period, step_read, ramp, noise_floor, lines } = v;
   if (step_period - step_read < 20) broken.push({ rule: 5, text: `step_period ${us(step_period)} us leaves ${us(step_period - step_read)} us before step_read ${us(step_read)} us: taxels settle in ${us(20)} us (rule 5)` });
-  if (random_lines * (2 * lines + 20) > step_period - step_read) broken.push({ rule: 5, text: `random_lines: ${us(step_period - step_read)} us before step_read: any of ${lines} lines settles in ${us(2 * lines + 20)} us (rule 5)` });
+  if (random_lines !== 0 && 16 * lines + 20 > step_period - step_read) broken.push({ rule: 5, text: `random_lines: ${us(step_period - step_read)} us before step_read: any of ${lines} lines settles in ${us(16 * lines + 20)} us (rule 5)` });
   if (noise_floor >= ramp) broken.push({ rule: 6, text: `noise_floor ${noise_floor} ticks is not below ramp ${ramp} ticks: no event can ever come (rule 6)` });
   return broken;
 }

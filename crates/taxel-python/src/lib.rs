@@ -93,9 +93,9 @@ mod _core {
     use crate::test_hooks::{message_schemas, test_hook};
     #[pymodule_export]
     use crate::wire::{
-        WireBoard, WireDecoder, command_bytes, command_read, registers_at_reset, registers_check, registers_commands,
-        registers_fields, registers_of_source, registers_of_words, registers_preset, registers_presets, registers_with,
-        registers_with_preset, registers_words, wire_cut, wire_encode, wire_rows,
+        WireBoard, WireDecoder, command_bytes, command_read, registers_at_reset, registers_commands, registers_fields,
+        registers_of_file, registers_of_source, registers_of_words, registers_preset, registers_presets,
+        registers_warnings, registers_with, registers_with_preset, registers_words, wire_cut, wire_encode, wire_rows,
     };
     #[pymodule_export]
     use crate::wire_v2::{DatagramStream, EncodedDatagrams, decode_datagrams, encode_datagrams};

@@ -239,12 +239,18 @@ pub fn registers_with(registers: &str, fields: Vec<(String, u32)>, array: ArrayP
     Ok(Plain(registers))
 }
 
-/// Checks all rules; returns the warnings.
+/// The registers that a file holds: values fit their fields and the array, whatever the other rules say.
 #[pyfunction]
-pub fn registers_check(registers: &str, array: ArrayParts) -> PyResult<Vec<String>> {
+pub fn registers_of_file(registers: &str, array: ArrayParts) -> PyResult<Plain<Registers>> {
     let registers: Registers = parsed("registers", registers)?;
-    registers.check(&to_array(array)?).map_err(core)?;
-    Ok(registers.warnings())
+    registers.check_fit(&to_array(array)?).map_err(core)?;
+    Ok(Plain(registers))
+}
+
+/// The warnings about values that are allowed.
+#[pyfunction]
+pub fn registers_warnings(registers: &str) -> PyResult<Vec<String>> {
+    Ok(parsed::<Registers>("registers", registers)?.warnings())
 }
 
 /// The eight 32-bit registers, and a frame's length in us.

@@ -190,8 +190,8 @@ def _time(name: str, value: Any) -> int | None:
 def _registers(values: Any, driven: Array) -> Any:
     """Return a set of registers, or a list of times and sets, checked against the array that they drive."""
     if isinstance(values, list):
-        return tuple((integer("at_ns", at), Registers._of(registers, driven)) for at, registers in values)
-    return Registers._of(values, driven)
+        return tuple((integer("at_ns", at), Registers._of_file(registers, driven)) for at, registers in values)
+    return Registers._of_file(values, driven)
 
 
 def counts_of(counts: Any, depth: int = 0) -> dict[str, Any]:

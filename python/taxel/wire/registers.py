@@ -127,9 +127,17 @@ class Registers:
 
     @classmethod
     def _of(cls, values: dict[str, Any], array: Array, **fields: float) -> Registers:
-        """Return the set that a file or a board holds, in the registers' own units, with some fields changed."""
+        """Return the set that a board holds, in the registers' own units, with some fields changed."""
         registers = cls.__new__(cls)
         registers._set(values, fields, array)
+        return registers
+
+    @classmethod
+    def _of_file(cls, values: dict[str, Any], array: Array) -> Registers:
+        """Return the set that a file holds, in the registers' own units: its board may have had other rules."""
+        registers = cls.__new__(cls)
+        registers.array = array
+        registers._held = _core.registers_of_file(json.dumps(values), array._parts())
         return registers
 
     @classmethod
@@ -235,8 +243,8 @@ class Registers:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Values that are allowed but probably mistakes (rules 5 and 6), a line each."""
-        return tuple(_core.registers_check(self._json(), self.array._parts()))
+        """Values that are allowed but probably mistakes, a line each."""
+        return tuple(_core.registers_warnings(self._json()))
 
     def commands_to(self, target: Registers) -> list[Command]:
         """Return the writes that change this set into another, in an order in which the board refuses none.

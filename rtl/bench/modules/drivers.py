@@ -10,6 +10,16 @@ from cocotb.triggers import FallingEdge, Timer
 
 #: In how many clocks a side of a stream is willing.
 PACES = (0.1, 0.5, 1.0)
+#: Of the numbers that are drawn between limits, how many are one of these, one less or one more.
+AT_LIMITS = 0.3
+
+
+def within(low: int, high: int, *limits: int) -> int:
+    """Return a number from low to high: `AT_LIMITS` of them at these two or further limits, one below or one above."""
+    if random.random() < AT_LIMITS:
+        near = [limit + k for limit in (low, high, *limits) for k in (-1, 0, 1)]
+        return random.choice([number for number in near if low <= number <= high])
+    return random.randint(low, high)
 
 
 class Pace:

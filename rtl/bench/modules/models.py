@@ -242,10 +242,15 @@ class Comparators:
 
     def rise(self, ticks: list[int], inverted: bool) -> None:
         """Begin a ramp: what the comparators of all channels will do."""
-        self.trips, self.level, self.sample = {}, 0, 0
+        self.sample = 0
         self.all = (1 << 2 * len(ticks)) - 1 if inverted else 0
+        self.follow(ticks)
+
+    def follow(self, ticks: list[int]) -> None:
+        """Select other taxels while the ramp rises: the comparators show at once what those would have done."""
+        self.trips, self.level = {}, 0
         for channel, tick in enumerate(ticks):
-            if tick == NOT_RETURNED:
+            if tick == NOT_RETURNED or tick < self.sample:
                 self.level |= 1 << 2 * channel
             else:
                 self.trips[tick] = self.trips.get(tick, 0) | 1 << 2 * channel

@@ -5,7 +5,7 @@ from collections import defaultdict, deque
 
 import cocotb
 from cocotb.triggers import FallingEdge
-from drivers import begin, settled
+from drivers import begin, settled, within
 from models import NOT_RETURNED, Afferent
 from structs import NUMBERS, pack, unpack
 
@@ -54,7 +54,11 @@ def drawn(frames, build):
                     if random.random() < 0.4:
                         ticks[taxel] = max(ticks[taxel] + random.randrange(-6, 7), 0)
                     if random.random() < 0.1:
-                        ticks[taxel] = random.randrange(now["ramp"] + 10)
+                        ticks[taxel] = within(0, now["ramp"] + 9, now["ramp"])
+                    if random.random() < 0.1:
+                        # Just what gives no event, or what does.
+                        moved = now["noise_floor"] + random.randrange(-1, 2)
+                        ticks[taxel] = max(ticks[taxel] + random.choice([-moved, moved]), 0)
                     counts.append(NOT_RETURNED if random.random() < 0.05 else ticks[taxel])
                 reads.append((read, counts))
         ended = now

@@ -6,7 +6,7 @@ from collections import deque
 import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, Timer
-from drivers import begin, settled
+from drivers import begin, settled, within
 from models import NOT_RETURNED, Comparators
 
 
@@ -41,6 +41,8 @@ async def each_read_has_a_ramp_and_is_reported(dut):
         for _ in range(count):
             await FallingEdge(dut.clk)
             dut.read_start.value = dut.step_end.value = 0
+            # They are a read's at its start only.
+            dut.length.value, dut.inverted.value = random.randrange(1, 1 << 16), random.getrandbits(1)
             await settled()
             if not int(dut.read_done.value):
                 continue
@@ -58,13 +60,13 @@ async def each_read_has_a_ramp_and_is_reported(dut):
                     assert not tripped or 2 * at + 1 - first == sample == length + 1, (c, tick, length)
 
     for _ in range(300):
-        period = random.randrange(27, 60)
-        read = random.choice([period, random.randrange(8, period + 1)])
+        period = within(27, 60)
+        read = within(4, period)
         # A next read may begin with its step: the ramp has to fall before it.
         most = 3 * read - 5
-        length = random.choice([1, 2, 3, most, random.randrange(1, most + 1)])
+        length = within(1, most)
         ticks = [
-            random.choice([0, length - 1, length, NOT_RETURNED, random.randrange(length + 9)]) for _ in range(channels)
+            random.choice([NOT_RETURNED, *(within(0, length + 9, length) for _ in range(4))]) for _ in range(channels)
         ]
         inverted = random.random() < 0.3
         reads.append((ticks, inverted))

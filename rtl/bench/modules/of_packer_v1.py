@@ -5,18 +5,21 @@ from collections import deque
 
 import cocotb
 from cocotb.triggers import FallingEdge
-from drivers import Pace, accept, beat, begin, datagrams, settled, vary
+from drivers import Pace, accept, beat, begin, datagrams, settled, vary, within
 from models import datagrams_1, words_1
 from structs import NUMBERS, pack
 
 
-def drawn(frames, valued):
+def drawn(frames, valued, most):
     """Return entries of the queue, each with its frame, and the datagrams that they are."""
     entries, expected = [], []
     for k in range(frames):
         frame, words, time = k & 1, [], random.randrange(1 << 16)
         spikes = random.random() < 0.3
-        for _ in range(random.choice([1, 1, 2, 5, 12])):
+        words_each = 2 if valued or spikes else 1
+        # As many as a datagram holds come in some frames: its last one may fill it, or find no room.
+        full = within(most // words_each - 1, most // words_each + 1)
+        for _ in range(random.choice([1, 1, 2, 5, 12, full if random.random() < 0.1 else 3])):
             x, y, more = random.randrange(64), random.randrange(64), random.getrandbits(1)
             value, marker = random.randrange(1 << 16), random.random() < 0.1
             kind = NUMBERS["ENTRY_MARKER" if marker else "ENTRY_EVENT"]
@@ -38,7 +41,7 @@ async def events_become_words_in_datagrams(dut):
     push_pace, ready_pace, link_pace = Pace(), Pace(), Pace()
     await begin(dut, ready=0, allowed=1, empty=1, frame=0, tready=0)
     came, queue = [], deque()
-    entries, expected = drawn(300, valued)
+    entries, expected = drawn(300, valued, most)
     expected = [datagram for words in expected for datagram in datagrams_1(words, most)]
     entries, last = deque(entries), entries[-1][0]
     cocotb.start_soon(vary(dut.clk, 400, push_pace, ready_pace, link_pace))

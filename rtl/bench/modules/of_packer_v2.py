@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import cocotb
 from cocotb.triggers import FallingEdge
-from drivers import Pace, begin, clocks, offer, reset, settled, vary
+from drivers import AT_LIMITS, Pace, begin, clocks, offer, reset, settled, vary, within
 from models import Datagram, Version2
 from structs import NUMBERS, pack, unpack
 
@@ -16,7 +16,7 @@ COUNTS = ("frames", "events", "dropped", "faults")
 def drawn(frames, rows, board, valued, difference):
     """Return entries of frames, and give them to the board; with them go what is repeated after an entry."""
     entries, at, totals = [], random.randrange(1 << 20), dict.fromkeys(COUNTS, 0)
-    form, spikes, length = {"version_2": 1, "frame_sync": 1}, 0, 200
+    form, spikes, usual = {"version_2": 1, "frame_sync": 1}, 0, 200
 
     def kind():
         return 0 if not valued and not spikes else 2 if form["wide_values"] or spikes else 1
@@ -27,7 +27,7 @@ def drawn(frames, rows, board, valued, difference):
             if k:
                 entries.append((pack("event_t", kind=FLUSH, format=form, at=at), None, None))
                 board.close(at)
-            spikes, wide, length = random.getrandbits(1), random.getrandbits(1), random.choice([30, 200, 9000, 70_000])
+            spikes, wide, usual = random.getrandbits(1), random.getrandbits(1), random.choice([30, 200, 9000, 70_000])
             form = {
                 "version_2": 1,
                 "frame_sync": random.getrandbits(1),
@@ -35,16 +35,30 @@ def drawn(frames, rows, board, valued, difference):
                 "wide_values": wide or spikes,
             }
             often = random.choice([0, 0.1, 1])
+        # Some frames end, and some events come, when a time that the page names is just over since what it counts from.
+        limits = [
+            since + limit + random.randrange(-1, 2) - at
+            for since in (board.latest, board.promised, board.begun and board.begun.base)
+            for limit in (100_000, 65_535, 32_511, board.heartbeat, board.hold)
+            if since is not None
+        ]
+        limits = [length for length in limits if 0 < length < 200_000]
+        length = random.choice(limits) if limits and random.random() < AT_LIMITS else usual
         sent = {"kind": kind(), "frame_sync": form["frame_sync"], "differences": int(difference and not spikes)}
         for x in random.sample(range(128), random.choice([1, 3])) if random.random() < often else ():
-            time = at if form["frame_sync"] else at + random.randrange(length)
-            for y in sorted(random.sample(range(rows), min(rows, random.choice([1, 2, 9])))):
+            time = at if form["frame_sync"] else at + random.choice([random.randrange(length), length - 1])
+            lines = [(x, y) for y in sorted(random.sample(range(rows), min(rows, random.choice([1, 2, 9]))))]
+            # The places between two events are as many as a word counts, one more or one less.
+            place = (lines[-1][0] << board.stride | lines[-1][1]) + 1 + within(125, 129, 127)
+            if place >> board.stride > x and place >> board.stride < 128 and place % (1 << board.stride) < rows:
+                lines.append((place >> board.stride, place % (1 << board.stride)))
+            for column, y in lines:
                 event = {
-                    "x": x,
+                    "x": column,
                     "y": y,
                     "at": time,
                     "more": random.getrandbits(1),
-                    "value": random.choice([7, 255, 256, 65535]),
+                    "value": within(0, 65535, 255),
                 }
                 lost = random.random() < 0.05
                 board.lost |= lost
@@ -111,7 +125,8 @@ async def datagrams_are_those_of_the_page(dut):
     # What was gathered before a reset is forgotten.
     before = drawn(20, rows, Version2(board.stride), valued, difference)
     source = cocotb.start_soon(offer(dut.clk, dut.valid, dut.taken, put, before, in_pace))
-    await clocks(dut.clk, random.randrange(20, 300))
+    # After some thousand clocks a line's values are most often waited for.
+    await clocks(dut.clk, random.choice([random.randrange(20, 300), 3000]))
     source.cancel()
     await reset(dut, valid=0)
     cocotb.start_soon(vary(dut.clk, 1500, in_pace, link_pace))

@@ -32,3 +32,28 @@ async def a_ramp_has_its_length_and_its_pairs(dut):
         assert (seen["nears"], seen["begins"], seen["begun"]) == ([delay - 2], [delay - 1], [delay])
         assert seen["open"] == list(range(delay, last + 1))
         assert seen["closing"] == [last - 1]
+
+
+@cocotb.test()
+async def a_ramp_may_start_before_the_samples_of_the_one_before(dut):
+    delay = int(dut.DELAY.value)
+    Clock(dut.clk_fast, 10, "ns").start()
+    dut.start.value, dut.length.value, dut.reset.value = 0, 1, 1
+    for _ in range(4):
+        await FallingEdge(dut.clk_fast)
+    dut.reset.value = 0
+    starts, clock = {}, 0
+    for _ in range(60):
+        clock += random.choice([5, 5, 6, 9])
+        # Ramps of at most seven ticks, which fall for a clock before the next one.
+        starts[clock] = random.randrange(1, 8)
+    for now in range(clock + delay + 9):
+        dut.start.value, dut.length.value = int(now in starts), starts.get(now, random.randrange(1, 300))
+        await FallingEdge(dut.clk_fast)
+        since = {now - start: length for start, length in starts.items() if 0 <= now - start < delay + 9}
+        high = [any(2 * ago + half < length for ago, length in since.items()) for half in range(2)]
+        assert int(dut.ramp.value) == high[0] + 2 * high[1]
+        for name, at in (("nears", delay - 2), ("begins", delay - 1), ("begun", delay)):
+            assert int(getattr(dut, name).value) == (at in since), name
+        assert int(dut.open.value) == any(delay <= ago <= delay + length // 2 for ago, length in since.items())
+        assert int(dut.closing.value) == any(ago == delay - 1 + length // 2 for ago, length in since.items())

@@ -44,12 +44,25 @@ def broken(held, build):
     return 0
 
 
-def attempt(held):
+def attempt(held, build):
     """Return a write that is near what is allowed: number and value."""
     if random.random() < 0.2:
         return 6, random.choice([*range(12), random.getrandbits(32)])
     f = random.choice(FIELDS)
-    near = [held[f["name"]] + random.choice([-1, 0, 1]), random.choice([0, 1, 2, 3, 15, 26, 75, 255, 300])]
+    # Where a rule is just kept, and one beside that.
+    edges = {
+        "lines": random.choice([build["driven_lines"] - 1, held["line_period"] // 16 - 1]),
+        "line_read": random.choice([held["line_period"], build["steps"] * held["step_period"]]),
+        "line_period": random.choice([held["line_read"], 16 * held["lines"] + 16]),
+        "step_period": random.choice([held["step_read"], held["line_read"] // build["steps"], build["channels"] + 10]),
+        "step_read": random.choice([held["step_period"], (held["ramp"] + 5 + 2) // 3, 4]),
+        "ramp": 3 * held["step_read"] - 5,
+    }
+    near = [
+        edges.get(f["name"], 0) + random.choice([-1, 0, 1]),
+        held[f["name"]] + random.choice([-1, 0, 1]),
+        random.choice([0, 1, 2, 3, 15, 26, 75, 255, 300]),
+    ]
     bits = (1 << f["bits"]) - 1
     changed = held | {f["name"]: random.choice([*near, random.getrandbits(f["bits"]), bits]) & bits}
     value = word(changed, f["register"])
@@ -80,7 +93,7 @@ async def every_command_is_answered_and_rules_are_kept(dut):
             await reset(dut, command=0, markers_taken=0)
             held = dict(first)
             waiting.clear()
-        number, value = attempt(held)
+        number, value = attempt(held, build)
         room = random.random() < 0.9
         dut.command.value, dut.number.value, dut.value.value, dut.room.value = 1, number, value, int(room)
         await clock()

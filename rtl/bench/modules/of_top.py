@@ -50,15 +50,24 @@ async def datagrams_and_lines_are_those_of_the_page(dut):
     chain = Chain([1] * columns)
 
     async def comparators():
-        model, high = Comparators(int(dut.DELAY.value)), 0
+        model, high, selected, held = Comparators(int(dut.DELAY.value)), 0, None, {}
         while True:
             await FallingEdge(dut.clk_fast)
+            # They follow the pins at all times: those of a ramp are as it rose, whatever is selected.
+            before, selected = selected, (tuple(chain.driven(columns)), int(dut.rsel.value))
             ramp = int(dut.ramp.value)
-            if ramp & 1 and not high:
-                lines, step = chain.driven(columns), int(dut.rsel.value)
-                assert len(lines) == 1
-                model.rise([ticks.get((lines[0], scan.steps * c + step), 0) for c in range(channels)], False)
+            rises = ramp & 1 and not high
             high = ramp
+            if rises:
+                assert len(selected[0]) == 1
+                held = dict(ticks)
+            if rises or (held and selected != before):
+                lines, step = selected
+                shown = [held.get((lines[0] if lines else 0, scan.steps * c + step), 0) for c in range(channels)]
+                if rises:
+                    model.rise(shown, False)
+                else:
+                    model.follow(shown)
             dut.comparators.value = model.pairs()
 
     async def shift_registers():

@@ -89,7 +89,7 @@ fn stamps_are_the_frames_with_sync_and_the_steps_without() {
 
 #[test]
 fn random_lines_visit_each_line_once_a_frame_in_an_order_of_its_own() {
-    let registers = Registers { random_lines: true, noise_floor: 0, ..Registers::default() };
+    let registers = Registers { random_lines: true, line_period: 1024, noise_floor: 0, ..Registers::default() };
     let mut board = Board::new(registers, &Array::thesis()).unwrap();
     let mut orders = std::collections::HashSet::new();
     for frame in 0..50_u16 {
@@ -118,7 +118,7 @@ fn drawn(word: &mut u16, lines: u16) -> Vec<u16> {
 
 #[test]
 fn the_random_order_is_drawn_line_by_line() {
-    let registers = Registers { random_lines: true, noise_floor: 0, ..Registers::default() };
+    let registers = Registers { random_lines: true, line_period: 1024, noise_floor: 0, ..Registers::default() };
     let (mut board, mut word) = (Board::new(registers, &Array::thesis()).unwrap(), 0xace1);
     for frame in 0..20_u16 {
         let (events, _) = decode(&play(&mut board, &[frame + 1; 4096]).concat(), Array::thesis(), Pairing::Direct);

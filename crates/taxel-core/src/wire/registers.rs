@@ -38,7 +38,7 @@ pub fn fields() -> &'static [Field] {
 pub struct WriteRefusal {
     /// The register that the write addressed.
     pub register: u8,
-    /// Which rule of the reference (5 and 6 only warn).
+    /// Which rule of the reference.
     pub rule: u8,
     /// The rule and the numbers that break it, in one line.
     pub text: String,
@@ -223,10 +223,25 @@ impl Registers {
     ///
     /// `Device`, with the first rule that is broken and the numbers.
     pub fn check(&self, array: &Array) -> Result<()> {
-        if !matches!(self.channels, 16 | 64) {
-            return Err(Error::device(format!("{} channels: the converter has 16 or 64", self.channels)));
-        }
+        self.check_channels()?;
         self.rules(0, array).map_err(Error::from)
+    }
+
+    /// Checks that values fit their fields and the array (rule 4): a file may be of a board with other rules of timing.
+    ///
+    /// # Errors
+    ///
+    /// `Device`, with the first value that does not fit.
+    pub fn check_fit(&self, array: &Array) -> Result<()> {
+        self.check_channels()?;
+        self.rules(0, array).or_else(|refusal| if refusal.rule == 4 { Err(refusal.into()) } else { Ok(()) })
+    }
+
+    fn check_channels(&self) -> Result<()> {
+        if matches!(self.channels, 16 | 64) {
+            return Ok(());
+        }
+        Err(Error::device(format!("{} channels: the converter has 16 or 64", self.channels)))
     }
 
     /// The rules that refuse, in the order in which the board checks them; the first is that every value is in its

@@ -38,6 +38,9 @@ pub(crate) fn board(random: &mut StdRng, array: &Array, hold_us: u64) -> Board {
     let mut registers = Registers::at_reset(array, channels);
     registers.wire_version = 2;
     registers.random_lines = random.random();
+    if registers.random_lines {
+        registers.line_period = registers.line_period.max(16 * u32::from(registers.lines));
+    }
     registers.frame_sync = random.random();
     registers.noise_floor = random.random_range(0..6);
     let words = [IntensityWord::Value, IntensityWord::Difference, IntensityWord::Nothing];

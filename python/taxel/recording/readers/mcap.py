@@ -200,11 +200,11 @@ class _Source:
         if first is None:
             changes = self.register_changes()
             return changes[0][1] if changes else None
-        return Registers._of(first, self.driven())
+        return Registers._of_file(first, self.driven())
 
     def register_changes(self) -> tuple[tuple[int, Registers], ...]:
         """Return the registers at each change."""
-        return tuple((at, Registers._of(values, self.driven())) for at, values in self.remarks().registers)
+        return tuple((at, Registers._of_file(values, self.driven())) for at, values in self.remarks().registers)
 
     def held(self) -> NDArray[np.uint16] | None:
         """Return the values that the taxels held at the beginning."""

@@ -5,6 +5,7 @@ use super::table::Registers;
 
 /// The first rule that refuses these registers, with its numbers.
 pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<(u8, String)> {
+    let random_lines = i64::from(registers.random_lines);
     let wire_version = i64::from(registers.wire_version);
     let line_period = i64::from(registers.line_period);
     let line_read = i64::from(registers.line_read);
@@ -53,6 +54,17 @@ pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<
             ),
         ));
     }
+    if random_lines != 0 && 16 * lines > line_period {
+        return Some((
+            5,
+            format!(
+                "random_lines: to drive any of {} lines next takes up to {} us, longer than line_period {} us (rule 5)",
+                lines,
+                us(16 * lines),
+                us(line_period)
+            ),
+        ));
+    }
     if channels + 10 > step_period {
         return Some((
             7,
@@ -97,14 +109,14 @@ pub(super) fn warnings(registers: &Registers) -> Vec<(u8, String)> {
             ),
         ));
     }
-    if random_lines * (2 * lines + 20) > step_period - step_read {
+    if random_lines != 0 && 16 * lines + 20 > step_period - step_read {
         warnings.push((
             5,
             format!(
                 "random_lines: {} us before step_read: any of {} lines settles in {} us (rule 5)",
                 us(step_period - step_read),
                 lines,
-                us(2 * lines + 20)
+                us(16 * lines + 20)
             ),
         ));
     }

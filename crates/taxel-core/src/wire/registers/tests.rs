@@ -116,6 +116,12 @@ fn every_rule_refuses_with_its_numbers_and_keeps_the_old_value() {
             "step_read 0.55 us is longer than step_period 0.51 us (rule 1); the board keeps step_period 0.75 us, step_read 0.55 us",
         ),
         (4, 0, 4, "ramp is 0: must be 1 or more (rule 4); the board keeps ramp 150 ticks"),
+        (
+            0,
+            1,
+            5,
+            "random_lines: to drive any of 64 lines next takes up to 10.24 us, longer than line_period 3.00 us (rule 5); the board keeps REG0=0x00000008",
+        ),
         (7, 1, 4, "REG7=0x00000001 sets reserved bits: they must be 0 (rule 4)"),
         (6, 9, 4, "REG6=0x00000009 sets reserved bits: they must be 0 (rule 4)"),
     ];
@@ -191,6 +197,7 @@ fn any_set_leads_to_any_other_without_a_refusal() {
             ramp: random.random_range(1..top.min(65_536)) as u16,
             noise_floor: random.random(),
             lines: random.random_range(1..=64),
+            random_lines: random.random(),
             ..Registers::default()
         };
         registers.line_read = registers.line_read.min(registers.line_period);

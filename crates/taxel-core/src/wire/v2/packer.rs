@@ -127,10 +127,10 @@ impl Packer {
     }
 
     /// Ends a frame: every event before `now` was added, and the next frame ends at `next`. Sends what is due: events,
-    /// or a heartbeat.
+    /// or a heartbeat. Without a hold time no event waits, even where two frames end within a microsecond.
     pub fn over(&mut self, now: u64, next: u64, sink: &mut impl FnMut(&[u8], usize)) {
         if self.events > 0 {
-            if next - self.base > self.settings.hold_us {
+            if self.settings.hold_us == 0 || next - self.base > self.settings.hold_us {
                 self.send(now, sink);
             }
             return;
