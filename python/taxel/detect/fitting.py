@@ -217,7 +217,8 @@ def learn(examples: EncodedExamples, recipe: Recipe, array: Array | None, report
         _, fitting, learners[label], points[label], _ = _best(examples, recipe, label, array, report)
         delays[label], ranges[label] = fitting.delay_ms, fitting.seen(learners[label])
         if fitting.alignment is not None:
-            alignments[label] = fitting.alignment
+            of_all = np.array(fitting.places)[fitting.alignment.example]
+            alignments[label] = replace(fitting.alignment, example=of_all)
     plan = replace(recipe, neurons=points) if recipe.neurons else recipe
     return Trained(plan, learners, readout_of(learners, delays, plan, array)._with(seen=ranges), alignments)
 
@@ -317,6 +318,9 @@ class Fitting:
         known: Known | None = None,
     ) -> None:
         self._label, self._needs = label, rows_of(recipe, label)
+        #: The places of the examples that say when the label happened; the others are left out.
+        self.places = [k for k, example in enumerate(examples) if label not in example.unlabelled]
+        examples = [examples[k] for k in self.places]
         learner, delay_ms = recipe.learner_of(label)
         received = recipe._received(recipe._of(label))
         ages = ages_of(received, array)
@@ -327,8 +331,7 @@ class Fitting:
         acts_after_ms = ACTS_AFTER_MS if neuron.kernel == "exponential" else neuron.step_ms
         self.delay_ms = delay_ms + (0.0 if ages is None else acts_after_ms)
         label_times = self._label_times = [_times(k, example, label) for k, example in enumerate(examples)]
-        count = sum(map(len, label_times))
-        if not count:
+        if not (count := sum(map(len, label_times))):
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
         sources = [_inputs(k, example, recipe, label, array) for k, example in enumerate(examples)]
         self._graded = received.kind == "graded"
@@ -337,8 +340,7 @@ class Fitting:
         self.alignment: Alignment | None = None
         if quantities:
             known = {} if known is None else known
-            inputs = recipe.inputs_of(label)
-            if inputs not in known:
+            if (inputs := recipe.inputs_of(label)) not in known:
                 known[inputs] = follow(sources, label, label_times, received.latency_ms, list(quantities))
             followers = known[inputs]
             if len(followers) <= rank and rank:

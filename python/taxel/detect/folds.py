@@ -372,7 +372,7 @@ def _read(examples: Sequence[Example], patterns: Sequence[Example], readout: Rea
 def _detect(readout: Readout, examples: Sequence[Example], part: Part, clocks: Sequence[Clock]) -> Detections:
     example, (frame_us, version) = examples[part.example], clocks[part.example]
     detections = run(readout, example.source, tare=example.tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
-    return detections[(detections.t >= part.start) & (detections.t < part.stop)]
+    return example._known(detections[(detections.t >= part.start) & (detections.t < part.stop)])
 
 
 def _of(part: Part, patterns: Sequence[Example]) -> Example:

@@ -63,6 +63,7 @@ class Loads:
         self.noise_floor, self.unit = noise_floor, unit_of(examples)
         self.names = sorted({name for example in examples for name in example.labels})
         self._labels = [{name: np.sort(times) for name, times in example.labels.items()} for example in examples]
+        self._unlabelled = [frozenset(example.unlabelled) for example in examples]
         self.whole_examples: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
         self._shift = [k * APART_US - _first(example) for k, example in enumerate(examples)]
         self._frame_ms = max(map(frame_ms, examples))
@@ -123,6 +124,11 @@ class Loads:
         by_example = [self._labels[k].get(name, np.empty(0, np.int64)) + shift for k, shift in enumerate(self._shift)]
         times = np.concatenate(by_example)
         return FoundTimes(times, times, np.zeros(len(times))).between(self.windows(parts)).t
+
+    def labelled(self, names: Iterable[str], parts: Iterable[Stretch]) -> list[Stretch]:
+        """Return the parts of which it is known when each of some labels happened."""
+        each = frozenset(names)
+        return [part for part in parts if not each & self._unlabelled[part[0]]]
 
     def windows(self, parts: Iterable[Stretch]) -> list[tuple[int, int]]:
         """Return from when to when parts of the examples last on the one clock, us, ascending."""

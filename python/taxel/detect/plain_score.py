@@ -189,7 +189,7 @@ def _detect(loads: Loads, rules: Mapping[str, PlainRule | None], part: Stretch) 
     """Return what the rule of each label detects of it in a part of an example."""
     detections = Detections([], [], [])
     for label, rule in rules.items():
-        if rule is None:
+        if rule is None or not loads.labelled([label], [part]):
             continue
         label_index = rule._parts["labels"].index(label)
         if rule.age_ms is None:

@@ -123,13 +123,13 @@ def best_rules(
 ) -> dict[str, PlainRule | None]:
     """Return for each label the best rule on parts of the examples, as `tune` does on all of them."""
     width_us = round(float(to_us(window_ms)))
-    windows = loads.windows(parts)
     truth = {name: loads.truth(name, parts) for name in names}
     best = _at_edges(loads, parts, truth, width_us)
     onsets = [name for name, (onset, end) in best.items() if onset.fit.error_ms < end.fit.error_ms]
     single = {name: min(pair, key=lambda tuned: tuned.fit[:2]) for name, pair in best.items()}
     kinds = onsets if len(onsets) == 2 else list(names) if len(names) == 2 else []
     if kinds:
+        windows = loads.windows(loads.labelled(kinds, parts))
         touches = {age: loads.at_age(age).between(windows) for age in loads.ages_ms(AGES_MS)}
         found = _for_kinds(touches, kinds, truth, width_us, loads.noise_floor, loads.unit)
         if found is not None and sum(fit.wrong for fit, _ in found) < sum(single[name].fit.wrong for name in kinds):
@@ -155,11 +155,14 @@ def _at_edges(
     worst = _RuleFit(2**62, np.inf, np.inf)
     fits = {name: [worst, worst] for name in truth}
     points: dict[str, list[tuple[str, float, float, int]]] = {name: [("area", 1.0, 1.0, 1)] * 2 for name in truth}
-    windows = loads.windows(parts)
-    for point in _points(loads, parts):
+    windows: dict[tuple[tuple[int, int], ...], list[str]] = {}
+    for name in truth:
+        windows.setdefault(tuple(loads.windows(loads.labelled([name], parts))), []).append(name)
+    for point, (inside, names) in product(_points(loads, parts), windows.items()):
         for edge, edges in enumerate(loads.edges(*point)):
-            found = edges.between(windows)
-            for name, true in truth.items():
+            found = edges.between(inside)
+            for name in names:
+                true = truth[name]
                 fit = _fit(found, true, width_us, fits[name][edge].wrong)
                 if fit is not None and fit[:2] < fits[name][edge][:2]:
                     fits[name][edge] = fit

@@ -105,6 +105,9 @@ class Training:
         From when to when the tare of each recording was taken from it, and how long it lasts; none of given tares.
     warned : tuple of str
         The warnings of the training.
+    unlabelled : mapping of str to tuple of str
+        The sources that no row of the labels names, by label, where rows name sources: they are neither trained nor
+        scored for it.
     """
 
     options: TrainOptions
@@ -116,6 +119,7 @@ class Training:
     outcomes: Sequence[Outcome]
     tares_us: Sequence[tuple[int, int, int]]
     warned: tuple[str, ...] = ()
+    unlabelled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def readout(self) -> Readout:
@@ -166,6 +170,7 @@ class Training:
             "helps": {label: advice.helps for label, advice in self.advice.items()},
             "options": sorted({advice.option for advice in self.advice.values() if advice.option is not None}),
             "warnings": list(self.warnings),
+            "unlabelled": {label: list(sources) for label, sources in self.unlabelled.items()},
         }
         if self.made.alignments:
             result["alignment"] = {label: aligned.to_dict() for label, aligned in self.made.alignments.items()}
@@ -182,6 +187,8 @@ class Training:
         lines = [f"not held out, on its own training data {window}: {self.why}"]
         if self.held_out:
             lines = [f"held out: {self.scored.how} {window}"]
+        for label, sources in self.unlabelled.items():
+            lines.append(f"{label}: neither trained nor scored on {', '.join(sources)}, which no row of labels names")
         for label in self.readout.labels:
             lines += self._scores(label)
         lines += [*self._better(), *self._advised(), *self._aligned()]
