@@ -23,6 +23,7 @@ from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_frames, later_us,
 from taxel.detect.alignment import Alignment, align, align_by
 from taxel.detect.examples import Example, array_of, check_examples, name_of, unit_of
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
+from taxel.detect.levels import fit_levels
 from taxel.detect.loads import clock_of
 from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
@@ -68,12 +69,15 @@ class Trained(NamedTuple):
     readout : Readout
     alignments : mapping of str to Alignment
         By how much its labels were moved to what the sensor felt, by label; empty where the recipe does not align them.
+    fitted_levels : bool
+        Whether the encoder's levels are of the training data (`Recipe`).
     """
 
     recipe: Recipe
     learners: Mapping[str, ConeR]
     readout: Readout
     alignments: Mapping[str, Alignment]
+    fitted_levels: bool = False
 
 
 def fit(
@@ -126,10 +130,16 @@ def fit_aligned(examples: Sequence[Example], recipe: Recipe, progress: Progress 
     sound, clocks = check_examples(examples), [clock_of(example) for example in examples]
     report = reporting(progress)
     recipe = in_frames(instance("recipe", recipe, Recipe), sound, clocks)
+    stated = recipe.encoder
+    recipe = fit_levels(recipe, sound, [(k, -np.inf, np.inf) for k in range(len(sound))])
     possibly = possible(recipe, sound)
     unit = unit_of(sound)
     trained = learn(EncodedExamples(sound, possibly, report), possibly, array_of(sound), report)
-    return trained._replace(recipe=recipe._at(trained.recipe.neurons), readout=trained.readout._with(unit=unit))
+    return trained._replace(
+        recipe=recipe._at(trained.recipe.neurons),
+        readout=trained.readout._with(unit=unit),
+        fitted_levels=recipe.encoder != stated,
+    )
 
 
 def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:

@@ -12,6 +12,7 @@ from taxel._base.messages import counted
 from taxel._base.times import beginning_us
 from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained
 from taxel.detect.advice import Advice
+from taxel.detect.levels import LEAST_LEVELS
 from taxel.detect.recipe import change_values, with_floor
 from taxel.recorded import recorded
 from taxel.recording import Recording
@@ -169,6 +170,7 @@ class Training:
             "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
             "helps": {label: advice.helps for label, advice in self.advice.items()},
             "options": sorted({advice.option for advice in self.advice.values() if advice.option is not None}),
+            "fitted_levels": list(self.fitted_levels),
             "warnings": list(self.warnings),
             "unlabelled": {label: list(sources) for label, sources in self.unlabelled.items()},
         }
@@ -195,7 +197,7 @@ class Training:
         if recipe is not None:
             about = self.made.recipe.about
             lines += ["", f"recipe {recipe}" + (f": {about}" if about else "")]
-        lines += [*self._tares(), repr(self.readout)]
+        lines += [*self._levels(), *self._tares(), repr(self.readout)]
         for label in self.readout.labels if self.options.search else ():
             point = self.made.recipe.neurons[label]
             chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key not in ("search", "choose"))
@@ -212,6 +214,20 @@ class Training:
             return "SECONDS" if self.tares_us else ""
         # More than half of a recording is refused.
         return f"{min(min(end, lasts // 2) for _, end, lasts in self.tares_us) / 1e6:g}"
+
+    @property
+    def fitted_levels(self) -> tuple[float, ...]:
+        """The levels of the encoder if they are of the training data, in the sensor's unit; else none."""
+        return tuple(self.made.recipe.encoder.levels) if self.made.fitted_levels else ()  # type: ignore[attr-defined]
+
+    def _levels(self) -> Iterator[str]:
+        """Yield the levels that the training data gave, if they did."""
+        if self.fitted_levels:
+            levels = ", ".join(f"{level:g}" for level in self.fitted_levels)
+            yield (
+                f"levels: {levels} {self.readout.unit}, of the training data, as fewer than {LEAST_LEVELS} of the "
+                "recipe's lie within what loaded taxels read; --set encoder.levels=[...] gives others"
+            )
 
     def _tares(self) -> Iterator[str]:
         """Yield the line of which tares were taken from the recordings."""
