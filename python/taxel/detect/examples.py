@@ -143,7 +143,36 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
         if both := [label for label in without if label in times]:
             raise ProblemError(f"{name}: unlabelled has {shown(both[0])}, of which there are labels")
         sound.append(Example(source, times, tare, text(f"{name}: group", group), name, without))
-    return sound
+    return _padded(sound)
+
+
+def sizes_of(examples: Sequence[Example]) -> list[tuple[int, int]]:
+    """Return the rows and columns of frames of grids of several sizes, ascending; none where they cannot be padded."""
+    sources = [recorded(example.source) for example in examples]
+    if not all(isinstance(source, Frames) and source.array._is_whole_grid for source in sources):
+        return []
+    shapes = sorted({source.array.shape for source in sources})  # type: ignore[union-attr]
+    return shapes if len(shapes) > 1 else []
+
+
+def _padded(examples: list[Example]) -> list[Example]:
+    """Return examples of grids of several sizes padded at their far edges to the largest; all others as they are.
+
+    A taxel beyond an edge reads 0, and has no rest in a tare, so that it counts nowhere.
+    """
+    shapes = sizes_of(examples)
+    if not shapes:
+        return examples
+    rows, columns = (max(sizes) for sizes in zip(*shapes, strict=True))
+    padded = []
+    for example in examples:
+        source, tare = example.source, example.tare
+        assert isinstance(source, Frames)
+        array = source.array._padded((rows, columns))
+        beyond = [(0, 0), (0, rows - source.array.rows), (0, columns - source.array.columns)]
+        values = Frames(np.pad(source.values, beyond), source.t, unit=source.unit, array=array)
+        padded.append(example._replace(source=values, tare=None if tare is None else tare._padded_to(array)))
+    return padded
 
 
 def array_of(examples: Sequence[Example]) -> Array | None:

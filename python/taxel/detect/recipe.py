@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -255,6 +255,25 @@ class Recipe:
             )
 
         return replace(self, neurons={label: left(label, neuron) for label, neuron in self.neurons.items()})
+
+    def _without_parts(self, names: Collection[str]) -> Recipe:
+        """Return the recipe without some parts of a composite encoder, and without the points that receive any of them.
+
+        Of a neuron whose first point is among these the next one is the first; one without any other keeps it.
+        """
+        if not isinstance(self.encoder, Composite) or not names:
+            return self
+        parts = self.encoder.parts
+
+        def left(label: str) -> dict[str, Any]:
+            points = self._points(label, "choose")
+            kept = [point for point in points if not set(names) & set(point.get("inputs", parts))]
+            if len(kept) == len(points) or not kept:
+                return dict(self.neurons[label])
+            first, *others = ({key: value for key, value in point.items() if key != "fewer"} for point in kept)
+            return {**first, **({"choose": others} if others else {})}
+
+        return replace(self, neurons={label: left(label) for label in self.neurons})
 
     def _labels(self, examples: Sequence[Example]) -> tuple[str, ...]:
         """Return the labels that are learnt: the recipe's, or where it has none those of the examples."""

@@ -18,7 +18,7 @@ from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
 from taxel.detect.advice import advise, fallen
-from taxel.detect.examples import check_examples
+from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.folds import INNER, count_of_folds
@@ -117,6 +117,9 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     if options.search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):
         raise refused("search", ": the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
     examples = _examples(opened, labelled, without, options.tare, plan)
+    if sizes := sizes_of(examples):
+        smallest, largest = ("{} x {}".format(*extreme) for extreme in (sizes[0], np.max(sizes, axis=0)))
+        warn(f"arrays of {len(sizes)} sizes, from {smallest} taxels on, are padded at their far edges to {largest}")
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
     return replace(_Work(opened, examples, options, update).training(plan), unlabelled=unlabelled)
