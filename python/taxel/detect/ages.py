@@ -75,14 +75,14 @@ def duration_train(encoder: Encoder, array: Array | None) -> int | None:
     return None
 
 
-class Touches(NamedTuple):
+class EndedTouches(NamedTuple):
     """The touches that ended: when each began, and how long it lasted, us; in order."""
 
     begin: NDArray[np.int64]
     lasted: NDArray[np.int64]
 
     @classmethod
-    def of(cls, trains: SpikeTrains, duration: int) -> Touches:
+    def from_trains(cls, trains: SpikeTrains, duration: int) -> EndedTouches:
         """Return the touches of the train with their durations."""
         spikes = slice(trains.offsets[duration], trains.offsets[duration + 1])
         assert trains.values is not None

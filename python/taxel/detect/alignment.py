@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import integer
 from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
-from taxel.detect.ages import Ages, Touches, onsets
+from taxel.detect.ages import Ages, EndedTouches, onsets
 from taxel.detect.followed import off_ms, one_after_another
 from taxel.detect.scoring import Score, score
 from taxel.detections import Detections
@@ -154,7 +154,7 @@ def align(
     if ages is not None:
         candidates[ages.trains[0]] = [onsets(pattern, ages) for pattern in patterns]
     if duration is not None:
-        begins = [to_ms(Touches.of(pattern, duration).begin) + latency_ms for pattern in patterns]
+        begins = [to_ms(EndedTouches.from_trains(pattern, duration).begin) + latency_ms for pattern in patterns]
         candidates = {duration: begins}
     scores = {}
     for train, spikes in candidates.items():

@@ -19,7 +19,16 @@ from taxel._base.progress import Progress, reporting
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect.ages import ACTS_AFTER_MS, Ages, Touches, ages_of, duration_train, in_frames, later_us, silent_windows
+from taxel.detect.ages import (
+    ACTS_AFTER_MS,
+    Ages,
+    EndedTouches,
+    ages_of,
+    duration_train,
+    in_frames,
+    later_us,
+    silent_windows,
+)
 from taxel.detect.alignment import Alignment, align, align_by
 from taxel.detect.examples import Example, array_of, check_examples, name_of, sizes_of, unit_of
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
@@ -484,7 +493,7 @@ class Fitting:
         for source, times in zip(self._sources, self._label_times, strict=True):
             t = np.rint(to_us(neuron.run(cone.weights_, source) - self._shift_ms)).astype(np.int64)
             if self._duration is not None:
-                t = Touches.of(source, self._duration).begin_of(t)
+                t = EndedTouches.from_trains(source, self._duration).begin_of(t)
             found.append(Detections([self._label] * len(t), t, t))
             truths.append({self._label: times})
         return score_together(found, truths, FOLLOWED_MS).rank[0]
@@ -517,7 +526,7 @@ def _learns_one(encoder: Encoder) -> bool:
 
 def _lasted(source: SpikeTrains, duration: int, felt: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return how long the touches last that began at some times, us."""
-    touches = Touches.of(source, duration)
+    touches = EndedTouches.from_trains(source, duration)
     return touches.lasted[touches.beginning_near(felt)] if len(felt) else np.zeros(0, np.int64)
 
 
