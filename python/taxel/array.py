@@ -223,6 +223,15 @@ class Array:
         """Whether taxels are known to lie side by side: a single row or column without a pitch is channels."""
         return self.pitch_mm is not None or 1 not in self.shape or self.shape == (1, 1)
 
+    def _padded(self, shape: tuple[int, int]) -> Array:
+        """Return a grid of which this one is the first rows and columns."""
+        return Array(*shape, self.pitch_mm, name=self.name)
+
+    @property
+    def _is_whole_grid(self) -> bool:
+        """Whether it is a grid of taxels that all exist, so that it may be padded at its far edges."""
+        return self.exists is None and self.places is None and 1 not in self.shape
+
     @property
     def taxels(self) -> int:
         """The number of taxels that exist."""

@@ -156,6 +156,10 @@ class Tare(Saved):
         tare.start_us, tare.stop_us, tare.note = values["start_us"], values["stop_us"], values["note"]
         return tare
 
+    def _padded_to(self, array: Array) -> Tare:
+        """Return the tare as that of a larger array's first rows and columns; taxels beyond have none."""
+        return self.from_json(_core.pad_tare(self._text, array._parts()))
+
     def to_json(self) -> str:
         """Return the tare as JSON."""
         return self._text

@@ -124,7 +124,10 @@ def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys
         (("contact", "foot_off"), "counts", (2, 2), "gait_plate"),
         (("contact", "Foot off"), "N", (2, 2), "gait_insole"),
         (("slip",), "counts", (2, 2), "touch"),
-        (("contact", "lift"), "V", (1, 4), "gait_channel"),
+        (("contact", "lift"), "V", (1, 4), "touch"),
+        (("press", "release"), "N", (1, 1), "touch"),
+        (("contact",), "N", (1, 4), "gait_insole"),
+        (("contact", "lift", "slip"), "V", (1, 4), "gait_channel"),
         (("soft", "hard"), "V", (16, 16), "touch"),
         (("soft", "hard"), "V", (3, 11), "touch"),
         (("soft", "hard"), "V", (4, 8), "touch"),
@@ -264,7 +267,8 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
         progress=lambda step, *_: said.append(step),
     )
     assert ([one for one in said if one.startswith("encoding")], followed) == (["encoding 1 of 1"] * 2, [])
-    # With a floor above every touch area and levels find nothing; two quantities are tried, and followed once.
+    # With a floor above every touch area and levels find nothing; two quantities are tried, and followed once; then the
+    # peak.
     floors = {
         "encoders.area.noise_floor": 90.0,
         "encoders.levels.noise_floor": 9e4,
@@ -273,7 +277,7 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
     blind = Recipe.load("touch", floors, LABELS, 3.0)
     said.clear()
     made = fit_aligned([example], blind, lambda step, *_: said.append(step))
-    assert [one for one in said if one.startswith("encoding")] == ["encoding 1 of 1"] * 4
+    assert [one for one in said if one.startswith("encoding")] == ["encoding 1 of 1"] * 5
     assert sorted(followed) == ["contact", "lift"]
     assert {one.inputs for one in made.readout.neurons.values()} <= {("area",), ("load",), ()}
 

@@ -104,7 +104,7 @@ def test_training_says_which_is_better_and_why_there_is_no_rule(examples, tmp_pa
         assert f"{label}: the plain rule is better" in call(capsys, *arguments, "-o", tmp_path / "r.json")[1]
 
 
-def test_channels_have_no_plain_rule_and_training_says_so() -> None:
+def test_channels_have_plain_rules_by_peak_alone() -> None:
     line, values = taxel.Array(1, 4), np.zeros((400, 1, 4))
     values[100:200] = values[250:300] = 20.0
     frames = taxel.Frames(values, np.arange(400) * 1000, unit="N", array=line)
@@ -114,12 +114,13 @@ def test_channels_have_no_plain_rule_and_training_says_so() -> None:
         name = quantity.replace("_", " ")
         with pytest.raises(taxel.ProblemError, match=f"a plain rule by {name} needs neighbours on a grid; .* 1 x 4"):
             run(PlainRule(quantity, 2), frames, tare=tare)
-    with pytest.raises(taxel.ProblemError, match="a plain rule by area needs neighbours on a grid"):
-        tune([example])
+    tuned = tune([example])["contact"]
+    assert tuned is not None
+    assert tuned.quantity == "peak"
     recipe = Recipe(taxel.encode.LevelCrossing([10.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
     judged = judge([example], recipe, [Fold([Part(0, stop=225_000)], [Part(0, start=225_000)])])
-    assert judged.plain.lacks == "plain rules need neighbours on a grid, and these are channels"
-    assert judged.plain.rules == {"contact": None}
+    assert judged.plain.lacks == ""
+    assert judged.plain.rules == {"contact": tuned}
     assert judged.together.found == 1
     assert (
         run(

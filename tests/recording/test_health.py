@@ -7,6 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from draws import seeds
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import taxel
 from taxel import _core
@@ -364,3 +366,49 @@ def test_a_missing_cell_of_frames_was_not_pressed() -> None:
     values[:, 1, 1] = np.nan
     found = taxel.health(taxel.Frames(values, np.arange(10) * 100_000, unit="N"))
     assert found.untested.tolist() == [[False] * 3, [False, True, False], [False] * 3]
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    full=st.sampled_from([1.0, 255.0, 65_535.0]),
+    unit=st.sampled_from(["N", "kPa", "counts"]),
+    touched=st.booleans(),
+)
+def test_a_taxel_at_the_greatest_value_throughout_is_stuck_though_never_touched(
+    seed: int, full: float, unit: str, touched: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    values = full * (0.1 + 0.2 * rng.random((60, 8, 8)))
+    y, x = rng.integers(1, 7, 2)
+    if touched:
+        values[20:30, y - 1 : y + 2, x - 1 : x + 2] = full * rng.random((10, 3, 3))
+    values[:, y, x] = full
+    frames = taxel.Frames(values, np.arange(60) * 20_000, unit=unit)
+    found = taxel.health(frames).named()
+    assert found["stuck"] == [(x, y)]
+    assert (x, y) not in found["dead"] + found["noisy"]
+    # Beside a load that stays nothing else moves, and one that comes back from it works.
+    values[:, y, x] = np.where(np.arange(60) % 4 == 3, 0.5 * full, full)
+    assert not taxel.health(taxel.Frames(values, frames.t, unit=unit)).stuck.any()
+    values[:] = full * 0.1
+    values[:, y, x] = full
+    assert not taxel.health(taxel.Frames(values, frames.t, unit=unit)).stuck.any()
+
+
+def test_a_taxel_of_a_board_that_a_state_shows_at_the_top_is_stuck() -> None:
+    moving = [(x, y) for x in range(3) for y in range(3) if (x, y) != (1, 1)]
+    t = np.repeat(np.arange(20) * 50_000, len(moving)).tolist()
+    x, y = (np.tile([place[k] for place in moving], 20).tolist() for k in (0, 1))
+    up = np.repeat(np.arange(20) % 2 == 0, len(moving))
+    ticks = np.where(up, 40, 10)
+    events = taxel.Events(
+        [0, *t],
+        [1, *x],
+        [1, *y],
+        [True, *up],
+        intensity=[150, *ticks],
+        array=taxel.Array(3, 3),
+        repaired=[True, *[False] * len(t)],
+    )
+    assert taxel.health(events).named()["stuck"] == [(1, 1)]

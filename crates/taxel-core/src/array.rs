@@ -225,6 +225,30 @@ impl Array {
             && (self.exists == other.exists || (0..self.len()).all(|taxel| self.has(taxel) == other.has(taxel)))
     }
 
+    /// Whether frames of another sensor can be those of this one's first rows and columns: both are grids of taxels that all
+    /// exist, and the other one is smaller.
+    #[must_use]
+    pub fn holds(&self, other: &Self) -> bool {
+        let is_whole =
+            |array: &Self| array.exists.is_none() && array.places.is_none() && array.rows.min(array.columns) > 1;
+        is_whole(self)
+            && is_whole(other)
+            && other.rows <= self.rows
+            && other.columns <= self.columns
+            && other.len() < self.len()
+    }
+
+    /// Values of a smaller array, row by row, as those of this one's first rows and columns, with others beyond its far edges.
+    #[must_use]
+    pub fn padded<T: Clone>(&self, values: &[T], columns: u16, beyond: &T) -> Vec<T> {
+        let mut padded = vec![beyond.clone(); self.len()];
+        let rows = padded.chunks_exact_mut(usize::from(self.columns));
+        for (row, values) in rows.zip(values.chunks_exact(usize::from(columns))) {
+            row[..values.len()].clone_from_slice(values);
+        }
+        padded
+    }
+
     /// The distance between neighbours, for `subject` that needs it.
     ///
     /// # Errors

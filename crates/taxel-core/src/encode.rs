@@ -32,6 +32,7 @@ pub use quantity::Quantity;
 pub use running_range::{FirstWindow, RunningRange};
 pub use stream::Stream;
 pub use tare::{Tare, TareBuilder, Zeroing};
+pub(crate) use touch_ends::duration_us;
 
 use encoding::Encoding;
 use side_by_side::SideBySide;
@@ -114,9 +115,31 @@ encoders! {
     local_load: LocalLoad,
     /// The area and force of a touch, and the displacement of its centre.
     moments: Moments,
+    /// The largest deviation of a taxel in units of its own noise.
+    peak: Peak,
+    /// How long a touch lasted and how large it was, when it ends.
+    touch_ends: TouchEnds,
 }
 
 impl Encoder {
+    /// The train with the duration of each touch as it ends; `None` of encoders that do not wait for that.
+    pub(crate) fn duration_train(&self, array: &Array) -> Option<usize> {
+        match self {
+            Self::TouchEnds(_) => Some(touch_ends::DURATION),
+            Self::Composite(encoder) => {
+                let mut first = 0;
+                for part in encoder.parts.values() {
+                    if let Some(train) = part.duration_train(array) {
+                        return Some(first + train);
+                    }
+                    first += part.trains(array) * part.kind().inputs_per_train();
+                }
+                None
+            }
+            _ => None,
+        }
+    }
+
     /// Parses an encoder from JSON and checks every parameter; missing parameters have their defaults.
     ///
     /// # Errors

@@ -100,6 +100,7 @@ fn readout_of(encoder: &str, cell: TrainedNeuron) -> Readout {
         time: Time::Continuous,
         after_spike: cell.neuron.after_spike,
         run_threshold: 1.0,
+        pads: false,
         delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), cell)].into(),
         seen: BTreeMap::new(),

@@ -150,6 +150,7 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         time: Time::Continuous,
         after_spike: cell.neuron.after_spike,
         run_threshold: 1.0,
+        pads: false,
         delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), cell)].into(),
         seen: BTreeMap::new(),

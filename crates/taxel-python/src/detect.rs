@@ -322,6 +322,11 @@ impl LoadCurve {
     fn at_age<'py>(&self, py: Python<'py>, age_ms: f64) -> PyResult<DecisionsOut<'py>> {
         Ok(from_decisions(py, &enter(py, |_| self.0.at_age(age_ms))?))
     }
+
+    /// Every touch as it ends, with its duration, ms.
+    fn at_end<'py>(&self, py: Python<'py>) -> PyResult<DecisionsOut<'py>> {
+        Ok(from_decisions(py, &enter(py, |_| self.0.at_end())?))
+    }
 }
 
 fn to_quantity(name: &str) -> PyResult<Quantity> {

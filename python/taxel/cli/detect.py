@@ -86,6 +86,8 @@ def detect(
             say(each.outcome.outside_text)
     if found.score is not None:
         say("", f"against {truth} (window {window_ms:g} ms):", *repr(found.score).split("\n"))
+        for label, sources in found.unlabelled.items():
+            say(f"not scored, as no row of {truth} names it: {label} of {', '.join(sources)}")
         if found.not_scored:
             say(f"not scored, as the readout has {', '.join(loaded.labels)}: {', '.join(found.not_scored)}")
     for name, path in files_written.items():

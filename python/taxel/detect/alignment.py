@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from taxel._base.arguments import integer
 from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
-from taxel.detect.ages import Ages, onsets
+from taxel.detect.ages import Ages, EndedTouches, onsets
 from taxel.detect.followed import off_ms, one_after_another
 from taxel.detect.scoring import Score, score
 from taxel.detections import Detections
-from taxel.spikes import SpikeTrains, to_us
+from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: How far from its label an input spike may lie, either way, ms.
 WINDOW_MS = 50.0
@@ -105,6 +105,9 @@ def align(
     given: Sequence[NDArray[np.int64]],
     latency_ms: float,
     ages: Ages | None = None,
+    duration: int | None = None,
+    *,
+    alone: bool = False,
 ) -> Alignment:
     """Return by how much the labels of one name move to what the sensor felt, which is chosen over all patterns.
 
@@ -122,6 +125,12 @@ def align(
     latency_ms : float, ms
     ages : Ages, optional
         The trains of ages, if there are any.
+    duration : int, optional
+        The train with the duration of each touch as it ends, if there is one: then the begins of these touches alone
+        are compared with the labels.
+    alone : bool
+        Whether the train is to tell the labels alone, of trains that are levels of one quantity: then it is the middle
+        one of those with the fewest missed and false, which is farthest from noise and from what weaker events reach.
 
     Returns
     -------
@@ -144,11 +153,14 @@ def align(
     }
     if ages is not None:
         candidates[ages.trains[0]] = [onsets(pattern, ages) for pattern in patterns]
+    if duration is not None:
+        begins = [to_ms(EndedTouches.from_trains(pattern, duration).begin) + latency_ms for pattern in patterns]
+        candidates = {duration: begins}
     scores = {}
     for train, spikes in candidates.items():
         fired = one_after_another([np.rint(to_us(ms - latency_ms)).astype(np.int64) for ms in spikes], patterns)
         scores[train] = score(Detections([label] * len(fired), fired, fired), {label: truth}, WINDOW_MS)
-    best = _best(scores, len(truth))
+    best = _middle(scores) if alone else _best(scores, len(truth))
     return align_by(label, given, None if best is None else (best, scores[best]))
 
 
@@ -169,6 +181,13 @@ def align_by(label: str, given: Sequence[NDArray[np.int64]], by: tuple[int, Scor
     (train, found), moved = by, np.full(len(example), np.nan)
     moved[found.pairs[:, 1]] = found.errors_ms
     return Alignment(label, train, example, np.concatenate([*given]), moved)
+
+
+def _middle(scores: Mapping[int, Score]) -> int | None:
+    """Return the middle one of the trains with the fewest missed and false; None where it has no spike near a label."""
+    least = min((score.rank[0] for score in scores.values()), default=0)
+    equal = sorted(train for train, score in scores.items() if score.rank[0] == least and score.found)
+    return equal[(len(equal) - 1) // 2] if equal else None
 
 
 def _best(scores: Mapping[int, Score], labels: int) -> int | None:

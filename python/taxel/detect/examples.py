@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taxel._base.arguments import column, instance, shown, text
+from taxel._base.arguments import column, instance, several, shown, text
 from taxel._base.errors import refused
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
@@ -41,6 +41,8 @@ class Example(NamedTuple):
         Examples of one group, as the two feet of a walk, share a fold; "": the example is alone.
     name : str
         What errors call it; "": a recording's title, else its number ("example 3").
+    unlabelled : sequence of str
+        The labels of which it is not known when they happened: it is neither trained nor scored for those.
 
     Raises
     ------
@@ -58,6 +60,13 @@ class Example(NamedTuple):
     tare: Tare | None = None
     group: str = ""
     name: str = ""
+    unlabelled: Sequence[str] = ()
+
+    def _known(self, found: Detections) -> Detections:
+        """Return those of some detections of which its labels say whether they are right."""
+        if not self.unlabelled:
+            return found
+        return found[np.array([label not in self.unlabelled for label in found.label], np.bool_)]
 
 
 def name_of(k: int, example: Example) -> str:
@@ -114,7 +123,7 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
         raise refused("examples", f" is {shown(examples)}: must be one Example or more")
     sound = []
     for k, example in enumerate(examples):
-        is_example = isinstance(example, tuple) and len(example) in (2, 3, 4, 5)
+        is_example = isinstance(example, tuple) and len(example) in (2, 3, 4, 5, 6)
         source = recorded(example[0]) if is_example else None
         if not isinstance(source, Events | Frames | SpikeTrains):
             raise ProblemError(
@@ -122,16 +131,48 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
                 "and labels"
             )
         _, labels, *rest = example
-        optional: list[Any] = [None, "", ""]
+        optional: list[Any] = [None, "", "", ()]
         optional[: len(rest)] = rest
-        tare, group, name = optional
+        tare, group, name, unlabelled = optional
         name = text(f"example {k}: name", name) or str(getattr(example[0], "title", f"example {k}"))
         if not isinstance(labels, Mapping):
             raise ProblemError(f"{name}: labels is {shown(labels)}: must be times (us) by label")
         times = {text("label", label): column(f"labels[{label!r}]", t, np.int64, "us") for label, t in labels.items()}
         tare = None if tare is None else instance(f"{name}: tare", tare, Tare)
-        sound.append(Example(source, times, tare, text(f"{name}: group", group), name))
-    return sound
+        without = tuple(text(f"{name}: unlabelled", label) for label in several(f"{name}: unlabelled", unlabelled))
+        if both := [label for label in without if label in times]:
+            raise ProblemError(f"{name}: unlabelled has {shown(both[0])}, of which there are labels")
+        sound.append(Example(source, times, tare, text(f"{name}: group", group), name, without))
+    return _padded(sound)
+
+
+def sizes_of(examples: Sequence[Example]) -> list[tuple[int, int]]:
+    """Return the rows and columns of frames of grids of several sizes, ascending; none where they cannot be padded."""
+    sources = [recorded(example.source) for example in examples]
+    if not all(isinstance(source, Frames) and source.array._is_whole_grid for source in sources):
+        return []
+    shapes = sorted({source.array.shape for source in sources})  # type: ignore[union-attr]
+    return shapes if len(shapes) > 1 else []
+
+
+def _padded(examples: list[Example]) -> list[Example]:
+    """Return examples of grids of several sizes padded at their far edges to the largest; all others as they are.
+
+    A taxel beyond an edge reads 0, and has no rest in a tare, so that it counts nowhere.
+    """
+    shapes = sizes_of(examples)
+    if not shapes:
+        return examples
+    rows, columns = (max(sizes) for sizes in zip(*shapes, strict=True))
+    padded = []
+    for example in examples:
+        source, tare = example.source, example.tare
+        assert isinstance(source, Frames)
+        array = source.array._padded((rows, columns))
+        beyond = [(0, 0), (0, rows - source.array.rows), (0, columns - source.array.columns)]
+        values = Frames(np.pad(source.values, beyond), source.t, unit=source.unit, array=array)
+        padded.append(example._replace(source=values, tare=None if tare is None else tare._padded_to(array)))
+    return padded
 
 
 def array_of(examples: Sequence[Example]) -> Array | None:

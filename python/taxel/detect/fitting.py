@@ -19,17 +19,27 @@ from taxel._base.progress import Progress, reporting
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_frames, later_us, silent_windows
+from taxel.detect.ages import (
+    ACTS_AFTER_MS,
+    Ages,
+    EndedTouches,
+    ages_of,
+    duration_train,
+    in_frames,
+    later_us,
+    silent_windows,
+)
 from taxel.detect.alignment import Alignment, align, align_by
-from taxel.detect.examples import Example, array_of, check_examples, name_of, unit_of
+from taxel.detect.examples import Example, array_of, check_examples, name_of, sizes_of, unit_of
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
-from taxel.detect.loads import clock_of
+from taxel.detect.levels import fit_levels
+from taxel.detect.loads import clock_of, lacks_neighbours
 from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import score_together
 from taxel.detect.seen import seen
 from taxel.detections import Detections
-from taxel.encode import Composite, LocalLoad
+from taxel.encode import Composite, Encoder, LocalLoad
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -68,12 +78,15 @@ class Trained(NamedTuple):
     readout : Readout
     alignments : mapping of str to Alignment
         By how much its labels were moved to what the sensor felt, by label; empty where the recipe does not align them.
+    fitted_levels : bool
+        Whether the encoder's levels are of the training data (`Recipe`).
     """
 
     recipe: Recipe
     learners: Mapping[str, ConeR]
     readout: Readout
     alignments: Mapping[str, Alignment]
+    fitted_levels: bool = False
 
 
 def fit(
@@ -126,17 +139,26 @@ def fit_aligned(examples: Sequence[Example], recipe: Recipe, progress: Progress 
     sound, clocks = check_examples(examples), [clock_of(example) for example in examples]
     report = reporting(progress)
     recipe = in_frames(instance("recipe", recipe, Recipe), sound, clocks)
+    stated = recipe.encoder
+    recipe = fit_levels(recipe, sound, [(k, -np.inf, np.inf) for k in range(len(sound))])
     possibly = possible(recipe, sound)
     unit = unit_of(sound)
     trained = learn(EncodedExamples(sound, possibly, report), possibly, array_of(sound), report)
-    return trained._replace(recipe=recipe._at(trained.recipe.neurons), readout=trained.readout._with(unit=unit))
+    return trained._replace(
+        recipe=recipe._at(trained.recipe.neurons),
+        readout=trained.readout._with(unit=unit, pads=len(sizes_of(examples)) > 0),
+        fitted_levels=recipe.encoder != stated,
+    )
 
 
 def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
     """Return the recipe without the points to choose from that (checked) examples do not allow.
 
-    The local load requires a tare.
+    The local load requires a tare; channels have no neighbours, so that only encoders that need none remain.
     """
+    if lacks_neighbours(examples) and isinstance(recipe.encoder, Composite):
+        near = {name for name, part in recipe.encoder.parts.items() if part._needs_neighbours}
+        recipe = recipe._without_parts(near)
     return recipe._without_choices(LocalLoad.name) if any(example.tare is None for example in examples) else recipe
 
 
@@ -217,7 +239,8 @@ def learn(examples: EncodedExamples, recipe: Recipe, array: Array | None, report
         _, fitting, learners[label], points[label], _ = _best(examples, recipe, label, array, report)
         delays[label], ranges[label] = fitting.delay_ms, fitting.seen(learners[label])
         if fitting.alignment is not None:
-            alignments[label] = fitting.alignment
+            of_all = np.array(fitting.places)[fitting.alignment.example]
+            alignments[label] = replace(fitting.alignment, example=of_all)
     plan = replace(recipe, neurons=points) if recipe.neurons else recipe
     return Trained(plan, learners, readout_of(learners, delays, plan, array)._with(seen=ranges), alignments)
 
@@ -268,8 +291,9 @@ def _best(examples: EncodedExamples, recipe: Recipe, label: str, array: Array | 
         if wrong < fewer:
             continue
         others = []
-        followed = recipe._received({**recipe.learner, **point})._quantities()
-        for rank in range(_FOLLOWED if followed else 1):
+        received = recipe._received({**recipe.learner, **point})
+        several = received._quantities() or duration_train(received, array) is not None
+        for rank in range(_FOLLOWED if several else 1):
             with contextlib.suppress(ProblemError):
                 others.append(fitted(point, rank))
         second = min(others, key=lambda fit: fit.wrong, default=None)
@@ -298,8 +322,9 @@ def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, 
 class Fitting:
     """The rows of one label's learner on encoded examples, for a recipe and all others that need the same.
 
-    Of an encoder with quantities that labels may follow it has those of one alone: the best, or `place` behind it.
-    Which follow the labels is `known` from other fits to the same examples, and is added to it.
+    Of an encoder with quantities that labels may follow it has those of one alone: the best, or the one `rank` behind
+    it. Of one of touches as they end it has first the duration alone, then all. Which follow the labels is `known` from
+    other fits to the same examples, and is added to it.
 
     Raises
     ------
@@ -317,9 +342,12 @@ class Fitting:
         known: Known | None = None,
     ) -> None:
         self._label, self._needs = label, rows_of(recipe, label)
+        #: The places of the examples that say when the label happened; the others are left out.
+        self.places = [k for k, example in enumerate(examples) if label not in example.unlabelled]
+        examples = [examples[k] for k in self.places]
         learner, delay_ms = recipe.learner_of(label)
         received = recipe._received(recipe._of(label))
-        ages = ages_of(received, array)
+        ages, self._duration = ages_of(received, array), duration_train(received, array)
         #: How much later than the event the neuron is trained to fire, ms, the encoder's latency apart. Where an age of
         #: the touch begins then it is later: a spike at that age acts after its time, or at once where the potential
         #: jumps.
@@ -327,8 +355,7 @@ class Fitting:
         acts_after_ms = ACTS_AFTER_MS if neuron.kernel == "exponential" else neuron.step_ms
         self.delay_ms = delay_ms + (0.0 if ages is None else acts_after_ms)
         label_times = self._label_times = [_times(k, example, label) for k, example in enumerate(examples)]
-        count = sum(map(len, label_times))
-        if not count:
+        if not (count := sum(map(len, label_times))):
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
         sources = [_inputs(k, example, recipe, label, array) for k, example in enumerate(examples)]
         self._graded = received.kind == "graded"
@@ -337,8 +364,7 @@ class Fitting:
         self.alignment: Alignment | None = None
         if quantities:
             known = {} if known is None else known
-            inputs = recipe.inputs_of(label)
-            if inputs not in known:
+            if (inputs := recipe.inputs_of(label)) not in known:
                 known[inputs] = follow(sources, label, label_times, received.latency_ms, list(quantities))
             followers = known[inputs]
             if len(followers) <= rank and rank:
@@ -346,20 +372,18 @@ class Fitting:
             followed = followers[rank] if followers else None
             self.alignment = align_by(label, label_times, followed and (followed.train, followed.score))
         elif recipe.align:
-            self.alignment = align(sources, label, label_times, received.latency_ms, ages)
+            how = received.latency_ms, ages, self._duration
+            self.alignment = align(sources, label, label_times, *how, alone=_learns_one(received))
         self._names = [name_of(k, example) for k, example in enumerate(examples)]
-        self._sources = (
-            sources if followed is None else [only(trains_of, quantities[followed.train]) for trains_of in sources]
-        )
+        self._sources = self._received(sources, received, quantities, followed, rank)
         felt = label_times if self.alignment is None else [self.alignment.felt(k) for k in range(len(label_times))]
         for name, times in zip(self._names, felt, strict=True):
             self._check_apart(name, times, neuron.refractory)
-        later = [np.zeros(len(times), np.int64) for times in felt]
-        if ages is not None and self.alignment is not None and self.alignment.train == ages.trains[0]:
-            later = [later_us(source, ages, to_ms(t), delay_ms) for source, t in zip(sources, felt, strict=True)]
+        later = self._later(sources, felt, ages, delay_ms)
         shift_ms = received.latency_ms + self.delay_ms
         self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
-        self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
+        if self._duration is None:
+            self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
         self._shift_ms = received.latency_ms + self.delay_ms
         lasting = self._until_targets(self._sources)
         trains = lasting if self._graded or self.alignment is None else self._until_targets(distinct(self._sources))
@@ -372,6 +396,43 @@ class Fitting:
         except ProblemError as error:
             raise ProblemError(f"{label}: {error}") from None
         self._before: ConeR | None = None
+
+    def _received(
+        self,
+        sources: Sequence[SpikeTrains],
+        received: Encoder,
+        quantities: Mapping[int, Sequence[int]],
+        followed: Followed | None,
+        rank: int,
+    ) -> list[SpikeTrains]:
+        """Return the trains that the neuron learns from, of those that it receives."""
+        if followed is not None:
+            return [only(trains_of, quantities[followed.train]) for trains_of in sources]
+        if self._duration is not None and rank == 0:
+            # Beside the duration the last train alone, which is 1: how large touches are may be learnt by heart.
+            return [only(trains_of, [self._duration, len(trains_of) - 1]) for trains_of in sources]
+        train = None if self.alignment is None else self.alignment.train
+        if train is not None and _learns_one(received):
+            return [only(trains_of, [train]) for trains_of in sources]
+        return list(sources)
+
+    def _later(
+        self,
+        sources: Sequence[SpikeTrains],
+        felt: Sequence[NDArray[np.int64]],
+        ages: Ages | None,
+        delay_ms: float,
+    ) -> list[NDArray[np.int64]]:
+        """Return how much later than the trained delay after what was felt each target is, us."""
+        if self._duration is not None:
+            if self.alignment is None or self.alignment.train is None:
+                raise ProblemError(
+                    f"{self._label}: no touch that ended begins near its labels, to which they must be aligned"
+                )
+            return [_lasted(source, self._duration, times) for source, times in zip(sources, felt, strict=True)]
+        if ages is not None and self.alignment is not None and self.alignment.train == ages.trains[0]:
+            return [later_us(source, ages, to_ms(t), delay_ms) for source, t in zip(sources, felt, strict=True)]
+        return [np.zeros(len(times), np.int64) for times in felt]
 
     def _until_targets(self, sources: Sequence[SpikeTrains]) -> list[SpikeTrains]:
         """Return trains with an end after the last target, which may come after the last spike."""
@@ -431,6 +492,8 @@ class Fitting:
         found, truths = [], []
         for source, times in zip(self._sources, self._label_times, strict=True):
             t = np.rint(to_us(neuron.run(cone.weights_, source) - self._shift_ms)).astype(np.int64)
+            if self._duration is not None:
+                t = EndedTouches.from_trains(source, self._duration).begin_of(t)
             found.append(Detections([self._label] * len(t), t, t))
             truths.append({self._label: times})
         return score_together(found, truths, FOLLOWED_MS).rank[0]
@@ -454,6 +517,17 @@ class Fitting:
         for text_of in _remarks(cone, self._targets, self._names, self._shift_ms, begins, caught):
             warn(f"{self._label}: {text_of}", stacklevel=5)
         return cone
+
+
+def _learns_one(encoder: Encoder) -> bool:
+    """Whether a neuron learns from one of an encoder's trains alone."""
+    return all(part._learns_one for part in encoder._each())
+
+
+def _lasted(source: SpikeTrains, duration: int, felt: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return how long the touches last that began at some times, us."""
+    touches = EndedTouches.from_trains(source, duration)
+    return touches.lasted[touches.beginning_near(felt)] if len(felt) else np.zeros(0, np.int64)
 
 
 def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:

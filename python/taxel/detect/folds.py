@@ -32,6 +32,7 @@ from taxel.detect.fitting import (
     readout_of,
     rows_of,
 )
+from taxel.detect.levels import fit_levels
 from taxel.detect.loads import Clock, clock_of
 from taxel.detect.plain_score import PlainScore, floor_of, plain_score
 from taxel.detect.readout import Readout, run
@@ -179,15 +180,18 @@ def judge(
     trained = []
     for n, fold in enumerate(ways):
         report(f"fold {n + 1} of {len(ways)}", n, len(ways))
-        plan = recipe
+        plan = fit_levels(recipe, examples, fold.train)
+        encoded = patterns
+        if plan is not recipe:
+            encoded = EncodedExamples(examples, plan, report, search=search)
         if search:
             inner = fold.inner or INNER
-            chosen = _choose(examples, patterns.patterns, patterns.plan, inner, fold.train, window, clocks, report)
-            plan = replace(recipe, neurons=chosen.neurons)
+            chosen = _choose(examples, encoded.patterns, encoded.plan, inner, fold.train, window, clocks, report)
+            plan = replace(plan, neurons=chosen.neurons)
         with collected():  # a readout that is only scored: the score shows what it misses
             parts_of = partial(_parts_of, fold.train)
-            trained_fold = learn(patterns.part(parts_of), plan, array, report)
-        of_fold = replace(recipe_in_frames, neurons=plan.neurons)._at(trained_fold.recipe.neurons)
+            trained_fold = learn(encoded.part(parts_of), plan, array, report)
+        of_fold = replace(recipe_in_frames, encoder=plan.encoder, neurons=plan.neurons)._at(trained_fold.recipe.neurons)
         trained.append(trained_fold._replace(recipe=of_fold, readout=trained_fold.readout._with(unit=unit)))
         for part in fold.test:
             detections.setdefault(part.example, []).append(_detect(trained[-1].readout, examples, part, clocks))
@@ -263,6 +267,7 @@ def choose(
     recipe = in_frames(instance("recipe", recipe, Recipe), examples, clocks)
     report = reporting(progress)
     parts = [Part(n) for n in range(len(examples))]
+    recipe = fit_levels(recipe, examples, parts)
     ways = integer("k", k, 2, 2**31) if isinstance(k, int | np.integer) else _folds(examples, k)[0]
     narrowed = recipe._narrowed(recipe._labels(examples), search=True)
     chosen = _choose(
@@ -372,7 +377,7 @@ def _read(examples: Sequence[Example], patterns: Sequence[Example], readout: Rea
 def _detect(readout: Readout, examples: Sequence[Example], part: Part, clocks: Sequence[Clock]) -> Detections:
     example, (frame_us, version) = examples[part.example], clocks[part.example]
     detections = run(readout, example.source, tare=example.tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
-    return detections[(detections.t >= part.start) & (detections.t < part.stop)]
+    return example._known(detections[(detections.t >= part.start) & (detections.t < part.stop)])
 
 
 def _of(part: Part, patterns: Sequence[Example]) -> Example:

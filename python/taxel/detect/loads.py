@@ -58,11 +58,12 @@ class Loads:
         clocks: Sequence[Clock],
         noise_floor: float,
         report: Progress,
-        quantities: Sequence[str] = ("area", "total", "local_load"),
+        quantities: Sequence[str] | None = None,
     ) -> None:
         self.noise_floor, self.unit = noise_floor, unit_of(examples)
         self.names = sorted({name for example in examples for name in example.labels})
         self._labels = [{name: np.sort(times) for name, times in example.labels.items()} for example in examples]
+        self._unlabelled = [frozenset(example.unlabelled) for example in examples]
         self.whole_examples: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
         self._shift = [k * APART_US - _first(example) for k, example in enumerate(examples)]
         self._frame_ms = max(map(frame_ms, examples))
@@ -70,6 +71,9 @@ class Loads:
         self._changes: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
         self._edges: dict[tuple[str, float, float, int], tuple[FoundTimes, FoundTimes]] = {}
         self._ages: dict[float, FoundTimes] = {}
+        if quantities is None:
+            # The others need neighbours.
+            quantities = ("peak",) if lacks_neighbours(examples) else ("area", "total", "local_load", "peak")
         for quantity in quantities:
             report(f"measuring the {quantity.replace('_', ' ')} for plain rules", 0, 0)
             self._curves[quantity] = [
@@ -108,6 +112,10 @@ class Loads:
             self._ages[age_ms] = self._together([curve.at_age(age_ms) for curve in self._curves["area"]])
         return self._ages[age_ms]
 
+    def at_end(self) -> FoundTimes:
+        """Return how long every touch lasted, ms, when it ended."""
+        return self._together([curve.at_end() for curve in self._curves["area"]])
+
     def values(self, quantity: str, parts: Iterable[Stretch]) -> NDArray[np.float64]:
         """Return what a quantity is after each of its changes in parts of the examples."""
         if quantity not in self._changes:
@@ -123,6 +131,11 @@ class Loads:
         by_example = [self._labels[k].get(name, np.empty(0, np.int64)) + shift for k, shift in enumerate(self._shift)]
         times = np.concatenate(by_example)
         return FoundTimes(times, times, np.zeros(len(times))).between(self.windows(parts)).t
+
+    def labelled(self, names: Iterable[str], parts: Iterable[Stretch]) -> list[Stretch]:
+        """Return the parts of which it is known when each of some labels happened."""
+        each = frozenset(names)
+        return [part for part in parts if not each & self._unlabelled[part[0]]]
 
     def windows(self, parts: Iterable[Stretch]) -> list[tuple[int, int]]:
         """Return from when to when parts of the examples last on the one clock, us, ascending."""
@@ -149,9 +162,9 @@ class Loads:
 
 
 def lacks_neighbours(examples: Sequence[Example]) -> bool:
-    """Whether an example is of channels: their taxels have no known neighbours, and rules count those beside one."""
-    sensed = [example.source for example in examples if not isinstance(example.source, SpikeTrains)]
-    return any(not source.array._has_neighbours for source in sensed)  # type: ignore[union-attr]
+    """Whether taxels of an example have no known neighbours, as channels and a single taxel."""
+    arrays = [example.source.array for example in examples if not isinstance(example.source, SpikeTrains)]  # type: ignore[union-attr]
+    return any(array.taxels < 2 or not array._has_neighbours for array in arrays)
 
 
 def frame_ms(example: Example) -> float:

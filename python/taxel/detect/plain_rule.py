@@ -27,20 +27,24 @@ class PlainRule(_Detector):
     With `age_ms` it decides once a touch between two kinds, by the quantity at that age. A touch begins with the first
     frame in which 2 taxels or more are loaded and ends with the first in which fewer are; `t` is its begin, and `known`
     the end of the frame that holds at the age. A touch that is over by then is decided by what the quantity is then.
+    With the age "end" it decides when the touch ends, by the quantity "duration"; `known` is the end of the frame in
+    which it ends. A touch that has not ended is not decided.
 
     Parameters
     ----------
-    quantity : {"area", "total", "local_load"}
+    quantity : {"area", "total", "local_load", "peak", "duration"}
         The number of loaded taxels, as `taxel.encode.ContactArea` counts them; the sum of their values above rest in
-        the sensor's unit, as `taxel.encode.Moments` adds them; or the largest sum over 3 x 3 taxels above a rest that
-        follows the sensor, in units of its noise, as of `taxel.encode.LocalLoad` ("largest"). In single precision.
+        the sensor's unit, as `taxel.encode.Moments` adds them; the largest sum over 3 x 3 taxels above a rest that
+        follows the sensor, in units of its noise, as of `taxel.encode.LocalLoad` ("largest"); the largest value of a
+        taxel above such a rest, in units of its own noise, with what several add, as of `taxel.encode.Peak`; or how
+        long a touch lasts, with the age "end". In single precision.
     threshold : float, above 0
-        Number of taxels, the sensor's unit, or units of noise.
+        Number of taxels, the sensor's unit, units of noise, or ms.
     release : float, above 0, at most 1
         The part of the threshold below which the load ends. 1 with `age_ms`.
     frames : int, from 1 to 1 000 000
         How many frames in a row decide. 1 with `age_ms`.
-    age_ms : float, ms, from 0 to 60 000, optional
+    age_ms : float, ms, from 0 to 60 000, or "end", optional
         The age of a touch at which it decides.
     labels : (str or None, str or None), optional
         Names of onset and end, default "contact" and "lift"; with `age_ms` of the kinds below the threshold and not
@@ -55,7 +59,7 @@ class PlainRule(_Detector):
     Raises
     ------
     ProblemError : parameters that are invalid or do not fit together (names the parameter); when it runs, channels, of
-        which no taxel is known to have neighbours
+        which no taxel is known to have neighbours, except by peak
 
     Notes
     -----
@@ -85,14 +89,14 @@ class PlainRule(_Detector):
         threshold: float,
         release: float = 1.0,
         frames: int = 1,
-        age_ms: float | None = None,
+        age_ms: float | str | None = None,
         *,
         labels: Sequence[str | None] | None = None,
         noise_floor: float = 3.0,
         unit: str | None = None,
         tare: Tare | None = None,
     ) -> None:
-        age = None if age_ms is None else number("age_ms", age_ms, "ms")
+        age = age_ms if age_ms is None or age_ms == "end" else number("age_ms", age_ms, "ms")
         self._hold(
             _core.make_plain_rule(
                 parameters(
@@ -117,12 +121,12 @@ class PlainRule(_Detector):
 
     @property
     def quantity(self) -> str:
-        """What is compared with the threshold: "area", "total" or "local_load"."""
+        """What is compared with the threshold: "area", "total", "local_load", "peak" or "duration"."""
         return str(self._parts["quantity"])
 
     @property
     def threshold(self) -> float:
-        """The threshold: number of taxels, the sensor's unit, or units of noise."""
+        """The threshold: number of taxels, the sensor's unit, units of noise, or ms."""
         return float(self._parts["threshold"])
 
     @property
@@ -136,10 +140,10 @@ class PlainRule(_Detector):
         return int(self._parts["frames"])
 
     @property
-    def age_ms(self) -> float | None:
-        """The age of a touch at which it decides, ms; None where it reports onset and end."""
-        age = self._parts["age_ms"]
-        return None if age is None else float(age)
+    def age_ms(self) -> float | str | None:
+        """The age of a touch at which it decides, ms, or "end"; None where it reports onset and end."""
+        age: float | str | None = self._parts["age_ms"]
+        return age
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -172,7 +176,8 @@ class PlainRule(_Detector):
         frames = "1 frame" if self.frames == 1 else f"{self.frames} frames"
         if self.age_ms is not None:
             kinds = f"below it {first}, else {second}".replace("None", "nothing")
-            return escaped(f"PlainRule({self.quantity} {self.threshold:g} at {self.age_ms:g} ms: {kinds})")
+            when = "the end" if self.age_ms == "end" else f"{self.age_ms:g} ms"
+            return escaped(f"PlainRule({self.quantity} {self.threshold:g} at {when}: {kinds})")
         found = ", ".join(f"{name} {label}" for name, label in (("onset", first), ("end", second)) if label is not None)
         return escaped(f"PlainRule({self.quantity} >= {self.threshold:g}, release {self.release:g}, {frames}: {found})")
 
@@ -181,11 +186,12 @@ class PlainRule(_Detector):
         if self.age_ms is not None:
             below, above = (label or "nothing" for label in self._parts["labels"])
             kinds = f"below {self.threshold:.3g} {below}, from there on {above}"
-            return f"one rule for both kinds, the {self.quantity} {self.age_ms:g} ms after the onset: {kinds}"
+            when = "of the touch, when it ends" if self.age_ms == "end" else f"{self.age_ms:g} ms after the onset"
+            return f"one rule for both kinds, the {self.quantity} {when}: {kinds}"
         return repr(self).removeprefix("PlainRule(").rpartition(": ")[0]
 
 
-def _labels(labels: object, age: float | None) -> list[str | None]:
+def _labels(labels: object, age: float | str | None) -> list[str | None]:
     """Return the two labels, of which either may be None."""
     if labels is None:
         if age is not None:

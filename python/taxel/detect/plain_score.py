@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import instance
 from taxel._base.progress import Progress
 from taxel.detect.examples import Example, name_of
-from taxel.detect.loads import Clock, Loads, Stretch, lacks_neighbours
+from taxel.detect.loads import Clock, Loads, Stretch
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.scoring import Score, score_together
 from taxel.detect.tuning import best_rules
@@ -169,8 +169,6 @@ def plain_score(
     if lacking:
         why = f"{name_of(lacking[0], examples[lacking[0]])} has no tare" if len(examples) > 1 else "there is no tare"
         return PlainScore(dict.fromkeys(labels), None, f"{why} to measure a load from")
-    if lacks_neighbours(examples):
-        return PlainScore(dict.fromkeys(labels), None, "plain rules need neighbours on a grid, and these are channels")
     loads = Loads(examples, clocks, noise_floor, report)
     report("tuning plain rules", 0, 0)
     rules = best_rules(loads, labels, loads.whole_examples, window_ms)
@@ -189,10 +187,12 @@ def _detect(loads: Loads, rules: Mapping[str, PlainRule | None], part: Stretch) 
     """Return what the rule of each label detects of it in a part of an example."""
     detections = Detections([], [], [])
     for label, rule in rules.items():
-        if rule is None:
+        if rule is None or not loads.labelled([label], [part]):
             continue
         label_index = rule._parts["labels"].index(label)
-        if rule.age_ms is None:
+        if isinstance(rule.age_ms, str):
+            edges = loads.at_end()
+        elif rule.age_ms is None:
             edges = loads.edges(rule.quantity, rule.threshold, rule.release, rule.frames)[label_index]
         else:
             edges = loads.at_age(rule.age_ms)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -56,6 +56,9 @@ class Recipe:
         is when the sensor felt the event. For labels that one input follows each time, as it does contact and lift;
         labels that say of which kind a touch is have none, so recipes for them leave it off. Scores are against the
         labels as given.
+    fit_levels : bool
+        Whether an encoder with levels in the sensor's unit (`LevelCrossing`, `ThresholdIzhikevich`) gets others from
+        the training data, where fewer than two of its own lie within what loaded taxels of frames read there.
 
     Raises
     ------
@@ -77,6 +80,7 @@ class Recipe:
     about: str = ""
     source: str = ""
     align: bool = False
+    fit_levels: bool = False
 
     def __post_init__(self) -> None:
         instance("encoder", self.encoder, Encoder)
@@ -85,6 +89,7 @@ class Recipe:
         text("about", self.about)
         text("source", self.source)
         flag("align", self.align)
+        flag("fit_levels", self.fit_levels)
         if not isinstance(self.neurons, Mapping):
             raise refused("neurons", f" is {shown(self.neurons)}: must be parameters by label")
         learner_from("learner", self.learner)
@@ -251,6 +256,25 @@ class Recipe:
 
         return replace(self, neurons={label: left(label, neuron) for label, neuron in self.neurons.items()})
 
+    def _without_parts(self, names: Collection[str]) -> Recipe:
+        """Return the recipe without some parts of a composite encoder, and without the points that receive any of them.
+
+        Of a neuron whose first point is among these the next one is the first; one without any other keeps it.
+        """
+        if not isinstance(self.encoder, Composite) or not names:
+            return self
+        parts = self.encoder.parts
+
+        def left(label: str) -> dict[str, Any]:
+            points = self._points(label, "choose")
+            kept = [point for point in points if not set(names) & set(point.get("inputs", parts))]
+            if len(kept) == len(points) or not kept:
+                return dict(self.neurons[label])
+            first, *others = ({key: value for key, value in point.items() if key != "fewer"} for point in kept)
+            return {**first, **({"choose": others} if others else {})}
+
+        return replace(self, neurons={label: left(label) for label in self.neurons})
+
     def _labels(self, examples: Sequence[Example]) -> tuple[str, ...]:
         """Return the labels that are learnt: the recipe's, or where it has none those of the examples."""
         return tuple(self.neurons) or tuple(sorted({label for example in examples for label in example.labels}))
@@ -339,6 +363,10 @@ class Recipe:
         if labels is not None:
             values = recipes.for_labels(values, several("labels", labels))
         values = change_values(values, {} if changes is None else changes)
+        if any(key in ("encoder.name", "encoder.levels") for key in changes or {}) and "fit_levels" not in (
+            changes or {}
+        ):
+            values["fit_levels"] = False  # levels that a user states stay
         return cls.from_dict(values if noise_floor is None else with_floor(values, noise_floor))
 
 

@@ -244,8 +244,8 @@ def score_together(
         Detections._of(list(f.label), f.t + by, f.known + by, f.slope) for f, by in zip(detections, later, strict=True)
     ]
     happened = {
-        label: np.concatenate([truth[label] + by for truth, by in zip(truths, later, strict=True)])
-        for label in truths[0]
+        label: np.concatenate([truth[label] + by for truth, by in zip(truths, later, strict=True) if label in truth])
+        for label in dict.fromkeys(label for truth in truths for label in truth)
     }
     return score(reduce(add, moved), happened, window_ms)
 

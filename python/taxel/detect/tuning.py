@@ -23,6 +23,8 @@ AREAS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 QUANTILES = tuple(np.linspace(0.0, 0.95, 20).tolist())
 #: Thresholds of the local load, units of noise.
 LOCAL_LOADS = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
+#: Thresholds of the peak, units of noise.
+PEAKS = (4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0, 32.0, 48.0)
 #: Parts of the threshold below which a load ends.
 RELEASES = (0.5, 1.0)
 #: How many frames in a row decide.
@@ -59,12 +61,12 @@ def tune(
 
     Nearest at the median of `known`, before the label as after it: what is known earlier responds to something else.
 
-    Tried are all thresholds of the area (`AREAS`), of the total (`QUANTILES` of its values above 0) and of the local
-    load (`LOCAL_LOADS`), with all numbers of frames (`FRAMES`) and
-    releases (`RELEASES`), at the onset and at the end of a load. Two labels are kinds
-    where exactly two are nearer to onsets than to ends, or where there are only two: then thresholds of the area at
-    each of `AGES_MS` are tried too, on a logarithmic scale, and hold for both where they are better for both together.
-    Of frames each counts once that holds at one of these ages.
+    Tried are all thresholds of the area (`AREAS`), of the total (`QUANTILES` of its values above 0), of the local load
+    (`LOCAL_LOADS`) and of the peak (`PEAKS`), with all numbers of frames (`FRAMES`) and releases (`RELEASES`), at the
+    onset and at the end of a load; of channels the peak alone. Two labels are kinds where exactly two are nearer to
+    onsets than to ends, or where there are only two: then thresholds of the area at each of `AGES_MS` are tried too, on
+    a logarithmic scale, and thresholds of the duration as touches end, and hold for both where they are better for both
+    together. Of frames each counts once that holds at one of these ages.
 
     Parameters
     ----------
@@ -87,12 +89,12 @@ def tune(
 
     Raises
     ------
-    ProblemError : examples that are invalid, without a tare, or of channels, which have no neighbours
+    ProblemError : examples that are invalid or without a tare
 
     Notes
     -----
-    Of equal rules the first counts: area before total before local load, low thresholds before high, few frames before
-    many. A rule that misses and invents as many as there are labels is no better than none.
+    Of equal rules the first counts: area before total before local load before peak, low thresholds before high, few
+    frames before many. A rule that misses and invents as many as there are labels is no better than none.
 
     Examples
     --------
@@ -123,14 +125,18 @@ def best_rules(
 ) -> dict[str, PlainRule | None]:
     """Return for each label the best rule on parts of the examples, as `tune` does on all of them."""
     width_us = round(float(to_us(window_ms)))
-    windows = loads.windows(parts)
     truth = {name: loads.truth(name, parts) for name in names}
     best = _at_edges(loads, parts, truth, width_us)
     onsets = [name for name, (onset, end) in best.items() if onset.fit.error_ms < end.fit.error_ms]
     single = {name: min(pair, key=lambda tuned: tuned.fit[:2]) for name, pair in best.items()}
     kinds = onsets if len(onsets) == 2 else list(names) if len(names) == 2 else []
-    if kinds:
-        touches = {age: loads.at_age(age).between(windows) for age in loads.ages_ms(AGES_MS)}
+    if kinds and "area" in loads.quantities:
+        windows = loads.windows(loads.labelled(kinds, parts))
+        touches: dict[float | str, FoundTimes] = {
+            age: loads.at_age(age).between(windows) for age in loads.ages_ms(AGES_MS)
+        }
+        # What is known last is tried last.
+        touches["end"] = loads.at_end().between(windows)
         found = _for_kinds(touches, kinds, truth, width_us, loads.noise_floor, loads.unit)
         if found is not None and sum(fit.wrong for fit, _ in found) < sum(single[name].fit.wrong for name in kinds):
             single |= dict(zip(kinds, found, strict=True))
@@ -139,10 +145,10 @@ def best_rules(
 
 def _points(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, float, float, int]]:
     """Yield the grid: quantity, threshold, release, frames; those that delay least first."""
-    totals = loads.values("total", parts)
+    totals = loads.values("total", parts) if "total" in loads.quantities else np.empty(0)
     totals = totals[totals > 0.0]
     by_total = np.unique(np.quantile(totals, QUANTILES)).tolist() if len(totals) else []
-    thresholds = {"area": AREAS, "total": by_total, "local_load": LOCAL_LOADS}
+    thresholds = {"area": AREAS, "total": by_total, "local_load": LOCAL_LOADS, "peak": PEAKS}
     for quantity in loads.quantities:
         for threshold, frames, release in product(thresholds[quantity], FRAMES, RELEASES):
             yield quantity, threshold, release, frames
@@ -154,12 +160,15 @@ def _at_edges(
     """Return for each label the best rule at onsets and the best at ends."""
     worst = _RuleFit(2**62, np.inf, np.inf)
     fits = {name: [worst, worst] for name in truth}
-    points: dict[str, list[tuple[str, float, float, int]]] = {name: [("area", 1.0, 1.0, 1)] * 2 for name in truth}
-    windows = loads.windows(parts)
-    for point in _points(loads, parts):
+    points: dict[str, list[tuple[str, float, float, int]]] = {name: [("peak", 4.0, 1.0, 1)] * 2 for name in truth}
+    windows: dict[tuple[tuple[int, int], ...], list[str]] = {}
+    for name in truth:
+        windows.setdefault(tuple(loads.windows(loads.labelled([name], parts))), []).append(name)
+    for point, (inside, names) in product(_points(loads, parts), windows.items()):
         for edge, edges in enumerate(loads.edges(*point)):
-            found = edges.between(windows)
-            for name, true in truth.items():
+            found = edges.between(inside)
+            for name in names:
+                true = truth[name]
                 fit = _fit(found, true, width_us, fits[name][edge].wrong)
                 if fit is not None and fit[:2] < fits[name][edge][:2]:
                     fits[name][edge] = fit
@@ -191,14 +200,17 @@ def _fit(found: FoundTimes, true: NDArray[np.int64], width_us: int, most: int = 
 
 
 def _for_kinds(
-    touches: Mapping[float, FoundTimes],
+    touches: Mapping[float | str, FoundTimes],
     kinds: Sequence[str],
     truth: Mapping[str, NDArray[np.int64]],
     width_us: int,
     floor: float,
     unit: str | None,
 ) -> list[_Best] | None:
-    """Return the best rule that decides between two kinds by the area at an age, once for each; None without any."""
+    """Return the best rule that decides between two kinds by the area at an age, or by the duration, once for each.
+
+    None without any.
+    """
     times = np.concatenate([truth[name] for name in kinds])
     order = np.argsort(times, kind="stable")
     is_second = (np.arange(len(times)) >= len(truth[kinds[0]]))[order]
@@ -215,7 +227,8 @@ def _for_kinds(
         fits = {}
         for name, is_kind in ((below, areas < threshold), (above, areas >= threshold)):
             fits[name] = _fit(FoundTimes(t[is_kind], known[is_kind], areas[is_kind]), truth[name], width_us)
-        rule = PlainRule("area", threshold, age_ms=age, labels=(below, above), noise_floor=floor, unit=unit)
+        quantity = "duration" if age == "end" else "area"
+        rule = PlainRule(quantity, threshold, age_ms=age, labels=(below, above), noise_floor=floor, unit=unit)
         best = [_Best(fit, rule) for name in kinds if (fit := fits[name]) is not None]
         rank = (sum(tuned.fit.wrong for tuned in best), max(tuned.fit.delay_ms for tuned in best))
         if chosen is None or rank < chosen[0]:

@@ -11,11 +11,13 @@ from taxel.encode.level_crossing import LevelCrossing as LevelCrossing
 from taxel.encode.level_crossing import RunningRange as RunningRange
 from taxel.encode.local_load import LocalLoad as LocalLoad
 from taxel.encode.moments import Moments as Moments
+from taxel.encode.peak import Peak as Peak
 from taxel.encode.sa1 import SA1 as SA1
 from taxel.encode.sa2 import SA2 as SA2
 from taxel.encode.skin import Afferents as Afferents
 from taxel.encode.skin import Skin as Skin
 from taxel.encode.threshold_izhikevich import ThresholdIzhikevich as ThresholdIzhikevich
+from taxel.encode.touch_ends import TouchEnds as TouchEnds
 
 # The imports above are the registry of encoders.
 __all__ = [name for name, kind in sorted(globals().items()) if isinstance(kind, type)]

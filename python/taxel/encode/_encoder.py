@@ -37,6 +37,10 @@ class Encoder(Value):
 
     name: ClassVar[str]
     _by_name: ClassVar[dict[str, type[Encoder]]] = {}
+    #: Whether it counts taxels beside each other, which channels do not have.
+    _needs_neighbours: ClassVar[bool] = False
+    #: Whether its trains are levels of one quantity, of which a neuron learns the one that follows its labels best.
+    _learns_one: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         if "name" in vars(cls):

@@ -51,6 +51,7 @@ class ContactArea(Tared):
     """
 
     name = "contact_area"
+    _needs_neighbours = True
 
     noise_floor: float = _DEFAULT.noise_floor
     levels: Sequence[int] = _DEFAULT.levels

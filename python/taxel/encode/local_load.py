@@ -98,6 +98,7 @@ class LocalLoad(Tared):
     """
 
     name = "local_load"
+    _needs_neighbours = True
 
     noise_floor: float = _DEFAULT.noise_floor
     least_noise: float = _DEFAULT.least_noise

@@ -90,6 +90,7 @@ class Moments(Tared):
     """
 
     name = "moments"
+    _needs_neighbours = True
 
     noise_floor: float = _DEFAULT.noise_floor
     levels: int = _DEFAULT.levels

@@ -392,13 +392,15 @@ def _notes(labels: Labels, name: Path, source: RecordedSource) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
     clock = source.timing.usable()
     times = labels._times(name, lambda: clock, source.origin.label)
+    rows = labels._rows(name, source.origin.label, "")
+    of_source = {row.text: row.source for row in sorted(rows, key=lambda row: bool(row.source))}
     names, replaced, labelled = labels_of(source.origin), set[int | None](), set[object]()
     if beside(source.origin.path).is_file():
         set_here = Labels(beside(source.origin.path))
         replaced, labelled = set_here._replaced(*names), {(row.text, row.t) for row in set_here._rows(*names)}
     return sorted(
         (
-            Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))))
+            Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))), source=of_source.get(label, ""))
             for label, label_times in times.items()
             for t in label_times
             if t not in replaced and (label, int(t)) not in labelled

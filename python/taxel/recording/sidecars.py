@@ -40,7 +40,7 @@ def _notes(source: RecordedSource) -> tuple[Note, ...]:
     notes = tuple(note for note in source.marks.notes() if note.t is None or note.t not in replaced)
     noted = {(note.text, note.t) for note in notes}
     more = sorted((row for row in labels._rows(*names) if (row.text, row.t) not in noted), key=lambda row: row.t or 0)
-    return notes + tuple(Note(row.text, row.t, row.at_ns) for row in more)
+    return notes + tuple(Note(row.text, row.t, row.at_ns, source=row.source) for row in more)
 
 
 def labels_of(origin: Origin) -> tuple[Path, str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from math import isnan
@@ -27,7 +27,7 @@ from taxel.recording import Recording
 from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
-from taxel.tasks.labels import GivenLabels, references
+from taxel.tasks.labels import GivenLabels, references, sources_without
 from taxel.tasks.rest import GivenTare, TakenRest, check_tare, rest
 
 #: No event.
@@ -123,6 +123,8 @@ class Detecting:
         Over all recordings, if the truth is known.
     not_scored : tuple of str
         The labels of the truth that the readout does not have.
+    unlabelled : mapping of str to tuple of str
+        The sources that no row of the truth names, by label, where rows name sources: they are not scored for it.
     window_ms : float, ms
     warnings : tuple of str
     """
@@ -130,6 +132,7 @@ class Detecting:
     each: tuple[Detected, ...]
     score: Score | None
     not_scored: tuple[str, ...]
+    unlabelled: Mapping[str, tuple[str, ...]]
     window_ms: float
     warnings: tuple[str, ...] = ()
 
@@ -143,7 +146,8 @@ class Detecting:
         result: dict[str, Any] = {"recordings": [each.to_dict() for each in self.each], "warnings": list(self.warnings)}
         if self.score is None:
             return result
-        return result | {"window_ms": self.window_ms, "score": self.score.to_dict()}
+        unlabelled = {label: list(sources) for label, sources in self.unlabelled.items()}
+        return result | {"window_ms": self.window_ms, "score": self.score.to_dict(), "unlabelled": unlabelled}
 
 
 def detect(
@@ -206,21 +210,28 @@ def detect(
             raise refused(
                 "truth", f" is {truth}: names no event in {', '.join(recording.title for recording in opened)}"
             )
+        unlabelled = {} if truth is None else sources_without(truth, opened, events)
         each = []
         for recording, labelled in zip(opened, events, strict=True):
             update(f"detecting in {recording.title}", 0, 0)
-            each.append(_detected(readout, recording, labelled, options))
-    outcomes = [detected.outcome for detected in each]
-    truths = [outcome.example.labels for outcome in outcomes if outcome.score is not None]
-    together = score_together([outcome.found for outcome in outcomes], truths, options.window_ms) if truths else None
+            without = {label for label, sources in unlabelled.items() if recording.label in sources}
+            each.append(_detected(readout, recording, labelled, without, options))
+    scored = [outcome for detected in each if (outcome := detected.outcome).score is not None]
+    truths = [outcome.example.labels for outcome in scored]
+    found = [outcome.example._known(outcome.found) for outcome in scored]
+    together = score_together(found, truths, options.window_ms) if truths else None
     unknown = sorted(
         {label for labels_of in events if labels_of is not None for label in labels_of} - set(readout.labels)
     )
-    return Detecting(tuple(each), together, tuple(unknown), options.window_ms, tuple(warnings))
+    return Detecting(tuple(each), together, tuple(unknown), unlabelled, options.window_ms, tuple(warnings))
 
 
 def _detected(
-    readout: Readout | PlainRule, recording: Recording, labels: Mapping[str, Any] | None, options: DetectOptions
+    readout: Readout | PlainRule,
+    recording: Recording,
+    labels: Mapping[str, Any] | None,
+    without: Collection[str],
+    options: DetectOptions,
 ) -> Detected:
     if recording.verdict.status in ("damaged", "unfinished", "lost", "nothing arrived"):
         # Detections may lack or have wrong times.
@@ -230,9 +241,11 @@ def _detected(
         tare, begin_us = (None, None) if taken is None else (taken.tare, taken.detect_from_us)
         found, outside = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=begin_us)
     # Labels that the readout does not have do not count as missed.
-    true = None if labels is None else {label: labels.get(label, _NONE) for label in readout.labels}
-    scored = None if true is None else score(found, true, options.window_ms)
-    outcome = Outcome(recording.title, Example(recording, true or {}, tare), found, scored, outside)
+    named = () if labels is None else tuple(label for label in readout.labels if label not in without)
+    true = {} if labels is None else {label: labels.get(label, _NONE) for label in named}
+    example = Example(recording, true, tare, unlabelled=tuple(without))
+    scored = score(example._known(found), true, options.window_ms) if true else None
+    outcome = Outcome(recording.title, example, found, scored, outside)
     return Detected(recording, outcome, taken, _hint(outcome, readout))
 
 

@@ -65,6 +65,35 @@ def references(
     return [_within(table, recording, argument) for recording in recordings]
 
 
+def sources_without(
+    source: GivenLabels, recordings: Sequence[Recording], events: Sequence[Mapping[str, Any] | None]
+) -> dict[str, tuple[str, ...]]:
+    """Return the sources that no row of labels names, by label, where rows of that label name sources at all.
+
+    Nothing is known of them. In a recording that rows of this source leave out, or all rows, nothing happened.
+
+    Parameters
+    ----------
+    source : "notes", path or sequence of mapping
+    recordings : sequence of Recording
+    events : sequence of mapping of str to int64, us
+        Of each recording, as `references` returns them.
+    """
+    if not isinstance(source, str | os.PathLike):
+        return {}
+    rows = (note for each in recordings for note in each.notes) if source == "notes" else Labels(source).rows
+    titles = {each.label: {each.title, each.name} for each in recordings if each.label}
+    of_sources = {row.text for row in rows if row.source or any(row.recording in names for names in titles.values())}
+    without = {}
+    for label in sorted(of_sources & {label for of_recording in events if of_recording for label in of_recording}):
+        pairs = zip(recordings, events, strict=True)
+        named = {each.label for each, of_recording in pairs if of_recording and label in of_recording}
+        without[label] = tuple(
+            dict.fromkeys(each.label for each in recordings if each.label and each.label not in named)
+        )
+    return {label: sources for label, sources in without.items() if sources}
+
+
 def _mapped(
     source: Sequence[Mapping[str, Any]], recordings: Sequence[Recording], argument: str
 ) -> list[dict[str, NDArray[np.int64]]]:

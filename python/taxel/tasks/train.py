@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -18,7 +18,7 @@ from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
 from taxel.detect.advice import advise, fallen
-from taxel.detect.examples import check_examples
+from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.folds import INNER, count_of_folds
@@ -33,7 +33,7 @@ from taxel.recording.analysis.rest import BY_UNIT
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
-from taxel.tasks.labels import GivenLabels, labelled_trials, references
+from taxel.tasks.labels import GivenLabels, labelled_trials, references, sources_without
 from taxel.tasks.rest import GivenTare, given_tare, tare_before, tare_if_any
 from taxel.tasks.train_result import Training, TrainOptions
 
@@ -102,7 +102,12 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
         if labels == "notes":
             raise helped(ProblemError(f"notes: names no event in {titles}"), "labels", "give")
         raise refused("labels", f" is {_named(labels)}: names no event in {titles}")
+    unlabelled = sources_without(labels, opened, labelled)
     names = sorted({label for events in labelled for label in events})
+    without = [{label for label in names if each.label in unlabelled.get(label, ())} for each in opened]
+    # A source without any label takes no part.
+    some = [k for k, none in enumerate(without) if len(none) < len(names)]
+    opened, labelled, without = [opened[k] for k in some], [labelled[k] for k in some], [without[k] for k in some]
     if options.recipe is None and "encoder.name" not in options.changes:
         recipe, why = recipes.chosen(recorded(opened[0]), names)
         update(f"recipe {recipe}, chosen for {why}", 0, 0)
@@ -111,10 +116,13 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     assert plan is not None
     if options.search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):
         raise refused("search", ": the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
-    examples = _examples(opened, labelled, options.tare, plan)
+    examples = _examples(opened, labelled, without, options.tare, plan)
+    if sizes := sizes_of(examples):
+        smallest, largest = ("{} x {}".format(*extreme) for extreme in (sizes[0], np.max(sizes, axis=0)))
+        warn(f"arrays of {len(sizes)} sizes, from {smallest} taxels on, are padded at their far edges to {largest}")
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
-    return _Work(opened, examples, options, update).training(plan)
+    return replace(_Work(opened, examples, options, update).training(plan), unlabelled=unlabelled)
 
 
 def _named(labels: GivenLabels) -> str:
@@ -124,6 +132,7 @@ def _named(labels: GivenLabels) -> str:
 def _examples(
     opened: Sequence[Recording],
     labelled: Sequence[Mapping[str, NDArray[np.int64]]],
+    without: Sequence[Collection[str]],
     tare: GivenTare | None,
     plan: Recipe,
 ) -> list[Example]:
@@ -142,9 +151,14 @@ def _examples(
 
     return [
         Example(
-            recording, events, rest(events, recording), recording.title.removesuffix(recording.label), recording.title
+            recording,
+            events,
+            rest(events, recording),
+            recording.title.removesuffix(recording.label),
+            recording.title,
+            tuple(unlabelled),
         )
-        for recording, events in zip(opened, labelled, strict=True)
+        for recording, events, unlabelled in zip(opened, labelled, without, strict=True)
     ]
 
 
@@ -223,19 +237,23 @@ class _Work:
         readout, outcomes = trained.readout, []
         for recording, example in zip(self.opened, self.examples, strict=True):
             self.update(f"scoring on {recording.title}", 0, 0)
-            truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
+            truth = {
+                label: np.asarray(example.labels.get(label, []), np.int64)
+                for label in readout.labels
+                if label not in example.unlabelled
+            }
             detections, outside = run_counting(readout, recording, tare=example.tare)
-            scored = score(detections, truth, self.options.window_ms)
-            outcomes.append(
-                Outcome(recording.title, Example(recording, truth, example.tare), detections, scored, outside)
-            )
+            scored = score(example._known(detections), truth, self.options.window_ms)
+            of_recording = Example(recording, truth, example.tare, unlabelled=example.unlabelled)
+            outcomes.append(Outcome(recording.title, of_recording, detections, scored, outside))
         return outcomes
 
 
 def _own(outcomes: Sequence[Outcome], window_ms: float) -> Judged:
     """Return the scores of a readout on its own training data."""
     truths = [outcome.example.labels for outcome in outcomes]
-    together = score_together([outcome.found for outcome in outcomes], truths, window_ms)
+    found = [outcome.example._known(outcome.found) for outcome in outcomes]
+    together = score_together(found, truths, window_ms)
     return Judged(
         tuple(outcome.score for outcome in outcomes if outcome.score is not None), together, "its own training data"
     )

@@ -12,6 +12,7 @@ from taxel._base.messages import counted
 from taxel._base.times import beginning_us
 from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained
 from taxel.detect.advice import Advice
+from taxel.detect.levels import LEAST_LEVELS
 from taxel.detect.recipe import change_values, with_floor
 from taxel.recorded import recorded
 from taxel.recording import Recording
@@ -105,6 +106,9 @@ class Training:
         From when to when the tare of each recording was taken from it, and how long it lasts; none of given tares.
     warned : tuple of str
         The warnings of the training.
+    unlabelled : mapping of str to tuple of str
+        The sources that no row of the labels names, by label, where rows name sources: they are neither trained nor
+        scored for it.
     """
 
     options: TrainOptions
@@ -116,6 +120,7 @@ class Training:
     outcomes: Sequence[Outcome]
     tares_us: Sequence[tuple[int, int, int]]
     warned: tuple[str, ...] = ()
+    unlabelled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def readout(self) -> Readout:
@@ -165,7 +170,9 @@ class Training:
             "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
             "helps": {label: advice.helps for label, advice in self.advice.items()},
             "options": sorted({advice.option for advice in self.advice.values() if advice.option is not None}),
+            "fitted_levels": list(self.fitted_levels),
             "warnings": list(self.warnings),
+            "unlabelled": {label: list(sources) for label, sources in self.unlabelled.items()},
         }
         if self.made.alignments:
             result["alignment"] = {label: aligned.to_dict() for label, aligned in self.made.alignments.items()}
@@ -182,13 +189,15 @@ class Training:
         lines = [f"not held out, on its own training data {window}: {self.why}"]
         if self.held_out:
             lines = [f"held out: {self.scored.how} {window}"]
+        for label, sources in self.unlabelled.items():
+            lines.append(f"{label}: neither trained nor scored on {', '.join(sources)}, which no row of labels names")
         for label in self.readout.labels:
             lines += self._scores(label)
         lines += [*self._better(), *self._advised(), *self._aligned()]
         if recipe is not None:
             about = self.made.recipe.about
             lines += ["", f"recipe {recipe}" + (f": {about}" if about else "")]
-        lines += [*self._tares(), repr(self.readout)]
+        lines += [*self._levels(), *self._tares(), repr(self.readout)]
         for label in self.readout.labels if self.options.search else ():
             point = self.made.recipe.neurons[label]
             chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key not in ("search", "choose"))
@@ -205,6 +214,20 @@ class Training:
             return "SECONDS" if self.tares_us else ""
         # More than half of a recording is refused.
         return f"{min(min(end, lasts // 2) for _, end, lasts in self.tares_us) / 1e6:g}"
+
+    @property
+    def fitted_levels(self) -> tuple[float, ...]:
+        """The levels of the encoder if they are of the training data, in the sensor's unit; else none."""
+        return tuple(self.made.recipe.encoder.levels) if self.made.fitted_levels else ()  # type: ignore[attr-defined]
+
+    def _levels(self) -> Iterator[str]:
+        """Yield the levels that the training data gave, if they did."""
+        if self.fitted_levels:
+            levels = ", ".join(f"{level:g}" for level in self.fitted_levels)
+            yield (
+                f"levels: {levels} {self.readout.unit}, of the training data, as fewer than {LEAST_LEVELS} of the "
+                "recipe's lie within what loaded taxels read; --set encoder.levels=[...] gives others"
+            )
 
     def _tares(self) -> Iterator[str]:
         """Yield the line of which tares were taken from the recordings."""

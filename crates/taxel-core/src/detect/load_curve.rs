@@ -1,7 +1,7 @@
 //! A quantity over a whole recording, on which many plain rules are tried without encoding it again.
 
 use crate::detect::detector::{SILENCE_US, usual_distance};
-use crate::detect::running_rule::{Decision, Limits, RunningRule};
+use crate::detect::running_rule::{Decision, Limits, RunningRule, When};
 use crate::detect::{FrameClock, FrameTime};
 use crate::encode::{Quantity, Tare};
 use crate::spikes::us;
@@ -92,7 +92,7 @@ impl LoadCurve {
     #[must_use]
     pub fn edges(&self, threshold: f64, release: f64, frames: u32) -> Vec<Decision> {
         let (end, frames) = (release * threshold, i64::from(frames));
-        let limits = Limits { begin: threshold, end, frames, touch_train: 0, threshold, age_us: None };
+        let limits = Limits { begin: threshold, end, frames, touch_train: 0, threshold, when: When::Edges };
         // Begins and ends depend only on which limits the quantity has passed, and it changes far more often than that.
         let mut last = limits.passed_limits(0.0);
         let passing = self.changes.iter().filter(|change| {
@@ -114,9 +114,23 @@ impl LoadCurve {
         Ok(self.run(Limits::at_age(0, f64::INFINITY, age_ms), self.changes.iter()))
     }
 
+    /// Every touch as it ends, with its duration, ms, as it is compared with a
+    /// [`PlainRule`](crate::detect::PlainRule)'s threshold.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for another quantity than the area.
+    pub fn at_end(&self) -> Result<Vec<Decision>> {
+        if self.quantity != Quantity::Area {
+            return Err(problem!("ends"; " are those of touches, which end by area: this is another quantity"));
+        }
+        Ok(self.run(Limits::at_end(f64::INFINITY), self.changes.iter()))
+    }
+
     fn run<'a>(&self, limits: Limits, changes: impl Iterator<Item = &'a Spike>) -> Vec<Decision> {
         let (mut rule, mut clock, mut out) = (RunningRule::new(limits), self.clock, vec![]);
-        let reach = (limits.frames as f64 * self.period_us).ceil() as i64 + limits.age_us.unwrap_or(0);
+        let reach = (limits.frames as f64 * self.period_us).ceil() as i64
+            + if let When::AtAge(age) = limits.when { age } else { 0 };
         let end = self.last + SILENCE_US + reach;
         let mut changes = changes.take_while(|change| us(change.t) < end as f64).peekable();
         for &t in &self.frame_times {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::allowed::above_0;
-use crate::detect::running_rule::{Limits, RunningRule};
+use crate::detect::running_rule::{Limits, RunningRule, When};
 use crate::detect::{FrameClock, FrameTime, ReadoutStream, file};
 use crate::encode::{Quantity, Tare};
 use crate::spikes::us;
@@ -19,6 +19,24 @@ const MOST_FRAMES: u32 = 1_000_000;
 /// The latest age at which a rule may decide, ms.
 const LATEST_AGE_MS: f64 = 60_000.0;
 
+/// The age of a touch at which a rule decides.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Age {
+    /// So long after its begin, ms.
+    Ms(f64),
+    /// Its end.
+    Named(NamedAge),
+}
+
+/// An age that is no number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NamedAge {
+    /// When the touch ends.
+    End,
+}
+
 /// A load above a threshold for some frames, with a label for its onset and one for its end.
 ///
 /// The sensor is loaded from the first of `frames` frames in a row in which the quantity is at least the threshold, to
@@ -28,7 +46,8 @@ const LATEST_AGE_MS: f64 = 60_000.0;
 ///
 /// With an age it decides once a touch. A touch begins with the first frame in which the area is 2 taxels or more, and
 /// ends with the first in which it is less. The label is that of the quantity in the frame that holds at the age after
-/// the touch's begin, below the threshold or not; `t` is the begin, and `known` the end of that frame.
+/// the touch's begin, below the threshold or not; `t` is the begin, and `known` the end of that frame. At the end of a touch
+/// it is that of its duration, and `known` the end of the frame in which the touch ends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlainRule {
@@ -41,7 +60,7 @@ pub struct PlainRule {
     /// The number of frames in a row, 1 or more; 1 with an age.
     pub frames: u32,
     /// The age of a touch at which the rule decides between two kinds, ms; `None`: it detects onsets and ends.
-    pub age_ms: Option<f64>,
+    pub age_ms: Option<Age>,
     /// The labels of onset and end, or of the kinds below and above the threshold; `None` omits those detections.
     pub labels: [Option<String>; 2],
     /// The board's noise floor, 0 or more, in the sensor's unit (ticks).
@@ -71,8 +90,13 @@ impl PlainRule {
         if !(1..=MOST_FRAMES).contains(&self.frames) {
             return Err(problem!("frames"; " is {}: must be from 1 to {MOST_FRAMES}", self.frames));
         }
+        if (self.quantity == Quantity::Duration) != matches!(self.age_ms, Some(Age::Named(NamedAge::End))) {
+            return Err(problem!("age_ms"; " end and the quantity duration: must be given together"));
+        }
         if let Some(age) = self.age_ms {
-            if !(0.0..=LATEST_AGE_MS).contains(&age) {
+            if let Age::Ms(age) = age
+                && !(0.0..=LATEST_AGE_MS).contains(&age)
+            {
                 return Err(problem!("age_ms"; " is {age}: must be from 0 to {LATEST_AGE_MS}"));
             }
             if self.release < 1.0 || self.frames > 1 {
@@ -114,6 +138,9 @@ impl PlainRule {
 
     /// The quantities that it reads: the one that is compared with the threshold, and with an age the area.
     fn read(&self) -> Vec<Quantity> {
+        if self.quantity == Quantity::Duration {
+            return vec![Quantity::Area];
+        }
         let mut read = vec![self.quantity];
         if self.age_ms.is_some() && self.quantity != Quantity::Area {
             read.push(Quantity::Area);
@@ -125,21 +152,27 @@ impl PlainRule {
     fn limits(&self) -> Limits {
         let Self { threshold, release, .. } = *self;
         match self.age_ms {
-            Some(age) => Limits::at_age(self.read().len() as u32 - 1, threshold, age),
+            Some(Age::Ms(age)) => Limits::at_age(self.read().len() as u32 - 1, threshold, age),
+            Some(Age::Named(NamedAge::End)) => Limits::at_end(threshold),
             None => Limits {
                 begin: threshold,
                 end: release * threshold,
                 frames: i64::from(self.frames),
                 touch_train: 0,
                 threshold,
-                age_us: None,
+                when: When::Edges,
             },
         }
     }
 
     /// The time after the last input within which its last detection is complete, us.
     pub(super) fn reach_us(&self, period_us: f64) -> i64 {
-        (f64::from(self.frames) * period_us + self.age_ms.map_or(0.0, us)).ceil() as i64
+        (f64::from(self.frames) * period_us
+            + match self.age_ms {
+                Some(Age::Ms(age)) => us(age),
+                _ => 0.0,
+            })
+        .ceil() as i64
     }
 
     /// Reads a rule from the text of its file and checks it.

@@ -26,6 +26,9 @@ pub struct Readout {
     pub encoder: Encoder,
     /// The sensor; `None` admits every array with the right number of trains.
     pub array: Option<Array>,
+    /// Whether it was trained on grids of several sizes: those smaller than `array` are padded at their far edges.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub pads: bool,
     /// The unit of the values on which it was trained, "ticks" of a board's; `None` if it is not known. It is compared
     /// where values have a unit: those of a stream have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -158,7 +161,8 @@ impl Readout {
         ))
     }
 
-    /// Starts a stream for an array with frames of this duration.
+    /// Starts a stream for an array with frames of this duration. Where the readout was trained on grids of several sizes, a
+    /// smaller one is padded at its far edges.
     ///
     /// # Errors
     ///
@@ -166,6 +170,10 @@ impl Readout {
     /// period is not valid.
     pub fn stream(&self, array: &Array, frames: impl Into<FrameTime>, tare: Option<&Tare>) -> Result<ReadoutStream> {
         self.check()?;
+        if let Some(sensor) = self.array.as_ref().filter(|sensor| self.pads && sensor.holds(array)) {
+            let tare = tare.map(|tare| if sensor.holds(&tare.array) { tare.padded_to(sensor) } else { tare.clone() });
+            return Ok(self.stream(sensor, frames, tare.as_ref())?.padding(array.clone()));
+        }
         if let Some(sensor) = &self.array
             && !sensor.fits(array)
         {
@@ -196,6 +204,7 @@ impl Readout {
             };
             let (encoder, inputs) = (self.encoder_of(cell)?, ReceivedTrains::new(received, self.delays_ms.len()));
             let named = NamedNeuron::new(label, cell, self.run_threshold, encoder.latency_ms(), inputs);
+            let named = named.with_duration(encoder.duration_train(array).map(|train| train as u32));
             Ok(named.with_ranges(Ranges::new(self.seen.get(label).cloned(), encoder.kind())))
         });
         let neurons = DelayedNeurons::new(neurons.collect::<Result<_>>()?, self.delays_ms.clone());

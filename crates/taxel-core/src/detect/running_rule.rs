@@ -19,8 +19,19 @@ pub(super) struct Limits {
     pub touch_train: u32,
     /// Train 0 is compared with this threshold, where the rule decides at an age.
     pub threshold: f64,
-    /// The age of a load at which the rule decides, us; `None`: it reports begin and end.
-    pub age_us: Option<i64>,
+    /// When the rule decides.
+    pub when: When,
+}
+
+/// When a rule decides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum When {
+    /// At the begin and at the end of a load, which it reports.
+    Edges,
+    /// At this age of a load, us.
+    AtAge(i64),
+    /// When a load ends, by how long it lasted, ms.
+    AtEnd,
 }
 
 impl Limits {
@@ -30,8 +41,13 @@ impl Limits {
 
     /// Decides at an age of each touch, which the area on `touch_train` begins in one frame.
     pub(super) fn at_age(touch_train: u32, threshold: f64, age_ms: f64) -> Self {
-        let age_us = Some(us(age_ms).round() as i64);
-        Self { begin: Self::TOUCHED, end: Self::TOUCHED, frames: 1, touch_train, threshold, age_us }
+        let when = When::AtAge(us(age_ms).round() as i64);
+        Self { begin: Self::TOUCHED, end: Self::TOUCHED, frames: 1, touch_train, threshold, when }
+    }
+
+    /// Decides when each touch ends, which the area on train 0 begins, by its duration, ms.
+    pub(super) fn at_end(threshold: f64) -> Self {
+        Self { when: When::AtEnd, ..Self::at_age(0, threshold, 0.0) }
     }
 
     /// Which limits a quantity of this value has passed.
@@ -51,7 +67,7 @@ pub struct Decision {
     pub known: i64,
     /// Whether a quantity changed in these frames together with a repair.
     pub repaired: bool,
-    /// The quantity of train 0 when the rule decided.
+    /// The quantity of train 0 when the rule decided; the duration, ms, where it decided at the end.
     pub value: f64,
 }
 
@@ -91,6 +107,8 @@ pub(super) struct RunningRule {
     /// The quantity that is compared with the threshold.
     quantity: f64,
     waiting: VecDeque<WaitingLoad>,
+    /// When the load began that lasts, us, and whether that may rest on a repair.
+    begun: (i64, bool),
 }
 
 impl RunningRule {
@@ -106,6 +124,7 @@ impl RunningRule {
             run: None,
             quantity: 0.0,
             waiting: VecDeque::new(),
+            begun: (0, false),
         }
     }
 
@@ -163,16 +182,22 @@ impl RunningRule {
         }
         self.run = None;
         self.loaded = !self.loaded;
-        match self.limits.age_us {
-            None => out.push(Decision {
-                label: usize::from(!self.loaded),
-                t,
-                known: clock.end_of_number(first + self.limits.frames - 1),
-                repaired,
-                value: self.quantity,
-            }),
-            Some(age) if self.loaded => self.waiting.push_back(WaitingLoad { t, at: t + age, repaired }),
-            Some(_) => {}
+        let known = clock.end_of_number(first + self.limits.frames - 1);
+        let (begun, repaired_begin) = self.begun;
+        if self.loaded {
+            self.begun = (t, repaired);
+        }
+        match self.limits.when {
+            When::Edges => {
+                out.push(Decision { label: usize::from(!self.loaded), t, known, repaired, value: self.quantity })
+            }
+            When::AtAge(age) if self.loaded => self.waiting.push_back(WaitingLoad { t, at: t + age, repaired }),
+            When::AtEnd if !self.loaded => {
+                let value = ms(t - begun);
+                let label = usize::from(value >= self.limits.threshold);
+                out.push(Decision { label, t: begun, known, repaired: repaired || repaired_begin, value });
+            }
+            When::AtAge(_) | When::AtEnd => {}
         }
     }
 

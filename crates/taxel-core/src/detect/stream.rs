@@ -49,6 +49,8 @@ pub struct ReadoutStream {
     late: u64,
     /// Nothing before it is detected, us.
     begin: i64,
+    /// The smaller array that the input is of, which is padded at its far edges; `None` where it is of the whole one.
+    smaller: Option<Array>,
 }
 
 /// What turns the encoder's spikes into detections.
@@ -77,7 +79,29 @@ impl ReadoutStream {
     fn start(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, decides: Decides) -> Self {
         let repairs = Repairs::with_memory(encoder.repaired_span_ms());
         let (emitted, zeroings) = (vec![], VecDeque::new());
-        Self { encoder, array, decides, clock, now: None, emitted, repairs, zeroings, late: 0, begin: i64::MIN }
+        Self {
+            encoder,
+            array,
+            decides,
+            clock,
+            now: None,
+            emitted,
+            repairs,
+            zeroings,
+            late: 0,
+            begin: i64::MIN,
+            smaller: None,
+        }
+    }
+
+    /// The stream for input of a smaller array, which is padded at its far edges.
+    pub(super) fn padding(self, smaller: Array) -> Self {
+        Self { smaller: Some(smaller), ..self }
+    }
+
+    /// The array that the input is of.
+    fn input_array(&self) -> &Array {
+        self.smaller.as_ref().unwrap_or(&self.array)
     }
 
     /// Detects nothing before `t` us: where a tare was measured, the sensor was at rest.
@@ -124,7 +148,13 @@ impl ReadoutStream {
     pub fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Detection>) -> Result<()> {
         check_time(t)?;
         self.zero_before(t);
-        self.encoder.push_frame(t, values, &mut self.emitted)?;
+        match &self.smaller {
+            Some(smaller) if values.len() == smaller.len() => {
+                let padded = self.array.padded(values, smaller.columns, &0.0);
+                self.encoder.push_frame(t, &padded, &mut self.emitted)?;
+            }
+            _ => self.encoder.push_frame(t, values, &mut self.emitted)?,
+        }
         self.settle(t, out)?;
         self.clock.start_frame(t);
         Ok(())
@@ -152,7 +182,7 @@ impl ReadoutStream {
     /// `Problem` if no such taxel exists, the rest is not a number, or the time is beyond 2^52 us.
     pub fn zero(&mut self, zeroing: &Zeroing) -> Result<()> {
         check_time(zeroing.t)?;
-        zeroing.check(&self.array)?;
+        zeroing.check(self.input_array())?;
         let index = self.zeroings.partition_point(|earlier| earlier.t <= zeroing.t);
         self.zeroings.insert(index, *zeroing);
         Ok(())
@@ -161,7 +191,9 @@ impl ReadoutStream {
     /// The rest of each taxel, row by row; `None` if it is unknown, or if the encoder uses no tare.
     #[must_use]
     pub fn rest(&self) -> Vec<Option<f64>> {
-        (0..self.array.len()).map(|taxel| self.encoder.rest(taxel)).collect()
+        let (rows, columns) = (self.input_array().rows, self.input_array().columns);
+        let taxels = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
+        taxels.map(|(x, y)| self.encoder.rest(self.array.index(x, y))).collect()
     }
 
     /// The number of events that arrived after later events, or after time was advanced beyond them.
@@ -231,6 +263,8 @@ impl ReadoutStream {
 
     /// Passes events to the encoder in order of time, and zeroes taxels at their times in between.
     fn encode(&mut self, events: EventsView<'_>) -> Result<()> {
+        let array = self.array.clone();
+        let events = if self.smaller.is_some() { EventsView { array: &array, ..events } } else { events };
         self.repairs.note(events);
         let mut from = 0;
         while let Some(zeroing) = self.zeroings.front() {
@@ -279,7 +313,8 @@ impl ReadoutStream {
     }
 
     fn check_shape(&self, array: &Array) -> Result<()> {
-        let (expected, given) = ((self.array.rows, self.array.columns), (array.rows, array.columns));
+        let input = self.input_array();
+        let (expected, given) = ((input.rows, input.columns), (array.rows, array.columns));
         if expected != given {
             return Err(problem!(
                 "input from {} x {} taxels: this readout reads {} x {}",

@@ -23,6 +23,11 @@ pub(super) trait Measure: Clone + Send + 'static {
     /// The number of its spike trains.
     fn trains(&self) -> usize;
 
+    /// What its spikes are.
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Unsigned
+    }
+
     /// Whether it changes while the values hold, so that it is computed between stamps too.
     fn drifts(&self) -> bool {
         false
@@ -102,7 +107,7 @@ impl<M: Measure> Stream for ByStamp<M> {
     }
 
     fn kind(&self) -> SpikeKind {
-        SpikeKind::Unsigned
+        self.measure.kind()
     }
 
     fn latency_ms(&self) -> f64 {

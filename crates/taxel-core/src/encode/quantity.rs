@@ -6,11 +6,12 @@ use super::blocks::Block;
 use super::by_stamp::{ByStamp, Measure};
 use super::loaded::Loaded;
 use super::local_load::{LargestSum, LocalLoad};
+use super::peak::PeakLoad;
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::rest::step_of;
 use crate::spikes::ms;
-use crate::{Array, Result, Spike};
+use crate::{Array, Result, Spike, problem};
 
 /// A measure of the load on a sensor, which does not depend on position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,6 +24,11 @@ pub enum Quantity {
     /// The largest sum over 3 x 3 taxels above a tracked rest, in units of its noise, as of
     /// [`LocalLoad`](super::LocalLoad).
     LocalLoad,
+    /// The largest value of a taxel above a tracked rest, in units of its noise, with what several loaded taxels add, as
+    /// of [`Peak`](super::Peak).
+    Peak,
+    /// How long a touch lasts, ms: the quantity of rules that decide when it ends, which is no load.
+    Duration,
 }
 
 impl Quantity {
@@ -31,17 +37,26 @@ impl Quantity {
     ///
     /// # Errors
     ///
-    /// `Problem` for channels, of which no taxel is known to have neighbours; without a tare, or with one of another
-    /// array; for the local load, with one without the taxels' noise.
+    /// `Problem` for channels, of which no taxel is known to have neighbours, except of the peak; without a tare, or with
+    /// one of another array; for the local load and the peak, with one without the taxels' noise; for the duration.
     pub fn stream(several: &[Self], array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Box<dyn Stream>> {
         for quantity in several {
-            array.check_neighbours(quantity.rule())?;
+            match quantity {
+                Self::Peak => {}
+                Self::Duration => {
+                    return Err(problem!("quantity"; " duration: is no load that changes during a touch"));
+                }
+                _ => array.check_neighbours(quantity.rule())?,
+            }
         }
         let loaded = Loaded::new("plain rule", array, tare, noise_floor)?;
         let mut local = LocalLoad { noise_floor, tare: tare.cloned(), ..LocalLoad::default() };
         local.least_noise *= step_of(noise_floor);
+        // The least noise of a taxel belongs to the floor: .3 is of a board's 3 ticks, and of values in whole steps.
+        let least = if noise_floor > 0.0 { noise_floor / 10.0 } else { local.least_noise };
         let local = several.contains(&Self::LocalLoad).then(|| local.largest(array)).transpose()?;
-        let loads = QuantityMeasure { quantities: several.to_vec(), values: vec![0.0; several.len()], local };
+        let peak = several.contains(&Self::Peak).then(|| PeakLoad::new(array, tare, least)).transpose()?;
+        let loads = QuantityMeasure { quantities: several.to_vec(), values: vec![0.0; several.len()], local, peak };
         Ok(Box::new(ByStamp::new(loads, loaded, array)))
     }
 
@@ -51,6 +66,8 @@ impl Quantity {
             Self::Area => "a plain rule by area",
             Self::Total => "a plain rule by total",
             Self::LocalLoad => "a plain rule by local load",
+            Self::Peak => "a plain rule by peak",
+            Self::Duration => "a plain rule by duration",
         }
     }
 }
@@ -62,6 +79,8 @@ struct QuantityMeasure {
     values: Vec<f32>,
     /// Computes the local load, if it is among the quantities.
     local: Option<LargestSum>,
+    /// Computes the peak, if it is among the quantities.
+    peak: Option<PeakLoad>,
 }
 
 impl Measure for QuantityMeasure {
@@ -70,23 +89,29 @@ impl Measure for QuantityMeasure {
     }
 
     fn drifts(&self) -> bool {
-        self.local.is_some()
+        self.local.is_some() || self.peak.is_some()
     }
 
     fn set_rest(&mut self, taxel: usize, rest: f64) {
         if let Some(local) = &mut self.local {
             local.set_rest(taxel, rest);
         }
+        if let Some(peak) = &mut self.peak {
+            peak.set_rest(taxel, rest);
+        }
     }
 
     fn emit(&mut self, t: i64, loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>) {
         let local = self.local.as_mut().map_or(0.0, |sums| sums.take(t, held.as_flattened()));
+        let peak = self.peak.as_mut().map_or(0.0, |peak| peak.take(t, held.as_flattened()));
         for (train, (quantity, last)) in (0..).zip(self.quantities.iter().zip(&mut self.values)) {
             // In single precision, which holds every number of taxels exactly.
             let value = match quantity {
                 Quantity::Area => loaded.area() as f32,
                 Quantity::Total => loaded.sums(held).total as f32,
                 Quantity::LocalLoad => local as f32,
+                Quantity::Peak => peak as f32,
+                Quantity::Duration => 0.0,
             };
             if value != *last {
                 *last = value;

@@ -61,6 +61,13 @@ impl Tare {
         }
     }
 
+    /// The tare as that of a larger array's first rows and columns; taxels beyond have none.
+    #[must_use]
+    pub fn padded_to(&self, array: &Array) -> Self {
+        let padded = |values: &[Option<f64>]| array.padded(values, self.array.columns, &None);
+        Self { array: array.clone(), rest: padded(&self.rest), noise: padded(&self.noise), ..self.clone() }
+    }
+
     /// The rest of each taxel of an array; unknown if the taxel does not exist.
     ///
     /// # Errors

@@ -159,6 +159,7 @@ mod tests {
             time: Time::Continuous,
             after_spike: cell.neuron.after_spike,
             run_threshold: 1.0,
+            pads: false,
             delays_ms: vec![0.0],
             neurons: [("touch".to_owned(), cell)].into(),
             seen: BTreeMap::new(),

@@ -81,8 +81,16 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
     if not isinstance(source, Frames):
         return (recipe_for["events"], "events of a board") if "events" in recipe_for else (_ANY, "no other fits events")
     array, grids = source.array, recipe_for.get("grids")
-    if grids is None or not labels or array.taxels < 2 or not array._has_neighbours:
-        grids, sensor = None, counted(array.taxels, "channel" if array.is_channels else "taxel")
+    known = False
+    if array.taxels < 2 or not array._has_neighbours:
+        sensor = counted(array.taxels, "channel" if array.is_channels else "taxel")
+        # Of these it knows contact and lift alone; a contact without its lift may be that of a step.
+        kinds = {_own(recipes[grids], label) for label in labels} if grids is not None else set()
+        if "lift" in kinds and None not in kinds:
+            return str(grids), f"{' and '.join(labels)} on {sensor}"
+        grids = None
+    elif grids is None or not labels:
+        grids, sensor = None, counted(array.taxels, "taxel")
     else:
         sensor = f"a grid of {array.rows} x {array.columns} taxels"
         others = [label for label in labels if _own(recipes[grids], label) is None]

@@ -36,6 +36,9 @@ REST_FROM, REST_SHARE = 10, 0.2
 LOUD_FROM, QUIET_SHARE = 10, 0.1
 #: ... It is stuck if it had at least this number of events, all with one value ...
 STUCK_FROM = 3
+#: ... or if it is known to hold the greatest value of the recording all the time while the values of its neighbours
+#: (median) move by at least this number of ticks.
+MOVES_FROM = 8
 #: ... It is noisy if it changed by itself in at least this number of bins of 50 ms, which are at least this share of
 #: those in which it changed, and at most this share of its changes went on in the direction of the one before: a touch
 #: goes on, noise turns back.
@@ -97,9 +100,10 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     """Return which taxels are dead, stuck or noisy, each compared with its neighbours.
 
     A recording cannot show whether taxels work in a region that was never touched: a taxel is named dead or stuck only
-    if its neighbours were touched three times or more. One that was touched less and did nothing is *untested*. States
-    of wire version 2 (`Events.repaired`) and the values held at the beginning count as held values, but not as changes
-    of the taxel. Without neighbours, as in one channel, no taxel is named.
+    if its neighbours were touched three times or more, or if it always reads the greatest value of all. One that was
+    touched less and did nothing is *untested*. States of wire version 2 (`Events.repaired`) and the values held at the
+    beginning count as held values, but not as changes of the taxel. Without neighbours, as in one channel, no taxel is
+    named.
 
     Parameters
     ----------
@@ -122,8 +126,10 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     median of the least values of its neighbours is 10 ticks or more and a fifth of the array's largest value; or no
     event in noise so strong that, over half of the array or more, the taxels with 1 to 9 events are at most a tenth as
     many as the silent ones. Stuck: like a dead one, but known to hold a value other than 0; or 3 events or more, all
-    with one intensity, while its neighbours show more than one. Noisy: in 10 bins of 50 ms or more, half of all in
-    which it changes, it has 3 changes or more, and more than 8 times those of all but one of the 24 taxels around it;
+    with one intensity, while its neighbours show more than one; or known to hold the greatest value of the recording,
+    and no other, while the values of its neighbours (median) move by 8 ticks or more, touched or not. Noisy: in 10 bins
+    of 50 ms or more, half of all in which it changes, it has 3 changes or more, and more than 8 times those of all but
+    one of the 24 taxels around it;
     and at most 45 % of its changes go on in the direction of the one before. Of frames, too, one that jumps for less
     than two frames at a time, 10 times or more, more than half as far from its median as ever, while all but one of
     its neighbours move less than an eighth as much.
@@ -161,6 +167,10 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     loaded = table.values[0] > least
     noisy = result.noisy | flickering(table)
     dead, stuck = (grid & ~noisy for grid in (result.dead & ~loaded, result.stuck | result.dead & loaded))
+    bounds = [extreme.reduce(ticks.values, axis=0) for extreme in (np.fmin, np.fmax)]
+    at_top = _at_top(table.array, *bounds)
+    dead, stuck, noisy = dead & ~at_top, stuck | at_top, noisy & ~at_top
+    result = replace(result, untested=result.untested & ~at_top)
     return replace(result, dead=dead, stuck=stuck, noisy=noisy, untested=result.untested & ~noisy)
 
 
@@ -229,6 +239,7 @@ def judge(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> He
         at_zero = silent & (statistics.greatest == 0) & (_neighbours(known & (statistics.least >= least)) > 0)
         dead |= _reaches(statistics.least, known, at_zero, least)
         stuck = dead & (statistics.greatest > 0)
+        stuck |= silent & known & _at_top(array, statistics.least, statistics.greatest)
     if statistics.values is not None:
         still = exists & (activity >= STUCK_FROM) & (statistics.values == 1)
         stuck |= _reaches(statistics.values, exists & (activity > 0), still, 1, above=True)
@@ -240,6 +251,16 @@ def judge(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> He
     works = enough | where(touches.pressed > 0) | (activity >= WORKS_FROM)
     untested = exists & ~dead & ~stuck & ~noisy & ~works
     return Health(array, activity, dead, stuck, noisy, untested)
+
+
+def _at_top(array: Array, least: NDArray[Any], greatest: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which taxels always held the greatest value of the array, ticks, while their neighbours moved."""
+    exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
+    known = exists & np.isfinite(least) & np.isfinite(greatest)
+    if min(array.shape) == 1 or not known.any():
+        return np.zeros(array.shape, bool)
+    top = known & (least == greatest[known].max())
+    return _reaches(np.where(known, greatest - least, 0), known, top, MOVES_FROM)
 
 
 def _statistics_of_events(events: Events) -> TaxelStatistics:

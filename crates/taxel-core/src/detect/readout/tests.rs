@@ -25,6 +25,7 @@ fn readout() -> Readout {
         time: Time::Grid,
         after_spike: AfterSpike::Keep,
         run_threshold: 0.9,
+        pads: false,
         delays_ms: vec![0.0],
         neurons: [("contact".to_owned(), cell(0.2, 3.0)), ("lift".to_owned(), cell(0.5, -0.1))].into(),
         seen: BTreeMap::new(),

@@ -3,7 +3,6 @@
 use super::named_neuron::{NamedNeuron, NeuronCrossing};
 use crate::detect::{Detection, FrameClock};
 use crate::neuron::NeuronStream;
-use crate::spikes::us;
 use crate::{Result, Spike, SpikeKind};
 
 /// Neurons with the delays at which they receive the encoder's trains.
@@ -65,8 +64,7 @@ impl DelayedNeurons {
             neuron.advance(until_ms, k, &mut crossings);
         }
         self.waiting.drain(..certain);
-        let t_of =
-            |crossing: &NeuronCrossing| us(crossing.spike.t - self.neurons[crossing.neuron].offset_ms).round() as i64;
+        let t_of = |crossing: &NeuronCrossing| self.neurons[crossing.neuron].event_us(&crossing.spike);
         crossings.retain(|crossing| t_of(crossing) >= begin);
         crossings.sort_by(|a, b| a.spike.t.total_cmp(&b.spike.t));
         self.outside += crossings.iter().filter(|crossing| crossing.outside).count() as u64;
@@ -77,6 +75,7 @@ impl DelayedNeurons {
             slope: crossing.spike.slope,
             repaired: crossing.repaired,
         }));
+        self.neurons.iter_mut().for_each(|neuron| neuron.forget_before(until_ms));
         Ok(())
     }
 }

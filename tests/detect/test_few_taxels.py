@@ -1,0 +1,110 @@
+"""Touches of one taxel, channels without places, and grids of several sizes in one training."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import Array, Frames, Readout, Tare
+from taxel.detect import Example, PlainRule, Recipe, fit, judge, recipes, run, score, tune
+from taxel.encode import LevelCrossing
+from taxel.tasks import train
+
+
+def single(shape: tuple[int, int], seed: int, count: int = 14, *, times: float = 10.0) -> Example:
+    """Return touches that load one taxel each, so many times its noise."""
+    rng = np.random.default_rng(seed)
+    begins = 200 + 80 * np.arange(count)
+    values = rng.normal(0.0, 0.1, (int(begins[-1]) + 150, *shape))
+    for begin in begins:
+        values[begin : begin + 30, rng.integers(shape[0]), rng.integers(shape[1])] += 0.1 * times
+    t = np.arange(len(values)) * 10_000
+    frames = Frames(np.maximum(values, 0.0), t, unit="N", array=Array(*shape))
+    return Example(frames, {"contact": t[begins], "lift": t[begins + 30]}, Tare.take(frames, stop_us=1_900_000))
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (2, 2), (8, 8)])
+@pytest.mark.parametrize("times", [10.0, 100.0])
+def test_one_loaded_taxel_is_learnt_on_any_array(shape: tuple[int, int], times: float) -> None:
+    learnt, unseen = single(shape, 1, times=times), single(shape, 2, times=times)
+    assert recipes.fitting(learnt.source, ["contact", "lift"]) == "touch"
+    readout = fit([learnt], Recipe.load("touch", labels=["contact", "lift"], noise_floor=0.6))
+    assert score(run(readout, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] <= 1
+    for label, rule in tune([learnt], noise_floor=0.6).items():
+        assert rule is not None
+        assert rule.quantity == "peak"
+        assert score(run(rule, learnt.source, tare=learnt.tare), {label: learnt.labels[label]}, 50.0).rank[0] <= 1
+
+
+def test_steps_and_kinds_of_channels_keep_their_recipes() -> None:
+    source = single((1, 6), 1).source
+    assert recipes.fitting(source, ["contact", "foot_off"]) == "gait_insole"
+    assert recipes.fitting(source, ["soft", "hard"]) == "gait_insole"
+
+
+def test_a_rule_by_peak_needs_no_neighbours_and_follows_its_unit() -> None:
+    unseen = single((1, 3), 3)
+    rule = PlainRule("peak", 6.0, release=0.5, noise_floor=0.6)
+    assert PlainRule.from_json(rule.to_json()) == rule
+    assert score(run(rule, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] == 0
+
+
+def sized(shape: tuple[int, int], seed: int) -> Example:
+    """Return touches of nine taxels on a grid of one size."""
+    rng = np.random.default_rng(seed)
+    begins = 200 + 80 * np.arange(8)
+    values = 40 + rng.normal(0, 0.4, (int(begins[-1]) + 150, *shape))
+    for begin in begins:
+        y, x = rng.integers(0, shape[0] - 3), rng.integers(0, shape[1] - 3)
+        values[begin : begin + 30, y : y + 3, x : x + 3] += 60
+    t = np.arange(len(values)) * 10_000
+    frames = Frames(np.rint(values), t, unit="counts", array=Array(*shape, pitch_mm=5.0))
+    return Example(frames, {"contact": t[begins], "lift": t[begins + 30]}, Tare.take(frames, stop_us=1_900_000))
+
+
+def padded(example: Example, shape: tuple[int, int]) -> Frames:
+    source = example.source
+    assert isinstance(source, Frames)
+    wide = [(0, 0), *((0, most - size) for size, most in zip(source.array.shape, shape, strict=True))]
+    return Frames(np.pad(source.values, wide), source.t, unit="counts", array=Array(*shape, pitch_mm=5.0))
+
+
+def test_grids_of_several_sizes_are_padded_at_their_far_edges(tmp_path: Path) -> None:
+    examples = [sized(shape, seed) for seed, shape in enumerate([(6, 8), (8, 6), (8, 7)])]
+    recipe = Recipe.load("touch", labels=["contact", "lift"], noise_floor=3.0)
+    assert judge(examples, recipe, 3).together.rank[0] == 0
+    readout = fit(examples, recipe)
+    assert readout.array.shape == (8, 8)
+    again = Readout.from_json(readout.to_json())
+    for example in [*examples, sized((5, 5), 9)]:
+        found = run(again, example.source, tare=example.tare)
+        assert score(found, example.labels, 50.0).rank[0] == 0
+    with pytest.raises(taxel.ProblemError, match="9 x 8 taxels: the readout was trained on 8 x 8"):
+        run(readout, sized((9, 8), 1).source, tare=sized((9, 8), 1).tare)
+    # One that was trained on one size takes this one alone.
+    alone = fit([sized((8, 8), 4)], recipe)
+    with pytest.raises(taxel.ProblemError, match="6 x 8 taxels: the readout was trained on 8 x 8"):
+        run(alone, examples[0].source, tare=examples[0].tare)
+    places = []
+    for k, example in enumerate(examples):
+        places.append(tmp_path / f"{k}.npz")
+        taxel.convert(example.source, places[-1])
+    labels = [{name: t.tolist() for name, t in example.labels.items()} for example in examples]
+    training = train([taxel.open(place) for place in places], labels)
+    assert any("3 sizes, from 6 x 8 taxels on, are padded at their far edges to 8 x 8" in w for w in training.warnings)
+
+
+def test_a_smaller_grid_gives_what_its_padded_frames_give() -> None:
+    small, large = sized((6, 7), 1), sized((8, 8), 2)
+    levels = LevelCrossing([70.0])
+    learner = {"tau": 5.0, "ub": 3.0, "lb": -3.0, "delay_ms": 1.0}
+    readout = fit([small, large], Recipe(levels, learner, {"contact": {}, "lift": {}}))
+    assert readout.array.shape == (8, 8)
+    assert run(readout, small.source) == run(readout, padded(small, (8, 8)))
+    stream = readout.stream(small.source.array, frame_us=10_000)
+    pieces = [stream.push(small.source[k : k + 100]) for k in range(0, len(small.source), 100)]
+    found = [d for piece in pieces for d in piece] + list(stream.advance(int(small.source.t[-1]) + 1_000_000))
+    assert [(d.label, d.t) for d in found] == [(d.label, d.t) for d in run(readout, small.source)]

@@ -1,0 +1,116 @@
+"""The peak against NumPy, written from the definition: the largest deviation in units of each taxel's own noise."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from refusal import refused
+
+from taxel import Array, Frames, Tare
+from taxel.encode import Peak
+
+from . import scenes
+from .scenes import rest, spikes_of
+
+REPAIRED = "read"
+#: Examples for the laws of all encoders (test_laws.py).
+EXAMPLES = {
+    "peak": Peak(tare=rest(scenes.ARRAY)),
+    "peak, of larger noise": Peak(levels=(0.5, 1.5, 9.0), release=1.0, least_noise=2.0, tare=rest(scenes.ARRAY)),
+}
+
+
+def turned(encoder):
+    """The trains as they stand on an array that is turned by half a turn: no quantity depends on the position."""
+    return np.arange(2 * len(encoder.levels))
+
+
+def peaks(t, frames, tare, least):
+    """The peak of each frame, above a rest that follows each taxel."""
+    known = ~np.isnan(tare.rest)
+    noise = np.where(known, np.maximum(np.nan_to_num(tare.noise), least), np.inf)
+    waiting = np.logical_and.accumulate(frames == 0, axis=0)
+    baseline, above, found = np.where(known, tare.rest, 0.0), np.zeros(frames.shape[1:]), []
+    for k, frame in enumerate(frames):
+        if k:
+            tau_us = np.where(np.abs(above) < 5 * noise, 1e6, 20e6)
+            baseline = baseline - np.expm1(-(t[k] - t[k - 1]) / tau_us) * above
+        above = np.where(waiting[k], 0.0, np.float32(frame - baseline))
+        units = above / noise
+        found.append(max(0.0, units.max(), np.sqrt((units[units >= 4] ** 2).sum())))
+    return np.array(found)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    shape=st.sampled_from([(1, 1), (1, 7), (2, 2), (5, 9), (16, 16)]),
+    noise=st.sampled_from([0.0, 0.3, 2.0]),
+    loaded=st.integers(1, 3),
+)
+def test_the_peak_is_numpys(seed, shape, noise, loaded):
+    rng, t = np.random.default_rng(seed), np.arange(80) * 10_000
+    array = Array(*shape)
+    level = rng.uniform(40, 60, shape)
+    frames = level + rng.normal(0, noise, (80, *shape))
+    for k in (20, 50):
+        places = rng.choice(array.rows * array.columns, min(loaded, array.rows * array.columns), replace=False)
+        frames[k : k + 10].reshape(10, -1)[:, places] += rng.uniform(1, 20, len(places))
+    frames = np.float32(frames)
+    tare = json.loads(Tare.take(Frames(frames[:20], t[:20], array=array)).to_json())
+    if array.taxels > 4:
+        tare["rest"][2] = tare["noise"][2] = None
+    tare = Tare.from_json(json.dumps(tare))
+    wanted = peaks(t, frames.astype(float), tare, 0.3)
+    # Levels between peaks, so that rounding in single precision crosses none.
+    steps = np.unique(wanted)
+    apart = np.flatnonzero(np.diff(steps) > 1e-3 * steps[1:])[:: max(1, len(steps) // 8)]
+    if not len(apart):
+        return
+    levels = ((steps[apart] + steps[apart + 1]) / 2).tolist()
+    spikes = Peak(levels=levels, release=1.0, tare=tare).encode(Frames(frames, t, array=array))
+    for level, rises, falls in zip(levels, spikes, list(spikes)[len(levels) :], strict=False):
+        moves = np.diff(np.concatenate([[0], wanted >= level]).astype(int))
+        assert np.rint(rises * 1000).astype(int).tolist() == t[moves == 1].tolist()
+        assert np.rint(falls * 1000).astype(int).tolist() == t[moves == -1].tolist()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 5), (4, 4)])
+def test_one_loaded_taxel_is_a_touch_whatever_the_array_and_the_unit(shape):
+    rng, t = np.random.default_rng(5), np.arange(300) * 10_000
+    values = rng.normal(0, 1, (300, *shape))
+    values[100:150, 0, -1] += 12.0
+    values[200:250, 0, -1] += 12.0
+    for scale in (1e-3, 1.0, 1e3):
+        frames = Frames(values * scale, t, unit="N", array=Array(*shape))
+        encoder = Peak(levels=[6.0], release=0.5, least_noise=1e-3 * scale).with_tare(
+            Tare.take(frames, stop_us=900_000)
+        )
+        rises, falls = encoder.encode(frames)
+        assert rises.tolist() == [1000.0, 2000.0]
+        assert falls.tolist() == [1500.0, 2500.0]
+
+
+def test_several_loaded_taxels_add():
+    values = np.zeros((4, 2, 2))
+    values[1, 0, 0] = 6.0
+    values[2] = 6.0
+    frames, at_rest = Frames(values, range(0, 4000, 1000), array=Array(2, 2)), np.zeros((2, 2, 2))
+    tare = Tare.take(Frames(at_rest, [0, 1000], array=Array(2, 2)))
+    below, above = (Peak(levels=[level], least_noise=1.0, tare=tare).encode(frames)[0] for level in (11.9, 12.1))
+    assert (below.tolist(), above.tolist()) == ([2.0], [])
+
+
+def test_it_needs_a_tare_and_levels_that_ascend():
+    frames = Frames(np.zeros((2, 1, 1)), [0, 1000])
+    with refused("peak without a tare"):
+        Peak().encode(frames)
+    with refused("must be above the one before"):
+        Peak(levels=[3.0, 3.0])
+    with refused("must hold one level or more"):
+        Peak(levels=[])
+    assert spikes_of(Peak(tare=Tare.take(frames)).encode(frames)) == []

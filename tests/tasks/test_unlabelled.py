@@ -1,0 +1,117 @@
+"""Sources that no row of labels names: neither trained nor scored, where rows name sources."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shell import call
+from tests.tasks.recordings import mat
+
+import taxel
+from taxel.detect import Example, judge, tune
+from taxel.detect.recipe import Recipe
+from taxel.recording.contents import alone, source_from
+from taxel.recording.sections import Origin
+from taxel.tare import Tare
+from taxel.tasks import train
+
+
+@pytest.fixture
+def feet(tmp_path: Path) -> Path:
+    """Write a recording of two sources, each touched eight times, with labels of the left one alone."""
+    frames = {name: taxel.open(mat(tmp_path, seed)).frames() for name, seed in (("left", 3), ("right", 4))}
+    sources = {name: source_from(each, Origin(tmp_path, label=name)) for name, each in frames.items()}
+    taxel.convert(taxel.Recording(alone(sources)), tmp_path / "both.mcap")
+    return tmp_path / "both.mcap"
+
+
+def table(place: Path, rows: str) -> Path:
+    place.write_text("source,label,t_us\n" + rows)
+    return place
+
+
+def rows(frames_at: list[int], source: str, label: str = "contact") -> str:
+    return "".join(f"{source},{label},{10_000 * k}\n" for k in frames_at)
+
+
+BEGINS = [100 + 60 * k for k in range(8)]
+ENDS = [begin + 20 for begin in BEGINS]
+
+
+def test_a_source_that_no_row_names_is_neither_trained_nor_scored(feet: Path, tmp_path: Path) -> None:
+    labels = table(tmp_path / "l.csv", rows(BEGINS, "left"))
+    training = train(taxel.open(feet), labels)
+    assert [each.label for each in training.recordings] == ["left"]
+    assert (training.score.found, training.score.false) == (8, 0)
+    assert "contact: neither trained nor scored on right, which no row of labels names" in training.lines()[:3]
+    assert training.to_dict()["unlabelled"] == {"contact": ["right"]}
+
+
+def test_it_holds_for_each_label_alone(feet: Path, tmp_path: Path) -> None:
+    begins = rows(BEGINS, "left") + rows(BEGINS, "right")
+    training = train(taxel.open(feet), table(tmp_path / "l.csv", begins + rows(ENDS, "left", "lift")))
+    found = {label: (score.events, score.false) for label, score in training.score.by_label.items()}
+    assert found == {"contact": (16, 0), "lift": (8, 0)}
+    assert training.scored.plain is not None
+    assert training.scored.plain.together is not None
+    assert training.scored.plain.together["lift"].false == 0
+
+
+def test_where_rows_name_no_source_nothing_happened_where_no_row_is(feet: Path, tmp_path: Path) -> None:
+    each = taxel.open_all(feet)
+    training = train(each, [{"contact": [10_000 * k for k in BEGINS]}, {}])
+    assert training.unlabelled == {}
+    assert len(training.recordings) == 2
+    # Rows of another source alone say of this recording's own that nothing happened, as other rows name that source.
+    places = [tmp_path / f"{name}.mcap" for name in "ab"]
+    for place in places:
+        place.write_bytes(feet.read_bytes())
+    text = "recording,source,label,t_us\n" + "".join(
+        f"{name},{source},contact,{10_000 * k}\n"
+        for name, source in (("a", "left"), ("a", "right"), ("b", "left"))
+        for k in BEGINS
+    )
+    (tmp_path / "l.csv").write_text(text)
+    training = train([source for place in places for source in taxel.open_all(place)], tmp_path / "l.csv")
+    assert training.unlabelled == {}
+    assert len(training.recordings) == 4
+    assert training.score.events == 24
+    assert training.score.false + training.score.missed >= 8
+
+
+def test_notes_of_one_source_say_nothing_of_the_other(feet: Path) -> None:
+    table(feet.with_name("both.notes.csv"), rows(BEGINS, "left"))
+    training = train(taxel.open(feet))
+    assert training.unlabelled == {"contact": ("right",)}
+    assert training.score.false == 0
+
+
+def test_detections_of_it_are_not_scored(feet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    labels, readout = table(tmp_path / "l.csv", rows(BEGINS, "left")), tmp_path / "r.json"
+    train(taxel.open(feet), labels).readout.save(readout)
+    _, out, _ = call(capsys, "detect", feet, "--readout", readout, "--truth", labels)
+    assert f"not scored, as no row of {labels} names it: contact of right" in out
+    found = taxel.tasks.detect(taxel.Readout.load(readout), taxel.open(feet), labels)
+    assert found.score is not None
+    assert found.score.false == 0
+    assert len(found.each[1].outcome.found) == 8
+
+
+def test_an_example_is_left_out_of_what_is_not_known_of_it(tmp_path: Path) -> None:
+    frames = taxel.open(mat(tmp_path)).frames()
+    tare, truth = Tare.take(frames, stop_us=900_000), {"contact": [10_000 * k for k in BEGINS]}
+    known, unknown = Example(frames, truth, tare), Example(frames, {}, tare, unlabelled=["contact"])
+    assert tune([known, unknown], ["contact"]) == tune([known], ["contact"])
+    recipe = Recipe.load("touch", labels=["contact"], noise_floor=6.0)
+    more = Example(frames, truth, tare)
+    with_it, without = (judge([known, more, *rest], recipe, 2).together for rest in ([unknown], []))
+    assert with_it.rank == without.rank
+    with pytest.raises(taxel.ProblemError, match="unlabelled has 'contact', of which there are labels"):
+        tune([Example(frames, truth, tare, unlabelled=["contact"])])
+    assert np.array_equal(known._known(known_detections()).t, [1000])
+
+
+def known_detections() -> taxel.Detections:
+    return taxel.Detections(["contact"], [1000], [1000])
