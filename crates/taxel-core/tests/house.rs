@@ -37,7 +37,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
             &["address", "bridged", "ports"],
             &["serial_line"],
             &["board_line", "recording"],
-            &["capture"],
+            &["capture", "frame_lines", "line_input"],
             &["emulate", "pipeline"],
         ],
     ),

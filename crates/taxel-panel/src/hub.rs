@@ -241,7 +241,7 @@ impl Hub {
             options: live.map(|live| Box::new(live.handle.options().clone())),
             udp: live.and_then(|live| match live.handle.origin() {
                 Origin::Udp(address) => Some(address.to_string()),
-                Origin::Bridge(_) => None,
+                Origin::Bridge(_) | Origin::Frames(_) => None,
             }),
             delta_intensity: live.map(|live| live.handle.options().differences),
             control: self.board().control.clone(),

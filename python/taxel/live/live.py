@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from functools import partial
@@ -30,6 +31,7 @@ from taxel.tare import Tare
 
 #: Prefix of the sources and destinations of the lab streaming layer.
 _LSL = "lsl:"
+_LSL_SOURCE = re.compile(r"(?:([^=:]+)=)?lsl:(.*)", re.DOTALL)
 
 #: The largest column or row of any taxel.
 _MOST_INDEX = 2**16 - 1
@@ -140,18 +142,15 @@ class Live:
         self._registers_stated = options.registers is not None or options.remote is not None
         options = options.completed()
         remote, say = options.remote, options.say
-        self.array = Array._of(options.array)
-        #: To begin another one on another address.
-        self._options = replace(options, array=self.array)
-        destinations, sources = options.destinations(), options.named_sources()
+        destinations, sources = options.destinations(), options.source_texts()
         outlets = [LslOutlet(to.removeprefix(_LSL)) for to in destinations if to.startswith(_LSL)]
-        inlets = {name: LslInlet(address.removeprefix(_LSL)) for name, address in sources if address.startswith(_LSL)}
+        inlets = {source: LslInlet(found[2]) for source in sources if (found := _LSL_SOURCE.fullmatch(source))}
         self._inlets = list(inlets.values())
         receivers: list[Callable[[Detection], object]] = [*outlets, *([] if say is None else [say])]
         self._summary: Summary | None = None
         stated = options.for_rust(
             send=[to for to in destinations if not to.startswith(_LSL)],
-            sources=[(name, _source_of(inlets[name]) if name in inlets else address) for name, address in sources],
+            sources=[_given(source, inlets[source]) if source in inlets else source for source in sources],
         )
         feed = None if remote is None else _core.ParcelFeed(remote.place, options.queue_bytes)
         self._core = _core.Live(
@@ -160,11 +159,20 @@ class Live:
             None if not receivers else lambda values: [receive(Detection(**values)) for receive in receivers],
             feed,
         )
+        array, name = self._core.sensor()
+        self.array = Array._from_geometry(array)
+        #: The name of the source that is read out.
+        self.name = name
+        layout = self._core.frame_layout()
+        #: The unit of the values, and the length of frames of numbers, us; None of a board.
+        self.unit, self.frame_us = ("ticks", None) if layout is None else layout
+        #: To begin another one on another address.
+        self._options = replace(options, array=self.array)
         self._remote, self._place = remote, self._core.place()
         if remote is not None and feed is not None:
             remote.begin(feed)
-        for name, inlet in inlets.items():
-            inlet.begin(partial(self._core.sample, name))
+        for source, inlet in inlets.items():
+            inlet.begin(partial(self._core.sample, _stream_name(source)))
 
     def _again(self, port: int, host: str, **changed: Any) -> Live:
         """Return another one that works alike, of a board that sends to this address."""
@@ -274,9 +282,15 @@ class Live:
         return self._core.counters()
 
     @property
-    def frame(self) -> NDArray[np.uint16]:
-        """Values that the taxels hold, ticks, shape (rows, columns), ten times a second; 0 without any event so far."""
-        return self._core.frame().reshape(self.array.shape)
+    def frame(self) -> NDArray[np.uint16] | NDArray[np.float32]:
+        """Values that the taxels hold, in `unit`, shape (rows, columns), ten times a second.
+
+        Those of a board without any event so far are 0; those of frames of numbers are NaN before the first one.
+        """
+        if self.frame_us is None:
+            return self._core.frame().reshape(self.array.shape)
+        values = self._core.values()
+        return (values if len(values) else np.full(self.array.taxels, np.nan, np.float32)).reshape(self.array.shape)
 
     @property
     def tare(self) -> Tare | None:
@@ -334,6 +348,8 @@ class Live:
 
     def sample(self, name: str, values: ArrayLike, arrived_ns: int | None = None) -> None:
         """Record numbers of a source whose values a program passes.
+
+        Of a source with an array they are those of a line of a frame.
 
         Parameters
         ----------
@@ -498,5 +514,12 @@ class Live:
         return escaped(f"Live({self.place}, {self.array.rows} x {self.array.columns} taxels)")
 
 
-def _source_of(inlet: LslInlet) -> str:
-    return f"given,columns={':'.join(inlet.columns)}"
+def _stream_name(source: str) -> str:
+    """Return the name of a stream of the lab streaming layer among the sources."""
+    found = _LSL_SOURCE.fullmatch(source)
+    return "lsl" if found is None or found[1] is None else found[1]
+
+
+def _given(source: str, inlet: LslInlet) -> str:
+    """Return the source whose numbers an inlet passes."""
+    return f"{_stream_name(source)}=given,columns={':'.join(inlet.columns)}"

@@ -49,6 +49,8 @@ pub struct ReadoutStream {
     late: u64,
     /// Nothing before it is detected, us.
     begin: i64,
+    /// The time by which an input is continued after its end, us.
+    silence_us: i64,
 }
 
 /// What turns the encoder's spikes into detections.
@@ -77,7 +79,24 @@ impl ReadoutStream {
     fn start(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, decides: Decides) -> Self {
         let repairs = Repairs::with_memory(encoder.repaired_span_ms());
         let (emitted, zeroings) = (vec![], VecDeque::new());
-        Self { encoder, array, decides, clock, now: None, emitted, repairs, zeroings, late: 0, begin: i64::MIN }
+        Self {
+            encoder,
+            array,
+            decides,
+            clock,
+            now: None,
+            emitted,
+            repairs,
+            zeroings,
+            late: 0,
+            begin: i64::MIN,
+            silence_us: 0,
+        }
+    }
+
+    /// Continues the input by `us` after its end ([`ReadoutStream::finish`]).
+    pub(super) fn with_silence(self, us: i64) -> Self {
+        Self { silence_us: us, ..self }
     }
 
     /// Detects nothing before `t` us: where a tare was measured, the sensor was at rest.
@@ -143,6 +162,15 @@ impl ReadoutStream {
             self.settle(t, out)?;
         }
         Ok(())
+    }
+
+    /// Ends the input at `last` us, which continues with its last values for as long as it can cause a detection.
+    ///
+    /// # Errors
+    ///
+    /// As [`ReadoutStream::advance`].
+    pub fn finish(&mut self, last: i64, out: &mut Vec<Detection>) -> Result<()> {
+        self.advance(last.saturating_add(self.silence_us), out)
     }
 
     /// Sets the rest of a taxel after all events up to the zeroing's time, or from now on if that time is past.
