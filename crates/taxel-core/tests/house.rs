@@ -36,7 +36,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
             &["clock", "host_clock", "regular_file"],
             &["address", "bridged", "ports"],
             &["serial_line"],
-            &["board_line", "recording"],
+            &["board_line", "line_place", "recording"],
             &["capture", "frame_lines", "line_input"],
             &["emulate", "pipeline"],
         ],

@@ -9,6 +9,7 @@ pub mod frame_lines;
 pub mod host_clock;
 mod latency;
 pub mod line_input;
+pub mod line_place;
 pub mod locked;
 pub mod ports;
 mod regular_file;

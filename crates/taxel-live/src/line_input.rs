@@ -2,14 +2,15 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
-use std::net::{SocketAddr, UdpSocket};
+use std::net::UdpSocket;
 use std::os::fd::{AsFd, AsRawFd, RawFd};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::line_place::LinePlace;
 use crate::recording::now_ns;
-use crate::serial_line::{CONNECT, SerialLine, SerialPlace};
+use crate::serial_line::{CONNECT, SerialLine};
 use crate::text_lines::{TextLine, TextLines};
 use crate::{Error, Result};
 
@@ -22,32 +23,9 @@ const LONGEST: usize = 1 << 16;
 /// The largest datagram that UDP can carry.
 const DATAGRAM_BYTES: usize = 1 << 16;
 
-/// The place from which lines of numbers are read.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum LineInput {
-    /// A serial line, or TCP.
-    Serial(SerialPlace),
-    /// A named pipe, or any file that is read to its end and then watched for more; `-` is the standard input.
-    File(PathBuf),
-    /// Datagrams to this local address, each with whole lines.
-    Udp(SocketAddr),
-}
-
-impl std::fmt::Display for LineInput {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Serial(SerialPlace::Port(port, baud)) => write!(f, "serial {port}, {baud} baud"),
-            Self::Serial(place @ SerialPlace::Tcp(..)) => write!(f, "lines of TCP {place}"),
-            Self::File(path) if path == Path::new("-") => f.write_str("lines of the standard input"),
-            Self::File(path) => write!(f, "lines of {}", path.display()),
-            Self::Udp(address) => write!(f, "lines of UDP {address}"),
-        }
-    }
-}
-
 /// Reads lines as they arrive.
 pub struct LineReader {
-    place: LineInput,
+    place: LinePlace,
     input: Option<OpenInput>,
     /// The lines that arrived.
     pub lines: TextLines,
@@ -70,10 +48,10 @@ impl LineReader {
     /// # Errors
     ///
     /// `Socket` or `File` if it cannot be opened.
-    pub fn open(place: &LineInput) -> Result<Self> {
+    pub fn open(place: &LinePlace) -> Result<Self> {
         let input = Some(OpenInput::open(place)?);
-        let bytes = if matches!(place, LineInput::Udp(_)) { DATAGRAM_BYTES } else { 4096 };
-        let is_cut = matches!(place, LineInput::Serial(SerialPlace::Port(..)));
+        let bytes = if matches!(place, LinePlace::Udp(_)) { DATAGRAM_BYTES } else { 4096 };
+        let is_cut = matches!(place, LinePlace::Serial(_));
         let lines = TextLines::new(LONGEST);
         Ok(Self { place: place.clone(), input, lines, came_ns: 0, is_cut, piece: vec![0; bytes] })
     }
@@ -102,7 +80,7 @@ impl LineReader {
             },
             Some(OpenInput::File(file)) if is_readable(file.as_raw_fd(), LOOK_EVERY) => {
                 match file.read(&mut self.piece) {
-                    Ok(0) if self.place == LineInput::File(PathBuf::from("-")) => return Ok(true),
+                    Ok(0) if self.place == LinePlace::File(PathBuf::from("-")) => return Ok(true),
                     // A pipe without a writer, or the end of a file: a program may still write to it.
                     Ok(0) => {
                         std::thread::sleep(LOOK_EVERY);
@@ -117,7 +95,7 @@ impl LineReader {
         if n > 0 {
             self.came_ns = now_ns();
             self.lines.push(&self.piece[..n]);
-            if matches!(self.place, LineInput::Udp(_)) && self.piece[n - 1] != b'\n' {
+            if matches!(self.place, LinePlace::Udp(_)) && self.piece[n - 1] != b'\n' {
                 // The end of a datagram ends its last line.
                 self.lines.push(b"\n");
             }
@@ -129,9 +107,9 @@ impl LineReader {
     #[must_use]
     pub fn broken(&self, error: io::Error) -> Error {
         match &self.place {
-            LineInput::Serial(place) => Error::socket(place.name())(error),
-            LineInput::File(path) => Error::file(path)(error),
-            LineInput::Udp(address) => Error::socket(format!("UDP {address}"))(error),
+            LinePlace::Serial(place) | LinePlace::Tcp(place) => Error::socket(place.name())(error),
+            LinePlace::File(path) => Error::file(path)(error),
+            LinePlace::Udp(address) => Error::socket(format!("UDP {address}"))(error),
         }
     }
 
@@ -145,24 +123,24 @@ impl LineReader {
             std::thread::sleep(LOOK_EVERY);
             self.input = OpenInput::open(&self.place).ok();
         }
-        self.is_cut = matches!(self.place, LineInput::Serial(_));
+        self.is_cut = matches!(self.place, LinePlace::Serial(_));
     }
 }
 
 impl OpenInput {
-    fn open(place: &LineInput) -> Result<Self> {
+    fn open(place: &LinePlace) -> Result<Self> {
         match place {
-            LineInput::Serial(place) => SerialLine::open(place, CONNECT).map(Self::Serial),
-            LineInput::File(path) if path == Path::new("-") => {
+            LinePlace::Serial(place) | LinePlace::Tcp(place) => SerialLine::open(place, CONNECT).map(Self::Serial),
+            LinePlace::File(path) if path == Path::new("-") => {
                 // Bypasses the program's own buffer, whose content `poll` does not see.
                 let input = io::stdin().as_fd().try_clone_to_owned().map_err(Error::file(path))?;
                 Ok(Self::File(File::from(input)))
             }
-            LineInput::File(path) => {
+            LinePlace::File(path) => {
                 let file = File::options().read(true).custom_flags(libc::O_NONBLOCK).open(path);
                 Ok(Self::File(file.map_err(Error::file(path))?))
             }
-            LineInput::Udp(address) => {
+            LinePlace::Udp(address) => {
                 let socket = UdpSocket::bind(address).and_then(|socket| {
                     socket.set_read_timeout(Some(LOOK_EVERY))?;
                     Ok(socket)

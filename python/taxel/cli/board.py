@@ -260,7 +260,9 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
         return f"{(total - earlier) / passed:,.0f}/s"
 
     if now["lines"] is not None:
-        return _frames_table(now, rate(now["frames"], before["frames"]), rate(now["lines"]["lines"], before["lines"]["lines"]))
+        return _frames_table(
+            now, rate(now["frames"], before["frames"]), rate(now["lines"]["lines"], before["lines"]["lines"])
+        )
     capture, wire, earlier = now["capture"], now["wire"], before["capture"]
     damaged = wire["skipped"] + wire["contradictory"] + wire["outside"] + wire["unpaired"]
     damage = f"{damaged:,} bytes and words, {wire['back']:,} events out of order"

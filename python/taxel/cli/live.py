@@ -95,7 +95,7 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     nothing was received, or something was lost after it had arrived; 2: the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
-    Example: taxel live --readout ball.json --tare 0.05 --send udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
+    Example: taxel live --readout ball.json --tare 0.05 --send lines+udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
     Example: taxel live --source serial:/dev/ttyACM0,array=16x16 --readout mat.json
     Example: taxel live --panel --control 127.0.0.1:5209
     Example: taxel live --remote zenoh:192.168.1.5:7447/left --panel
@@ -329,6 +329,8 @@ def _silence(now: dict[str, Any], place: str) -> str:
     since = f"nothing for {arrival['silent_s']:.1f} s"
     if arrival["state"] == "quiet":
         return f"quiet: {since}"
+    if now["lines"] is not None:
+        return f"silent: {since} from {place}"
     within_ms = to_ms(arrival["heartbeat_us"])
     return f"silent: {since} from the board, though it sent a heartbeat every {within_ms:g} ms or sooner"
 

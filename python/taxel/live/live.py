@@ -49,10 +49,11 @@ class Live:
 
     Parameters
     ----------
-    port : int, 0 to 65535
-        The UDP port that the board sends to. 0 finds a free one, see `address`.
-    host : str
-        The address of this machine to listen on; 0.0.0.0: all.
+    port : int, 0 to 65535, optional
+        The UDP port that the board sends to. Default: 5208, unless --source names what to receive. 0 finds a free one,
+        see `address`.
+    host : str, optional
+        The address of this machine to listen on for a board; 0.0.0.0: all.
     remote : RemoteBoard, optional
         Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there. Stop the
         `Live` before it.
@@ -77,14 +78,18 @@ class Live:
         recorded while one runs.
     name : str
         The board's name among the sources of the recording.
-    sources : mapping of str to str, optional
-        Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU
-        (serial:PLACE@BAUD or pipe:PATH, columns=t_us:ax:ay). By name, in a `.mcap`, each with its own clock:
-        "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which sends to that address of this machine;
-        "serial:PLACE@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard input); "given" are numbers that a
-        program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of a line (default: those of the
-        first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called `t_us`, `time_ms` ...;
-        "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its arrival.
+    sources : mapping of str to str or str or sequence of str, optional
+        What to receive, [NAME=]KIND:PLACE and KEY=VALUE after commas, as lines:-,array=16x16 or
+        serial:COM3,array=16x16: frames of numbers, a board (board:HOST:PORT), or further sources of a recording.
+        "board:HOST:PORT" is a board that sends to that address of this machine (array=ROWSxCOLUMNS, preset=NAME). Lines
+        of numbers come from "serial:PLACE" (baud=), "lines:PATH" (a pipe, or a file that grows; "-" is the standard
+        input), "lines+tcp:HOST:PORT" (connects), "lines+udp:HOST:PORT" (listens) and "given", what a program passes to
+        `sample`. With ``array=`` they are frames: a line each, or ``frame_lines=16``, or up to an empty line
+        (``frame_end=blank``). ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1; ``time=A+B``
+        adds seconds and nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns,
+        ``leave_out=A:B`` are those without values, ``unit=``, ``falls=`` (true, or the number that readings are
+        subtracted from) and ``rate=`` (frames a second; default: measured). Lines without an array, as of an IMU, are
+        recorded with the first source. "lsl:NAME" is a stream of the lab streaming layer.
     compression : str
         Compression of a .mcap: none, lz4 or zstd.
     overwrite : bool
@@ -96,9 +101,10 @@ class Live:
     lines : bool
         Print one line of JSON for each detection, and nothing else.
     send : str or sequence of str
-        Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD. UDP sends a datagram
-        each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab streaming layer.
-        Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and counted.
+        Send each detection as a line of JSON to serial:PLACE, lines:PATH (a named pipe), lines+tcp:HOST:PORT or
+        lines+udp:HOST:PORT. UDP sends a datagram each, TCP connects; the named pipe must exist; ``,baud=`` may follow a
+        serial port; "lsl:NAME" sends the label in a stream of markers of the lab streaming layer. Up to 1024 lines wait
+        for a slow reader; lines without room, or without a reader, are lost and counted.
     kernel_buffer_bytes : int, 0 to 2147483647
         How much may wait in the kernel, bytes.
     queue_bytes : int, 0 to 2147483647

@@ -56,6 +56,15 @@ impl ValueSteps {
         Self { size: decimal(decimals).max(least), zero: MIDDLE }
     }
 
+    /// Steps that are not much smaller than the noise, its standard deviation, so that a noise floor of some steps holds it.
+    #[must_use]
+    pub fn above_noise(self, noise: f64) -> Self {
+        let power = 10_f64.powf(noise.log10().floor());
+        let size =
+            [5.0, 2.0, 1.0].into_iter().map(|digit| digit * power).find(|&size| size <= noise).unwrap_or(self.size);
+        if size > self.size { Self { size, ..self } } else { self }
+    }
+
     /// Larger steps, which have room for this value too.
     #[must_use]
     pub fn widened(self, value: f32) -> Self {
@@ -114,6 +123,14 @@ mod tests {
         for value in [1e9, -1e9, 65_534.0, -1.0] {
             let steps = ValueSteps { size: 1.0, zero: 0 };
             assert!(!steps.holds(value) && steps.widened(value).holds(value), "{value}");
+        }
+    }
+
+    #[test]
+    fn steps_are_as_large_as_the_noise() {
+        let steps = ValueSteps { size: 0.001, zero: MIDDLE };
+        for (noise, size) in [(0.0, 0.001), (0.0004, 0.001), (0.37, 0.2), (5.0, 5.0), (1.99, 1.0), (12.0, 10.0)] {
+            assert!((steps.above_noise(noise).size - size).abs() < 1e-9, "{noise}");
         }
     }
 

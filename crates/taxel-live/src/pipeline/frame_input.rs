@@ -11,7 +11,8 @@ use super::source::OpenedLines;
 use crate::Result;
 use crate::capture::{MessageFeed, Origin, Receiver, ReceiverOptions};
 use crate::frame_lines::{FrameAssembler, FrameLayout, write_message};
-use crate::line_input::{LineInput, LineReader};
+use crate::line_input::LineReader;
+use crate::line_place::LinePlace;
 use crate::locked::lock;
 use crate::recording::{DamageCounts, now_ns};
 use crate::text_lines::{LeftOut, TextLine};
@@ -65,7 +66,7 @@ impl LineCounts {
 pub(super) struct FrameInput {
     pub(super) layout: FrameLayout,
     /// The place; a program passes the numbers if there is none.
-    place: Option<LineInput>,
+    place: Option<LinePlace>,
     state: Mutex<InputState>,
 }
 
@@ -79,7 +80,7 @@ struct InputState {
 impl FrameInput {
     /// The input, and what a pipeline receives of it.
     pub(super) fn new(
-        place: Option<LineInput>,
+        place: Option<LinePlace>,
         layout: FrameLayout,
         options: ReceiverOptions,
     ) -> (Arc<Self>, Receiver) {

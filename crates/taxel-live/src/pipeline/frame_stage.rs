@@ -16,6 +16,9 @@ use crate::frame_lines::read_message;
 /// Shortest interval at which the readout's time is advanced while no frames arrive.
 const TICK: Duration = Duration::from_micros(500);
 
+/// Number of differences between frames from which the noise is measured.
+const NOISE_FRAMES: usize = 32;
+
 /// Frames in order of time.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct FrameBlock {
@@ -52,9 +55,11 @@ pub(super) struct FrameStage {
     taxels: usize,
     columns: usize,
     frames: FrameBlock,
-    /// The values of the last frame.
+    /// The values of the last frame, and of the one before it.
     last: Vec<f32>,
+    before: Vec<f32>,
     steps: Option<ValueSteps>,
+    noise: FirstNoise,
     held: Held,
     /// The changes of `held` with these frames.
     changes: Events,
@@ -74,7 +79,9 @@ impl FrameStage {
             columns: array.columns.into(),
             frames: FrameBlock::default(),
             last: vec![],
+            before: vec![],
             steps: None,
+            noise: FirstNoise::new(array.len()),
             held: Held::unknown(array.len()),
             changes: no_changes(array),
             clock: BoardClock::default(),
@@ -89,6 +96,7 @@ impl FrameStage {
         let mut is_new = false;
         for (message, bytes) in batch.iter() {
             let (t, values) = read_message(bytes);
+            self.before.clone_from(&self.last);
             self.last.clear();
             self.last.extend(values);
             self.frames.t.push(t);
@@ -111,6 +119,9 @@ impl FrameStage {
             if !steps.holds(value) {
                 steps = steps.widened(value);
             }
+        }
+        if let Some(noise) = self.noise.take(&self.before, &self.last) {
+            steps = steps.above_noise(noise);
         }
         let is_new = self.steps.is_some_and(|before| before != steps);
         self.steps = Some(steps);
@@ -184,6 +195,11 @@ impl FrameStage {
         counters.board.offset = self.clock.offset();
         counters.board.pace.clone_from(&self.pace);
         counters.board.board_us = self.latest.map(|(t, _)| t);
+        // A source of frames sends one each so long, as a board its heartbeats.
+        #[allow(clippy::cast_possible_truncation)]
+        {
+            counters.board.heartbeat_us = Some(self.frame_us.ceil() as i64);
+        }
     }
 
     /// The interval at which the readout's time is advanced while no frames arrive.
@@ -197,6 +213,39 @@ impl FrameStage {
         let (t, arrived_ns) = self.latest?;
         let passed_us = (until_ns? - arrived_ns).max(0) / 1000;
         Some(QuietUntil::ByHostClock(t + passed_us - (self.guard_frames * self.frame_us) as i64))
+    }
+}
+
+/// The noise of the first frames.
+struct FirstNoise {
+    /// Of each taxel the sum of its squared differences from frame to frame.
+    squares: Vec<f64>,
+    frames: usize,
+}
+
+impl FirstNoise {
+    fn new(taxels: usize) -> Self {
+        Self { squares: vec![0.0; taxels], frames: 0 }
+    }
+
+    /// Takes the next frame; once, when it was measured, returns the standard deviation of the median taxel.
+    fn take(&mut self, before: &[f32], frame: &[f32]) -> Option<f64> {
+        if self.frames >= NOISE_FRAMES || before.is_empty() {
+            return None;
+        }
+        for (square, (&before, &value)) in self.squares.iter_mut().zip(before.iter().zip(frame)) {
+            let difference = f64::from(value) - f64::from(before);
+            *square += if difference.is_finite() { difference * difference } else { 0.0 };
+        }
+        self.frames += 1;
+        if self.frames < NOISE_FRAMES {
+            return None;
+        }
+        let middle = self.squares.len() / 2;
+        let (_, median, _) = self.squares.select_nth_unstable_by(middle, f64::total_cmp);
+        // A difference has the noise of two frames.
+        #[allow(clippy::cast_precision_loss)]
+        Some((*median / (2.0 * NOISE_FRAMES as f64)).sqrt())
     }
 }
 

@@ -121,9 +121,10 @@ options! {
         gap_frames: f64 = 1.0, "commands" = "", "minimum" = 0;
         /// Print one line of JSON for each detection, and nothing else.
         lines: bool = false, "flag" = "--json";
-        /// Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD.
+        /// Send each detection as a line of JSON to serial:PLACE, lines:PATH (a named pipe), lines+tcp:HOST:PORT or
+        /// lines+udp:HOST:PORT.
         ///
-        /// UDP sends a datagram each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab
+        /// UDP sends a datagram each, TCP connects; the named pipe must exist; ``,baud=`` may follow a serial port; "lsl:NAME" sends the label in a stream of markers of the lab
         /// streaming layer. Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and
         /// counted.
         send: Vec<String> = vec![], "metavar" = "WHERE", "python" = "str | Sequence[str]", "typed" = "May be repeated.";

@@ -12,10 +12,10 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
 use crate::frame_lines::{FrameAssembler, FrameEnd, FrameLayout, cells, number};
-use crate::line_input::{LineInput, LineReader};
+use crate::line_input::LineReader;
+use crate::line_place::LinePlace;
 use crate::locked::lock;
 use crate::recording::{Header, StreamColumns, UNITS_US, clock_unit_us, now_ns};
-use crate::serial_line::{BAUD, SerialPlace};
 use crate::text_lines::TextLine;
 use crate::{Error, Result, address};
 
@@ -28,7 +28,7 @@ const MEASURE: Duration = Duration::from_secs(1);
 
 /// How a source is written, for errors.
 const FORMS: &str = "[NAME=]board:HOST:PORT, serial:PLACE, lines:PATH (- is the standard input), lines+tcp:HOST:PORT, \
-                     lines+udp:HOST:PORT or given, then KEY=VALUE after commas";
+                     lines+udp:HOST:PORT or given, and KEY=VALUE after commas";
 
 /// A source as a text states it.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +55,7 @@ pub enum SourcePlace {
     /// A board that sends to this local address, and the preset of its registers.
     Board(SocketAddr, String),
     /// Lines of text.
-    Lines(LineInput),
+    Lines(LinePlace),
     /// A program passes numbers ([`Live::sample`](super::Live::sample)).
     Given,
 }
@@ -84,9 +84,9 @@ pub enum SourceKind {
     /// A board that sends to this local address.
     Board(SocketAddr, Box<Array>, Registers),
     /// Frames of numbers, from lines or, without them, from a program.
-    Frames(Option<LineInput>, Box<FrameLayout>, Opened),
+    Frames(Option<LinePlace>, Box<FrameLayout>, Opened),
     /// Lines of numbers that are no frames, as of an IMU; from a program if there are none.
-    Numbers(Option<LineInput>, StreamColumns, Opened),
+    Numbers(Option<LinePlace>, StreamColumns, Opened),
 }
 
 /// Lines that were opened to read their columns, with what arrived so far. The reader continues there: reopening would
@@ -106,7 +106,7 @@ impl Opened {
     }
 
     /// The open lines, or those of a place that is opened now.
-    pub(super) fn take_or_open(&self, place: &LineInput) -> Result<OpenedLines> {
+    pub(super) fn take_or_open(&self, place: &LinePlace) -> Result<OpenedLines> {
         let opened = lock(&self.0).take();
         opened.map_or_else(|| OpenedLines::open(place), Ok)
     }
@@ -128,7 +128,7 @@ impl PartialEq for Opened {
 impl NamedSource {
     /// The source's header in the recording.
     pub(super) fn header(&self) -> taxel_core::Result<Header> {
-        let place = |input: &Option<LineInput>| {
+        let place = |input: &Option<LinePlace>| {
             input.as_ref().map_or_else(|| "given by a program".to_owned(), ToString::to_string)
         };
         match &self.kind {
@@ -165,33 +165,20 @@ impl FromStr for SourceText {
             };
             options.insert(key.trim(), value.trim());
         }
-        let mut take = |key: &str| options.remove(key).map(str::to_owned);
-        let array = take("array").map(|size| array_of(text, &size)).transpose()?;
-        let in_text = |error: taxel_core::Error| error.in_part(&format!("source {text:?}"));
+        let array = options.remove("array").map(|size| array_of(text, size)).transpose()?;
+        let in_text = |error: Error| error.in_part(&format!("source {text:?}"));
         let place = match head.split_once(':') {
             Some(("board", place)) => {
-                SourcePlace::Board(address::of_text(place)?, take("preset").unwrap_or_else(|| "5.2 kHz".to_owned()))
+                let preset = options.remove("preset").unwrap_or("5.2 kHz").to_owned();
+                SourcePlace::Board(address::of_text(place)?, preset)
             }
-            Some(("serial", place)) if !place.is_empty() => {
-                let baud = take("baud");
-                let no_number = |text: &String| problem!("baud"; " is {text:?}: must be a number of bits/s, as {BAUD}");
-                let stated =
-                    baud.as_ref().map(|text| text.parse().map_err(|_| in_text(no_number(text)))).transpose()?;
-                let place = SerialPlace::new(place, stated.unwrap_or(BAUD)).map_err(in_text)?;
-                if let (SerialPlace::Tcp(..), Some(baud)) = (&place, baud) {
-                    return Err(refused(format!("baud is {baud}: {place} is a TCP port, which has none")));
-                }
-                SourcePlace::Lines(LineInput::Serial(place))
-            }
-            Some(("lines", place)) if !place.is_empty() => SourcePlace::Lines(LineInput::File(place.into())),
-            Some(("lines+tcp", place)) => match address::host_and_port(place) {
-                Some((host, port)) => SourcePlace::Lines(LineInput::Serial(SerialPlace::Tcp(host.to_owned(), port))),
-                None => return Err(refused(format!("{place:?} must be HOST:PORT, as 127.0.0.1:9000"))),
-            },
-            Some(("lines+udp", place)) => SourcePlace::Lines(LineInput::Udp(address::of_text(place)?)),
             None if head == "given" => SourcePlace::Given,
-            _ => return Err(refused(format!("must be {FORMS}"))),
+            _ => match LinePlace::parse(head, &mut options).map_err(in_text)? {
+                Some(place) => SourcePlace::Lines(place),
+                None => return Err(refused(format!("must be {FORMS}"))),
+            },
         };
+        let mut take = |key: &str| options.remove(key).map(str::to_owned);
         let number = |key: &str, value: Option<String>| -> Result<Option<f64>> {
             let parsed = value.map(|value| {
                 let number = value.parse::<f64>().ok().filter(|number| number.is_finite());
@@ -306,10 +293,7 @@ impl SourceText {
             SourcePlace::Lines(input) => Some(input.clone()),
             SourcePlace::Given => None,
         };
-        let in_text = |error: Error| match error {
-            Error::Core(error) => Error::Core(error.in_part(&format!("source {:?}", self.text))),
-            error => error,
-        };
+        let in_text = |error: Error| error.in_part(&format!("source {:?}", self.text));
         if readout_array.is_some() || self.frames_are_stated() {
             let (layout, opened) =
                 self.frames(input.as_ref(), readout_array.and_then(Option::as_ref)).map_err(in_text)?;
@@ -321,7 +305,7 @@ impl SourceText {
     }
 
     /// The columns that are stated, or those of the first line.
-    fn columns_or_first_line(&self, input: Option<&LineInput>) -> Result<(Vec<String>, Opened)> {
+    fn columns_or_first_line(&self, input: Option<&LinePlace>) -> Result<(Vec<String>, Opened)> {
         match (&self.columns, input) {
             (Some(columns), _) => Ok((columns.clone(), Opened::default())),
             (None, None) => Err(problem!("source {:?}: needs columns=A:B:C", self.text).into()),
@@ -360,7 +344,7 @@ impl SourceText {
     }
 
     /// How the lines make frames, with what was read to find it.
-    fn frames(&self, input: Option<&LineInput>, readout_array: Option<&Array>) -> Result<(FrameLayout, Opened)> {
+    fn frames(&self, input: Option<&LinePlace>, readout_array: Option<&Array>) -> Result<(FrameLayout, Opened)> {
         let end = self.end.unwrap_or(FrameEnd::Lines(1));
         let mut opened = None;
         let columns = match (&self.columns, input) {
@@ -492,7 +476,7 @@ fn array_of(text: &str, size: &str) -> Result<Array> {
 }
 
 impl OpenedLines {
-    fn open(input: &LineInput) -> Result<Self> {
+    fn open(input: &LinePlace) -> Result<Self> {
         Ok(Self { reader: LineReader::open(input)?, begun: vec![] })
     }
 
@@ -525,7 +509,7 @@ impl OpenedLines {
 
     /// Waits for the first line that defines the columns, and returns them: a line of names, or of numbers, whose columns are
     /// then named `column_0` and so on. Text before it that is neither is skipped.
-    fn first(&mut self, input: &LineInput, leave_out: &[String]) -> Result<Vec<String>> {
+    fn first(&mut self, input: &LinePlace, leave_out: &[String]) -> Result<Vec<String>> {
         let until = Instant::now() + FIRST_LINE;
         let mut names: Option<Vec<String>> = None;
         while let Some((line, at_ns)) = self.next(until)? {
@@ -542,7 +526,11 @@ impl OpenedLines {
                 self.begun.push((line, at_ns));
                 return Ok(columns);
             }
-            names = Some(found.into_iter().map(Cow::into_owned).collect());
+            let words: Vec<String> = found.into_iter().map(Cow::into_owned).collect();
+            if words.iter().any(|word| clock_unit_us(word).is_some()) {
+                return Ok(words);
+            }
+            names = Some(words);
         }
         // Only names have arrived.
         names.ok_or_else(|| self.nothing(input, "columns=t_us:ax:ay:az"))
@@ -550,7 +538,7 @@ impl OpenedLines {
 
     /// Measures the time from one frame to the next, us, from what arrives first.
     #[allow(clippy::cast_precision_loss)]
-    fn frame_us(&mut self, layout: &FrameLayout, input: &LineInput) -> Result<f64> {
+    fn frame_us(&mut self, layout: &FrameLayout, input: &LinePlace) -> Result<f64> {
         let mut frames = FrameAssembler::new(FrameLayout { frame_us: 1.0, ..layout.clone() });
         let mut times: Vec<i64> =
             self.begun.iter().filter_map(|(line, at_ns)| Some(frames.push(line, *at_ns)?.0)).collect();
@@ -578,7 +566,7 @@ impl OpenedLines {
     }
 
     /// The error if too little arrived.
-    fn nothing(&mut self, input: &LineInput, remedy: &str) -> Error {
+    fn nothing(&mut self, input: &LinePlace, remedy: &str) -> Error {
         self.reader.lines.discard();
         let left_out = self.reader.lines.take_left_out();
         let came = match left_out.in_no_line + left_out.unfinished {
@@ -600,26 +588,17 @@ mod tests {
         let SourceKind::Board(address, array, _) = &board else { panic!("{board:?}") };
         assert_eq!((address.port(), array.rows, array.columns), (5209, 16, 8));
         let imu = open("serial:/dev/ttyACM0,baud=9600,columns=n:ax:ay,time=n:ms");
-        let SourceKind::Numbers(Some(LineInput::Serial(place)), stream, _) = &imu else { panic!("{imu:?}") };
-        assert_eq!(*place, SerialPlace::Port("/dev/ttyACM0".to_owned(), 9600));
+        let SourceKind::Numbers(Some(place), stream, _) = &imu else { panic!("{imu:?}") };
+        assert_eq!(place.to_string(), "serial:/dev/ttyACM0,baud=9600");
         assert_eq!((stream.time.as_deref(), stream.unit_us), (Some("n"), 1e3));
         let mat: SourceText = "mat=lines:-,array=2x3,columns=s:ns:id:a:b:c,time=1+2,leave_out=id,frame_lines=2,rate=50,falls=1023,unit=kPa"
             .parse()
             .unwrap();
         assert_eq!(mat.name(), "mat");
-        let SourceKind::Frames(Some(LineInput::File(path)), layout, _) = mat.open(None).unwrap() else { panic!() };
+        let SourceKind::Frames(Some(LinePlace::File(path)), layout, _) = mat.open(None).unwrap() else { panic!() };
         assert_eq!(path.to_str(), Some("-"));
         assert_eq!((layout.fields, &layout.values[..], layout.frame_us), (6, &[3, 4, 5][..], 20_000.0));
         assert_eq!((&layout.time[..], layout.turned, &*layout.unit), (&[(0, 1e6), (1, 1e-3)][..], Some(1023.0), "kPa"));
-        for (text, place) in [
-            ("lines+tcp:localhost:9000", "lines of TCP localhost:9000"),
-            ("lines+udp:127.0.0.1:9000", "lines of UDP 127.0.0.1:9000"),
-            ("serial:localhost:9000", "lines of TCP localhost:9000"),
-        ] {
-            let source: SourceText = text.parse().unwrap();
-            let SourcePlace::Lines(input) = source.place else { panic!("{text}") };
-            assert_eq!(input.to_string(), place);
-        }
     }
 
     #[test]

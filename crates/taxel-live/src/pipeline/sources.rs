@@ -21,7 +21,8 @@ use super::shared::PipelineShared;
 use super::source::{NamedSource, Opened, OpenedLines, SourceKind};
 use crate::capture::{Receiver, ReceiverOptions};
 use crate::frame_lines::FrameLayout;
-use crate::line_input::{LineInput, LineReader};
+use crate::line_input::LineReader;
+use crate::line_place::LinePlace;
 use crate::locked::lock;
 use crate::recording::{self, DamageCounts, SourceWriter, StreamColumns, StreamFaults, fields, now_ns};
 use crate::text_lines::{LeftOut, TextLine};
@@ -212,12 +213,12 @@ pub(super) enum PipelineInput {
     /// Datagrams that another computer receives.
     Fed(Receiver),
     /// Frames of numbers, and the lines to read them from.
-    Frames(Option<LineInput>, Box<FrameLayout>, Option<OpenedLines>),
+    Frames(Option<LinePlace>, Box<FrameLayout>, Option<OpenedLines>),
 }
 
 impl PipelineInput {
     /// Frames of a place that may be open already, or of a program.
-    pub(super) fn frames(place: &Option<LineInput>, layout: &FrameLayout, opened: &Opened) -> Result<Self> {
+    pub(super) fn frames(place: &Option<LinePlace>, layout: &FrameLayout, opened: &Opened) -> Result<Self> {
         let lines = place.as_ref().map(|place| opened.take_or_open(place)).transpose()?;
         Ok(Self::Frames(place.clone(), Box::new(layout.clone()), lines))
     }
