@@ -323,16 +323,16 @@ def _silence(now: dict[str, Any], place: str) -> str:
     if arrival["state"] == "nothing":
         if now["seconds"] < _FIRST_WITHIN_S:
             return ""
+        check = "is the board on, and does it send to this address and port?"
         if now["lines"] is not None:
-            return f"no frame has arrived from {place} so far: is it connected, and does it print lines of numbers?"
-        return f"nothing has arrived on {place} so far: is the board on, and does it send to this address and port?"
+            check = "is it connected, and does it print lines of numbers?"
+        return f"nothing has arrived on {place} so far: {check}"
     since = f"nothing for {arrival['silent_s']:.1f} s"
     if arrival["state"] == "quiet":
         return f"quiet: {since}"
-    if now["lines"] is not None:
-        return f"silent: {since} from {place}"
     within_ms = to_ms(arrival["heartbeat_us"])
-    return f"silent: {since} from the board, though it sent a heartbeat every {within_ms:g} ms or sooner"
+    what = "heartbeat" if now["lines"] is None else "frame"
+    return f"silent: {since} from {place}, though it sent a {what} every {within_ms:g} ms or sooner"
 
 
 def _state(now: dict[str, Any], place: str) -> Text:

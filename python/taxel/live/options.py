@@ -99,4 +99,4 @@ def _plain(option: Field[Any], value: object) -> object:
         "int": lambda: integer(option.name, value, option.metadata["min"], option.metadata["max"]),
         "str": lambda: text(option.name, value),
     }
-    return checks.get(option.type, lambda: number(option.name, value))()
+    return checks.get(option.type.removesuffix(" | None"), lambda: number(option.name, value))()

@@ -286,7 +286,7 @@ class Recording:
 
     @property
     def frame_us(self) -> float | None:
-        """The length of a frame, us, by the board's registers or as a source of frames states it; None if neither does."""
+        """The length of a frame, us, as the board's registers or a source of frames state it; None if none does."""
         if (registers := self.registers) is not None:
             return registers.frame_us
         main = self._contents.main
