@@ -84,8 +84,10 @@ enum Input {
     /// The socket, locked by a caller while it waits for datagrams, or `None` after it was moved into the thread; and
     /// the thread.
     Socket(Mutex<Option<Socket>>, Mutex<Option<JoinHandle<()>>>),
-    /// What another computer receives, or, without parcels, the messages of a [`MessageFeed`].
-    Feed(Option<ParcelFeed>),
+    /// What another computer receives.
+    Parcels(ParcelFeed),
+    /// The messages of a [`MessageFeed`], which may end by itself once it was asked to.
+    Messages { ends_itself: bool },
 }
 
 impl Receiver {
@@ -145,15 +147,16 @@ impl Receiver {
     pub fn fed(name: &str, options: ReceiverOptions) -> (Self, ParcelFeed) {
         let queue = Arc::new(BatchQueue::new(options.queue_bytes, CaptureCounts::default()));
         let feed = ParcelFeed::new(Arc::clone(&queue));
-        (Self { queue, origin: Origin::Bridge(name.to_owned()), input: Input::Feed(Some(feed.clone())) }, feed)
+        (Self { queue, origin: Origin::Bridge(name.to_owned()), input: Input::Parcels(feed.clone()) }, feed)
     }
 
-    /// Receives the messages that the caller passes to the [`MessageFeed`].
+    /// Receives the messages that the caller passes to the [`MessageFeed`]. The caller may end by itself once the end was
+    /// requested, so that nothing is left that it has read: then it calls [`MessageFeed::close`].
     #[must_use]
-    pub fn of_messages(origin: Origin, options: ReceiverOptions) -> (Self, MessageFeed) {
+    pub fn of_messages(origin: Origin, options: ReceiverOptions, ends_itself: bool) -> (Self, MessageFeed) {
         let queue = Arc::new(BatchQueue::new(options.queue_bytes, CaptureCounts::default()));
         let feed = MessageFeed::new(Arc::clone(&queue));
-        (Self { queue, origin, input: Input::Feed(None) }, feed)
+        (Self { queue, origin, input: Input::Messages { ends_itself } }, feed)
     }
 
     /// Where datagrams come from, with the actual port if 0 was requested.
@@ -175,8 +178,8 @@ impl Receiver {
     #[must_use]
     pub fn bridged(&self) -> Option<Bridged> {
         match &self.input {
-            Input::Feed(Some(feed)) => Some(feed.bridged()),
-            Input::Socket(..) | Input::Feed(None) => None,
+            Input::Parcels(feed) => Some(feed.bridged()),
+            Input::Socket(..) | Input::Messages { .. } => None,
         }
     }
 
@@ -185,7 +188,7 @@ impl Receiver {
     pub fn silent_until(&self) -> Option<i64> {
         match &self.input {
             Input::Socket(..) => Some(now_ns()),
-            Input::Feed(_) => self.queue.silent_until(),
+            Input::Parcels(_) | Input::Messages { .. } => self.queue.silent_until(),
         }
     }
 
@@ -212,7 +215,7 @@ impl Receiver {
                     None => self.queue.pop(batch, timeout),
                 }
             }
-            Input::Feed(_) => self.queue.pop(batch, timeout),
+            Input::Parcels(_) | Input::Messages { .. } => self.queue.pop(batch, timeout),
         };
         received.map_err(Error::socket(&self.origin))
     }
@@ -249,7 +252,7 @@ impl Receiver {
     /// Requests the end: what has arrived so far is received, then nothing more.
     pub fn stop(&self) {
         self.queue.stop();
-        if let Input::Feed(_) = self.input {
+        if let Input::Parcels(_) | Input::Messages { ends_itself: false } = self.input {
             self.queue.close(None);
         }
     }

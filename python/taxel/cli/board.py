@@ -62,7 +62,8 @@ def _parameter(field: Field[Any]) -> inspect.Parameter:
     flag = words.get("flag", "--" + field.name.replace("_", "-"))
     help_ = " ".join([described.pop("help"), *filter(None, [words.get("typed")])])
     plain = kind.removesuffix(" | None")
-    read, default = _TYPES.get(plain, str), field.default if plain in _TYPES else None
+    default = field.default if plain in _TYPES else None
+    read: Any = _TYPES.get(plain, str)
     if plain != kind or plain not in _TYPES:
         read |= None
     if "PathLike" in kind:

@@ -41,7 +41,9 @@ class Screen:
         self._before: tuple[float, int] = (0.0, 0)
         self._rate = 0.0
 
-    def draw(self, counters: dict[str, Any], frame: NDArray[np.uint16], detections: list[Detection]) -> None:
+    def draw(
+        self, counters: dict[str, Any], frame: NDArray[np.uint16] | NDArray[np.float32], detections: list[Detection]
+    ) -> None:
         """Draw counters, frame and detections so far."""
         now = (counters["board_us"] or 0) * 1e-6
         then, events = self._before

@@ -170,8 +170,10 @@ class Live:
         #: The name of the source that is read out.
         self.name = name
         layout = self._core.frame_layout()
-        #: The unit of the values, and the length of frames of numbers, us; None of a board.
-        self.unit, self.frame_us = ("ticks", None) if layout is None else layout
+        #: The unit of the values.
+        self.unit: str = "ticks" if layout is None else layout[0]
+        #: The length of frames of numbers, us; None of a board.
+        self.frame_us: float | None = None if layout is None else layout[1]
         #: To begin another one on another address.
         self._options = replace(options, array=self.array)
         self._remote, self._place = remote, self._core.place()

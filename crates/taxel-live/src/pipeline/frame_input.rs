@@ -85,7 +85,7 @@ impl FrameInput {
         options: ReceiverOptions,
     ) -> (Arc<Self>, Receiver) {
         let origin = place.as_ref().map_or_else(|| "a program".to_owned(), ToString::to_string);
-        let (receiver, feed) = Receiver::of_messages(Origin::Frames(origin), options);
+        let (receiver, feed) = Receiver::of_messages(Origin::Frames(origin), options, place.is_some());
         let frames = FrameAssembler::new(layout.clone());
         let state = Mutex::new(InputState { frames, feed, message: vec![], trouble: None });
         (Arc::new(Self { layout, place, state }), receiver)
@@ -97,6 +97,9 @@ impl FrameInput {
         let InputState { frames, feed, message, .. } = &mut *state;
         if self.place.is_some() {
             return Err(problem!("source {name:?}: reads lines, and takes no samples").into());
+        }
+        if feed.is_over() {
+            return Err(problem!("source {name:?}: has ended").into());
         }
         let frame = frames.push_values(values, arrived_ns).map_err(|error| error.in_part(&format!("source {name}")))?;
         if let Some((t, values)) = frame {

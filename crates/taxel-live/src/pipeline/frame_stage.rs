@@ -65,6 +65,8 @@ pub(super) struct FrameStage {
     changes: Events,
     clock: BoardClock,
     pace: Option<Pace>,
+    /// Time of the first frame, us.
+    first: Option<i64>,
     /// Time of the last frame, us, and its arrival, ns since 1970.
     latest: Option<(i64, i64)>,
     count: u64,
@@ -86,6 +88,7 @@ impl FrameStage {
             changes: no_changes(array),
             clock: BoardClock::default(),
             pace: None,
+            first: None,
             latest: None,
             count: 0,
         }
@@ -101,6 +104,7 @@ impl FrameStage {
             self.last.extend(values);
             self.frames.t.push(t);
             self.frames.values.extend_from_slice(&self.last);
+            self.first.get_or_insert(t);
             self.latest = Some((t, message.arrived_ns));
             self.count += 1;
             if self.clock.note(t, message.arrived_ns) {
@@ -168,8 +172,9 @@ impl FrameStage {
         &self.held
     }
 
-    pub(super) fn steps(&self) -> Option<ValueSteps> {
-        self.steps
+    /// The steps of the values, and the time of the first frame, us.
+    pub(super) fn steps(&self) -> Option<(ValueSteps, i64)> {
+        self.steps.zip(self.first)
     }
 
     /// The values of the last frame.

@@ -55,12 +55,13 @@ impl Handle {
         self.shared.counters()
     }
 
-    /// Unit and steps of the frames of numbers that are received, in which viewers get their values; `None` of a board, and
-    /// before the first frame.
+    /// Unit and steps of the frames of numbers that are received, in which viewers get their values, and the time of the
+    /// first one, us; `None` of a board, and before the first frame.
     #[must_use]
-    pub fn frame_values(&self) -> Option<(String, ValueSteps)> {
+    pub fn frame_values(&self) -> Option<(String, ValueSteps, i64)> {
         let frames = self.shared.frames.as_ref()?;
-        Some((frames.layout.unit.clone(), self.shared.published().steps?))
+        let (steps, begin_us) = self.shared.published().steps?;
+        Some((frames.layout.unit.clone(), steps, begin_us))
     }
 
     /// As [`Live::is_over`](super::Live::is_over).

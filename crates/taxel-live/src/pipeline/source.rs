@@ -8,6 +8,7 @@ use std::str::FromStr;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use taxel_core::array::Pitch;
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
@@ -165,7 +166,8 @@ impl FromStr for SourceText {
             };
             options.insert(key.trim(), value.trim());
         }
-        let array = options.remove("array").map(|size| array_of(text, size)).transpose()?;
+        let is_board = head.starts_with("board:");
+        let array = options.remove("array").map(|size| array_of(text, size, is_board)).transpose()?;
         let in_text = |error: Error| error.in_part(&format!("source {text:?}"));
         let place = match head.split_once(':') {
             Some(("board", place)) => {
@@ -460,17 +462,24 @@ fn index_of(key: &str, column: &str, columns: &[String]) -> taxel_core::Result<u
     }
 }
 
-/// Parses an array of rows x columns, with the thesis' pitch for a board of the thesis alone.
-fn array_of(text: &str, size: &str) -> Result<Array> {
-    let sides = size.split_once('x').and_then(|(rows, columns)| Some((rows.parse().ok()?, columns.parse().ok()?)));
-    let Some((rows, columns)) = sides else {
-        return Err(problem!("source {text:?}: array {size:?} must be rows x columns, as 64x64").into());
+/// Parses an array of rows x columns, with or without a pitch, mm; without one that of a board is the thesis', and that of other
+/// sensors is unknown.
+fn array_of(text: &str, size: &str, is_board: bool) -> Result<Array> {
+    let wrong =
+        || problem!("source {text:?}: array {size:?} must be rows x columns, as 64x64, or with a pitch, as 64x64x5");
+    let sides: Vec<&str> = size.split('x').collect();
+    let (rows, columns, pitch_mm) = match sides[..] {
+        [rows, columns] => (rows, columns, None),
+        [rows, columns, pitch] => (rows, columns, Some(pitch.parse::<f64>().map_err(|_| wrong())?)),
+        _ => return Err(wrong().into()),
     };
+    let (rows, columns) = (rows.parse().map_err(|_| wrong())?, columns.parse().map_err(|_| wrong())?);
     let thesis = Array::thesis();
-    if (rows, columns) == (thesis.rows, thesis.columns) {
+    if is_board && pitch_mm.is_none() && (rows, columns) == (thesis.rows, thesis.columns) {
         return Ok(thesis);
     }
-    let array = Array { pitch_mm: thesis.pitch_mm, ..Array::unmeasured(rows, columns, size) };
+    let pitch_mm = pitch_mm.map(Pitch::square).or(thesis.pitch_mm.filter(|_| is_board));
+    let array = Array { pitch_mm, ..Array::unmeasured(rows, columns, size) };
     array.check()?;
     Ok(array)
 }

@@ -124,18 +124,18 @@ impl LiveSource {
 
     /// Unit and steps of frames of numbers; none of a board, and before the first frame.
     pub(crate) fn frames(&self) -> Option<LiveFrames> {
-        let (unit, steps) = self.handle.frame_values()?;
-        Some(LiveFrames { unit, step: steps.size, zero: steps.zero })
+        let (unit, steps, begin_us) = self.handle.frame_values()?;
+        Some(LiveFrames { unit, step: steps.size, zero: steps.zero, begin_us })
     }
 
     /// The steps of the values; ticks of a board.
     fn value_steps(&self) -> ValueSteps {
-        self.handle.frame_values().map_or(ValueSteps { size: 1.0, zero: 0 }, |(_, steps)| steps)
+        self.handle.frame_values().map_or(ValueSteps { size: 1.0, zero: 0 }, |(_, steps, _)| steps)
     }
 
     /// Whether those are others than at the last call, so that clients are to be told.
     pub(crate) fn has_new_steps(&self) -> bool {
-        let now = self.handle.frame_values().map(|(_, steps)| steps);
+        let now = self.handle.frame_values().map(|(_, steps, _)| steps);
         std::mem::replace(&mut *lock(&self.steps), now) != now
     }
 

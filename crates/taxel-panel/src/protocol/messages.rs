@@ -455,6 +455,8 @@ pub(crate) struct LiveFrames {
     /// A value is `(ticks - zero) * step`.
     pub(crate) step: f64,
     pub(crate) zero: u16,
+    /// Time of the first frame, us: seconds are shown since then where times are those since 1970.
+    pub(crate) begin_us: i64,
 }
 
 /// A recording of frames.
