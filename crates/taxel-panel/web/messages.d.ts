@@ -154,6 +154,8 @@ export interface LiveFrames {
   /** A value is `(ticks - zero) * step`. */
   step: number;
   zero: number;
+  /** Time of the first frame, us: seconds are shown since then where times are those since 1970. */
+  begin_us: number;
 }
 
 /** What was lost, by cause. */
