@@ -1,6 +1,6 @@
 """Frames that a sensor prints: 1000 lines a second of 256 numbers, read, recorded, read out and sent to a page.
 
-A process of its own prints lines, each a frame of 16 x 16 counts with noise and touches, into a pipe at the stated rate. This
+A process of its own prints lines, each a frame of 16 x 16 counts with noise and touches, into a pipe, at the rate. This
 process reads them live, records them to a .mcap on the disk, runs a readout of level crossings on all taxels, and
 serves the panel to a client in another process, which reads every frame. CPU is of this process, all threads; a wall
 second has one core second.
