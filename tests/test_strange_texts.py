@@ -175,7 +175,7 @@ def live(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:
     to = ["--host", "127.0.0.1", "--port", free_port(), "--seconds", "0.3"]
     yield ["live", *to, "--readout", places["other readout"], "--record", out / f"{FILE}.mcap"]
     yield ["live", *to, "--readout", places["labels"]]
-    yield ["live", *to, "--send", f"udp:{NAME}", "--readout", places["readout"]]
+    yield ["live", *to, "--send", f"lines+udp:{NAME}", "--readout", places["readout"]]
     yield ["live", *to, "--remote", NAME]
 
 
@@ -183,10 +183,10 @@ def record(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:
     to = ["--host", "127.0.0.1", "--port", free_port(), "--seconds", "0.5"]
     lines = out / f"{FILE}.lines"
     lines.write_text("".join(f"{10 * k},{CELL if k == 9 else k}\n" for k in range(50)), newline="")
-    for what in (f"pipe:{lines},columns=t_ms:a", f"pipe:{lines},columns=t_ms:{CELL}", f"pipe:{NAME}", NAME):
+    for what in (f"lines:{lines},columns=t_ms:a", f"lines:{lines},columns=t_ms:{CELL}", f"lines:{NAME}", NAME):
         yield ["record", out / f"{FILE}.mcap", *to, "--source", f"line={what}", "--overwrite"]
     yield ["record", out / f"{FILE}2.mcap", *to]
-    yield ["record", out / f"{FILE}.mcap", *to, "--source", f"{NAME}=udp:127.0.0.1:{free_port()}"]
+    yield ["record", out / f"{FILE}.mcap", *to, "--source", f"{NAME}=board:127.0.0.1:{free_port()}"]
     yield ["record", out / NAME / "a.mcap", *to]
 
 

@@ -87,7 +87,7 @@ def test_each_byte_of_a_pipe_is_in_a_line_or_counted(tmp_path: Path, name: str) 
     pieces = PIPES[name]
     lines, strange, beyond, unfinished = numbers_of(pieces)
     path, place = tmp_path / "a.mcap", tmp_path / "pipe"
-    sources = {"imu": f"pipe:{place},columns=a:b"}
+    sources = {"imu": f"lines:{place},columns=a:b"}
     with writing(place, pieces) as written, Live(0, host=LOOPBACK, record=path, sources=sources) as live:
         assert written.wait(20)
         until(lambda: counts_of(live)["lines"] == lines and counts_of(live)["bytes_in_no_line"] == beyond)
@@ -119,7 +119,7 @@ def counts_of(live: Live) -> dict[str, int]:
 def test_what_comes_before_the_first_line_is_counted_and_names_no_column(tmp_path: Path, capsys, garbage) -> None:
     path, place = tmp_path / "a.mcap", tmp_path / "pipe"
     with writing(place, [garbage, b"\n1,2\n3,4\n"]):
-        source = ("--source", f"imu=pipe:{place}", "--seconds", "1", "--json")
+        source = ("--source", f"imu=lines:{place}", "--seconds", "1", "--json")
         code, out, _ = call(capsys, "record", path, "--port", "0", "--host", LOOPBACK, *source)
     summary = json.loads(out)
     counts = summary["counters"]["sources"]["imu"]
@@ -135,14 +135,14 @@ def test_without_a_first_line_the_error_says_how_much_came(tmp_path: Path) -> No
     place = tmp_path / "pipe"
     with (
         writing(place, [b"x" * 200_000]),
-        pytest.raises(taxel.ProblemError, match="no line in the 200000 bytes that came"),
+        pytest.raises(taxel.ProblemError, match="too few lines of numbers in the 200000 bytes that came"),
     ):
-        Live(0, host=LOOPBACK, record=tmp_path / "a.mcap", sources={"imu": f"pipe:{place}"})
+        Live(0, host=LOOPBACK, record=tmp_path / "a.mcap", sources={"imu": f"lines:{place}"})
 
 
 def test_of_a_pipe_that_closes_at_once_nothing_arrived(tmp_path: Path) -> None:
     place = tmp_path / "pipe"
-    sources = {"imu": f"pipe:{place},columns=a"}
+    sources = {"imu": f"lines:{place},columns=a"}
     with writing(place, []) as written, Live(0, host=LOOPBACK, record=tmp_path / "a.mcap", sources=sources) as live:
         assert written.wait(5)
         summary = live.stop()

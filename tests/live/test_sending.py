@@ -84,7 +84,7 @@ def test_a_detection_goes_by_udp_and_into_a_pipe(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind((LOOPBACK, 0))
         other.settimeout(30)
-        with listen([f"udp:{LOOPBACK}:{other.getsockname()[1]}", f"pipe:{pipe}"], record) as live:
+        with listen([f"lines+udp:{LOOPBACK}:{other.getsockname()[1]}", f"lines:{pipe}"], record) as live:
             wait_for(live, 0)
             wait_for(live, play(presses(6), live.address[1]))
             counts = live.stop().counters
@@ -103,7 +103,7 @@ def test_a_detection_drives_a_serial_line(tmp_path: Path) -> None:
     tty.setraw(theirs)
     name = os.ttyname(theirs)
     os.close(theirs)
-    with listen(f"serial:{name}@9600", tmp_path / "said.mcap") as live:
+    with listen(f"serial:{name},baud=9600", tmp_path / "said.mcap") as live:
         wait_for(live, play(presses(3), live.address[1]))
         counts = live.stop().counters
     got = b""
@@ -111,7 +111,7 @@ def test_a_detection_drives_a_serial_line(tmp_path: Path) -> None:
         got += os.read(ours, 4096)
     os.close(ours)
     the_same(got.splitlines(), tmp_path / "said.mcap")
-    assert counts["sent"] == [{"to": f"serial:{name}@9600", "sent": 3, "lost": 0, "waiting": 0, "trouble": None}]
+    assert counts["sent"] == [{"to": f"serial:{name},baud=9600", "sent": 3, "lost": 0, "waiting": 0, "trouble": None}]
 
 
 def test_an_unplugged_serial_line_loses_lines_and_is_opened_again(tmp_path: Path) -> None:
@@ -154,7 +154,7 @@ def test_who_does_not_read_loses_lines_and_holds_nothing(tmp_path: Path) -> None
     pipe, presses_made = tmp_path / "slow", 1500
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-    with listen(f"pipe:{pipe}", tmp_path / "said.mcap") as live:
+    with listen(f"lines:{pipe}", tmp_path / "said.mcap") as live:
         wait_for(live, 0)
         events, until = presses(presses_made), time.monotonic() + 60
         for k in range(0, len(events), 20 * 50):
@@ -182,7 +182,7 @@ def test_who_does_not_read_loses_lines_and_holds_nothing(tmp_path: Path) -> None
 def test_a_reader_that_comes_late_hears_what_is_said_from_then_on(tmp_path: Path) -> None:
     pipe, events = tmp_path / "later", presses(8)
     os.mkfifo(pipe)
-    with listen(f"pipe:{pipe}", tmp_path / "said.mcap") as live:
+    with listen(f"lines:{pipe}", tmp_path / "said.mcap") as live:
         n = play(events[: 4 * 20], live.address[1])
         wait_for(live, n)
         until = time.monotonic() + 30
@@ -206,11 +206,11 @@ def test_a_reader_that_comes_late_hears_what_is_said_from_then_on(tmp_path: Path
 @pytest.mark.parametrize(
     ("to", "kind", "said"),
     [
-        ("nowhere", taxel.ProblemError, "must be udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD"),
-        ("udp:9000", taxel.ProblemError, "must be a host and a port"),
-        ("serial:/dev/null@fast", taxel.ProblemError, "'fast'".replace("'", '"')),
-        ("pipe:/dev/null", taxel.ProblemError, "/dev/null: is no named pipe; mkfifo makes one"),
-        ("pipe:/no/such/pipe", FileNotFoundError, "/no/such/pipe"),
+        ("nowhere", taxel.ProblemError, "must be serial:PLACE, lines:PATH, lines+tcp:HOST:PORT or lines+udp:HOST:PORT"),
+        ("lines+udp:9000", taxel.ProblemError, "must be a host and a port"),
+        ("serial:/dev/null,baud=fast", taxel.ProblemError, "'fast'".replace("'", '"')),
+        ("lines:/dev/null", taxel.ProblemError, "/dev/null: is no named pipe; mkfifo makes one"),
+        ("lines:/no/such/pipe", FileNotFoundError, "/no/such/pipe"),
         ("serial:/no/such/line", OSError, "/no/such/line"),
         (7, taxel.ProblemError, "send is 7"),
         ([7], taxel.ProblemError, "send is 7"),
@@ -223,8 +223,8 @@ def test_a_destination_that_is_none_is_refused(to: object, kind: type[Exception]
 
 
 def test_without_a_readout_nothing_is_sent() -> None:
-    with pytest.raises(taxel.ProblemError, match=r"send to udp:127\.0\.0\.1:9 without a readout"):
-        Live(0, host=LOOPBACK, send="udp:127.0.0.1:9")
+    with pytest.raises(taxel.ProblemError, match=r"send to lines\+udp:127\.0\.0\.1:9 without a readout"):
+        Live(0, host=LOOPBACK, send="lines+udp:127.0.0.1:9")
 
 
 def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:
@@ -239,9 +239,9 @@ def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:
             "--port",
             str(port),
             "--send",
-            f"udp:{LOOPBACK}:{other.getsockname()[1]}",
+            f"lines+udp:{LOOPBACK}:{other.getsockname()[1]}",
             "--send",
-            f"pipe:{pipe}",
+            f"lines:{pipe}",
             "--guard-frames",
             "1e6",
         ]
@@ -253,10 +253,10 @@ def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:
             line = json.loads(other.recv(65_536))
             told = process.stderr.read()
     assert set(line) == KEYS
-    assert f"taxel: lines not sent to pipe:{pipe}: 3 of 3: no reader" in told
+    assert f"taxel: lines not sent to lines:{pipe}: 3 of 3: no reader" in told
     assert process.returncode == 3
     said = subprocess.run(
-        command("live", "--panel", "--send", "udp:127.0.0.1:9"), capture_output=True, text=True, check=False
+        command("live", "--panel", "--send", "lines+udp:127.0.0.1:9"), capture_output=True, text=True, check=False
     )
     assert said.stderr == "taxel: --tare, --report and --send belong to a readout: give --readout FILE\n"
     assert said.returncode == 2

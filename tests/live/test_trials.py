@@ -263,7 +263,7 @@ def heard(live: Live) -> int:
 
 def test_every_source_is_in_every_trial_and_each_of_its_lines_in_one(tmp_path: Path) -> None:
     paths = [tmp_path / f"{n}.mcap" for n in range(4)]
-    sources = {"left": f"udp:{LOOPBACK}:0,array=4x4", "force": "given,columns=n"}
+    sources = {"left": f"board:{LOOPBACK}:0,array=4x4", "force": "given,columns=n"}
     with Live(0, host=LOOPBACK, array=SMALL, record_later=True, name="right", sources=sources) as live:
         # Datagrams and samples that arrive while nothing is recorded are counted but not stored.
         live.sample("force", [-1.0])
@@ -322,7 +322,7 @@ def test_a_full_disk_ends_the_trials_in_one_line(tmp_path: Path, full_device: Pa
 def test_a_trial_to_which_only_bytes_without_a_line_came_is_kept_with_their_count(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    arguments = ["--source", f"imu=pipe:{pipe},columns=a:b", "--length", 1, "--countdown", 0, "--trials", 2]
+    arguments = ["--source", f"imu=lines:{pipe},columns=a:b", "--length", 1, "--countdown", 0, "--trials", 2]
     command = record(free_port(), tmp_path / "step.mcap", *arguments)
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as ran:
         with pipe.open("wb", buffering=0) as into:

@@ -44,7 +44,7 @@ def stream(folder: Path) -> taxel.Recording:
     lines = folder / "lines"
     lines.write_bytes(b"1,2\n3,4\nnonsense\n" + b"7" * 100_000 + b"\n5,6\n7")
     with taxel.live.Live(
-        0, host="127.0.0.1", record=folder / "lines.mcap", sources={"imu": f"pipe:{lines},columns=a:b"}
+        0, host="127.0.0.1", record=folder / "lines.mcap", sources={"imu": f"lines:{lines},columns=a:b"}
     ) as live:
         while live.counters["sources"]["imu"]["lines"] < 5:
             live.next(0.01)

@@ -50,7 +50,7 @@ def record_all(path: Path) -> dict[str, taxel.Events]:
     ours, theirs = pty.openpty()
     tty.setraw(theirs)
     sources = {
-        "left": f"udp:{LOOPBACK}:0,array=4x4",
+        "left": f"board:{LOOPBACK}:0,array=4x4",
         "imu": f"serial:{os.ttyname(theirs)},columns=t_ms:ax:ay",
         "given": "given,columns=force",
     }
@@ -202,15 +202,16 @@ def test_the_command_line_shows_and_writes_one_source(
 @pytest.mark.parametrize(
     ("sources", "said"),
     [
-        ({"imu": "nowhere"}, "must be udp:HOST:PORT, serial:PLACE@BAUD, pipe:PATH or given"),
+        ({"imu": "nowhere"}, "must be [NAME=]board:HOST:PORT, serial:PLACE, lines:PATH"),
         ({"imu": "given"}, "needs columns=A:B:C"),
         ({"imu": "given,columns=a:a"}, "two of that name"),
         ({"imu": "given,columns=t_us"}, "holds no column of values"),
         ({"board": "given,columns=a"}, "there are two of that name"),
         ({"a b": "given,columns=a"}, "a name is of letters, digits"),
         ({"imu": 3}, "source imu is 3"),
-        (["imu"], "sources is ['imu']"),
-        ({"imu": "given,columns=a,rate=3"}, 'has no option "rate"'),
+        (["imu"], 'source "imu": must be'),
+        ({"imu": "given,columns=a,speed=3"}, 'has no option "speed"'),
+        ({"imu": "given,columns=a,rate=3"}, "rate is of frames: state array=ROWSxCOLUMNS too"),
     ],
 )
 def test_a_source_that_is_none_is_refused_and_leaves_no_file(tmp_path: Path, sources: object, said: str) -> None:
@@ -229,7 +230,7 @@ def test_a_source_needs_a_recording_that_can_hold_it_and_its_place(tmp_path: Pat
         Live(0, host=LOOPBACK, record=tmp_path / "no.mcap", sources={"imu": "serial:/no/such/line,columns=a"})
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind((LOOPBACK, 0))
-        where = f"udp:{LOOPBACK}:{taken.getsockname()[1]}"
+        where = f"board:{LOOPBACK}:{taken.getsockname()[1]}"
         with pytest.raises(OSError, match="Address already in use"):
             Live(0, host=LOOPBACK, record=tmp_path / "no.mcap", sources={"left": where})
     assert not list(tmp_path.iterdir())
@@ -240,7 +241,7 @@ def test_columns_are_learnt_from_the_first_line_of_a_pipe(tmp_path: Path) -> Non
     os.mkfifo(pipe)
     writer = os.open(pipe, os.O_RDWR)
     os.write(writer, b"t_s,ax\n")
-    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"pipe:{pipe}"}) as live:
+    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"lines:{pipe}"}) as live:
         os.write(writer, b"0.5,1\n0.25,2\n# no numbers\n0.75 3\n")
         until(lambda: lines(live, "imu") == 4)
     os.close(writer)
@@ -257,7 +258,7 @@ def test_what_a_line_does_not_hold_is_counted_and_a_missing_value_too(tmp_path: 
     sound = b"1000,1,2\n2000,nan,2\n3000,nan,NaN\n4000,-3e38,4\n"
     strange = b"2500,inf,1\n2500,-Infinity,1\n2500,1e400,1\n2500,1e39,1\n2500,1_0,1\n"
     no_time = b"5000000000000000,1,1\nnan,1,1\n-1e300,1,1\n"
-    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"pipe:{pipe}"}) as live:
+    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"lines:{pipe}"}) as live:
         os.write(writer, sound + strange + "2500,\u0663,1\n".encode() + no_time)
         until(lambda: lines(live, "imu") == 13)
     os.close(writer)
@@ -287,7 +288,7 @@ def test_what_comes_with_the_first_line_is_kept_and_its_writer_lives(tmp_path: P
 
     writer = threading.Thread(target=write, daemon=True)
     writer.start()
-    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"pipe:{pipe}"}) as live:
+    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"lines:{pipe}"}) as live:
         until(lambda: lines(live, "imu") == 202)
     done.set()
     assert said.is_set()
@@ -298,7 +299,7 @@ def test_what_comes_with_the_first_line_is_kept_and_its_writer_lives(tmp_path: P
 
 def test_the_command_says_what_came_of_each_source(tmp_path: Path) -> None:
     line = [sys.executable, "-m", "taxel", "record", str(tmp_path / "two.mcap"), "--port", "0", "--host", LOOPBACK]
-    line += ["--source", f"left=udp:{LOOPBACK}:0", "--source", "imu=pipe:-", "--seconds", "2"]
+    line += ["--source", f"left=board:{LOOPBACK}:0", "--source", "imu=lines:-", "--seconds", "2"]
     with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as command:
         assert command.stdin is not None
         assert command.stdout is not None
@@ -312,7 +313,7 @@ def test_the_command_says_what_came_of_each_source(tmp_path: Path) -> None:
 
 def test_the_last_line_of_an_input_may_lack_its_end(tmp_path: Path) -> None:
     line = [sys.executable, "-m", "taxel", "record", str(tmp_path / "a.mcap"), "--port", "0", "--host", LOOPBACK]
-    line += ["--source", "imu=pipe:-", "--seconds", "2"]
+    line += ["--source", "imu=lines:-", "--seconds", "2"]
     done = subprocess.run(line, input="ax,ay\n1,2\n3,4.5", capture_output=True, text=True, check=False)
     assert "  imu: 2 lines\n" in done.stdout
     frames = taxel.open(tmp_path / "a.mcap").sources["imu"].frames()
@@ -415,7 +416,7 @@ print(report.began_ns)
 def test_two_boards_that_drift_are_put_on_one_clock(tmp_path: Path) -> None:
     """Two processes on version 2, +50 and -30 ppm; a machine may hold either up, so less is asked than it keeps."""
     drifts, began = {"board": 50.0, "left": -30.0}, {}
-    sources = {"left": f"udp:{LOOPBACK}:0,preset=2 kHz"}
+    sources = {"left": f"board:{LOOPBACK}:0,preset=2 kHz"}
     with Live(0, host=LOOPBACK, registers="2 kHz", record=tmp_path / "two.mcap", sources=sources) as live:
         to = {"board": live.address, "left": live.source_address("left")}
         boards = {
@@ -526,7 +527,7 @@ def test_a_recording_begun_in_mid_stream_begins_with_what_the_taxels_held(tmp_pa
 
 def test_a_silent_source_of_a_finished_recording_is_said_to_be_silent_also_by_the_file(tmp_path: Path) -> None:
     path = tmp_path / "quiet.mcap"
-    sources = {"imu": "given,columns=ax", "left": f"udp:{LOOPBACK}:0,array=4x4"}
+    sources = {"imu": "given,columns=ax", "left": f"board:{LOOPBACK}:0,array=4x4"}
     with Live(0, host=LOOPBACK, array=SMALL, record=path, name="right", sources=sources) as live:
         play(presses(9, 1), live.address)
         until(lambda: live.counters["decoded"] == 9)

@@ -1,5 +1,6 @@
 //! Receives and counts UDP datagrams: in the caller's thread, or in a separate thread between the socket and a bounded
-//! queue. Datagrams from another computer ([`ParcelFeed`]) pass through the same queue.
+//! queue. Datagrams from another computer ([`ParcelFeed`]), and messages that a program makes ([`MessageFeed`]), pass
+//! through the same queue.
 //!
 //! By default the caller receives in its own thread, which saves a wake-up and a copy. A caller that may wait for a disk requests a
 //! separate thread ([`Receiver::receive_in_thread`]), which receives in the meantime.
@@ -12,6 +13,7 @@
 
 mod counts;
 mod feed;
+mod messages;
 mod options;
 mod parcel;
 mod queue;
@@ -30,6 +32,7 @@ use crate::recording::now_ns;
 use crate::{Error, Result};
 pub use counts::CaptureCounts;
 pub use feed::ParcelFeed;
+pub use messages::MessageFeed;
 pub use options::ReceiverOptions;
 pub use parcel::{LONGEST, ParcelPacker};
 use queue::BatchQueue;
@@ -55,13 +58,15 @@ pub enum Origin {
     /// Another computer receives the board's datagrams, and a bridge sends them to this one: its address, and the
     /// board's name there.
     Bridge(String),
+    /// Frames of numbers are read from this place.
+    Frames(String),
 }
 
 impl std::fmt::Display for Origin {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Udp(address) => write!(f, "UDP {address}"),
-            Self::Bridge(name) => f.write_str(name),
+            Self::Bridge(name) | Self::Frames(name) => f.write_str(name),
         }
     }
 }
@@ -79,7 +84,10 @@ enum Input {
     /// The socket, locked by a caller while it waits for datagrams, or `None` after it was moved into the thread; and
     /// the thread.
     Socket(Mutex<Option<Socket>>, Mutex<Option<JoinHandle<()>>>),
-    Feed(ParcelFeed),
+    /// What another computer receives.
+    Parcels(ParcelFeed),
+    /// The messages of a [`MessageFeed`], which may end by itself once it was asked to.
+    Messages { ends_itself: bool },
 }
 
 impl Receiver {
@@ -139,7 +147,16 @@ impl Receiver {
     pub fn fed(name: &str, options: ReceiverOptions) -> (Self, ParcelFeed) {
         let queue = Arc::new(BatchQueue::new(options.queue_bytes, CaptureCounts::default()));
         let feed = ParcelFeed::new(Arc::clone(&queue));
-        (Self { queue, origin: Origin::Bridge(name.to_owned()), input: Input::Feed(feed.clone()) }, feed)
+        (Self { queue, origin: Origin::Bridge(name.to_owned()), input: Input::Parcels(feed.clone()) }, feed)
+    }
+
+    /// Receives the messages that the caller passes to the [`MessageFeed`]. The caller may end by itself once the end was
+    /// requested, so that nothing is left that it has read: then it calls [`MessageFeed::close`].
+    #[must_use]
+    pub fn of_messages(origin: Origin, options: ReceiverOptions, ends_itself: bool) -> (Self, MessageFeed) {
+        let queue = Arc::new(BatchQueue::new(options.queue_bytes, CaptureCounts::default()));
+        let feed = MessageFeed::new(Arc::clone(&queue));
+        (Self { queue, origin, input: Input::Messages { ends_itself } }, feed)
     }
 
     /// Where datagrams come from, with the actual port if 0 was requested.
@@ -153,7 +170,7 @@ impl Receiver {
     pub fn address(&self) -> SocketAddr {
         match self.origin {
             Origin::Udp(address) => address,
-            Origin::Bridge(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+            Origin::Bridge(_) | Origin::Frames(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
         }
     }
 
@@ -161,8 +178,8 @@ impl Receiver {
     #[must_use]
     pub fn bridged(&self) -> Option<Bridged> {
         match &self.input {
-            Input::Socket(..) => None,
-            Input::Feed(feed) => Some(feed.bridged()),
+            Input::Parcels(feed) => Some(feed.bridged()),
+            Input::Socket(..) | Input::Messages { .. } => None,
         }
     }
 
@@ -171,7 +188,7 @@ impl Receiver {
     pub fn silent_until(&self) -> Option<i64> {
         match &self.input {
             Input::Socket(..) => Some(now_ns()),
-            Input::Feed(_) => self.queue.silent_until(),
+            Input::Parcels(_) | Input::Messages { .. } => self.queue.silent_until(),
         }
     }
 
@@ -198,7 +215,7 @@ impl Receiver {
                     None => self.queue.pop(batch, timeout),
                 }
             }
-            Input::Feed(_) => self.queue.pop(batch, timeout),
+            Input::Parcels(_) | Input::Messages { .. } => self.queue.pop(batch, timeout),
         };
         received.map_err(Error::socket(&self.origin))
     }
@@ -235,7 +252,7 @@ impl Receiver {
     /// Requests the end: what has arrived so far is received, then nothing more.
     pub fn stop(&self) {
         self.queue.stop();
-        if let Input::Feed(_) = self.input {
+        if let Input::Parcels(_) | Input::Messages { ends_itself: false } = self.input {
             self.queue.close(None);
         }
     }

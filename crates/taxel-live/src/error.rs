@@ -43,6 +43,15 @@ impl Error {
         taxel_core::Error::format(format!("{}: {text}", path.display())).into()
     }
 
+    /// Adds the part of an input that an error of the core is about; other errors name their place.
+    #[must_use]
+    pub(crate) fn in_part(self, part: &str) -> Self {
+        match self {
+            Self::Core(error) => Self::Core(error.in_part(part)),
+            error => error,
+        }
+    }
+
     /// Adds the address, or the serial port, to an error of the operating system.
     pub fn socket(place: impl ToString) -> impl FnOnce(std::io::Error) -> Self {
         let place = place.to_string();

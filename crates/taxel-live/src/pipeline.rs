@@ -1,4 +1,4 @@
-//! Converts datagrams to detections, as they arrive.
+//! Converts datagrams, or frames of numbers, to detections, as they arrive.
 //!
 //! The stages are *receive*, *decode*, *record* and *read out* (`stages`). One thread runs them all, and passes them to
 //! another thread before it calls a sink (`threads`). While a recording runs, which a disk may delay, there are
@@ -10,6 +10,8 @@
 mod copies;
 mod counters;
 mod decode_stage;
+mod frame_input;
+mod frame_stage;
 mod handle;
 mod observers;
 mod options;
@@ -43,15 +45,17 @@ use std::time::{Duration, Instant};
 use crossbeam_channel as channel;
 use taxel_core::encode::Tare;
 use taxel_core::wire;
-use taxel_core::{Marker, Stop};
+use taxel_core::{Marker, Stop, problem};
 
 use crate::capture::{Origin, Receiver};
+use crate::frame_lines::FrameLayout;
 use crate::locked::lock;
 use crate::{Error, Result};
 pub use copies::{Copied, Copies};
 pub use counters::{
     Arrival, ArrivalState, BoardState, Counters, DecodingCounts, LiveSummary, ReadoutCounts, SourceCounts,
 };
+pub use frame_input::LineCounts;
 pub use handle::Handle;
 pub use options::{LiveOptions, Record, StatedTare};
 use output::DetectionOutput;
@@ -62,10 +66,10 @@ use running_readout::RunningReadout;
 use running_recording::{RecordingPart, RunningRecording};
 use sending::Sending;
 pub use sending::{Destination, Sent};
-use shared::{PipelineShared, PublishedState, RecordingSlot};
+use shared::{PipelineShared, PublishedState, RecordingSlot, frame_time, header_of};
 pub use sink::{LineSink, OutputDetection, Sink};
-pub use source::{FurtherSource, LineInput, SourceKind};
-use sources::Others;
+pub use source::{NamedSource, SourceKind, SourceText};
+use sources::{Others, PipelineInput};
 use stages::Stages;
 use threads::Threads;
 pub use viewer_queue::{Piece, TaxelChange, ViewerEvents};
@@ -86,7 +90,47 @@ pub struct Live {
 }
 
 impl Live {
-    /// Opens the socket (and the file), and starts.
+    /// Opens the source that the options state (and the file), and starts: what a bridge receives if `fed` is given, else a
+    /// board where a port, a host or a board is stated, or no source is; else the first source, as frames.
+    ///
+    /// # Errors
+    ///
+    /// As [`Live::start`]; those of [`SourceText::open`] and [`ReadoutSetup::from_options`].
+    pub fn open(options: LiveOptions, fed: Option<Receiver>, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
+        let mut texts = options.source_texts()?;
+        let is_stated = options.port.is_some() || options.host.is_some() || texts.is_empty();
+        let mut options = options;
+        let mut input = match fed {
+            Some(receiver) => Some(PipelineInput::Fed(receiver)),
+            None if is_stated => Some(PipelineInput::Board(options.address()?)),
+            None => None,
+        };
+        if input.is_none() {
+            let text = texts.remove(texts.iter().position(SourceText::is_board).unwrap_or(0));
+            options.name = text.name();
+            input = Some(match text.open(Some(&Some(options.array.clone())))? {
+                SourceKind::Board(address, array, registers) => {
+                    if text.states_array() {
+                        (options.array, options.registers) = (*array, registers);
+                    }
+                    PipelineInput::Board(address)
+                }
+                SourceKind::Frames(place, layout, opened) => {
+                    options.array = layout.array.clone();
+                    PipelineInput::frames(&place, &layout, &opened)?
+                }
+                SourceKind::Numbers(..) => return Err(problem!("source {:?}: is not read out", text.text).into()),
+            });
+        }
+        let input = input.unwrap_or(PipelineInput::Board(options.address()?));
+        let readout = {
+            let (layout, frames) = (input.layout(), frame_time(&options, input.layout()));
+            ReadoutSetup::from_options(&options, frames, layout.map_or("ticks", |layout| &*layout.unit))?
+        };
+        Self::start_from(input, options, texts, readout, sinks)
+    }
+
+    /// Opens the socket (and the file), and starts to receive a board.
     ///
     /// # Errors
     ///
@@ -98,9 +142,8 @@ impl Live {
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
-        let capture = options.capture();
-        // The socket is opened before the file, so that a port that is in use leaves no empty file.
-        Self::start_from(|| Receiver::bind(address, capture), options, readout, sinks)
+        let texts = options.source_texts()?;
+        Self::start_from(PipelineInput::Board(address), options, texts, readout, sinks)
     }
 
     /// As [`Live::start`], for datagrams that another computer receives ([`Receiver::fed`]).
@@ -114,65 +157,69 @@ impl Live {
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
-        Self::start_from(|| Ok(receiver), options, readout, sinks)
+        let texts = options.source_texts()?;
+        Self::start_from(PipelineInput::Fed(receiver), options, texts, readout, sinks)
     }
 
+    /// Starts with the further sources of these texts.
     fn start_from(
-        receiver: impl FnOnce() -> Result<Receiver>,
+        input: PipelineInput,
         options: LiveOptions,
+        texts: Vec<SourceText>,
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         if options.record_later && options.record.is_some() {
-            return Err(
-                taxel_core::problem!("recordings that begin later, and one from the beginning: choose one").into()
-            );
+            return Err(problem!("recordings that begin later, and one from the beginning: choose one").into());
         }
-        if let (None, false, Some((name, _))) = (&options.record, options.record_later, options.sources.first()) {
-            return Err(taxel_core::problem!("source {name} without a recording: nothing would keep it").into());
+        if let (None, false, Some(source)) = (&options.record, options.record_later, texts.first()) {
+            return Err(problem!("source {} without a recording: nothing would keep it", source.name()).into());
         }
-        let sources = options.sources.iter();
-        let sources = sources.map(|(name, source)| Ok(FurtherSource { name: name.clone(), kind: source.parse()? }));
+        let sources = texts.iter().map(|text| Ok(NamedSource { name: text.name(), kind: text.open(None)? }));
         let sources = sources.collect::<Result<_>>()?;
-        Self::begin(Box::new(receiver), options, sources, readout, sinks, None)
+        Self::begin(input, options, sources, readout, sinks, None)
     }
 
     /// Starts the pipeline; `host` is the pipeline whose recording contains this one's as a part.
     fn begin(
-        receiver: Box<dyn FnOnce() -> Result<Receiver> + '_>,
+        input: PipelineInput,
         options: LiveOptions,
-        sources: Vec<FurtherSource>,
+        sources: Vec<NamedSource>,
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
         host: Option<RecordingPart>,
     ) -> Result<Self> {
         for (name, frames) in [("guard_frames", options.guard_frames), ("gap_frames", options.gap_frames)] {
             if !(frames.is_finite() && frames >= 0.0) {
-                return Err(taxel_core::problem!(name; " is {frames}: must be 0 or more and finite").into());
+                return Err(problem!(name; " is {frames}: must be 0 or more and finite").into());
             }
         }
         if options.readout_events == 0 {
-            return Err(taxel_core::problem!("readout_events"; " is 0: must be 1 or more").into());
+            return Err(problem!("readout_events"; " is 0: must be 1 or more").into());
         }
-        wire::v2::checked_stride(&options.array)?;
-        options.registers.check(&options.array)?;
+        if input.layout().is_none() {
+            wire::v2::checked_stride(&options.array)?;
+            options.registers.check(&options.array)?;
+        }
         if let (ReadoutSetup::None, Some(to)) = (&readout, options.send.first()) {
-            return Err(taxel_core::problem!("send to {to} without a readout: nothing would be detected").into());
+            return Err(problem!("send to {to} without a readout: nothing would be detected").into());
         }
         match &readout {
             ReadoutSetup::Taring(stretch_us, _) if *stretch_us <= 0 => {
-                return Err(taxel_core::problem!("tare"; " of {stretch_us} us: must be above 0").into());
+                return Err(problem!("tare"; " of {stretch_us} us: must be above 0").into());
             }
             ReadoutSetup::Taring(_, readout) => readout.check()?,
             ReadoutSetup::None | ReadoutSetup::Reading(_) => {}
         }
         let record = options.recording()?;
         let sending = options.send.iter().map(|to| Sending::open(&to.parse()?)).collect::<Result<Vec<_>>>()?;
-        let receiver = receiver()?;
+        // The socket is opened before the file, so that a port that is in use leaves no empty file.
+        let (receiver, frames, lines) = input.open(options.capture())?;
+        let header = header_of(&options, receiver.origin(), frames.as_ref().map(|frames| &frames.layout))?;
         let recording = match (&record, host) {
             (None, _) => None,
-            (Some(record), None) => Some(RunningRecording::create(record, &options, &sources, receiver.origin())?),
-            (Some(record), Some(host)) => Some(RunningRecording::join(host, record, &options, receiver.origin())),
+            (Some(record), None) => Some(RunningRecording::create(record, header, &sources)?),
+            (Some(record), Some(host)) => Some(RunningRecording::join(host, record, header)),
         };
         let published = PublishedState { frame: vec![0; options.array.len()], ..PublishedState::default() };
         let shared = Arc::new(PipelineShared {
@@ -186,6 +233,7 @@ impl Live {
             sending: sending.iter().map(Sending::line).collect(),
             registers: Mutex::new(options.registers),
             options: options.clone(),
+            frames,
             sources,
             begun: Instant::now(),
             expected: AtomicU8::new(0),
@@ -193,18 +241,17 @@ impl Live {
         });
         let (queue, detections) = channel::bounded(OUTPUT_WAITING);
         let reads_out = !matches!(readout, ReadoutSetup::None);
-        let board = |address, options: LiveOptions, part| {
-            let capture = options.capture();
-            let receiver = move || Receiver::bind(address, capture);
-            Self::begin(Box::new(receiver), options, vec![], ReadoutSetup::None, vec![], Some(part))
+        let begin = |input: PipelineInput, options: LiveOptions, part: RecordingPart| {
+            let options = LiveOptions { name: part.name.clone(), ..options };
+            Self::begin(input, options, vec![], ReadoutSetup::None, vec![], Some(part))
         };
-        let others = Others::start(&shared, board).inspect_err(|_| {
+        let others = Others::start(&shared, begin).inspect_err(|_| {
             // Nothing arrived: a new file is removed.
             let recording = lock(&shared.recording.running).take();
             drop(recording.map(|recording| recording.finish(&Counters::default())));
         })?;
-        let boards = others.boards.iter().map(|(name, board)| (name.clone(), Arc::clone(&board.shared)));
-        let recording_switch = RecordingSwitch::new(Arc::clone(&shared), boards.collect(), others.numbers.clone());
+        let pipelines = others.pipelines.iter().map(|(name, other)| (name.clone(), Arc::clone(&other.shared)));
+        let recording_switch = RecordingSwitch::new(Arc::clone(&shared), pipelines.collect(), others.numbers.clone());
         let others = Mutex::new(others);
         let mut live = Self {
             shared: Arc::clone(&shared),
@@ -216,13 +263,17 @@ impl Live {
         // The destinations come first: a device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|sending| Box::new(sending) as Box<dyn Sink>);
         let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
-        let readout = reads_out.then(|| RunningReadout::new(readout, &options));
+        let readout = reads_out.then(|| RunningReadout::new(readout, &options.array, shared.frame_time()));
         let stages = Stages::new(&shared, readout);
         let names: &[&str] = if reads_out { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
         let threads = Arc::new(Threads::new(stages, output, names.len()));
         for name in names {
             let (threads, shared) = (Arc::clone(&threads), Arc::clone(&shared));
             live.spawn(name, move || threads.run(&shared))?;
+        }
+        if let (Some(frames), Some(lines)) = (&shared.frames, lines) {
+            let frames = Arc::clone(frames);
+            live.spawn("taxel-lines", move || frames.read(lines))?;
         }
         Ok(live)
     }
@@ -304,15 +355,16 @@ impl Live {
     #[must_use]
     pub fn counters(&self) -> Counters {
         let others = lock(&self.others);
-        let boards = others.boards.iter().map(|(n, b)| (n.clone(), SourceCounts::Board(Box::new(b.counters()))));
+        let counted =
+            |(name, other): &(String, Live)| (name.clone(), SourceCounts::Pipeline(Box::new(other.counters())));
         let numbers = others.numbers.iter().map(|(name, numbers)| (name.clone(), numbers.counts()));
-        Counters { sources: boards.chain(numbers).collect(), ..self.shared.counters() }
+        Counters { sources: others.pipelines.iter().map(counted).chain(numbers).collect(), ..self.shared.counters() }
     }
 
-    /// The address on which another board of the recording is received; `None` if there is no board of that name.
+    /// The address on which another board of the recording is received; `None` if there is no such source.
     #[must_use]
     pub fn source_address(&self, name: &str) -> Option<SocketAddr> {
-        lock(&self.others).boards.iter().find(|(known, _)| known == name).map(|(_, board)| board.address())
+        lock(&self.others).pipelines.iter().find(|(known, _)| known == name).map(|(_, other)| other.address())
     }
 
     /// Records one line of a source whose values a program passes, with a number for each of its columns; it arrived at
@@ -322,11 +374,36 @@ impl Live {
     ///
     /// `Core(Problem)` if there is no such source, or it has other columns; `File` if the disk is full.
     pub fn sample(&self, name: &str, arrived_ns: i64, values: &[f64]) -> Result<()> {
-        let numbers = lock(&self.others).numbers.iter().find(|(known, _)| known == name).map(|(_, n)| Arc::clone(n));
-        match numbers {
-            Some(numbers) => numbers.sample(arrived_ns, values),
-            None => Err(taxel_core::problem!("source {name:?}: none of numbers has that name").into()),
+        let others = lock(&self.others);
+        let numbers = others.numbers.iter().find(|(known, _)| known == name).map(|(_, n)| Arc::clone(n));
+        let own = (self.shared.options.name == name).then_some(&self.shared);
+        let all =
+            own.into_iter().chain(others.pipelines.iter().filter(|(known, _)| known == name).map(|(_, o)| &o.shared));
+        let frames = all.filter_map(|shared| shared.frames.as_ref()).map(Arc::clone).next();
+        drop(others);
+        match (numbers, frames) {
+            (Some(numbers), _) => numbers.sample(arrived_ns, values),
+            (None, Some(frames)) => frames.sample(name, arrived_ns, values),
+            (None, None) => Err(problem!("source {name:?}: none of numbers has that name").into()),
         }
+    }
+
+    /// The layout of the frames of numbers that it receives; `None` of a board.
+    #[must_use]
+    pub fn layout(&self) -> Option<&FrameLayout> {
+        self.shared.frames.as_ref().map(|frames| &frames.layout)
+    }
+
+    /// The options, with the sensor and the name of the source.
+    #[must_use]
+    pub fn options(&self) -> &LiveOptions {
+        &self.shared.options
+    }
+
+    /// The values of frames of numbers, by taxel index, updated ten times a second; empty before the first one.
+    #[must_use]
+    pub fn values(&self) -> Vec<f32> {
+        self.shared.published().values.clone()
     }
 
     /// The taxels' values, ticks, by taxel index, updated ten times a second; 0 for a taxel without any event so far.
@@ -364,7 +441,7 @@ impl Live {
     /// `Core(Problem)` if there is no such version.
     pub fn expect_version(&self, version: u8) -> Result<()> {
         if !(1..=2).contains(&version) {
-            return Err(taxel_core::problem!("wire version {version}: must be 1 or 2").into());
+            return Err(problem!("wire version {version}: must be 1 or 2").into());
         }
         self.shared.expected.store(version, Ordering::Release);
         Ok(())
@@ -379,7 +456,7 @@ impl Live {
     /// cannot be created: then the one that runs goes on. What ended that one early, or `File` if its end cannot be written.
     pub fn record(&self, record: &Record) -> Result<Option<LiveSummary>> {
         if !self.shared.options.record_later {
-            return Err(taxel_core::problem!("a recording while listening: begin without one, for later ones").into());
+            return Err(problem!("a recording while listening: begin without one, for later ones").into());
         }
         self.handle().record(record)
     }

@@ -38,6 +38,7 @@ pub use mcap_reader::{
 pub use mcap_writer::{SourceWriter, Writer};
 pub use output::OutputFile;
 pub use stream::{Samples, StreamColumns, StreamFaults, fields};
+pub(crate) use stream::{UNITS_US, clock_unit_us, is_held};
 pub use topic::Topic;
 pub(crate) use verdict::JUMPED_BEFORE;
 pub use verdict::{Basis, Condition, FileEnding, NOTHING_LOST, Rebuilt, RecordingCounts, RecordingStatus, Verdict};
@@ -256,6 +257,24 @@ impl Header {
             frames: None,
             sources: vec![],
         }
+    }
+
+    /// The header of a source of frames.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if the name or a property is not valid.
+    pub fn of_frames(
+        name: &str,
+        array: Array,
+        frames: FrameProperties,
+        source: String,
+        started_ns: i64,
+    ) -> taxel_core::Result<Self> {
+        let board = Self::of_board(array, None, source, started_ns);
+        let header = Self { name: name.to_owned(), frames: Some(frames), ..board };
+        header.check()?;
+        Ok(header)
     }
 
     /// The header of a stream of numbers: an array of one row, with one taxel per column of values.

@@ -190,6 +190,9 @@ impl Hub {
             if let Some(offset) = counters.board.offset {
                 live.follow_clock(offset);
             }
+            if live.has_new_steps() {
+                self.clients.send(Broadcast::Hello);
+            }
             self.send_counters(&live, &counters, before.as_ref(), counted.elapsed().as_secs_f64());
             (counted, before) = (Instant::now(), Some(counters));
             self.clients.new_frame();
@@ -241,8 +244,13 @@ impl Hub {
             options: live.map(|live| Box::new(live.handle.options().clone())),
             udp: live.and_then(|live| match live.handle.origin() {
                 Origin::Udp(address) => Some(address.to_string()),
-                Origin::Bridge(_) => None,
+                Origin::Bridge(_) | Origin::Frames(_) => None,
             }),
+            lines: live.and_then(|live| match live.handle.origin() {
+                Origin::Frames(place) => Some(place.clone()),
+                Origin::Udp(_) | Origin::Bridge(_) => None,
+            }),
+            frames: live.and_then(|live| live.frames()),
             delta_intensity: live.map(|live| live.handle.options().differences),
             control: self.board().control.clone(),
             folder: self.options.folder.display().to_string(),

@@ -120,10 +120,11 @@ const mapsShown = () => (hasMaps() ? settings.values.maps : "pressure");
 /** Shows values and times as the source has them: ticks and seconds, or a unit and the numbers of frames. */
 function showUnits() {
   const frames = opened?.frames;
-  const { unit, step, zero } = frames ?? { unit: "ticks", step: 1, zero: 0 };
+  const live = opened ? null : hello?.frames;
+  const { unit, step, zero } = frames ?? live ?? { unit: "ticks", step: 1, zero: 0 };
   maps.values = { unit, step, zero, frames: frames !== null && frames !== undefined };
   numbering.number_us = frames?.number_us ?? null;
-  numbering.begin_us = beginning(opened?.start_us ?? null);
+  numbering.begin_us = beginning(opened?.start_us ?? live?.begin_us ?? null);
   write(part("begun", HTMLElement), begun() && `0 s: ${begun()}`);
   const trials = part("trials", HTMLSelectElement);
   trials.hidden = !frames?.trials.length;
@@ -285,7 +286,10 @@ function greet(message) {
   if (message.array && player.transport.source === null) resize(message.array);
   board.greet(message);
   view.greet(message);
-  if (!opened) view.offer(message.readout_encoders);
+  if (!opened) {
+    view.offer(message.readout_encoders);
+    showUnits();
+  }
   labels.offer(message.readout ?? []);
   showAssumed();
   recorder.able = message.live;
@@ -341,7 +345,7 @@ async function ask(name, trial) {
 
 /** A readout that runs live assumes a frame, where the registers were neither stated nor read. */
 function showAssumed() {
-  const assumes = hello?.readout && registers && !registers.known && !registers.stated && !opened;
+  const assumes = hello?.readout && !hello.lines && registers && !registers.known && !registers.stated && !opened;
   write(part("assumed", HTMLElement), assumes ? `The readout assumes frames of ${short(registers?.frame_us ?? 0)}: the registers are not known.` : "");
 }
 

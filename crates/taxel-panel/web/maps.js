@@ -253,8 +253,8 @@ export class Maps {
     const { unit, step, zero, frames } = this.values;
     write(part("pressure-half", HTMLElement), rounded((scale * step) / 2));
     write(part("pressure-top", HTMLElement), `${rounded(scale * step)} ${unit}`);
-    write(part("change-least", HTMLElement), `−${Math.round(changes)}`);
-    write(part("change-top", HTMLElement), `+${Math.round(changes)} ticks`);
+    write(part("change-least", HTMLElement), `−${rounded(Math.round(changes) * step)}`);
+    write(part("change-top", HTMLElement), `+${rounded(Math.round(changes) * step)} ${unit}`);
     write(part("rest-from", HTMLElement), this.restWords());
     write(part("pressure-above", HTMLElement), !frames || this.sources.some(({ rest }) => rest === "quiet") ? "above rest" : "");
     const { unknown } = this.info;
@@ -352,7 +352,7 @@ export class Maps {
         map.marks.append(mark);
       };
       for (const kind of /** @type {const} */ (["dead", "stuck", "noisy"])) for (const taxel of this.health?.[kind] ?? []) put(taxel, kind);
-      for (const { taxel, rest } of this.zeroed) put(taxel, "zeroed", `, rests at ${rest} ticks`);
+      for (const { taxel, rest } of this.zeroed) put(taxel, "zeroed", `, rests at ${rest} ${this.values.unit}`);
       map.sources.replaceChildren(...(this.sources.length > 1 ? this.sources.map((source) => this.nameOf(source)) : []));
     }
   }

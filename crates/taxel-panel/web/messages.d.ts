@@ -148,6 +148,16 @@ export interface Latency {
   report: Quantiles;
 }
 
+/** The values of a live source of frames. */
+export interface LiveFrames {
+  unit: string;
+  /** A value is `(ticks - zero) * step`. */
+  step: number;
+  zero: number;
+  /** Time of the first frame, us: seconds are shown since then where times are those since 1970. */
+  begin_us: number;
+}
+
 /** What was lost, by cause. */
 export interface Lost {
   /** Messages. */
@@ -253,6 +263,10 @@ export interface Hello {
   options: Record<string, unknown> | null;
   /** Where datagrams are received. */
   udp: string | null;
+  /** Where frames of numbers are read; null of a board. */
+  lines: string | null;
+  /** The values of those frames, after the first one; null of a board, whose values are ticks. */
+  frames: LiveFrames | null;
   /** Whether intensities are differences; null without a board. */
   delta_intensity: boolean | null;
   /** The board's serial line; null: registers cannot be written. */

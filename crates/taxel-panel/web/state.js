@@ -16,15 +16,20 @@ const FIRST_WITHIN_S = 1;
  * Whether anything arrives from the live source, in words.
  * @param {Counters | null} counters
  * @param {string} address where it should arrive
+ * @param {boolean} isBoard whether a board sends it, else a source of lines
  * @returns {{ word: string, text: string } | null} null: it does
  */
-function silence(counters, address) {
+function silence(counters, address, isBoard) {
   if (!counters) return null;
   const { arrival, board_us, seconds: elapsed_s, taring } = counters;
-  const since = `since ${seconds(board_us)} of the board, for ${short(1e6 * arrival.silent_s)}`;
+  const since = `since ${seconds(board_us)} of the ${isBoard ? "board" : "source"}, for ${short(1e6 * arrival.silent_s)}`;
   if (arrival.state === "nothing") {
-    return elapsed_s < FIRST_WITHIN_S ? null : { word: "Nothing arrives", text: `Nothing has arrived at ${address} so far. Is the board on, and does it send to this address and port?` };
+    const text = isBoard
+      ? `Nothing has arrived at ${address} so far. Is the board on, and does it send to this address and port?`
+      : `No frame has arrived from ${address} so far. Is it connected, and does it print lines of numbers?`;
+    return elapsed_s < FIRST_WITHIN_S ? null : { word: "Nothing arrives", text };
   }
+  if (arrival.state === "lost" && !isBoard) return { word: "Silent", text: `The line is silent: nothing from ${address} ${since}.` };
   if (arrival.state === "lost") return { word: "Lost", text: `The board is lost: nothing ${since}, though it sent a heartbeat every ${short(arrival.heartbeat_us ?? 0)} or sooner.` };
   if (taring) return { word: "Tare", text: "Taking a tare: leave the sensor at rest." };
   return arrival.state === "quiet" ? { word: "Quiet", text: `Quiet: nothing ${since}.` } : null;
@@ -67,7 +72,7 @@ function shape(opened, hello) {
  */
 export function showState({ connected, why }, { source, state }, hello, opened, recorder, counters, opening, refused) {
   const recording = recorder?.state === "recording" ? recorder : null;
-  const silent = connected && source === null && hello?.live ? silence(counters, hello.udp ? `UDP ${hello.udp}` : "the bridge's address") : null;
+  const silent = connected && source === null && hello?.live ? silence(counters, hello.lines ?? (hello.udp ? `UDP ${hello.udp}` : "the bridge's address"), hello.lines === null) : null;
   const [kind, word] = !connected
     ? ["lost", why ? "No connection" : "Connecting"]
     : source !== null || !hello?.live

@@ -2,6 +2,7 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
+use taxel_core::Stop;
 use taxel_core::detect::{
     Decision, Detection, Detector, FrameTime, LoadCurve as CoreCurve, PlainRule, Readout, ReadoutStream as CoreStream,
     Reference, Spread, score as score_core,
@@ -165,6 +166,13 @@ fn parse_tare(tare: Option<&str>) -> PyResult<Option<Tare>> {
     tare.map(Tare::from_json).transpose().map_err(core)
 }
 
+/// Zeroings: t in us, column, row, rest.
+type ZeroingsIn = Vec<(i64, u16, u16, f64)>;
+
+fn to_zeroings(zeroings: ZeroingsIn) -> Vec<Zeroing> {
+    zeroings.into_iter().map(|(t, x, y, rest)| Zeroing { t, x, y, rest, before: None }).collect()
+}
+
 /// The detections of a readout or a plain rule in a whole recording of events, with its zeroings: t in us, column, row,
 /// rest; and how many of them have an input outside its range in training.
 #[pyfunction]
@@ -175,20 +183,19 @@ pub fn readout_run_events<'py>(
     frame_us: f64,
     wire_version: u8,
     tare: Option<&str>,
-    zeroings: Vec<(i64, u16, u16, f64)>,
+    zeroings: ZeroingsIn,
     begin: Option<i64>,
 ) -> PyResult<(DetectionsOut<'py>, Option<u64>)> {
     let (readout, tare) = parse(readout, tare)?;
-    let zeroings: Vec<_> =
-        zeroings.into_iter().map(|(t, x, y, rest)| Zeroing { t, x, y, rest, before: None }).collect();
+    let zeroings = to_zeroings(zeroings);
     let events = events.view()?;
     let frames = FrameTime::on_wire(frame_us, wire_version);
     let (found, outside) = enter(py, |stop| readout.run_events(events, frames, tare.as_ref(), &zeroings, begin, stop))?;
     Ok((from_detections(py, found), outside))
 }
 
-/// The detections of a readout or a plain rule in a whole recording of frames, and how many of them have an input
-/// outside its range in training.
+/// The detections of a readout or a plain rule in a whole recording of frames, with its zeroings, and how many of them have
+/// an input outside its range in training.
 #[pyfunction]
 pub fn readout_run_frames<'py>(
     py: Python<'py>,
@@ -196,11 +203,13 @@ pub fn readout_run_frames<'py>(
     frames: FramesIn<'py>,
     frame_us: Option<f64>,
     tare: Option<&str>,
+    zeroings: ZeroingsIn,
     begin: Option<i64>,
 ) -> PyResult<(DetectionsOut<'py>, Option<u64>)> {
     let (readout, tare) = parse(readout, tare)?;
-    let frames = frames.view()?;
-    let (found, outside) = enter(py, |stop| readout.run_frames(frames, frame_us, tare.as_ref(), begin, stop))?;
+    let (frames, zeroings) = (frames.view()?, to_zeroings(zeroings));
+    let run = |stop: Stop<'_>| readout.run_frames(frames, frame_us, tare.as_ref(), &zeroings, begin, stop);
+    let (found, outside) = enter(py, run)?;
     Ok((from_detections(py, found), outside))
 }
 

@@ -14,7 +14,7 @@ use taxel_core::problem;
 use taxel_live::address::of_host;
 use taxel_live::capture::Sender;
 use taxel_live::pipeline::{
-    Handle, LineSink, Live as Pipeline, LiveOptions, LiveSummary, OutputDetection, ReadoutSetup, Record, Sink,
+    Handle, LineSink, Live as Pipeline, LiveOptions, LiveSummary, OutputDetection, Record, Sink,
 };
 
 use crate::bridge::{Copies, ParcelFeed};
@@ -127,12 +127,8 @@ impl Live {
                 .map_err(std::io::Error::other)
             }));
         }
-        let readout = ReadoutSetup::from_options(&options).map_err(core)?;
         let fed = feed.map(|feed| feed.receiver()).transpose().map_err(live)?;
-        let pipeline = enter(py, |_| match fed {
-            Some(receiver) => Pipeline::start_fed(receiver, options, readout, sinks),
-            None => Pipeline::start(of_host(&options.host, options.port)?, options, readout, sinks),
-        })?;
+        let pipeline = enter(py, |_| Pipeline::open(options, fed, sinks))?;
         Ok(Self {
             pipeline: Threaded::new("live", "live: has been stopped; begin a new one", pipeline),
             summary: Mutex::default(),
@@ -185,6 +181,24 @@ impl Live {
             all["arrival"] = json!(counters.arrival(taxel_live::recording::now_ns()));
             Ok(Plain(all))
         })
+    }
+
+    /// The sensor, as JSON values, and the name of the source.
+    fn sensor(&self, py: Python<'_>) -> PyResult<(Plain<Value>, String)> {
+        self.with(py, |pipeline| {
+            let options = pipeline.options();
+            Ok((Plain(json!(options.array)), options.name.clone()))
+        })
+    }
+
+    /// Unit and length (us) of the frames of numbers that it receives; None of a board.
+    fn frame_layout(&self, py: Python<'_>) -> PyResult<Option<(String, f64)>> {
+        self.with(py, |pipeline| Ok(pipeline.layout().map(|layout| (layout.unit.clone(), layout.frame_us))))
+    }
+
+    /// The values of frames of numbers, by taxel index; none before the first frame.
+    fn values<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        Ok(array(py, self.with(py, |pipeline| Ok(pipeline.values()))?))
     }
 
     /// The values that the taxels hold, ticks, by taxel index.

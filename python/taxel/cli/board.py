@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
@@ -25,7 +26,7 @@ from taxel.live.remote import receiver_of
 from taxel.tare import Tare
 from taxel.wire import Registers
 
-__all__ = ["REDRAW_S", "counters_table", "exit_code", "for_live", "with_live_options"]
+__all__ = ["REDRAW_S", "counters_table", "exit_code", "for_live", "received", "with_live_options"]
 
 #: Interval at which the display is redrawn and the end is checked, s.
 REDRAW_S = 0.1
@@ -60,7 +61,11 @@ def _parameter(field: Field[Any]) -> inspect.Parameter:
     words, kind, described = field.metadata["typed"], str(field.type), about(StatedOptions, field.name)
     flag = words.get("flag", "--" + field.name.replace("_", "-"))
     help_ = " ".join([described.pop("help"), *filter(None, [words.get("typed")])])
-    read, default = _TYPES.get(kind, str | None), field.default if kind in _TYPES else None
+    plain = kind.removesuffix(" | None")
+    default = field.default if plain in _TYPES else None
+    read: Any = _TYPES.get(plain, str)
+    if plain != kind or plain not in _TYPES:
+        read |= None
     if "PathLike" in kind:
         read = Path | None
     elif "Sequence" in kind or "Mapping" in kind:
@@ -107,7 +112,10 @@ def for_live(options: dict[str, Any], rate_hz: float | None = None, bits: int | 
     sensor = trained.array if array is None and trained is not None else array
     registers = _registers(options["registers"], rate_hz, bits, options.get("remote"), sensor)
     read = {"readout": trained, "array": array, "registers": registers, "tare": _rest(options.get("tare"))}
-    return options | read | {"send": options.get("send") or ()}
+    given = {"send": options.get("send") or ()}
+    if "sources" in options:
+        given["sources"] = options["sources"] or None
+    return options | read | given
 
 
 def _registers(
@@ -174,11 +182,17 @@ def doubts(counters: dict[str, Any]) -> Iterator[str]:
             yield f"{name}: {counts['pace']['doubt']}" if name else counts["pace"]["doubt"]
 
 
+def _in_no_line(summary: Summary) -> bool:
+    """Return whether bytes of a source of lines are in no line."""
+    sources = (summary.counters, *summary.counters["sources"].values())
+    lines = (counts["lines"] if "capture" in counts else counts for counts in sources)
+    return any(counts is not None and counts["bytes_in_no_line"] for counts in lines)
+
+
 def exit_code(summary: Summary, array: Array) -> int:
     """Return the exit code for what was received and lost."""
     unsent = any(counts["lost"] for counts in summary.counters["sent"])
-    left_out = any(counts.get("bytes_in_no_line") for counts in summary.counters["sources"].values())
-    if summary.nothing_came or summary.lost or summary.counters["events_dropped"] or unsent or left_out:
+    if summary.nothing_came or summary.lost or summary.counters["events_dropped"] or unsent or _in_no_line(summary):
         return OUTSIDE
     return WRONG_INPUT if outside(summary.counters, array) else 0
 
@@ -202,6 +216,43 @@ def _bridge_rows(counts: dict[str, Any] | None) -> list[tuple[str, str, str]]:
     return [("other computer", state, ""), ("lost between", lost, ""), ("its clock", compared, "")]
 
 
+def received(counters: dict[str, Any]) -> str:
+    """Return what was received of a source, in words."""
+    lines = counters["lines"]
+    if lines is None:
+        return f"{counted(counters['decoded'], 'datagram')}, {counted(counters['events'], 'event')}"
+    return f"{counted(lines['lines'], 'line')}, {counted(counters['frames'], 'frame')}{left_out(lines)}"
+
+
+def left_out(lines: dict[str, Any]) -> str:
+    """Return what is wrong with lines of numbers, in words that follow their number."""
+    parts = (
+        (lines["strange"], "line", "that could not be read"),
+        (lines["bytes_in_no_line"], "byte", "in no line"),
+    )
+    said = "".join(f", {counted(n, what)} {where}" for n, what, where in parts if n)
+    return said + (f"; {lines['trouble']}" if lines["trouble"] else "")
+
+
+def _frames_table(now: dict[str, Any], frames: str, lines: str) -> Table:
+    """Return the rows of a source of frames of numbers."""
+    counts, pace = now["lines"], now["pace"]
+    clock = "-" if now["board_us"] is None else f"{now['board_us'] / 1e6:.2f} s"
+    if pace is not None:
+        clock += f", drift {pace['drift_ppm']:+.1f} ppm, delays {delays(pace['delay'])}"
+    table = Table.grid(padding=(0, 2))
+    for name, total, per_second in (
+        ("lines", f"{counts['lines']:,}", lines),
+        ("frames", f"{now['frames']:,}", frames),
+        ("not read", left_out(counts).removeprefix(", ") or "-", ""),
+        ("lost", f"{now['capture']['dropped_by_queue']:,} by our queue", ""),
+        ("arrival to frame", delays(now["decode_latency"]), ""),
+        ("source's clock", clock, ""),
+    ):
+        table.add_row(name, total, per_second)
+    return table
+
+
 def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
     """Return rates since `before`, totals and losses, as rows whose places stay the same."""
     passed = max(now["seconds"] - before["seconds"], 1e-9)
@@ -209,6 +260,10 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
     def rate(total: float, earlier: float) -> str:
         return f"{(total - earlier) / passed:,.0f}/s"
 
+    if now["lines"] is not None:
+        return _frames_table(
+            now, rate(now["frames"], before["frames"]), rate(now["lines"]["lines"], before["lines"]["lines"])
+        )
     capture, wire, earlier = now["capture"], now["wire"], before["capture"]
     damaged = wire["skipped"] + wire["contradictory"] + wire["outside"] + wire["unpaired"]
     damage = f"{damaged:,} bytes and words, {wire['back']:,} events out of order"

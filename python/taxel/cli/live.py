@@ -34,6 +34,7 @@ from taxel.cli.board import (
     exit_code,
     for_live,
     outside,
+    received,
     remote,
     with_live_options,
 )
@@ -85,7 +86,7 @@ class _LiveArguments:
 @app.command()
 @with_live_options("live")
 def live(options: dict[str, Any], typed: _LiveArguments) -> None:
-    """Receive a board's events and print what a readout detects, live; with --panel, show them.
+    """Receive a board's events, or frames of numbers, and print what a readout detects, live; with --panel, show them.
 
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
     JSON, written by the thread that made it: label; t_us, known_us, reported_us by the board's clock; slope_mv_per_ms;
@@ -94,7 +95,8 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     nothing was received, or something was lost after it had arrived; 2: the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
-    Example: taxel live --readout ball.json --tare 0.05 --send udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
+    Example: taxel live --readout ball.json --tare 0.05 --send lines+udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
+    Example: taxel live --source serial:/dev/ttyACM0,array=16x16 --readout mat.json
     Example: taxel live --panel --control 127.0.0.1:5209
     Example: taxel live --remote zenoh:192.168.1.5:7447/left --panel
     """
@@ -113,7 +115,8 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
             at_rest.enter_context(at_rest.enter_context(Cable(typed.control)).floor(0))
         lossless = record is not None or trained is not None
         board = connected.enter_context(remote(address, typed.congestion, lossless=lossless))
-        if trained is not None and options["registers"] is None and board is None:
+        is_board = options["port"] is not None or options["host"] is not None or not options["sources"]
+        if trained is not None and options["registers"] is None and board is None and is_board:
             sensor = trained.array if options["array"] is None else options["array"]
             frame_us = Registers(array=Array._of(sensor)).frame_us
             console.print(
@@ -184,8 +187,7 @@ def _report(folder: Path, readout: Readout | PlainRule, path: Path, tare: Tare |
 
 def _print_summary(summary: Summary, guard_frames: float) -> None:
     counters = summary.counters
-    detections, events = counted(counters["detections"], "detection"), counted(counters["events"], "event")
-    say(f"{detections}, {events} in {counters['seconds']:.1f} s")
+    say(f"{counted(counters['detections'], 'detection')}, {received(counters)} in {counters['seconds']:.1f} s")
     if counters["detections"]:
         say(f"from known to output: {delays(counters['report_latency'])}")
     if counters["wrong"]:
@@ -265,7 +267,9 @@ def _watch(
     display = Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
     with asked_to_end() as end_request, display:
         before, warned, silence = None, False, ""
-        while not end_request.is_set() and (before is None or seconds is None or before["seconds"] < seconds):
+        while not (end_request.is_set() or (panel is None and pipeline.is_over)) and (
+            before is None or seconds is None or before["seconds"] < seconds
+        ):
             try:
                 if panel is not None and panel.live is not None and panel.live is not pipeline:
                     # A client of the panel chose another address.
@@ -282,7 +286,7 @@ def _watch(
             # Where the display is not shown, each silence is one line.
             if not console.is_terminal and bool(now_silent := _silence(now, pipeline.place)) != bool(silence):
                 silence = now_silent
-                console.print(silence or "datagrams arrive")
+                console.print(silence or ("datagrams arrive" if now["lines"] is None else "frames arrive"))
             if not now["taring"]:
                 at_rest.close()
                 if panel is not None and control is not None:
@@ -319,12 +323,16 @@ def _silence(now: dict[str, Any], place: str) -> str:
     if arrival["state"] == "nothing":
         if now["seconds"] < _FIRST_WITHIN_S:
             return ""
-        return f"nothing has arrived on {place} so far: is the board on, and does it send to this address and port?"
+        check = "is the board on, and does it send to this address and port?"
+        if now["lines"] is not None:
+            check = "is it connected, and does it print lines of numbers?"
+        return f"nothing has arrived on {place} so far: {check}"
     since = f"nothing for {arrival['silent_s']:.1f} s"
     if arrival["state"] == "quiet":
         return f"quiet: {since}"
     within_ms = to_ms(arrival["heartbeat_us"])
-    return f"silent: {since} from the board, though it sent a heartbeat every {within_ms:g} ms or sooner"
+    what = "heartbeat" if now["lines"] is None else "frame"
+    return f"silent: {since} from {place}, though it sent a {what} every {within_ms:g} ms or sooner"
 
 
 def _state(now: dict[str, Any], place: str) -> Text:

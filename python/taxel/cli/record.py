@@ -18,7 +18,6 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import OUTSIDE, App, SecondsOption, with_out
 from taxel.cli._noting import noting
-from taxel.cli._recordings import pairs
 from taxel.cli._say import say
 from taxel.cli.board import (
     REDRAW_S,
@@ -28,7 +27,9 @@ from taxel.cli.board import (
     doubts,
     exit_code,
     for_live,
+    left_out,
     outside,
+    received,
     remote,
     with_live_options,
 )
@@ -80,19 +81,20 @@ def record(
     nothing is lost between two trials. An empty trial is not saved, and its number is used again; with --trials, three
     empty trials in a row end the command with exit code 3. While it records, a key on the terminal, or a line on any
     other standard input, writes a note with that label and the board's time into the .mcap (add < /dev/null if the
-    input is not for taxel). --source records other boards, and lines of numbers, into the same .mcap, each with its own
-    clock. Exit code 3: nothing was received, or something was lost after it had arrived, as bytes of a source
-    of lines that are in no line; 2: the board has more taxels than --array.
+    input is not for taxel). --source names what is received, each source with its own clock: frames of numbers, boards,
+    lines of numbers. Exit code 3: nothing was received, or something was lost after it had arrived, as bytes of a
+    source of lines that are in no line; 2: the board has more taxels than --array.
 
     Example: taxel record --port 5208 walk.mcap
-    Example: taxel record walk.mcap --source left=udp:0.0.0.0:5209 --source imu=serial:/dev/ttyACM0,columns=t_us:ax:ay
+    Example: taxel record walk.mcap --port 5208 --source left=board:0.0.0.0:5209 --source imu=serial:COM3
+    Example: taxel record mat.mcap --source serial:/dev/ttyACM0,array=16x16,unit=counts
     Example: taxel record --remote zenoh:192.168.1.5:7447/left walk.mcap
     """
     if typed.length is None and typed.trials is not None:
         raise ProblemError("--trials without --length: automatic mode needs how long each trial is")
     if typed.length is not None and typed.seconds is not None:
         raise ProblemError("--seconds and --length: give --length for automatic mode, --seconds for one recording")
-    live = for_live(options, typed.rate_hz, typed.bits) | {"sources": _sources(options["sources"] or [])}
+    live = for_live(options, typed.rate_hz, typed.bits)
     console = Console(stderr=True, quiet=typed.as_json)
     if typed.length is None:
         summary, code = _one(file, live, typed, console)
@@ -183,9 +185,10 @@ def _one(file: Path, options: dict[str, Any], typed: _RecordArguments, console: 
         return summary, exit_code(summary, live.array)
 
 
-def _takes_notes(file: Path, sources: dict[str, str]) -> bool:
+def _takes_notes(file: Path, sources: list[str] | None) -> bool:
     """Return whether typed lines are notes: a .lsa holds no notes, and a source may read the input itself."""
-    return file.suffix == ".mcap" and not any(address.startswith("pipe:-") for address in sources.values())
+    reads_input = (source.split(",")[0].endswith("lines:-") for source in sources or ())
+    return file.suffix == ".mcap" and not any(reads_input)
 
 
 def _watch(
@@ -213,19 +216,16 @@ def _watch(
                 say(f"taxel: {wrong}", err=True)
                 warned = True
             display.update(counters_table(before, now))
-            if trial and not live.records:
+            if (trial and not live.records) or live.is_over:
                 return
             before = now
 
 
-def _sources(texts: list[str]) -> dict[str, str]:
-    """Return the sources that ``--source NAME=WHAT`` describes, by name."""
-    sources: dict[str, str] = {}
-    for name, address in pairs("--source", texts, "NAME=WHAT, as imu=serial:/dev/ttyACM0"):
-        if name in sources:
-            raise ProblemError(f"--source {name}={address}: there are two sources of that name")
-        sources[name] = address
-    return sources
+def _bytes_and_markers(counters: dict[str, Any]) -> str:
+    """Return the numbers of a board's bytes and markers, in words that follow those of its datagrams."""
+    if counters["lines"] is not None:
+        return ""
+    return f", {counted(counters['capture']['bytes'], 'byte')}, {counted(counters['markers'], 'marker')}"
 
 
 def _print(summary: Summary, as_json: bool) -> None:
@@ -235,22 +235,10 @@ def _print(summary: Summary, as_json: bool) -> None:
         return
     counters = summary.counters
     if summary.path is not None:
-        contents = (
-            counted(counters["decoded"], "datagram"),
-            counted(counters["capture"]["bytes"], "byte"),
-            counted(counters["events"], "event"),
-            counted(counters["markers"], "marker"),
-        )
-        say(f"{summary.path}: {counters['seconds']:.1f} s, {', '.join(contents)}")
+        say(f"{summary.path}: {counters['seconds']:.1f} s, {received(counters)}{_bytes_and_markers(counters)}")
     for name, counts in counters["sources"].items():
-        if "capture" in counts:
-            received = f"{counted(counts['decoded'], 'datagram')}, {counted(counts['events'], 'event')}"
-        else:
-            received = counted(counts["lines"], "line")
-            if counts["bytes_in_no_line"]:
-                received += f", {counted(counts['bytes_in_no_line'], 'byte')} in no line"
-        trouble = counts.get("trouble")  # sources of lines alone have this key
-        say(f"  {name}: {received}" + (f"; {trouble}" if trouble else ""))
+        contents = received(counts) if "capture" in counts else f"{counted(counts['lines'], 'line')}{left_out(counts)}"
+        say(f"  {name}: {contents}")
     for why in doubts(counters):
         say(why)
     say(summary.verdict)

@@ -41,7 +41,9 @@ class Screen:
         self._before: tuple[float, int] = (0.0, 0)
         self._rate = 0.0
 
-    def draw(self, counters: dict[str, Any], frame: NDArray[np.uint16], detections: list[Detection]) -> None:
+    def draw(
+        self, counters: dict[str, Any], frame: NDArray[np.uint16] | NDArray[np.float32], detections: list[Detection]
+    ) -> None:
         """Draw counters, frame and detections so far."""
         now = (counters["board_us"] or 0) * 1e-6
         then, events = self._before
@@ -101,7 +103,7 @@ class Screen:
         return line
 
 
-def _blocks(frame: NDArray[np.uint16]) -> Text:
+def _blocks(frame: NDArray[np.uint16] | NDArray[np.float32]) -> Text:
     """Return a frame of ticks as half blocks: two rows a line; each cell is the largest of 2 x 2 taxels."""
     above = np.clip((frame.astype(float) - np.median(frame) - 6.0) / 80.0, 0.0, 1.0)
     rows, columns = (n // 2 for n in frame.shape)

@@ -41,9 +41,10 @@ class FoundTimes(NamedTuple):
 def clock_of(example: object, frame_us: float | None = None) -> Clock:
     """Return the clock of an example as `taxel.detect.run` finds it; frames last as given, if they are."""
     source = example[0] if isinstance(example, tuple) and example else None
-    if isinstance(source, Recording) and source.registers is not None:
-        return source.registers.frame_us if frame_us is None else frame_us, source.registers.wire_version
-    return frame_us, 1
+    if not isinstance(source, Recording):
+        return frame_us, 1
+    version = 1 if source.registers is None else source.registers.wire_version
+    return source.frame_us if frame_us is None else frame_us, version
 
 
 class Loads:

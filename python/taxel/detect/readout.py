@@ -431,9 +431,9 @@ def run_counting(
     rest, zeroings = tare_text(tare), []
     if isinstance(source, Recording):
         if source.registers is not None:
-            period = source.registers.frame_us if period is None else period
             version = source.registers.wire_version if version is None else version
-        zeroings = [(z.t, z.x, z.y, z.rest) for z in source.zeroings] if source.has_events else []
+        period = source.frame_us if period is None else period
+        zeroings = [(z.t, z.x, z.y, z.rest) for z in source.zeroings]
         source = recorded(source)
     if isinstance(source, SpikeTrains):
         if not isinstance(readout, Readout):
@@ -452,7 +452,7 @@ def run_counting(
         raise refused(
             "source", f" is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
         )
-    columns, outside = _core.readout_run_frames(text, source._parts(), period, rest, begin_us)
+    columns, outside = _core.readout_run_frames(text, source._parts(), period, rest, zeroings, begin_us)
     return Detections._from_parts(columns), outside
 
 

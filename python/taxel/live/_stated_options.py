@@ -23,9 +23,17 @@ __all__ = ["StatedOptions"]
 class StatedOptions:
     """Hold the options of a `Live`, which documents each, with their defaults."""
 
-    port: int = option(5208, "The UDP port that the board sends to.", least=0, most=65_535, commands="live record")
+    port: int | None = option(
+        None,
+        "The UDP port that the board sends to. Default: 5208, unless --source names what to receive.",
+        least=0,
+        most=65_535,
+        commands="live record",
+    )
     _: KW_ONLY
-    host: str = option("0.0.0.0", "The address of this machine to listen on; 0.0.0.0: all.", commands="live record")
+    host: str | None = option(
+        None, "The address of this machine to listen on for a board; 0.0.0.0: all.", commands="live record"
+    )
     remote: RemoteBoard | None = option(
         None,
         "Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.",
@@ -63,13 +71,13 @@ class StatedOptions:
         False, "Recordings begin and end while it runs (`record`, `end_recording`).", commands=""
     )
     name: str = option("board", "The board's name among the sources of the recording.", commands="record")
-    sources: Mapping[str, str] | None = option(
+    sources: Mapping[str, str] | str | Sequence[str] | None = option(
         None,
-        "Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU "
-        "(serial:PLACE@BAUD or pipe:PATH, columns=t_us:ax:ay).",
-        commands="record",
+        "What to receive, [NAME=]KIND:PLACE and KEY=VALUE after commas, as lines:-,array=16x16 or "
+        "serial:COM3,array=16x16: frames of numbers, a board (board:HOST:PORT), or further sources of a recording.",
+        commands="live record",
         flag="--source",
-        metavar="NAME=WHAT",
+        metavar="[NAME=]KIND:PLACE",
         typed="May be repeated.",
     )
     compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.", commands="record")
@@ -83,7 +91,8 @@ class StatedOptions:
     lines: bool = option(False, "Print one line of JSON for each detection, and nothing else.", flag="--json")
     send: str | Sequence[str] = option(
         (),
-        "Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD.",
+        "Send each detection as a line of JSON to serial:PLACE, lines:PATH (a named pipe), lines+tcp:HOST:PORT or "
+        "lines+udp:HOST:PORT.",
         metavar="WHERE",
         typed="May be repeated.",
     )

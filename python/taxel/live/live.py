@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from functools import partial
@@ -30,6 +31,7 @@ from taxel.tare import Tare
 
 #: Prefix of the sources and destinations of the lab streaming layer.
 _LSL = "lsl:"
+_LSL_SOURCE = re.compile(r"(?:([^=:]+)=)?lsl:(.*)", re.DOTALL)
 
 #: The largest column or row of any taxel.
 _MOST_INDEX = 2**16 - 1
@@ -47,10 +49,11 @@ class Live:
 
     Parameters
     ----------
-    port : int, 0 to 65535
-        The UDP port that the board sends to. 0 finds a free one, see `address`.
-    host : str
-        The address of this machine to listen on; 0.0.0.0: all.
+    port : int, 0 to 65535, optional
+        The UDP port that the board sends to. Default: 5208, unless --source names what to receive. 0 finds a free one,
+        see `address`.
+    host : str, optional
+        The address of this machine to listen on for a board; 0.0.0.0: all.
     remote : RemoteBoard, optional
         Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there. Stop the
         `Live` before it.
@@ -75,14 +78,18 @@ class Live:
         recorded while one runs.
     name : str
         The board's name among the sources of the recording.
-    sources : mapping of str to str, optional
-        Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU
-        (serial:PLACE@BAUD or pipe:PATH, columns=t_us:ax:ay). By name, in a `.mcap`, each with its own clock:
-        "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which sends to that address of this machine;
-        "serial:PLACE@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard input); "given" are numbers that a
-        program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of a line (default: those of the
-        first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called `t_us`, `time_ms` ...;
-        "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its arrival.
+    sources : mapping of str to str or str or sequence of str, optional
+        What to receive, [NAME=]KIND:PLACE and KEY=VALUE after commas, as lines:-,array=16x16 or
+        serial:COM3,array=16x16: frames of numbers, a board (board:HOST:PORT), or further sources of a recording.
+        "board:HOST:PORT" is a board that sends to that address of this machine (array=ROWSxCOLUMNS, preset=NAME). Lines
+        of numbers come from "serial:PLACE" (baud=), "lines:PATH" (a pipe, or a file that grows; "-" is the standard
+        input), "lines+tcp:HOST:PORT" (connects), "lines+udp:HOST:PORT" (listens) and "given", what a program passes to
+        `sample`. With ``array=`` they are frames: a line each, or ``frame_lines=16``, or up to an empty line
+        (``frame_end=blank``). ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1; ``time=A+B``
+        adds seconds and nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns,
+        ``leave_out=A:B`` are those without values, ``unit=``, ``falls=`` (true, or the number that readings are
+        subtracted from) and ``rate=`` (frames a second; default: measured). Lines without an array, as of an IMU, are
+        recorded with the first source. "lsl:NAME" is a stream of the lab streaming layer.
     compression : str
         Compression of a .mcap: none, lz4 or zstd.
     overwrite : bool
@@ -94,9 +101,10 @@ class Live:
     lines : bool
         Print one line of JSON for each detection, and nothing else.
     send : str or sequence of str
-        Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD. UDP sends a datagram
-        each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab streaming layer.
-        Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and counted.
+        Send each detection as a line of JSON to serial:PLACE, lines:PATH (a named pipe), lines+tcp:HOST:PORT or
+        lines+udp:HOST:PORT. UDP sends a datagram each, TCP connects; the named pipe must exist; ``,baud=`` may follow a
+        serial port; "lsl:NAME" sends the label in a stream of markers of the lab streaming layer. Up to 1024 lines wait
+        for a slow reader; lines without room, or without a reader, are lost and counted.
     kernel_buffer_bytes : int, 0 to 2147483647
         How much may wait in the kernel, bytes.
     queue_bytes : int, 0 to 2147483647
@@ -140,18 +148,15 @@ class Live:
         self._registers_stated = options.registers is not None or options.remote is not None
         options = options.completed()
         remote, say = options.remote, options.say
-        self.array = Array._of(options.array)
-        #: To begin another one on another address.
-        self._options = replace(options, array=self.array)
-        destinations, sources = options.destinations(), options.named_sources()
+        destinations, sources = options.destinations(), options.source_texts()
         outlets = [LslOutlet(to.removeprefix(_LSL)) for to in destinations if to.startswith(_LSL)]
-        inlets = {name: LslInlet(address.removeprefix(_LSL)) for name, address in sources if address.startswith(_LSL)}
+        inlets = {source: LslInlet(found[2]) for source in sources if (found := _LSL_SOURCE.fullmatch(source))}
         self._inlets = list(inlets.values())
         receivers: list[Callable[[Detection], object]] = [*outlets, *([] if say is None else [say])]
         self._summary: Summary | None = None
         stated = options.for_rust(
             send=[to for to in destinations if not to.startswith(_LSL)],
-            sources=[(name, _source_of(inlets[name]) if name in inlets else address) for name, address in sources],
+            sources=[_given(source, inlets[source]) if source in inlets else source for source in sources],
         )
         feed = None if remote is None else _core.ParcelFeed(remote.place, options.queue_bytes)
         self._core = _core.Live(
@@ -160,11 +165,22 @@ class Live:
             None if not receivers else lambda values: [receive(Detection(**values)) for receive in receivers],
             feed,
         )
+        array, name = self._core.sensor()
+        self.array = Array._from_geometry(array)
+        #: The name of the source that is read out.
+        self.name = name
+        layout = self._core.frame_layout()
+        #: The unit of the values.
+        self.unit: str = "ticks" if layout is None else layout[0]
+        #: The length of frames of numbers, us; None of a board.
+        self.frame_us: float | None = None if layout is None else layout[1]
+        #: To begin another one on another address.
+        self._options = replace(options, array=self.array)
         self._remote, self._place = remote, self._core.place()
         if remote is not None and feed is not None:
             remote.begin(feed)
-        for name, inlet in inlets.items():
-            inlet.begin(partial(self._core.sample, name))
+        for source, inlet in inlets.items():
+            inlet.begin(partial(self._core.sample, _stream_name(source)))
 
     def _again(self, port: int, host: str, **changed: Any) -> Live:
         """Return another one that works alike, of a board that sends to this address."""
@@ -274,9 +290,15 @@ class Live:
         return self._core.counters()
 
     @property
-    def frame(self) -> NDArray[np.uint16]:
-        """Values that the taxels hold, ticks, shape (rows, columns), ten times a second; 0 without any event so far."""
-        return self._core.frame().reshape(self.array.shape)
+    def frame(self) -> NDArray[np.uint16] | NDArray[np.float32]:
+        """Values that the taxels hold, in `unit`, shape (rows, columns), ten times a second.
+
+        Those of a board without any event so far are 0; those of frames of numbers are NaN before the first one.
+        """
+        if self.frame_us is None:
+            return self._core.frame().reshape(self.array.shape)
+        values = self._core.values()
+        return (values if len(values) else np.full(self.array.taxels, np.nan, np.float32)).reshape(self.array.shape)
 
     @property
     def tare(self) -> Tare | None:
@@ -334,6 +356,8 @@ class Live:
 
     def sample(self, name: str, values: ArrayLike, arrived_ns: int | None = None) -> None:
         """Record numbers of a source whose values a program passes.
+
+        Of a source with an array they are those of a line of a frame.
 
         Parameters
         ----------
@@ -498,5 +522,12 @@ class Live:
         return escaped(f"Live({self.place}, {self.array.rows} x {self.array.columns} taxels)")
 
 
-def _source_of(inlet: LslInlet) -> str:
-    return f"given,columns={':'.join(inlet.columns)}"
+def _stream_name(source: str) -> str:
+    """Return the name of a stream of the lab streaming layer among the sources."""
+    found = _LSL_SOURCE.fullmatch(source)
+    return "lsl" if found is None or found[1] is None else found[1]
+
+
+def _given(source: str, inlet: LslInlet) -> str:
+    """Return the source whose numbers an inlet passes."""
+    return f"{_stream_name(source)}=given,columns={':'.join(inlet.columns)}"

@@ -35,7 +35,7 @@ class LiveOptions(StatedOptions):
             self.readout, self.remote, self.array, self.registers, self.differences,
         )  # fmt: skip
         if readout is not None:
-            detector("readout", readout)._check_unit("ticks", "live values")
+            detector("readout", readout)
         if remote is not None:
             if instance("remote", remote, RemoteBoard).in_use:  # type: ignore[type-abstract]
                 raise refused("remote", ": is in use already; make another one")
@@ -61,19 +61,17 @@ class LiveOptions(StatedOptions):
         """Return where detections are sent."""
         return [text("send", to) for to in ([self.send] if isinstance(self.send, str) else several("send", self.send))]
 
-    def named_sources(self) -> list[tuple[str, str]]:
-        """Return the other sources of a recording, by name."""
+    def source_texts(self) -> list[str]:
+        """Return what is received, as texts: [NAME=]KIND:PLACE and KEY=VALUE after commas."""
         if self.sources is None:
             return []
-        if not isinstance(self.sources, Mapping):
-            raise ProblemError(
-                f'sources is {shown(self.sources)}: must be a mapping, as {{"imu": "serial:/dev/ttyACM0"}}'
-            )
-        return [
-            (text("name of a source", name), text(f"source {name}", address)) for name, address in self.sources.items()
-        ]
+        if isinstance(self.sources, Mapping):
+            named = {text("name of a source", name): text(f"source {name}", of) for name, of in self.sources.items()}
+            return [f"{name}={of}" for name, of in named.items()]
+        listed = [self.sources] if isinstance(self.sources, str) else several("sources", self.sources)
+        return [text("source", of) for of in listed]
 
-    def for_rust(self, *, send: list[str], sources: list[tuple[str, str]]) -> str:
+    def for_rust(self, *, send: list[str], sources: list[str]) -> str:
         """Return the options as the compiled part reads them; it opens `send` and `sources` itself."""
         plain = {o.name: _plain(o, getattr(self, o.name)) for o in fields(StatedOptions) if o.name not in _APART}
         return parameters(plain | {"send": send, "sources": sources})
@@ -101,4 +99,4 @@ def _plain(option: Field[Any], value: object) -> object:
         "int": lambda: integer(option.name, value, option.metadata["min"], option.metadata["max"]),
         "str": lambda: text(option.name, value),
     }
-    return checks.get(option.type, lambda: number(option.name, value))()
+    return checks.get(option.type.removesuffix(" | None"), lambda: number(option.name, value))()

@@ -186,6 +186,7 @@ def source_from(
     *,
     untimed: bool = False,
     turned: float | None = None,
+    frame_us: float | None = None,
     columns: Sequence[str] = (),
     **header: Any,
 ) -> BoardSource | FrameSource:
@@ -195,7 +196,7 @@ def source_from(
     ----------
     table : Events or Frames
     origin : Origin, optional
-    untimed, turned : bool, float
+    untimed, turned, frame_us : bool, float, float
         As of `FrameTable`.
     columns : sequence of str
         Columns of a stream of numbers, as those of `SampleColumns`.
@@ -206,7 +207,7 @@ def source_from(
     sensor = header.pop("sensor", None) or sections.Sensor(table.array)
     if isinstance(table, Events):
         return BoardSource(origin, sensor, sections.EventTable(known(table)), **header)
-    frame_table = sections.FrameTable(known(table), untimed, turned)
+    frame_table = sections.FrameTable(known(table), untimed, turned, frame_us)
     if columns:
         return Stream(origin, sensor, frame_table, sections.SampleColumns(tuple(columns)), **header)
     return FrameSource(origin, sensor, frame_table, **header)

@@ -63,6 +63,7 @@ def json_of(source: RecordedSource) -> str:
         "columns": source.columns,
         "untimed": source.untimed,
         "turned": source.frame_table.turned if isinstance(source, FrameSource) else None,
+        "frame_us": source.frame_table.frame_us if isinstance(source, FrameSource) else None,
         "truncated": losses.truncated,
         "rebuilt": dict(losses.rebuilt()),
         "lost": losses.lost(),
@@ -114,6 +115,7 @@ def described_source(
         replace(origin, source=get("source", "")),
         untimed=get("untimed", False),
         turned=get("turned"),
+        frame_us=get("frame_us"),
         columns=get("columns", ()),
         sensor=sections.Sensor(table.array, get("side", ""), get("heel", "")),
         settings=sections.Settings(known(held), known(get("registers")), known(get("register_changes", ()))),
@@ -209,6 +211,11 @@ def turned_of(value: Any) -> float:
     return finite("turned", value, least=-limits.VALUE, most=limits.VALUE)
 
 
+def frame_us_of(value: Any) -> float:
+    """Return the time from one frame to the next, us, as a file states it."""
+    return finite("frame_us", value, "us", least=1.0, most=3.6e9)
+
+
 def _texts(texts: Any) -> tuple[str, ...]:
     if not isinstance(texts, list):
         raise ProblemError("no list")
@@ -236,6 +243,7 @@ _ENTRIES: dict[str, Any] = {
     "zeroings": lambda value, _: zeroings_of(value),
     "columns": lambda value, _: _texts(value),
     "turned": lambda value, _: turned_of(value),
+    "frame_us": lambda value, _: frame_us_of(value),
     "untimed": lambda value, _: flag("untimed", value),
     "truncated": lambda value, _: flag("truncated", value),
     "rebuilt": lambda value, _: counts_of(value),

@@ -144,9 +144,7 @@ def _at_rate(source: RecordedSource, rate_hz: float) -> RecordedSource:
     def notes(before: tuple[Note, ...]) -> tuple[Note, ...]:
         return tuple(replace(n, t=None if n.t is None else round(n.t * 1e6 / rate_hz)) for n in before)
 
-    frame_table = sections.FrameTable(
-        source.frame_table.frames.to(frames), untimed=False, turned=source.frame_table.turned
-    )
+    frame_table = replace(source.frame_table, frames=source.frame_table.frames.to(frames), untimed=False)
     return replace(source, frame_table=frame_table, marks=replace(source.marks, notes=source.marks.notes.to(notes)))
 
 

@@ -25,7 +25,7 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording.between import Slices, between, inside
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Contents, S, Stream, refuse_several
+from taxel.recording.contents import Contents, FrameSource, S, Stream, refuse_several
 from taxel.recording.frames import as_frames, at_rate, calibrate
 from taxel.recording.kinds import kind_of_file, verdict_of
 from taxel.recording.on_clock import on_clock
@@ -283,6 +283,14 @@ class Recording:
         They are those of the whole sensor (`Registers.array`), even if the recording is a part of it.
         """
         return self._contents.main.settings.registers()
+
+    @property
+    def frame_us(self) -> float | None:
+        """The length of a frame, us, as the board's registers or a source of frames state it; None if none does."""
+        if (registers := self.registers) is not None:
+            return registers.frame_us
+        main = self._contents.main
+        return main.frame_table.frame_us if isinstance(main, FrameSource) else None
 
     @property
     def register_changes(self) -> tuple[tuple[int, Registers], ...]:

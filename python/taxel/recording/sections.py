@@ -227,11 +227,14 @@ class FrameTable:
         Whether they have no times: they are numbered, one a us.
     turned : float
         The number that readings were subtracted from, as they fall with pressure (`falls` of a layout file).
+    frame_us : float, us, optional
+        Time from one frame to the next, by which a readout knew live when a frame was over.
     """
 
     frames: Once[Frames]
     untimed: bool = False
     turned: float | None = None
+    frame_us: float | None = None
 
     def losses(self) -> list[str]:
         """Return what a file without this section does not hold, but for the frames."""

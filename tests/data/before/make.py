@@ -91,7 +91,7 @@ def live() -> None:
     ours, theirs = pty.openpty()
     tty.setraw(theirs)
     sources = {
-        "left": f"udp:{LOOPBACK}:0,array=4x4",
+        "left": f"board:{LOOPBACK}:0,array=4x4",
         "imu": f"serial:{os.ttyname(theirs)},columns=t_ms:ax:ay",
         "given": "given,columns=force",
     }

@@ -73,16 +73,37 @@ impl Detector {
         }
     }
 
+    /// Checks that values in this unit are those that it was trained on.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming both units.
+    pub fn check_unit(&self, unit: &str) -> Result<()> {
+        let (kind, trained) = match self {
+            Self::Readout(readout) => ("readout", &readout.unit),
+            Self::PlainRule(rule) => ("plain rule", &rule.unit),
+        };
+        match trained.as_deref().filter(|&trained| trained != unit) {
+            None => Ok(()),
+            Some(trained) => Err(problem!(
+                "live values in {unit}, and the {kind} was trained on {trained}: must be in {trained}, or train anew on \
+                 recordings in {unit}"
+            )),
+        }
+    }
+
     /// Starts a stream for an array with frames of this duration.
     ///
     /// # Errors
     ///
     /// Those of [`Readout::stream`] and [`PlainRule::stream`].
     pub fn stream(&self, array: &Array, frames: impl Into<FrameTime>, tare: Option<&Tare>) -> Result<ReadoutStream> {
-        match self {
-            Self::Readout(readout) => readout.stream(array, frames, tare),
-            Self::PlainRule(rule) => rule.stream(array, frames, tare),
-        }
+        let frames = frames.into();
+        let stream = match self {
+            Self::Readout(readout) => readout.stream(array, frames, tare)?,
+            Self::PlainRule(rule) => rule.stream(array, frames, tare)?,
+        };
+        Ok(stream.with_silence(self.silence_us(frames)))
     }
 
     /// The time that a recording is continued after its end, us.
@@ -111,29 +132,31 @@ impl Detector {
         begin: Option<i64>,
         stop: Stop<'_>,
     ) -> Result<(Vec<Detection>, Option<u64>)> {
-        let frames = frames.into();
         let last = events.t.iter().copied().chain(events.markers.iter().map(|m| m.t)).max().unwrap_or(0);
         let mut stream = self.stream(events.array, frames, tare)?;
         begin.into_iter().for_each(|t| stream.begin_at(t));
         zeroings.iter().try_for_each(|zeroing| stream.zero(zeroing))?;
         events.check_order()?;
         let mut found = stream.push_recording(events, stop)?;
-        stream.advance(last.saturating_add(self.silence_us(frames)), &mut found)?;
+        stream.finish(last, &mut found)?;
         Ok((found, stream.outside()))
     }
 
-    /// The detections of a whole recording of frames, continued for a second with the last frame, and how many of
-    /// them have an input outside its range in training. Frames last `frame_us`, or by default the median distance
-    /// between frames. Nothing is detected before `begin` us.
+    /// The detections of a whole recording of frames with taxels that a person zeroed, continued for a second with the
+    /// last frame, and how many of them have an input outside its range in training. Frames last `frame_us`, or by default
+    /// the median distance between frames. Nothing is detected before `begin` us: of the frames before it, at rest, only
+    /// the last one is read.
     ///
     /// # Errors
     ///
-    /// Those of [`Detector::stream`] and [`ReadoutStream::push_frames`]; `Interrupted` if asked to stop.
+    /// Those of [`Detector::stream`], [`ReadoutStream::zero`] and [`ReadoutStream::push_frames`]; `Interrupted` if asked to
+    /// stop.
     pub fn run_frames(
         &self,
         frames: FramesView<'_>,
         frame_us: Option<f64>,
         tare: Option<&Tare>,
+        zeroings: &[Zeroing],
         begin: Option<i64>,
         stop: Stop<'_>,
     ) -> Result<(Vec<Detection>, Option<u64>)> {
@@ -143,9 +166,13 @@ impl Detector {
         };
         let last = frames.t.last().copied().unwrap_or(0);
         let mut stream = self.stream(frames.array, frame_us, tare)?;
+        frames.check()?;
         begin.into_iter().for_each(|t| stream.begin_at(t));
-        let mut found = stream.push_frames(frames, stop)?;
-        stream.advance(last.saturating_add(self.silence_us(frame_us.into())), &mut found)?;
+        zeroings.iter().try_for_each(|zeroing| stream.zero(zeroing))?;
+        let first = begin.map_or(0, |begin| frames.t.partition_point(|&t| t < begin).saturating_sub(1));
+        let rest = FramesView { t: &frames.t[first..], values: &frames.values[first * frames.array.len()..], ..frames };
+        let mut found = stream.push_frames(rest, stop)?;
+        stream.finish(last, &mut found)?;
         Ok((found, stream.outside()))
     }
 }

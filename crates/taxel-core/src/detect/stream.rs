@@ -51,6 +51,8 @@ pub struct ReadoutStream {
     begin: i64,
     /// The smaller array that the input is of, which is padded at its far edges; `None` where it is of the whole one.
     smaller: Option<Array>,
+    /// The time by which an input is continued after its end, us.
+    silence_us: i64,
 }
 
 /// What turns the encoder's spikes into detections.
@@ -91,12 +93,18 @@ impl ReadoutStream {
             late: 0,
             begin: i64::MIN,
             smaller: None,
+            silence_us: 0,
         }
     }
 
     /// The stream for input of a smaller array, which is padded at its far edges.
     pub(super) fn padding(self, smaller: Array) -> Self {
         Self { smaller: Some(smaller), ..self }
+    }
+
+    /// Continues the input by `us` after its end ([`ReadoutStream::finish`]).
+    pub(super) fn with_silence(self, us: i64) -> Self {
+        Self { silence_us: us, ..self }
     }
 
     /// The array that the input is of.
@@ -173,6 +181,15 @@ impl ReadoutStream {
             self.settle(t, out)?;
         }
         Ok(())
+    }
+
+    /// Ends the input at `last` us, which continues with its last values for as long as it can cause a detection.
+    ///
+    /// # Errors
+    ///
+    /// As [`ReadoutStream::advance`].
+    pub fn finish(&mut self, last: i64, out: &mut Vec<Detection>) -> Result<()> {
+        self.advance(last.saturating_add(self.silence_us), out)
     }
 
     /// Sets the rest of a taxel after all events up to the zeroing's time, or from now on if that time is past.

@@ -192,6 +192,11 @@ impl BatchQueue {
         state.until_ns.filter(|_| state.waiting.is_empty())
     }
 
+    /// Whether half of the room is taken.
+    pub(super) fn is_half_full(&self) -> bool {
+        self.state().waiting.bytes.len() > self.limit / 2
+    }
+
     pub(super) fn counts(&self) -> CaptureCounts {
         let state = self.state();
         CaptureCounts { waiting: state.waiting.len() as u64, ..state.counts }

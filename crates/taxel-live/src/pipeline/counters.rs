@@ -8,12 +8,13 @@ use taxel_core::counts_since;
 use taxel_core::encode::Tare;
 use taxel_core::wire::{self, SenderTotals, StepBack};
 
+use super::frame_input::LineCounts;
 use super::sending::Sent;
 use crate::bridged::Bridged;
 use crate::capture;
 use crate::clock::{Offset, Pace};
 use crate::latency::Quantiles;
-use crate::recording::{DamageCounts, Verdict};
+use crate::recording::Verdict;
 
 /// Counts of what arrived, how it was processed, and what was lost at which stage.
 ///
@@ -26,6 +27,8 @@ pub struct Counters {
     pub capture: capture::CaptureCounts,
     /// Losses between another computer, which receives the board's datagrams, and this one.
     pub bridged: Option<Bridged>,
+    /// Counts of the lines of a source of frames.
+    pub lines: Option<LineCounts>,
     /// What was decoded.
     #[serde(flatten)]
     pub decoding: DecodingCounts,
@@ -69,6 +72,8 @@ pub struct DecodingCounts {
     pub wire_steps: Vec<StepBack>,
     /// Number of decoded events.
     pub events: u64,
+    /// Number of frames of numbers.
+    pub frames: u64,
 }
 
 /// Counts of the readout and of its detections.
@@ -168,7 +173,8 @@ impl Counters {
     /// Whether no datagram has arrived, not even one that was lost.
     #[must_use]
     pub fn nothing_came(&self) -> bool {
-        self.capture.messages + self.capture.dropped_by_kernel == 0
+        let lines = self.lines.as_ref().map_or(0, |counts| counts.lines);
+        self.capture.messages + self.capture.dropped_by_kernel + lines == 0
     }
 
     /// The difference from earlier counts. Clocks, versions and latencies are the current ones; datagrams that still
@@ -194,6 +200,7 @@ impl Counters {
         };
         Self {
             capture,
+            lines: self.lines.as_ref().map(|now| earlier.lines.as_ref().map_or_else(|| now.clone(), |l| now.since(l))),
             bridged: self.bridged.map(|now| now.since(&earlier.bridged.unwrap_or_default())),
             decoding: self.decoding.since(&earlier.decoding),
             readout: self.readout.since(&earlier.readout),
@@ -208,7 +215,7 @@ impl DecodingCounts {
     fn since(&self, earlier: &Self) -> Self {
         counts_since! {
             self, earlier;
-            decoded, wire_late, events;
+            decoded, wire_late, events, frames;
             wire: self.wire.since(&earlier.wire),
             wire_version: self.wire_version,
             wire_v2: self.wire_v2.since(&earlier.wire_v2),
@@ -246,23 +253,8 @@ pub struct LiveSummary {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum SourceCounts {
-    /// The counts of a board's pipeline.
-    Board(Box<Counters>),
+    /// The counts of the pipeline of a board or of frames.
+    Pipeline(Box<Counters>),
     /// The counts of a stream of numbers.
-    Numbers {
-        /// Number of lines, or of samples passed by a program.
-        lines: u64,
-        /// Number of lines that could not be parsed; they are recorded as they arrived.
-        strange: u64,
-        /// Number of bytes that were left out, as they are in no line of numbers: what follows in a line that is longer than
-        /// 65 536 bytes, and before the first line what cannot be one.
-        bytes_in_no_line: u64,
-        /// Number of bytes of lines whose end did not arrive, or whose beginning did not.
-        bytes_of_unfinished_lines: u64,
-        /// The system's last error, if reading failed.
-        trouble: Option<String>,
-        /// What is wrong with its lines and stamps, as a verdict states it.
-        #[serde(skip)]
-        faults: DamageCounts,
-    },
+    Numbers(LineCounts),
 }

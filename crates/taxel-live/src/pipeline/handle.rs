@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 
 use crossbeam_channel as channel;
 use taxel_core::encode::{Tare, Zeroing};
+use taxel_core::rest::ValueSteps;
 use taxel_core::wire::Registers;
 
 use super::copies::Copies;
@@ -52,6 +53,15 @@ impl Handle {
     #[must_use]
     pub fn counters(&self) -> Counters {
         self.shared.counters()
+    }
+
+    /// Unit and steps of the frames of numbers that are received, in which viewers get their values, and the time of the
+    /// first one, us; `None` of a board, and before the first frame.
+    #[must_use]
+    pub fn frame_values(&self) -> Option<(String, ValueSteps, i64)> {
+        let frames = self.shared.frames.as_ref()?;
+        let (steps, begin_us) = self.shared.published().steps?;
+        Some((frames.layout.unit.clone(), steps, begin_us))
     }
 
     /// As [`Live::is_over`](super::Live::is_over).

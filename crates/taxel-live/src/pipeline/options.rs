@@ -5,15 +5,22 @@
 //! the commands that have an option (`taxel live` where it is left out), `flag` its name there, `metavar` its value, `typed`
 //! what only the command line adds, and `python` the type in Python where it is not plain.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize, Serializer};
-use taxel_core::Array;
 use taxel_core::detect::FrameTime;
 use taxel_core::wire::Registers;
+use taxel_core::{Array, problem};
 
+use super::source::SourceText;
+use crate::address::of_host;
 use crate::capture::ReceiverOptions;
 use crate::recording::Compression;
+
+/// Where a board is received if nothing else is stated.
+pub const PORT: u16 = 5208;
+const HOST: &str = "0.0.0.0";
 
 /// Declares the options with their defaults; `KEY = VALUE` after one is what its schema says beside.
 macro_rules! options {
@@ -39,12 +46,12 @@ options! {
     #[serde(default, deny_unknown_fields)]
     #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
     pub struct LiveOptions {
-        /// The UDP port that the board sends to.
+        /// The UDP port that the board sends to. Default: 5208, unless --source names what to receive.
         ///
         /// 0 finds a free one, see `address`.
-        port: u16 = 5208, "commands" = "live record";
-        /// The address of this machine to listen on; 0.0.0.0: all.
-        host: String = "0.0.0.0".to_owned(), "commands" = "live record";
+        port: Option<u16> = None, "commands" = "live record";
+        /// The address of this machine to listen on for a board; 0.0.0.0: all.
+        host: Option<String> = None, "commands" = "live record";
         /// Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.
         ///
         /// Stop the `Live` before it.
@@ -89,17 +96,21 @@ options! {
         record_later: bool = false, "commands" = "";
         /// The board's name among the sources of the recording.
         name: String = "board".to_owned(), "commands" = "record";
-        /// Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU
-        /// (serial:PLACE@BAUD or pipe:PATH, columns=t_us:ax:ay).
+        /// What to receive, [NAME=]KIND:PLACE and KEY=VALUE after commas, as lines:-,array=16x16 or serial:COM3,array=16x16:
+        /// frames of numbers, a board (board:HOST:PORT), or further sources of a recording.
         ///
-        /// By name, in a `.mcap`, each with its own clock: "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which
-        /// sends to that address of this machine; "serial:PLACE@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard
-        /// input); "given" are numbers that a program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of
-        /// a line (default: those of the first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called
-        /// `t_us`, `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its
-        /// arrival.
-        sources: Vec<(String, String)> = vec![], "commands" = "record", "flag" = "--source", "metavar" = "NAME=WHAT",
-            "python" = "Mapping[str, str] | None", "typed" = "May be repeated.";
+        /// "board:HOST:PORT" is a board that sends to that address of this machine (array=ROWSxCOLUMNS, preset=NAME). Lines of
+        /// numbers come from "serial:PLACE" (baud=), "lines:PATH" (a pipe, or a file that grows; "-" is the standard input),
+        /// "lines+tcp:HOST:PORT" (connects), "lines+udp:HOST:PORT" (listens) and "given", what a program passes to `sample`. With
+        /// ``array=`` they are frames: a line each, or ``frame_lines=16``, or up to an empty line (``frame_end=blank``).
+        /// ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1; ``time=A+B`` adds seconds and
+        /// nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns, ``leave_out=A:B`` are those without
+        /// values, ``unit=``, ``falls=`` (true, or the number that readings are subtracted from) and ``rate=`` (frames a second;
+        /// default: measured). Lines without an array, as of an IMU, are recorded with the first source. "lsl:NAME" is a
+        /// stream of the lab streaming layer.
+        sources: Vec<String> = vec![], "commands" = "live record", "flag" = "--source",
+            "metavar" = "[NAME=]KIND:PLACE", "python" = "Mapping[str, str] | str | Sequence[str] | None",
+            "typed" = "May be repeated.";
         /// Compression of a .mcap: none, lz4 or zstd.
         compression: String = "none".to_owned(), "commands" = "record";
         /// Replace the file if it exists.
@@ -110,9 +121,10 @@ options! {
         gap_frames: f64 = 1.0, "commands" = "", "minimum" = 0;
         /// Print one line of JSON for each detection, and nothing else.
         lines: bool = false, "flag" = "--json";
-        /// Send each detection as a line of JSON to udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD.
+        /// Send each detection as a line of JSON to serial:PLACE, lines:PATH (a named pipe), lines+tcp:HOST:PORT or
+        /// lines+udp:HOST:PORT.
         ///
-        /// UDP sends a datagram each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab
+        /// UDP sends a datagram each, TCP connects; the named pipe must exist; ``,baud=`` may follow a serial port; "lsl:NAME" sends the label in a stream of markers of the lab
         /// streaming layer. Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and
         /// counted.
         send: Vec<String> = vec![], "metavar" = "WHERE", "python" = "str | Sequence[str]", "typed" = "May be repeated.";
@@ -155,6 +167,32 @@ impl LiveOptions {
     #[must_use]
     pub fn frames(&self) -> FrameTime {
         FrameTime::on_wire(self.registers.frame_us(), self.registers.wire_version)
+    }
+
+    /// The address to receive a board on.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` if there is no such host.
+    pub fn address(&self) -> crate::Result<SocketAddr> {
+        of_host(self.host.as_deref().unwrap_or(HOST), self.port.unwrap_or(PORT))
+    }
+
+    /// The sources that are stated.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` if a text is none of a source, or two have one name.
+    pub(super) fn source_texts(&self) -> crate::Result<Vec<SourceText>> {
+        let texts = self.sources.iter().map(|text| text.parse()).collect::<crate::Result<Vec<SourceText>>>()?;
+        for (k, text) in texts.iter().enumerate() {
+            let name = text.name();
+            if texts[..k].iter().any(|earlier| earlier.name() == name) {
+                let text = &text.text;
+                return Err(problem!("source {text:?}: there are two named {name}; name it, as second={text}").into());
+            }
+        }
+        Ok(texts)
     }
 
     /// The socket and the queue behind it.

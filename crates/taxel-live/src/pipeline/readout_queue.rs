@@ -6,6 +6,7 @@ use taxel_core::encode::Zeroing;
 use taxel_core::events::FARTHEST_BACK_US;
 use taxel_core::{Array, Events};
 
+use super::frame_stage::FrameBlock;
 use crate::locked::lock;
 
 /// Events that wait for the readout, and the time up to which there are no more.
@@ -19,6 +20,7 @@ pub(super) struct ReadoutQueue {
 #[derive(Debug)]
 struct WaitingEvents {
     events: Events,
+    frames: FrameBlock,
     quiet: Option<QuietUntil>,
     zeroings: Vec<Zeroing>,
     dropped: u64,
@@ -32,6 +34,8 @@ pub(super) enum QuietUntil {
     ByHostClock(i64),
     /// As the board has promised.
     ByBoard(i64),
+    /// The input has ended: none follow at all.
+    Ended,
 }
 
 impl QuietUntil {
@@ -41,6 +45,7 @@ impl QuietUntil {
         match self {
             Self::ByHostClock(t) => t - FARTHEST_BACK_US,
             Self::ByBoard(t) => t,
+            Self::Ended => i64::MAX,
         }
     }
 }
@@ -57,7 +62,8 @@ pub(super) struct BatchEnd {
 impl ReadoutQueue {
     pub(super) fn new(array: &Array, limit: usize) -> Self {
         let events = Events::empty(array.clone());
-        let state = WaitingEvents { events, quiet: None, zeroings: vec![], dropped: 0, closed: false };
+        let frames = FrameBlock::default();
+        let state = WaitingEvents { events, frames, quiet: None, zeroings: vec![], dropped: 0, closed: false };
         Self { state: Mutex::new(state), came: Condvar::new(), limit }
     }
 
@@ -75,6 +81,24 @@ impl ReadoutQueue {
             events.clear();
         }
         state.quiet = promised.map(QuietUntil::ByBoard);
+        let dropped = state.dropped;
+        drop(state);
+        self.came.notify_one();
+        dropped
+    }
+
+    /// Adds frames, and leaves `frames` empty; a block that does not fit is dropped. Returns the number of frames dropped so
+    /// far.
+    pub(super) fn push_frames(&self, frames: &mut FrameBlock) -> u64 {
+        let mut state = self.state();
+        // A frame has as many values as the array; a block that waits alone always fits.
+        if state.frames.is_empty() || state.frames.values.len() + frames.values.len() <= self.limit {
+            state.frames.append(frames);
+        } else {
+            state.dropped += frames.t.len() as u64;
+            frames.clear();
+        }
+        state.quiet = None;
         let dropped = state.dropped;
         drop(state);
         self.came.notify_one();
@@ -103,14 +127,16 @@ impl ReadoutQueue {
     }
 
     /// Waits until something is there and removes all of it; adds to `zeroings`.
-    pub(super) fn pop(&self, events: &mut Events, zeroings: &mut Vec<Zeroing>) -> BatchEnd {
+    pub(super) fn pop(&self, events: &mut Events, frames: &mut FrameBlock, zeroings: &mut Vec<Zeroing>) -> BatchEnd {
         events.clear();
+        frames.clear();
         let nothing = |s: &mut WaitingEvents| {
             let silent = s.events.is_empty() && s.events.markers.is_empty() && s.zeroings.is_empty();
-            silent && s.quiet.is_none() && !s.closed
+            silent && s.frames.is_empty() && s.quiet.is_none() && !s.closed
         };
         let mut state = self.came.wait_while(self.state(), nothing).unwrap_or_else(PoisonError::into_inner);
         std::mem::swap(&mut state.events, events);
+        std::mem::swap(&mut state.frames, frames);
         zeroings.append(&mut state.zeroings);
         BatchEnd { quiet: state.quiet.take(), last: state.closed }
     }
@@ -144,7 +170,10 @@ mod tests {
             assert!(piece.is_empty());
         }
         let mut popped = Events::empty(Array::thesis());
-        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]), BatchEnd { quiet: None, last: false });
+        assert_eq!(
+            readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]),
+            BatchEnd { quiet: None, last: false }
+        );
         assert_eq!(popped.t, [1, 2, 3, 4]);
         let intensity = popped.intensity.as_ref().expect("one had an intensity");
         assert_eq!(intensity.ticks, [0, 0, 7, 0]);
@@ -158,7 +187,7 @@ mod tests {
         assert_eq!(readout_queue.push(&mut events(&[1, 2], None), None), 0);
         assert_eq!(readout_queue.push(&mut events(&[3, 4, 5], None), None), 2);
         let mut popped = Events::empty(Array::thesis());
-        readout_queue.pop(&mut popped, &mut vec![]);
+        readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]);
         assert_eq!(popped.t, [1, 2, 3]);
     }
 
@@ -167,13 +196,19 @@ mod tests {
         let readout_queue = ReadoutQueue::new(&Array::thesis(), 10);
         let mut popped = Events::empty(Array::thesis());
         readout_queue.set_quiet(QuietUntil::ByHostClock(100));
-        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, Some(QuietUntil::ByHostClock(100)));
+        assert_eq!(
+            readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]).quiet,
+            Some(QuietUntil::ByHostClock(100))
+        );
         readout_queue.set_quiet(QuietUntil::ByHostClock(200));
         readout_queue.push(&mut events(&[150], None), None);
-        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, None);
+        assert_eq!(readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]).quiet, None);
         readout_queue.push(&mut events(&[], None), Some(300));
-        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, Some(QuietUntil::ByBoard(300)));
+        assert_eq!(
+            readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]).quiet,
+            Some(QuietUntil::ByBoard(300))
+        );
         readout_queue.close(None);
-        assert!(readout_queue.pop(&mut popped, &mut vec![]).last);
+        assert!(readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]).last);
     }
 }

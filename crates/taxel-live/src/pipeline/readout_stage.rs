@@ -4,6 +4,7 @@ use taxel_core::Events;
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 
+use super::frame_stage::FrameBlock;
 use super::readout_queue::{BatchEnd, QuietUntil};
 use super::running_readout::RunningReadout;
 use super::shared::PipelineShared;
@@ -78,6 +79,18 @@ impl ReadoutStage {
             }
         }
         self.announced = self.announced.max(promised);
+    }
+
+    /// Processes frames.
+    pub(super) fn push_frames(&mut self, shared: &PipelineShared, frames: &mut FrameBlock) {
+        match &mut self.readout {
+            _ if !self.is_on || frames.is_empty() => {}
+            Some(readout) => readout.push_frames(shared, frames),
+            None => {
+                let dropped = shared.readout_queue.push_frames(frames);
+                shared.published().counters.readout.events_dropped = dropped;
+            }
+        }
     }
 
     /// Processes a silence: no events before a time.

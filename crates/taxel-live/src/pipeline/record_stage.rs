@@ -132,12 +132,14 @@ impl RecordStage {
         let now = self.shared.counters();
         let ended = lock(&self.shared.recording.running).take();
         self.origin = None;
+        let begins = next.is_some();
         if let Some(mut next) = next {
             if let Err(error) = next.begin(&now, held.values()) {
                 *lock(&self.shared.recording.running) = ended;
                 return Err(error);
             }
-            self.origin = Some(Box::new(fresh_decoder(&self.shared.options)));
+            let is_board = self.shared.frames.is_none();
+            self.origin = is_board.then(|| Box::new(fresh_decoder(&self.shared.options)));
             self.tared = false;
             let timed = next.is_timed();
             *lock(&self.shared.recording.running) = Some(*next);
@@ -145,7 +147,7 @@ impl RecordStage {
                 self.earlier_zeroings()?;
             }
         }
-        self.shared.recording.runs.store(self.origin.is_some(), Ordering::Release);
+        self.shared.recording.runs.store(begins, Ordering::Release);
         Ok((ended, now))
     }
 
@@ -166,7 +168,8 @@ impl RecordStage {
     /// Buffers a preview if one is due, and records the selected ones; with `last` also the final one.
     pub(super) fn previews(&mut self, decoded: u64, held: &Held, last: bool) -> Result<()> {
         let now = Instant::now();
-        if !(last || self.preview_buffer.is_due(now)) {
+        // Frames are shown by any viewer.
+        if self.shared.frames.is_some() || !(last || self.preview_buffer.is_due(now)) {
             return Ok(());
         }
         let times = std::mem::take(&mut *lock(&self.shared.recording.preview_times));
@@ -207,12 +210,13 @@ impl RecordStage {
             self.counted = Instant::now();
         }
         let (capture, bridged) = (self.shared.receiver.counts(), self.shared.receiver.bridged());
+        let lines = self.shared.frames.as_ref().map(|frames| frames.counts());
         self.with(|recording| {
             if let Some(tare) = tare {
                 recording.tare(&tare)?;
             }
             recording.flush()?;
-            if due { recording.counts(&Counters { capture, bridged, ..counters }) } else { Ok(()) }
+            if due { recording.counts(&Counters { capture, bridged, lines, ..counters }) } else { Ok(()) }
         })
     }
 }

@@ -8,7 +8,8 @@ use crossbeam_channel as channel;
 use taxel_core::problem;
 
 use super::counters::{Counters, LiveSummary, SourceCounts};
-use super::options::{LiveOptions, Record};
+use super::frame_input::LineCounts;
+use super::options::Record;
 use super::running_recording::{Host, RecordingPart, RunningRecording, losses};
 use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
 use super::sources::{NumberStream, losses_of_lines};
@@ -21,7 +22,7 @@ use crate::{Error, Result};
 pub(super) struct RecordingSwitch {
     shared: Arc<PipelineShared>,
     /// The other sources of a recording, by name.
-    boards: Vec<(String, Arc<PipelineShared>)>,
+    pipelines: Vec<(String, Arc<PipelineShared>)>,
     numbers: Vec<(String, Arc<NumberStream>)>,
     /// Locked while one recording replaces another.
     replacing: Mutex<()>,
@@ -30,10 +31,10 @@ pub(super) struct RecordingSwitch {
 impl RecordingSwitch {
     pub(super) fn new(
         shared: Arc<PipelineShared>,
-        boards: Vec<(String, Arc<PipelineShared>)>,
+        pipelines: Vec<(String, Arc<PipelineShared>)>,
         numbers: Vec<(String, Arc<NumberStream>)>,
     ) -> Self {
-        Self { shared, boards, numbers, replacing: Mutex::default() }
+        Self { shared, pipelines, numbers, replacing: Mutex::default() }
     }
 
     /// As [`Handle::record`](super::Handle::record).
@@ -42,9 +43,7 @@ impl RecordingSwitch {
             // Returns an error that ended an earlier recording and that no call has returned yet.
             self.take_error()?;
         }
-        let options = &self.shared.options;
-        let header = LiveOptions { registers: *lock(&self.shared.registers), ..options.clone() };
-        let next = RunningRecording::reserve(record, &header, &self.shared.sources, self.shared.receiver.origin())?;
+        let next = RunningRecording::reserve(record, self.shared.header()?, &self.shared.sources)?;
         self.replace(Some(next))
     }
 
@@ -56,12 +55,12 @@ impl RecordingSwitch {
     /// As [`Handle::records`](super::Handle::records).
     pub(super) fn run(&self) -> bool {
         let is_sound = |board: &Arc<PipelineShared>| lock(&board.recording.broken).is_none();
-        self.shared.recording.runs.load(Ordering::Acquire) && self.boards.iter().all(|(_, board)| is_sound(board))
+        self.shared.recording.runs.load(Ordering::Acquire) && self.pipelines.iter().all(|(_, board)| is_sound(board))
     }
 
     /// The error that ended a recording early, of this board or another one.
     fn take_error(&self) -> Result<()> {
-        let all = self.boards.iter().map(|(_, board)| board).chain([&self.shared]);
+        let all = self.pipelines.iter().map(|(_, board)| board).chain([&self.shared]);
         let errors: Vec<Error> = all.filter_map(|shared| lock(&shared.recording.broken).take()).collect();
         errors.into_iter().next().map_or(Ok(()), Err)
     }
@@ -71,17 +70,17 @@ impl RecordingSwitch {
         let replacing = lock(&self.replacing);
         let mut sources = BTreeMap::new();
         let mut ended = vec![];
-        for (name, board) in &self.boards {
+        for (name, board) in &self.pipelines {
             let host: Weak<dyn Host> = Arc::<PipelineShared>::downgrade(&self.shared);
             let part = RecordingPart { host, name: name.clone() };
-            let origin = board.receiver.origin();
-            let part = next.as_ref().map(|next| next.part_of(part, &board.options, origin)).transpose()?;
+            let header = board.header()?;
+            let part = next.as_ref().map(|next| next.part_of(part, header)).transpose()?;
             let (recording, counts) = replace_of(board, part)?;
             let counters = recording
                 .as_ref()
                 .and_then(RunningRecording::since)
                 .map_or_else(Counters::default, |s| counts.since(s));
-            sources.insert(name.clone(), SourceCounts::Board(Box::new(counters)));
+            sources.insert(name.clone(), SourceCounts::Pipeline(Box::new(counters)));
             ended.push((recording, counts));
         }
         for (name, numbers) in &self.numbers {
@@ -128,17 +127,19 @@ pub(super) fn verdict(
     nothing: bool,
     lost: &RecordingCounts,
 ) -> Verdict {
-    let of_board =
-        |counters: &Counters, lost: &RecordingCounts| lost.verdict().doubtful(counters.decoding.totals.doubtful_after);
+    let of_source = |counters: &Counters, lost: &RecordingCounts| match &counters.lines {
+        None => lost.verdict().doubtful(counters.decoding.totals.doubtful_after),
+        Some(lines) => Verdict::of_lines(lost).doubtful(lines.faults.doubtful_after_us),
+    };
     let verdict = if nothing {
         Verdict::nothing_arrived(nothing_arrived(origin, counters.seconds))
     } else {
-        of_board(counters, lost)
+        of_source(counters, lost)
     };
     let others = counters.sources.iter().map(|(name, counts)| {
         let verdict = match counts {
-            SourceCounts::Board(counts) => of_board(counts, &losses(counts, None)),
-            SourceCounts::Numbers { lines, faults, .. } => {
+            SourceCounts::Pipeline(counts) => of_source(counts, &losses(counts, None)),
+            SourceCounts::Numbers(LineCounts { lines, faults, .. }) => {
                 Verdict::of_lines(&losses_of_lines(*lines, faults)).doubtful(faults.doubtful_after_us)
             }
         };
@@ -151,6 +152,7 @@ pub(super) fn verdict(
 fn nothing_arrived(origin: &Origin, seconds: f64) -> String {
     let ask = match origin {
         Origin::Udp(address) => format!("does the board send to this machine, and to port {}?", address.port()),
+        Origin::Frames(_) => "is it connected, and does it send lines of numbers?".to_owned(),
         Origin::Bridge(_) => "does the board send to the computer that bridges it?".to_owned(),
     };
     format!("nothing arrived at {origin} in {seconds:.1} s: {ask}")

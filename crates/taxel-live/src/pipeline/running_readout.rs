@@ -1,10 +1,11 @@
 //! Encodes events and runs the readout: in the decoding thread, or in a separate one.
 
-use taxel_core::Events;
 use taxel_core::detect::{Detection, Detector, FrameTime, ReadoutStream};
 use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::problem;
+use taxel_core::{Array, Events};
 
+use super::frame_stage::FrameBlock;
 use super::options::{LiveOptions, StatedTare};
 use super::output::DetectionOutput;
 use super::readout_queue::{BatchEnd, QuietUntil};
@@ -24,21 +25,22 @@ pub enum ReadoutSetup {
 }
 
 impl ReadoutSetup {
-    /// The setup of the options' readout, where there is one: it measures a fresh tare where they say for how long, else it
+    /// The setup of the options' readout, where there is one, for frames of this length and values in this unit: it measures a fresh tare where they say for how long, else it
     /// reads at once, with the saved tare where its encoder needs one.
     ///
     /// # Errors
     ///
     /// `Format` for a text that is no readout or no tare, `Problem` for a time that no tare takes; as [`Detector::stream`].
-    pub fn from_options(options: &LiveOptions) -> taxel_core::Result<Self> {
+    pub fn from_options(options: &LiveOptions, frames: FrameTime, unit: &str) -> taxel_core::Result<Self> {
         let Some(readout) = &options.readout else { return Ok(Self::None) };
         let readout = Detector::from_json(readout)?;
+        readout.check_unit(unit)?;
         let tare = match &options.tare {
             Some(StatedTare::Seconds(seconds)) => return Ok(Self::Taring(tare_us(*seconds)?, Box::new(readout))),
             Some(StatedTare::Saved(text)) => Some(Tare::from_json(text)?),
             None => None,
         };
-        Ok(Self::Reading(Box::new(readout.stream(&options.array, options.frames(), tare.as_ref())?)))
+        Ok(Self::Reading(Box::new(readout.stream(&options.array, frames, tare.as_ref())?)))
     }
 }
 
@@ -56,6 +58,8 @@ pub(super) struct RunningReadout {
     /// Detections that do not wait for output yet.
     pub(super) found: Vec<Detection>,
     events: Events,
+    /// Of a source of frames, in place of events.
+    block: FrameBlock,
     zeroings: Vec<Zeroing>,
     frames: FrameTime,
 }
@@ -68,16 +72,16 @@ enum Mode {
 }
 
 impl RunningReadout {
-    pub(super) fn new(readout: ReadoutSetup, options: &LiveOptions) -> Self {
-        let events = Events::empty(options.array.clone());
+    pub(super) fn new(readout: ReadoutSetup, array: &Array, frames: FrameTime) -> Self {
+        let events = Events::empty(array.clone());
         let mode = match readout {
             ReadoutSetup::None => Mode::Idle,
             ReadoutSetup::Reading(stream) => Mode::Reading(SpeculativeReadout::new(stream)),
             ReadoutSetup::Taring(stretch_us, readout) => {
-                Mode::Taring(Box::new(TareMeasurement::new(stretch_us, readout, &options.array)))
+                Mode::Taring(Box::new(TareMeasurement::new(stretch_us, readout, array)))
             }
         };
-        Self { mode, found: vec![], events, zeroings: vec![], frames: options.frames() }
+        Self { mode, found: vec![], events, block: FrameBlock::default(), zeroings: vec![], frames }
     }
 
     /// Publishes whether it measures a tare, and the rest that it reads with, before the first events.
@@ -97,7 +101,7 @@ impl RunningReadout {
             if last {
                 break;
             }
-            let end = shared.readout_queue.pop(&mut self.events, &mut self.zeroings);
+            let end = shared.readout_queue.pop(&mut self.events, &mut self.block, &mut self.zeroings);
             self.process(shared, end);
             last = end.last;
         }
@@ -110,9 +114,17 @@ impl RunningReadout {
         self.events.clear();
     }
 
+    /// As [`RunningReadout::push`], of frames.
+    pub(super) fn push_frames(&mut self, shared: &PipelineShared, frames: &mut FrameBlock) {
+        std::mem::swap(&mut self.block, frames);
+        self.process(shared, BatchEnd { quiet: None, last: false });
+        self.block.clear();
+    }
+
     /// Advances time without events.
     pub(super) fn advance(&mut self, shared: &PipelineShared, end: BatchEnd) {
         self.events.clear();
+        self.block.clear();
         self.process(shared, end);
     }
 
@@ -133,7 +145,11 @@ impl RunningReadout {
             Mode::Reading(readout) => {
                 self.zeroings.drain(..).try_for_each(|zeroing| readout.zero(&zeroing))?;
                 readout.push(self.events.view(), &mut self.found)?;
+                for (t, frame) in self.block.view(&self.events.array).iter() {
+                    readout.push_frame(t, frame, &mut self.found)?;
+                }
                 match end.quiet {
+                    Some(QuietUntil::Ended) => readout.finish(&mut self.found)?,
                     Some(QuietUntil::ByBoard(t)) => readout.advance(t, &mut self.found)?,
                     Some(QuietUntil::ByHostClock(t)) if end.last => readout.advance(t, &mut self.found)?,
                     Some(QuietUntil::ByHostClock(t)) => readout.advance_silence(t, &mut self.found)?,
@@ -141,15 +157,21 @@ impl RunningReadout {
                 }
             }
             Mode::Taring(measurement) => {
-                if let Some((stop, inside)) = measurement.push(&self.events, end.quiet.map(QuietUntil::certain))? {
+                let quiet_until = end.quiet.map(QuietUntil::certain);
+                let frames = self.block.view(&self.events.array);
+                let over = match measurement.push_frames(frames)? {
+                    None if self.block.is_empty() => measurement.push(&self.events, quiet_until)?,
+                    over => over,
+                };
+                if let Some((stop, inside)) = over {
                     self.begin_reading(shared, stop, inside)?;
                 }
             }
             Mode::Idle => self.zeroings.clear(),
         }
-        if !self.events.is_empty() || end.last {
+        if !self.events.is_empty() || !self.block.is_empty() || end.last {
             let counters = &mut shared.published().counters;
-            counters.readout.read_out += self.events.len() as u64;
+            counters.readout.read_out += (self.events.len() + self.block.t.len()) as u64;
             if let Mode::Reading(readout) = &self.mode {
                 (counters.readout.late, counters.readout.wrong) = (readout.late(), readout.wrong());
                 counters.readout.outside = readout.outside();
@@ -158,12 +180,17 @@ impl RunningReadout {
         Ok(())
     }
 
-    /// Ends the tare: runs the readout from the first event after it on.
+    /// Ends the tare: runs the readout from the first event or frame after it on.
     fn begin_reading(&mut self, shared: &PipelineShared, stop: i64, inside: usize) -> crate::Result<()> {
         let Mode::Taring(measurement) = std::mem::replace(&mut self.mode, Mode::Idle) else { return Ok(()) };
         let (tare, stream) = measurement.finish(stop, self.frames)?;
         let mut readout = SpeculativeReadout::new(Box::new(stream));
-        readout.push(self.events.view().piece(inside..self.events.len()), &mut self.found)?;
+        if self.block.is_empty() {
+            readout.push(self.events.view().piece(inside..self.events.len()), &mut self.found)?;
+        }
+        for (t, frame) in self.block.view(&self.events.array).iter().skip(inside) {
+            readout.push_frame(t, frame, &mut self.found)?;
+        }
         self.mode = Mode::Reading(readout);
         self.publish_rest(shared);
         let mut published = shared.published();

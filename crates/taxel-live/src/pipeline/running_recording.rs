@@ -10,12 +10,13 @@ use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
 use super::counters::{Counters, DecodingCounts};
-use super::options::{LiveOptions, Record};
+use super::options::Record;
 use super::sink::OutputDetection;
-use super::source::FurtherSource;
-use crate::capture::{Batch, Origin};
+use super::source::NamedSource;
+use crate::capture::Batch;
+use crate::frame_lines::read_message;
 use crate::locked::lock;
-use crate::recording::{self, BoardChange, Decoding, Header, LsaWriter, OutputFile, SourceWriter, Writer, now_ns};
+use crate::recording::{self, BoardChange, FrameEncoding, Header, LsaWriter, OutputFile, SourceWriter, Writer, now_ns};
 use crate::{Error, Result};
 
 /// One recording, from its reservation to its end. A raw `.lsa` contains bytes only: notes, markers and the like are
@@ -50,6 +51,14 @@ enum RecordingClock {
     Waits,
     /// The first stamp has not arrived.
     Unknown,
+}
+
+impl RecordingClock {
+    /// The clock of a recording that begins while its source is received: stamps of a board begin anew, those of frames
+    /// do not.
+    fn beginning_later(header: &Header) -> Self {
+        if header.frames.is_some() { Self::Behind(0) } else { Self::Unknown }
+    }
 }
 
 enum RecordingFile {
@@ -112,22 +121,18 @@ impl RunningRecording {
     }
 
     /// A part of another pipeline's recording.
-    pub(super) fn join(host: RecordingPart, record: &Record, options: &LiveOptions, origin: &Origin) -> Self {
+    pub(super) fn join(host: RecordingPart, record: &Record, header: Header) -> Self {
         let name = host.name.clone();
-        let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(origin), now_ns());
-        Self { host: Some(host), ..Self::new(record, Header { name, ..board }) }
+        Self { host: Some(host), ..Self::new(record, Header { name, ..header }) }
     }
 
-    /// A part of another pipeline's recording that begins while this pipeline's board is being received.
-    pub(super) fn part_of(&self, host: RecordingPart, options: &LiveOptions, origin: &Origin) -> Result<Self> {
+    /// A part of another pipeline's recording that begins while this pipeline's source is being received.
+    pub(super) fn part_of(&self, host: RecordingPart, header: Header) -> Result<Self> {
         let track = self.track_of(&host.name)?;
-        let part = Self::join(host, &self.record, options, origin);
-        Ok(Self {
-            file: OnceLock::from(RecordingFile::Track(Box::new(track))),
-            since: Some(Box::default()),
-            clock: Mutex::new(RecordingClock::Unknown),
-            ..part
-        })
+        let clock = Mutex::new(RecordingClock::beginning_later(&header));
+        let part = Self::join(host, &self.record, header);
+        let file = OnceLock::from(RecordingFile::Track(Box::new(track)));
+        Ok(Self { file, since: Some(Box::default()), clock, ..part })
     }
 
     /// The writer of another source's part of this recording.
@@ -141,13 +146,8 @@ impl RunningRecording {
     }
 
     /// A recording from the pipeline's beginning: a new file is begun at once.
-    pub(super) fn create(
-        record: &Record,
-        options: &LiveOptions,
-        sources: &[FurtherSource],
-        origin: &Origin,
-    ) -> Result<Self> {
-        let (recording, file) = Self::open(record, options, sources, origin)?;
+    pub(super) fn create(record: &Record, header: Header, sources: &[NamedSource]) -> Result<Self> {
+        let (recording, file) = Self::open(record, header, sources)?;
         let new = file.is_new();
         *lock(&recording.reserved) = Some(file);
         if new {
@@ -157,39 +157,31 @@ impl RunningRecording {
     }
 
     /// A recording that begins while the pipeline runs: the file is reserved now, and written later.
-    pub(super) fn reserve(
-        record: &Record,
-        options: &LiveOptions,
-        sources: &[FurtherSource],
-        origin: &Origin,
-    ) -> Result<Self> {
-        let (recording, file) = Self::open(record, options, sources, origin)?;
+    pub(super) fn reserve(record: &Record, header: Header, sources: &[NamedSource]) -> Result<Self> {
+        let (recording, file) = Self::open(record, header, sources)?;
         let recording = Self { since: Some(Box::default()), ..recording };
         if kind_of_name(&record.path)? == "lsa" {
             *lock(&recording.reserved) = Some(file);
             return Ok(recording);
         }
         // Without other sources the file waits for the board's first stamp, so that its times are the pipeline's.
-        let for_clock = recording.header.sources.is_empty();
+        let for_clock = recording.header.sources.is_empty() && recording.header.frames.is_none();
         let writer = Writer::plan(file, &recording.header, record.compression, for_clock);
-        let clock = Mutex::new(if for_clock { RecordingClock::Waits } else { RecordingClock::Unknown });
+        let later = RecordingClock::beginning_later(&recording.header);
+        let clock = Mutex::new(if for_clock { RecordingClock::Waits } else { later });
         Ok(Self { file: OnceLock::from(RecordingFile::Mcap(Box::new(writer))), clock, ..recording })
     }
 
     /// A recording whose file is opened and locked, but not changed.
-    fn open(
-        record: &Record,
-        options: &LiveOptions,
-        sources: &[FurtherSource],
-        origin: &Origin,
-    ) -> Result<(Self, OutputFile)> {
-        let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(origin), now_ns());
-        let sources = sources.iter().map(FurtherSource::header).collect::<taxel_core::Result<_>>()?;
-        let decoding = Decoding { difference: options.differences, ..Decoding::default() };
-        let header = Header { decoding, name: options.name.clone(), sources, ..board };
+    fn open(record: &Record, header: Header, sources: &[NamedSource]) -> Result<(Self, OutputFile)> {
+        let sources = sources.iter().map(NamedSource::header).collect::<taxel_core::Result<_>>()?;
+        let header = Header { sources, ..header };
         let (path, kind) = (&record.path, kind_of_name(&record.path)?);
         if !header.sources.is_empty() && kind != "mcap" {
             return Err(problem!("{}: only a .mcap holds several sources", path.display()).into());
+        }
+        if header.frames.is_some() && kind != "mcap" {
+            return Err(problem!("{}: a .lsa holds a board's bytes; record frames to a .mcap", path.display()).into());
         }
         header.check()?;
         let file = match kind {
@@ -204,6 +196,10 @@ impl RunningRecording {
         self.since = Some(Box::new(now.clone()));
         if let Some(registers) = &self.header.registers {
             self.registers(registers)?;
+        }
+        if self.header.frames.is_some() {
+            // The first frame has all values.
+            return Ok(());
         }
         let t_us = now.board.board_us.and_then(|t| self.timed(t));
         self.with_track(|track| track.held(now_ns(), t_us, held))
@@ -295,6 +291,9 @@ impl RunningRecording {
     pub(super) fn datagrams(&self, batch: &Batch) -> Result<()> {
         self.has_data.store(true, Ordering::Relaxed);
         let file = self.create_once()?;
+        if let (Some(_), Some(track)) = (&self.header.frames, file.track()) {
+            return write_frames(track, batch);
+        }
         if let Some(track) = file.track() {
             batch.iter().try_for_each(|(d, bytes)| track.datagram(d.arrived_ns, d.number, bytes))?;
         }
@@ -423,12 +422,15 @@ fn unpoisoned(writer: Mutex<LsaWriter>) -> LsaWriter {
     writer.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The source of datagrams, as text for files.
-fn origin_text(origin: &Origin) -> String {
-    match origin {
-        Origin::Udp(address) => format!("udp {address}"),
-        Origin::Bridge(name) => name.clone(),
-    }
+/// Writes the frames of a batch of messages.
+fn write_frames(track: &SourceWriter, batch: &Batch) -> Result<()> {
+    let mut frame: Vec<f32> = vec![];
+    batch.iter().try_for_each(|(message, bytes)| {
+        let (t, values) = read_message(bytes);
+        frame.clear();
+        frame.extend(values);
+        track.frame(message.arrived_ns, message.number, t, &frame, FrameEncoding::choose(&frame))
+    })
 }
 
 /// The kind of file, by its extension.
@@ -446,6 +448,15 @@ fn kind_of_name(path: &Path) -> Result<&str> {
 pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::RecordingCounts {
     // Datagrams that wait at the end belong to a later recording.
     let now = since.map_or_else(|| counters.clone(), |begun| counters.since(begun));
+    if let Some(lines) = &now.lines {
+        return recording::RecordingCounts {
+            received: now.capture.datagrams,
+            recorded: now.decoding.decoded,
+            dropped_by_queue: now.capture.dropped_by_queue,
+            decoder: lines.faults.damage.clone(),
+            ..recording::RecordingCounts::default()
+        };
+    }
     let DecodingCounts { wire, wire_v2, totals, .. } = &now.decoding;
     let (mut decoder, missing) = recording::damage(wire, wire_v2, totals);
     decoder.insert("changes_between_senders".to_owned(), now.capture.changes_between_senders);

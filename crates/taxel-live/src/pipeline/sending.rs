@@ -3,13 +3,12 @@
 //! The thread that made a line writes it if the destination has room; other lines wait in a bounded queue for a
 //! separate thread. If a reader is too slow, or absent, lines are lost and counted; the pipeline never waits for it.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::fmt::{self, Display, Formatter};
 use std::fs::File;
 use std::io::{self, ErrorKind, Write};
 use std::net::{SocketAddr, UdpSocket};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
-use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -19,9 +18,10 @@ use serde::Serialize;
 use taxel_core::problem;
 
 use super::sink::{OutputDetection, Sink};
+use crate::line_place::{FORMS, LinePlace};
 use crate::locked::lock;
-use crate::serial_line::{CONNECT, SerialLine, SerialPlace};
-use crate::{Error, Result, address};
+use crate::serial_line::{CONNECT, SerialLine};
+use crate::{Error, Result};
 
 /// Capacity of the queue of lines.
 const WAITING: usize = 1024;
@@ -35,40 +35,28 @@ const WRITE_EVERY: Duration = Duration::from_millis(2);
 /// Longest wait for a slow reader at the end.
 const LAST: Duration = Duration::from_secs(1);
 
-/// A destination of detections: `udp:HOST:PORT`, `pipe:PATH` (a named pipe), `serial:PLACE` or `serial:PLACE@BAUD`.
+/// A destination of detections: as lines are written there.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Destination {
-    /// One datagram per line.
-    Udp(SocketAddr),
-    /// A named pipe, which must exist; lines are lost while it has no reader.
-    Pipe(PathBuf),
-    /// A serial line, which is opened again after it was unplugged.
-    Serial(SerialPlace),
-}
+pub struct Destination(LinePlace);
 
 impl FromStr for Destination {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        match text.split_once(':') {
-            Some(("udp", place)) => Ok(Self::Udp(address::of_text(place)?)),
-            Some(("pipe", place)) if !place.is_empty() => Ok(Self::Pipe(place.into())),
-            Some(("serial", place)) if !place.is_empty() => {
-                let place = place.parse::<SerialPlace>().map_err(|error| error.in_part(&format!("send to {text:?}")));
-                Ok(Self::Serial(place?))
-            }
-            _ => Err(problem!("send to {text:?}: must be udp:HOST:PORT, pipe:PATH or serial:PLACE@BAUD").into()),
+        let in_text = |error: Error| error.in_part(&format!("send to {text:?}"));
+        let (place, option) = text.split_once(',').map_or((text, None), |(place, option)| (place, Some(option)));
+        let mut options: BTreeMap<&str, &str> = option.and_then(|option| option.split_once('=')).into_iter().collect();
+        let found = LinePlace::parse(place, &mut options).map_err(in_text)?;
+        match found.filter(|_| options.is_empty() && option.is_none_or(|option| option.contains('='))) {
+            Some(place) => Ok(Self(place)),
+            None => Err(problem!("send to {text:?}: must be {FORMS}; baud=RATE may follow that of a port").into()),
         }
     }
 }
 
 impl Display for Destination {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Udp(address) => write!(f, "udp:{address}"),
-            Self::Pipe(path) => write!(f, "pipe:{}", path.display()),
-            Self::Serial(place) => write!(f, "serial:{place}"),
-        }
+        self.0.fmt(f)
     }
 }
 
@@ -140,7 +128,7 @@ impl Sending {
 impl Sink for Sending {
     fn output(&mut self, detection: &OutputDetection) -> io::Result<()> {
         let mut state = lock(&self.line.state);
-        if state.device.is_none() && matches!(self.line.to, Destination::Pipe(_)) {
+        if state.device.is_none() && matches!(self.line.to.0, LinePlace::File(_)) {
             // A pipe may have a reader by now; a serial line takes longer to open, which is left to the other thread.
             state.set_device(Device::open(&self.line.to));
         }
@@ -257,13 +245,13 @@ impl SendingState {
 impl Device {
     /// Opens a destination; `None` for a pipe without a reader.
     fn open(to: &Destination) -> Result<Option<Self>> {
-        match to {
-            Destination::Udp(address) => {
+        match &to.0 {
+            LinePlace::Udp(address) => {
                 let any = if address.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
                 let socket = UdpSocket::bind(any).and_then(|s| s.set_nonblocking(true).map(|()| s));
                 Ok(Some(Self::Udp(socket.map_err(Error::socket(to))?, *address)))
             }
-            Destination::Pipe(path) => {
+            LinePlace::File(path) => {
                 if !std::fs::metadata(path).map_err(Error::file(path))?.file_type().is_fifo() {
                     return Err(problem!("{}: is no named pipe; mkfifo makes one", path.display()).into());
                 }
@@ -273,7 +261,9 @@ impl Device {
                     Err(error) => Err(Error::file(path)(error)),
                 }
             }
-            Destination::Serial(place) => Ok(Some(Self::Serial(SerialLine::open(place, CONNECT)?))),
+            LinePlace::Serial(place) | LinePlace::Tcp(place) => {
+                Ok(Some(Self::Serial(SerialLine::open(place, CONNECT)?)))
+            }
         }
     }
 
@@ -293,19 +283,30 @@ mod tests {
     #[test]
     fn destinations_are_read_as_they_are_written() {
         for (text, shown) in [
-            ("udp:127.0.0.1:9000", "udp:127.0.0.1:9000"),
-            ("udp:[::1]:9", "udp:[::1]:9"),
-            ("pipe:/tmp/out", "pipe:/tmp/out"),
-            ("serial:/dev/ttyACM0", "serial:/dev/ttyACM0@115200"),
-            ("serial:/dev/ttyACM0@9600", "serial:/dev/ttyACM0@9600"),
-            ("serial:COM3", "serial:COM3@115200"),
+            ("lines+udp:127.0.0.1:9000", "lines+udp:127.0.0.1:9000"),
+            ("lines+udp:[::1]:9", "lines+udp:[::1]:9"),
+            ("lines+tcp:localhost:9000", "lines+tcp:localhost:9000"),
+            ("lines:/tmp/out", "lines:/tmp/out"),
+            ("serial:/dev/ttyACM0", "serial:/dev/ttyACM0,baud=115200"),
+            ("serial:/dev/ttyACM0,baud=9600", "serial:/dev/ttyACM0,baud=9600"),
+            ("serial:COM3", "serial:COM3,baud=115200"),
             ("serial:localhost:5209", "serial:localhost:5209"),
         ] {
             assert_eq!(text.parse::<Destination>().unwrap().to_string(), shown);
         }
-        for text in
-            ["", "udp", "udp:", "udp:9000", "pipe:", "serial:", "serial:/dev/x@", "serial:/dev/x@fast", "file:x"]
-        {
+        for text in [
+            "",
+            "udp:127.0.0.1:9000",
+            "lines+udp:",
+            "lines+udp:9000",
+            "lines+tcp:9000",
+            "lines:",
+            "serial:",
+            "serial:/dev/x,baud",
+            "serial:/dev/x,baud=fast",
+            "serial:/dev/x,rate=9600",
+            "file:x",
+        ] {
             assert!(text.parse::<Destination>().is_err(), "{text}");
         }
     }

@@ -7,21 +7,25 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
 use taxel_core::Marker;
+use taxel_core::detect::FrameTime;
 use taxel_core::encode::{Tare, Zeroing};
+use taxel_core::rest::ValueSteps;
 use taxel_core::wire::Registers;
 
 use super::counters::Counters;
+use super::frame_input::FrameInput;
 use super::options::LiveOptions;
 use super::readout_queue::ReadoutQueue;
 use super::running_recording::{Host, RunningRecording};
 use super::sending::SendingLine;
 use super::sink::OutputDetection;
-use super::source::FurtherSource;
+use super::source::NamedSource;
 use super::viewer_queue::ViewerEvents;
-use crate::capture::Receiver;
+use crate::capture::{Origin, Receiver};
+use crate::frame_lines::FrameLayout;
 use crate::latency::Latencies;
 use crate::locked::lock;
-use crate::recording::SourceWriter;
+use crate::recording::{Decoding, Header, SourceWriter, now_ns};
 use crate::{Error, Result};
 
 /// Interval at which a wait for a reply checks whether the decoding thread has ended.
@@ -35,6 +39,10 @@ pub(super) struct PublishedState {
     pub(super) report_latency: Latencies,
     pub(super) markers: Vec<Marker>,
     pub(super) frame: Vec<u16>,
+    /// Of a source of frames: the steps of those values and the time of the first frame, us; and the values of the same
+    /// frame.
+    pub(super) steps: Option<(ValueSteps, i64)>,
+    pub(super) values: Vec<f32>,
     pub(super) tare: Option<Tare>,
     /// The readout's rest of each taxel, by taxel index; empty if its encoder uses no tare, or has none yet.
     pub(super) rest: Vec<Option<f64>>,
@@ -60,8 +68,10 @@ pub(super) struct RecordingSlot {
 /// State shared by all threads.
 pub(super) struct PipelineShared {
     pub(super) options: LiveOptions,
+    /// The frames of numbers that it receives; it receives a board if there are none.
+    pub(super) frames: Option<Arc<FrameInput>>,
     /// The other sources of the recording.
-    pub(super) sources: Vec<FurtherSource>,
+    pub(super) sources: Vec<NamedSource>,
     pub(super) begun: Instant,
     pub(super) receiver: Receiver,
     pub(super) readout_queue: ReadoutQueue,
@@ -143,12 +153,28 @@ impl PipelineShared {
         Counters {
             capture: self.receiver.counts(),
             bridged: self.receiver.bridged(),
+            lines: self.frames.as_ref().map(|frames| frames.counts()),
             decode_latency: published.decode_latency.quantiles(),
             report_latency: published.report_latency.quantiles(),
             sent: self.sending.iter().map(|line| line.counts()).collect(),
             seconds: self.begun.elapsed().as_secs_f64(),
             ..published.counters.clone()
         }
+    }
+
+    /// The length of the source's frames, and the unit of their stamps.
+    pub(super) fn frame_time(&self) -> FrameTime {
+        frame_time(&self.options, self.frames.as_ref().map(|frames| &frames.layout))
+    }
+
+    /// The header of a recording of this source alone.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` if a name or a property is not valid.
+    pub(super) fn header(&self) -> Result<Header> {
+        let options = LiveOptions { registers: *lock(&self.registers), ..self.options.clone() };
+        header_of(&options, self.receiver.origin(), self.frames.as_ref().map(|frames| &frames.layout))
     }
 
     /// Writes a note, with the current time or without one.
@@ -169,6 +195,29 @@ impl PipelineShared {
         self.published().failed.get_or_insert(error);
         self.receiver.stop();
     }
+}
+
+/// The length of a source's frames, and the unit of their stamps: by its registers, or as its frames are laid out.
+pub(super) fn frame_time(options: &LiveOptions, frames: Option<&FrameLayout>) -> FrameTime {
+    frames.map_or_else(|| options.frames(), |layout| layout.frame_us.into())
+}
+
+/// The header of a recording of a board or of frames.
+///
+/// # Errors
+///
+/// `Core(Problem)` if a name or a property is not valid.
+pub(super) fn header_of(options: &LiveOptions, origin: &Origin, frames: Option<&FrameLayout>) -> Result<Header> {
+    let (array, name) = (options.array.clone(), options.name.clone());
+    let source = match origin {
+        Origin::Udp(address) => format!("udp {address}"),
+        Origin::Bridge(name) | Origin::Frames(name) => name.clone(),
+    };
+    if let Some(layout) = frames {
+        return Ok(Header::of_frames(&name, array, layout.properties(), source, now_ns())?);
+    }
+    let decoding = Decoding { difference: options.differences, ..Decoding::default() };
+    Ok(Header { decoding, name, ..Header::of_board(array, Some(options.registers), source, now_ns()) })
 }
 
 impl Host for PipelineShared {

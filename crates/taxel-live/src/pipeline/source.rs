@@ -1,72 +1,115 @@
-//! The specification of a further source of a recording, and its parser: another board, lines of numbers from a serial
-//! line or a pipe, or numbers that a program passes; and a reader of lines as they arrive.
+//! The text that names a source, `[NAME=]KIND:PLACE[,KEY=VALUE...]`, and the source that is opened of it: a board, frames
+//! of numbers, or lines of numbers.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, ErrorKind, Read};
 use std::net::SocketAddr;
-use std::os::fd::{AsFd, AsRawFd, RawFd};
-use std::os::unix::fs::OpenOptionsExt;
-use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use taxel_core::array::Pitch;
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
+use crate::frame_lines::{FrameAssembler, FrameEnd, FrameLayout, cells, number};
+use crate::line_input::LineReader;
+use crate::line_place::LinePlace;
 use crate::locked::lock;
-use crate::recording::{Header, StreamColumns, fields, now_ns};
-use crate::serial_line::{CONNECT, SerialLine, SerialPlace};
-use crate::text_lines::{TextLine, TextLines};
+use crate::recording::{Header, StreamColumns, UNITS_US, clock_unit_us, now_ns};
+use crate::text_lines::TextLine;
 use crate::{Error, Result, address};
 
 /// Timeout for the first line of a source, which defines its columns, if they are not given.
 const FIRST_LINE: Duration = Duration::from_secs(3);
 
-/// Interval at which a failed line is opened again, and the end is checked.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// The time from one frame to the next is measured until so many arrived, or for so long from the first one.
+const MEASURED_FRAMES: usize = 32;
+const MEASURE: Duration = Duration::from_secs(1);
 
-/// Longest line, bytes; a longer one is not a line of numbers, and what follows in it is left out.
-const LONGEST: usize = 1 << 16;
+/// How a source is written, for errors.
+const FORMS: &str = "[NAME=]board:HOST:PORT, serial:PLACE, lines:PATH (- is the standard input), lines+tcp:HOST:PORT, \
+                     lines+udp:HOST:PORT or given, and KEY=VALUE after commas";
 
-/// A further source of a recording.
+/// A source as a text states it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FurtherSource {
+pub struct SourceText {
+    /// The text.
+    pub text: String,
+    /// Its name, if it is stated.
+    pub name: Option<String>,
+    /// Where it is.
+    pub place: SourcePlace,
+    array: Option<Array>,
+    columns: Option<Vec<String>>,
+    time: Option<StatedTime>,
+    end: Option<FrameEnd>,
+    leave_out: Vec<String>,
+    unit: Option<String>,
+    turned: Option<f64>,
+    rate_hz: Option<f64>,
+}
+
+/// Where a source is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SourcePlace {
+    /// A board that sends to this local address, and the preset of its registers.
+    Board(SocketAddr, String),
+    /// Lines of text.
+    Lines(LinePlace),
+    /// A program passes numbers ([`Live::sample`](super::Live::sample)).
+    Given,
+}
+
+/// The column of a source's clock.
+#[derive(Debug, Clone, PartialEq)]
+enum StatedTime {
+    /// A column, and its unit, us; by its name where none is stated.
+    Column(String, Option<f64>),
+    /// A column of seconds and one of nanoseconds, which are added.
+    Sum(String, String),
+}
+
+/// A source with its name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedSource {
     /// Name of the source.
     pub name: String,
     /// Kind of the source.
     pub kind: SourceKind,
 }
 
-/// The kind of a further source.
+/// The kind of a source.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SourceKind {
     /// A board that sends to this local address.
     Board(SocketAddr, Box<Array>, Registers),
-    /// Lines of numbers; already open if the columns were read from the first line.
-    Lines(LineInput, StreamColumns, Opened),
-    /// Numbers that a program passes ([`Live::sample`](super::Live::sample)).
-    Given(StreamColumns),
+    /// Frames of numbers, from lines or, without them, from a program.
+    Frames(Option<LinePlace>, Box<FrameLayout>, Opened),
+    /// Lines of numbers that are no frames, as of an IMU; from a program if there are none.
+    Numbers(Option<LinePlace>, StreamColumns, Opened),
 }
 
-/// The place from which lines of numbers are read.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum LineInput {
-    /// A serial line.
-    Serial(SerialPlace),
-    /// A named pipe, or any file that is read to its end and then watched for more; `-` is the standard input.
-    Pipe(PathBuf),
-}
-
-/// Lines that were opened to read their columns, with the bytes after the first line. The reader continues there:
-/// reopening would lose those bytes, and closing a pipe ends the program that writes to it.
+/// Lines that were opened to read their columns, with what arrived so far. The reader continues there: reopening would
+/// lose it, and closing a pipe ends the program that writes to it.
 #[derive(Clone, Default)]
-pub struct Opened(Arc<Mutex<Option<LineReader>>>);
+pub struct Opened(Arc<Mutex<Option<OpenedLines>>>);
+
+/// An open reader, and the lines that were read to find their columns.
+pub struct OpenedLines {
+    pub(super) reader: LineReader,
+    pub(super) begun: Vec<(TextLine, i64)>,
+}
 
 impl Opened {
-    pub(super) fn take(&self) -> Option<LineReader> {
-        lock(&self.0).take()
+    fn of(lines: OpenedLines) -> Self {
+        Self(Arc::new(Mutex::new(Some(lines))))
+    }
+
+    /// The open lines, or those of a place that is opened now.
+    pub(super) fn take_or_open(&self, place: &LinePlace) -> Result<OpenedLines> {
+        let opened = lock(&self.0).take();
+        opened.map_or_else(|| OpenedLines::open(place), Ok)
     }
 }
 
@@ -83,279 +126,464 @@ impl PartialEq for Opened {
     }
 }
 
-impl std::fmt::Display for LineInput {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Serial(place) => write!(f, "serial {place}"),
-            Self::Pipe(path) => write!(f, "pipe {}", path.display()),
-        }
-    }
-}
-
-impl FurtherSource {
+impl NamedSource {
     /// The source's header in the recording.
     pub(super) fn header(&self) -> taxel_core::Result<Header> {
+        let place = |input: &Option<LinePlace>| {
+            input.as_ref().map_or_else(|| "given by a program".to_owned(), ToString::to_string)
+        };
         match &self.kind {
             SourceKind::Board(address, array, registers) => {
                 let board = Header::of_board((**array).clone(), Some(*registers), format!("udp {address}"), now_ns());
                 Ok(Header { name: self.name.clone(), ..board })
             }
-            SourceKind::Lines(place, stream, _) => {
-                Header::of_stream(&self.name, stream.clone(), place.to_string(), now_ns())
+            SourceKind::Frames(input, layout, _) => {
+                Header::of_frames(&self.name, layout.array.clone(), layout.properties(), place(input), now_ns())
             }
-            SourceKind::Given(stream) => {
-                Header::of_stream(&self.name, stream.clone(), "given by a program".to_owned(), now_ns())
+            SourceKind::Numbers(input, stream, _) => {
+                Header::of_stream(&self.name, stream.clone(), place(input), now_ns())
             }
         }
     }
 }
 
-/// Parses `udp:HOST:PORT`, `serial:PLACE@BAUD`, `pipe:PATH` or `given`, followed by options after commas: `array=RxC`
-/// and `preset=NAME` for a board, `columns=A:B:C` and `time=NAME:UNIT` for numbers. Without `columns` the first line is
-/// awaited, which defines them.
-impl FromStr for SourceKind {
+impl FromStr for SourceText {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
+        let refused = |what: String| -> Error { problem!("source {text:?}: {what}").into() };
         let mut parts = text.split(',');
-        let input = parts.next().unwrap_or_default();
+        let head = parts.next().unwrap_or_default();
+        let kind_end = head.find(':').unwrap_or(head.len());
+        let (name, head) = match head[..kind_end].split_once('=') {
+            Some((name, _)) => (Some(name.trim().to_owned()), &head[name.len() + 1..]),
+            None => (None, head),
+        };
         let mut options = BTreeMap::new();
         for part in parts {
             let Some((key, value)) = part.split_once('=') else {
-                return Err(problem!("source {text:?}: {part:?} must be KEY=VALUE").into());
+                return Err(refused(format!("{part:?} must be KEY=VALUE")));
             };
             options.insert(key.trim(), value.trim());
         }
-        let kind = match input.split_once(':') {
-            Some(("udp", place)) => {
-                let array = options.remove("array").map_or(Ok(Array::thesis()), |size| array_of(text, size))?;
-                let registers = Registers::preset_on(options.remove("preset").unwrap_or("5.2 kHz"), &array)?;
-                Self::Board(address::of_text(place)?, Box::new(array), registers)
+        let is_board = head.starts_with("board:");
+        let array = options.remove("array").map(|size| array_of(text, size, is_board)).transpose()?;
+        let in_text = |error: Error| error.in_part(&format!("source {text:?}"));
+        let place = match head.split_once(':') {
+            Some(("board", place)) => {
+                let preset = options.remove("preset").unwrap_or("5.2 kHz").to_owned();
+                SourcePlace::Board(address::of_text(place)?, preset)
             }
-            Some(("serial", place)) if !place.is_empty() => {
-                let place = place.parse::<SerialPlace>().map_err(|error| error.in_part(&format!("source {text:?}")))?;
-                let place = LineInput::Serial(place);
-                let (stream, opened) = columns_or_first_line(stream_of(text, &mut options)?, &place)?;
-                Self::Lines(place, stream, opened)
-            }
-            Some(("pipe", place)) if !place.is_empty() => {
-                let place = LineInput::Pipe(place.into());
-                let (stream, opened) = columns_or_first_line(stream_of(text, &mut options)?, &place)?;
-                Self::Lines(place, stream, opened)
-            }
-            None if input == "given" => match stream_of(text, &mut options)? {
-                Some(stream) => Self::Given(stream),
-                None => return Err(problem!("source {text:?}: needs columns=A:B:C").into()),
+            None if head == "given" => SourcePlace::Given,
+            _ => match LinePlace::parse(head, &mut options).map_err(in_text)? {
+                Some(place) => SourcePlace::Lines(place),
+                None => return Err(refused(format!("must be {FORMS}"))),
             },
-            _ => {
-                return Err(problem!(
-                    "source {text:?}: must be udp:HOST:PORT, serial:PLACE@BAUD, pipe:PATH or given, then options after \
-                     commas"
-                )
-                .into());
-            }
         };
+        let mut take = |key: &str| options.remove(key).map(str::to_owned);
+        let number = |key: &str, value: Option<String>| -> Result<Option<f64>> {
+            let parsed = value.map(|value| {
+                let number = value.parse::<f64>().ok().filter(|number| number.is_finite());
+                number.ok_or_else(|| refused(format!("{key} is {value:?}: must be a number")))
+            });
+            parsed.transpose()
+        };
+        let listed = |value: Option<String>| value.map(|names| names.split(':').map(str::to_owned).collect());
+        let mut source = Self {
+            text: text.to_owned(),
+            name,
+            place,
+            array,
+            columns: None,
+            time: None,
+            end: None,
+            leave_out: vec![],
+            unit: None,
+            turned: None,
+            rate_hz: None,
+        };
+        if !matches!(source.place, SourcePlace::Board(..)) {
+            source.columns = listed(take("columns"));
+            source.time = take("time").map(|time| StatedTime::parse(text, &time)).transpose()?;
+            source.leave_out = listed(take("leave_out")).unwrap_or_default();
+            source.unit = take("unit");
+            source.turned = match take("falls") {
+                Some(falls) if falls == "true" => Some(0.0),
+                Some(falls) if falls == "false" => None,
+                falls => number("falls", falls)?,
+            };
+            source.rate_hz = number("rate", take("rate"))?;
+            source.end = match (take("frame_lines"), take("frame_end")) {
+                (Some(_), Some(_)) => return Err(refused("frame_lines and frame_end: give one".to_owned())),
+                (Some(lines), None) => match lines.parse() {
+                    Ok(lines @ 1..=65_535) => Some(FrameEnd::Lines(lines)),
+                    _ => return Err(refused(format!("frame_lines is {lines:?}: must be a number from 1 to 65535"))),
+                },
+                (None, Some(end)) if end == "blank" => Some(FrameEnd::EmptyLine),
+                (None, Some(end)) => return Err(refused(format!("frame_end is {end:?}: must be blank"))),
+                (None, None) => None,
+            };
+            if source.unit.as_ref().is_some_and(String::is_empty) {
+                return Err(refused("unit is empty: must be that of the values, as N or kPa".to_owned()));
+            }
+            if let Some(rate_hz) = source.rate_hz.filter(|rate_hz| !(1e6 / 3.6e9..=1e6).contains(rate_hz)) {
+                return Err(refused(format!("rate is {rate_hz} Hz: must be from 1 an hour to 1000000")));
+            }
+        }
         match options.keys().next() {
-            Some(key) => Err(problem!("source {text:?}: has no option {key:?}").into()),
-            None => Ok(kind),
+            Some(key) => Err(refused(format!("has no option {key:?}"))),
+            None => Ok(source),
         }
     }
 }
 
-/// Parses an array of rows x columns, with the thesis' pitch.
-fn array_of(text: &str, size: &str) -> Result<Array> {
-    let sides = size.split_once('x').and_then(|(rows, columns)| Some((rows.parse().ok()?, columns.parse().ok()?)));
-    let Some((rows, columns)) = sides else {
-        return Err(problem!("source {text:?}: array {size:?} must be rows x columns, as 64x64").into());
+impl StatedTime {
+    fn parse(source: &str, text: &str) -> Result<Self> {
+        if let Some((seconds, nanoseconds)) = text.split_once('+') {
+            return Ok(Self::Sum(seconds.to_owned(), nanoseconds.to_owned()));
+        }
+        let Some((column, unit)) = text.split_once(':') else { return Ok(Self::Column(text.to_owned(), None)) };
+        match UNITS_US.into_iter().find(|(known, _)| *known == unit) {
+            Some((_, unit_us)) => Ok(Self::Column(column.to_owned(), Some(unit_us))),
+            None => Err(problem!("source {source:?}: unit {unit:?} must be ns, us, ms or s").into()),
+        }
+    }
+}
+
+impl SourceText {
+    /// Whether it is a board.
+    #[must_use]
+    pub fn is_board(&self) -> bool {
+        matches!(self.place, SourcePlace::Board(..))
+    }
+
+    /// Whether its array is stated.
+    pub(super) fn states_array(&self) -> bool {
+        self.array.is_some()
+    }
+
+    /// The name, or that of the kind.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.name.clone().unwrap_or_else(|| match (&self.place, self.frames_are_stated()) {
+            (SourcePlace::Board(..), _) => "board".to_owned(),
+            (_, true) => "frames".to_owned(),
+            (_, false) => "numbers".to_owned(),
+        })
+    }
+
+    /// Whether its lines are stated to be frames of an array.
+    fn frames_are_stated(&self) -> bool {
+        self.array.is_some() || self.end.is_some()
+    }
+
+    /// Opens the source. Lines are frames where an array is stated and where `readout_array` is given, that is, where they
+    /// are read out and shown: without a stated array they are of that of the readout if it has as many taxels as a line
+    /// has values, else of one row.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` if what is stated does not fit the lines, or none arrives in 3 s although it must show the columns;
+    /// `File` or `Socket` if the place cannot be opened.
+    pub fn open(&self, readout_array: Option<&Option<Array>>) -> Result<SourceKind> {
+        let input = match &self.place {
+            SourcePlace::Board(address, preset) => {
+                let array = self.array.clone().unwrap_or_else(Array::thesis);
+                let registers = Registers::preset_on(preset, &array)?;
+                return Ok(SourceKind::Board(*address, Box::new(array), registers));
+            }
+            SourcePlace::Lines(input) => Some(input.clone()),
+            SourcePlace::Given => None,
+        };
+        let in_text = |error: Error| error.in_part(&format!("source {:?}", self.text));
+        if readout_array.is_some() || self.frames_are_stated() {
+            let (layout, opened) =
+                self.frames(input.as_ref(), readout_array.and_then(Option::as_ref)).map_err(in_text)?;
+            return Ok(SourceKind::Frames(input, Box::new(layout), opened));
+        }
+        let (columns, opened) = self.columns_or_first_line(input.as_ref())?;
+        let stream = self.stream(columns).map_err(in_text)?;
+        Ok(SourceKind::Numbers(input, stream, opened))
+    }
+
+    /// The columns that are stated, or those of the first line.
+    fn columns_or_first_line(&self, input: Option<&LinePlace>) -> Result<(Vec<String>, Opened)> {
+        match (&self.columns, input) {
+            (Some(columns), _) => Ok((columns.clone(), Opened::default())),
+            (None, None) => Err(problem!("source {:?}: needs columns=A:B:C", self.text).into()),
+            (None, Some(input)) => {
+                let mut lines = OpenedLines::open(input)?;
+                let columns = lines.first(input, &self.leave_out)?;
+                Ok((columns, Opened::of(lines)))
+            }
+        }
+    }
+
+    /// The columns of lines of numbers that are no frames.
+    fn stream(&self, columns: Vec<String>) -> Result<StreamColumns> {
+        for (is_stated, key) in [
+            (!self.leave_out.is_empty(), "leave_out"),
+            (self.unit.is_some(), "unit"),
+            (self.turned.is_some(), "falls"),
+            (self.rate_hz.is_some(), "rate"),
+        ] {
+            if is_stated {
+                return Err(problem!("{key} is of frames: state array=ROWSxCOLUMNS too").into());
+            }
+        }
+        let stream = StreamColumns::of_columns(columns);
+        Ok(match &self.time {
+            None => stream,
+            Some(StatedTime::Column(column, unit_us)) => {
+                let name = stream.columns[index_of("time", column, &stream.columns)?].clone();
+                let unit_us = unit_us.or_else(|| clock_unit_us(&name)).unwrap_or(1.0);
+                StreamColumns { time: Some(name), unit_us, ..stream }
+            }
+            Some(StatedTime::Sum(..)) => {
+                return Err(problem!("time=A+B is of frames: state array=ROWSxCOLUMNS too").into());
+            }
+        })
+    }
+
+    /// How the lines make frames, with what was read to find it.
+    fn frames(&self, input: Option<&LinePlace>, readout_array: Option<&Array>) -> Result<(FrameLayout, Opened)> {
+        let end = self.end.unwrap_or(FrameEnd::Lines(1));
+        let mut opened = None;
+        let columns = match (&self.columns, input) {
+            (Some(columns), _) => columns.clone(),
+            // What is stated says how many numbers a line has, if all of them are values of one row.
+            (None, None) => self.columns_of_array(end)?,
+            (None, Some(input)) => {
+                let mut lines = OpenedLines::open(input)?;
+                let columns = lines.first(input, &self.leave_out)?;
+                opened = Some(lines);
+                columns
+            }
+        };
+        let time = self.clock(&columns)?;
+        let left = self.leave_out.iter().map(|column| index_of("leave_out", column, &columns));
+        let left = left.collect::<taxel_core::Result<Vec<_>>>()?;
+        let is_value = |field: &usize| !left.contains(field) && time.iter().all(|(clock, _)| clock != field);
+        let values: Vec<usize> = (0..columns.len()).filter(is_value).collect();
+        if values.is_empty() {
+            return Err(problem!("a line of {} columns has no values beside its time", columns.len()).into());
+        }
+        let array = self.array_for(values.len(), end, readout_array)?;
+        let is_named = self.columns.is_some() || !columns.iter().enumerate().all(|(k, name)| *name == numbered(k));
+        let has_quantities = is_named && self.array.is_none() && array.rows == 1;
+        let mut layout = FrameLayout {
+            fields: columns.len(),
+            names: if has_quantities { values.iter().map(|&k| columns[k].clone()).collect() } else { vec![] },
+            array,
+            time,
+            values,
+            end,
+            turned: self.turned,
+            unit: self.unit.clone().unwrap_or_else(|| "counts".to_owned()),
+            frame_us: self.rate_hz.map_or(0.0, |rate_hz| 1e6 / rate_hz),
+        };
+        if self.rate_hz.is_none() {
+            let Some(input) = input else {
+                return Err(problem!("rate=HZ is not stated: how many frames a second the program passes").into());
+            };
+            let mut lines = opened.map_or_else(|| OpenedLines::open(input), Ok)?;
+            layout.frame_us = lines.frame_us(&layout, input)?;
+            opened = Some(lines);
+        }
+        layout.check()?;
+        Ok((layout, opened.map(Opened::of).unwrap_or_default()))
+    }
+
+    /// The columns of lines without names that fill the stated array.
+    fn columns_of_array(&self, end: FrameEnd) -> Result<Vec<String>> {
+        let (Some(array), FrameEnd::Lines(lines)) = (&self.array, end) else {
+            return Err(problem!("needs array=ROWSxCOLUMNS or columns=A:B:C").into());
+        };
+        let clocks = match &self.time {
+            None => 0,
+            Some(StatedTime::Column(..)) => 1,
+            Some(StatedTime::Sum(..)) => 2,
+        };
+        let columns = array.len() / lines + clocks + self.leave_out.len();
+        Ok((0..columns).map(numbered).collect())
+    }
+
+    /// The fields of the clock, each with its unit, us.
+    fn clock(&self, columns: &[String]) -> taxel_core::Result<Vec<(usize, f64)>> {
+        Ok(match &self.time {
+            Some(StatedTime::Column(column, unit_us)) => {
+                let field = index_of("time", column, columns)?;
+                let Some(unit_us) = unit_us.or_else(|| clock_unit_us(&columns[field])) else {
+                    return Err(problem!("time={column}: state its unit, as time={column}:ms"));
+                };
+                vec![(field, unit_us)]
+            }
+            Some(StatedTime::Sum(seconds, nanoseconds)) => {
+                vec![(index_of("time", seconds, columns)?, 1e6), (index_of("time", nanoseconds, columns)?, 1e-3)]
+            }
+            None => {
+                let found = columns.iter().enumerate().find_map(|(field, name)| Some((field, clock_unit_us(name)?)));
+                found.into_iter().collect()
+            }
+        })
+    }
+
+    /// The stated array, or the one that lines of so many values fill.
+    fn array_for(&self, values: usize, end: FrameEnd, readout_array: Option<&Array>) -> Result<Array> {
+        if let Some(array) = &self.array {
+            return Ok(array.clone());
+        }
+        let FrameEnd::Lines(lines) = end else {
+            return Err(problem!("frame_end=blank: state array=ROWSxCOLUMNS too").into());
+        };
+        if let Some(array) = readout_array.filter(|array| array.len() == values * lines) {
+            return Ok(array.clone());
+        }
+        let side = |n: usize| u16::try_from(n).map_err(|_| problem!("a line has {n} values: at most 65535"));
+        let (rows, columns) = (side(lines)?, side(values)?);
+        Ok(Array::unmeasured(rows, columns, &self.name()))
+    }
+}
+
+/// The name of a column without one.
+fn numbered(column: usize) -> String {
+    format!("column_{column}")
+}
+
+/// The index of a column that is named, or numbered from 1.
+fn index_of(key: &str, column: &str, columns: &[String]) -> taxel_core::Result<usize> {
+    if let Some(index) = columns.iter().position(|name| name == column) {
+        return Ok(index);
+    }
+    match column.parse::<usize>() {
+        Ok(number) if (1..=columns.len()).contains(&number) => Ok(number - 1),
+        Ok(_) => Err(problem!("{key}={column}: a line has {} columns", columns.len())),
+        Err(_) => Err(problem!("{key}={column}: no column has this name, of {}", columns.join(", "))),
+    }
+}
+
+/// Parses an array of rows x columns, with or without a pitch, mm; without one that of a board is the thesis', and that of other
+/// sensors is unknown.
+fn array_of(text: &str, size: &str, is_board: bool) -> Result<Array> {
+    let wrong =
+        || problem!("source {text:?}: array {size:?} must be rows x columns, as 64x64, or with a pitch, as 64x64x5");
+    let sides: Vec<&str> = size.split('x').collect();
+    let (rows, columns, pitch_mm) = match sides[..] {
+        [rows, columns] => (rows, columns, None),
+        [rows, columns, pitch] => (rows, columns, Some(pitch.parse::<f64>().map_err(|_| wrong())?)),
+        _ => return Err(wrong().into()),
     };
+    let (rows, columns) = (rows.parse().map_err(|_| wrong())?, columns.parse().map_err(|_| wrong())?);
     let thesis = Array::thesis();
-    if (rows, columns) == (thesis.rows, thesis.columns) {
+    if is_board && pitch_mm.is_none() && (rows, columns) == (thesis.rows, thesis.columns) {
         return Ok(thesis);
     }
-    let array = Array { pitch_mm: thesis.pitch_mm, ..Array::unmeasured(rows, columns, size) };
+    let pitch_mm = pitch_mm.map(Pitch::square).or(thesis.pitch_mm.filter(|_| is_board));
+    let array = Array { pitch_mm, ..Array::unmeasured(rows, columns, size) };
     array.check()?;
     Ok(array)
 }
 
-/// The columns that the options define, if any.
-fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<StreamColumns>> {
-    let columns = options.remove("columns").map(|names| names.split(':').map(str::to_owned).collect());
-    let time = options.remove("time");
-    let Some(columns) = columns else {
-        if time.is_some() {
-            return Err(problem!("source {text:?}: time without columns").into());
-        }
-        return Ok(None);
-    };
-    let mut stream = StreamColumns::of_columns(columns);
-    if let Some(time) = time {
-        let (name, unit) = time.split_once(':').unwrap_or((time, "us"));
-        let unit_us =
-            [("ns", 1e-3), ("us", 1.0), ("ms", 1e3), ("s", 1e6)].into_iter().find(|(known, _)| *known == unit);
-        let Some((_, unit_us)) = unit_us else {
-            return Err(problem!("source {text:?}: unit {unit:?} must be ns, us, ms or s").into());
-        };
-        stream = StreamColumns { time: Some(name.to_owned()), unit_us, ..stream };
-    }
-    Ok(Some(stream))
-}
-
-/// The given columns, or those of the first line.
-fn columns_or_first_line(named: Option<StreamColumns>, place: &LineInput) -> Result<(StreamColumns, Opened)> {
-    named.map_or_else(|| first_line(place), |stream| Ok((stream, Opened::default())))
-}
-
-/// Opens lines and waits for the first one that defines the columns: a line of names, or of numbers, whose columns are
-/// then named a, b, c and so on.
-fn first_line(place: &LineInput) -> Result<(StreamColumns, Opened)> {
-    let mut reader = LineReader::open(place)?;
-    let until = Instant::now() + FIRST_LINE;
-    // After opening, a serial line may start in the middle of a line: the rest of that line is skipped.
-    let mut skip = matches!(place, LineInput::Serial(..));
-    let mut numbers = None;
-    while Instant::now() < until {
-        let ended = reader.fill().map_err(|error| reader.broken(error))?;
-        while let Some(line) = reader.lines.next(ended) {
-            let TextLine { text, bytes, cut } = &line;
-            if std::mem::take(&mut skip) {
-                reader.lines.left_out.unfinished += bytes;
-                continue;
-            }
-            // Neither numbers nor names.
-            if *cut || text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t')) {
-                reader.lines.left_out.in_no_line += bytes;
-                continue;
-            }
-            let found: Vec<&str> = fields(text).collect();
-            if found.is_empty() || text.starts_with('#') {
-                continue;
-            }
-            if found.iter().all(|field| field.parse::<f64>().is_ok()) {
-                numbers = Some(found.len());
-                // The first line contains data, so it is processed again.
-                reader.lines.put_back(&line);
-                break;
-            }
-            let stream = StreamColumns::of_columns(found.into_iter().map(str::to_owned).collect());
-            return Ok((stream, Opened(Arc::new(Mutex::new(Some(reader))))));
-        }
-        if numbers.is_some() || ended {
-            break;
-        }
-    }
-    match numbers {
-        Some(n) => {
-            let stream = StreamColumns::of_columns((0..n).map(|k| format!("column_{k}")).collect());
-            Ok((stream, Opened(Arc::new(Mutex::new(Some(reader))))))
-        }
-        None => {
-            let waited = FIRST_LINE.as_secs();
-            reader.lines.discard();
-            let left_out = reader.lines.take_left_out();
-            let came = match left_out.in_no_line + left_out.unfinished {
-                0 => String::new(),
-                bytes => format!(" in the {bytes} bytes that came"),
-            };
-            Err(problem!("{place}: no line{came} within {waited} s; name its columns, as columns=t_us:ax:ay:az").into())
-        }
-    }
-}
-
-/// Lines of text from a serial line, a pipe or the standard input, as they arrive.
-pub(super) struct LineReader {
-    place: LineInput,
-    input: Option<OpenInput>,
-    pub(super) lines: TextLines,
-    /// When the last bytes arrived, ns since 1970.
-    pub(super) came_ns: i64,
-}
-
-enum OpenInput {
-    Serial(SerialLine),
-    Pipe(File),
-}
-
-impl LineReader {
-    pub(super) fn open(place: &LineInput) -> Result<Self> {
-        let input = Some(OpenInput::open(place)?);
-        Ok(Self { place: place.clone(), input, lines: TextLines::new(LONGEST), came_ns: 0 })
+impl OpenedLines {
+    fn open(input: &LinePlace) -> Result<Self> {
+        Ok(Self { reader: LineReader::open(input)?, begun: vec![] })
     }
 
-    pub(super) fn is_serial(&self) -> bool {
-        matches!(self.place, LineInput::Serial(..))
-    }
-
-    /// Waits briefly for more bytes; returns whether no more can arrive.
-    pub(super) fn fill(&mut self) -> io::Result<bool> {
-        let mut piece = [0; 4096];
-        let n = match &mut self.input {
-            None => {
-                std::thread::sleep(LOOK_EVERY);
-                0
-            }
-            Some(OpenInput::Serial(line)) => line.read(&mut piece, LOOK_EVERY)?,
-            Some(OpenInput::Pipe(file)) if is_readable(file.as_raw_fd(), LOOK_EVERY) => match file.read(&mut piece) {
-                Ok(0) if self.place == LineInput::Pipe(PathBuf::from("-")) => return Ok(true),
-                // A pipe without a writer, or the end of a file: a program may still write to it.
-                Ok(0) => {
-                    std::thread::sleep(LOOK_EVERY);
-                    0
+    /// The next line that is whole text, if one arrives until then.
+    fn next(&mut self, until: Instant) -> Result<Option<(TextLine, i64)>> {
+        loop {
+            while let Some((line, at_ns)) = self.reader.next(false) {
+                let text = &line.text;
+                if std::mem::take(&mut self.reader.is_cut) {
+                    // The line may lack its beginning.
+                    self.reader.lines.left_out.unfinished += line.bytes;
+                } else if line.cut
+                    || text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t'))
+                {
+                    // Neither numbers nor names.
+                    self.reader.lines.left_out.in_no_line += line.bytes;
+                } else {
+                    return Ok(Some((line, at_ns)));
                 }
-                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => 0,
-                read => read?,
-            },
-            Some(OpenInput::Pipe(_)) => 0,
+            }
+            if Instant::now() >= until {
+                return Ok(None);
+            }
+            if self.reader.fill().map_err(|error| self.reader.broken(error))? {
+                let last = self.reader.next(true);
+                return Ok(last);
+            }
+        }
+    }
+
+    /// Waits for the first line that defines the columns, and returns them: a line of names, or of numbers, whose columns are
+    /// then named `column_0` and so on. Text before it that is neither is skipped.
+    fn first(&mut self, input: &LinePlace, leave_out: &[String]) -> Result<Vec<String>> {
+        let until = Instant::now() + FIRST_LINE;
+        let mut names: Option<Vec<String>> = None;
+        while let Some((line, at_ns)) = self.next(until)? {
+            let found = cells(&line.text);
+            if found.is_empty() || line.text.starts_with('#') {
+                continue;
+            }
+            let count = found.len();
+            // Text before the numbers names their columns if it has as many words.
+            let named = names.take().filter(|names| names.len() == count);
+            let columns = named.unwrap_or_else(|| (0..count).map(numbered).collect());
+            let is_left = |k: usize| leave_out.iter().any(|left| index_of("", left, &columns) == Ok(k));
+            if found.iter().enumerate().all(|(k, cell)| is_left(k) || number(cell).is_some()) {
+                self.begun.push((line, at_ns));
+                return Ok(columns);
+            }
+            let words: Vec<String> = found.into_iter().map(Cow::into_owned).collect();
+            if words.iter().any(|word| clock_unit_us(word).is_some()) {
+                return Ok(words);
+            }
+            names = Some(words);
+        }
+        // Only names have arrived.
+        names.ok_or_else(|| self.nothing(input, "columns=t_us:ax:ay:az"))
+    }
+
+    /// Measures the time from one frame to the next, us, from what arrives first.
+    #[allow(clippy::cast_precision_loss)]
+    fn frame_us(&mut self, layout: &FrameLayout, input: &LinePlace) -> Result<f64> {
+        let mut frames = FrameAssembler::new(FrameLayout { frame_us: 1.0, ..layout.clone() });
+        let mut times: Vec<i64> =
+            self.begun.iter().filter_map(|(line, at_ns)| Some(frames.push(line, *at_ns)?.0)).collect();
+        let mut until = Instant::now() + FIRST_LINE;
+        while times.len() <= MEASURED_FRAMES {
+            let Some((line, at_ns)) = self.next(until)? else { break };
+            if let Some((t, _)) = frames.push(&line, at_ns) {
+                times.push(t);
+                if times.len() == 2 {
+                    until = Instant::now() + MEASURE;
+                }
+            }
+            self.begun.push((line, at_ns));
+        }
+        let (Some(first), Some(last), 2..) = (times.first(), times.last(), times.len()) else {
+            return Err(self.nothing(input, "rate=HZ, and the array or the columns"));
         };
-        if n > 0 {
-            self.came_ns = now_ns();
-            self.lines.push(&piece[..n]);
+        if layout.time.is_empty() {
+            // Lines arrive in packets.
+            return Ok(((last - first) as f64 / (times.len() - 1) as f64).max(1.0));
         }
-        Ok(false)
+        let mut apart: Vec<i64> = times.windows(2).map(|two| two[1] - two[0]).collect();
+        let middle = apart.len() / 2;
+        Ok(*apart.select_nth_unstable(middle).1 as f64)
     }
 
-    pub(super) fn broken(&self, error: io::Error) -> Error {
-        match &self.place {
-            LineInput::Serial(place) => Error::socket(place.name())(error),
-            LineInput::Pipe(path) => Error::file(path)(error),
-        }
+    /// The error if too little arrived.
+    fn nothing(&mut self, input: &LinePlace, remedy: &str) -> Error {
+        self.reader.lines.discard();
+        let left_out = self.reader.lines.take_left_out();
+        let came = match left_out.in_no_line + left_out.unfinished {
+            0 => String::new(),
+            bytes => format!(" in the {bytes} bytes that came"),
+        };
+        problem!("{input}: too few lines of numbers{came} within {} s; state {remedy}", FIRST_LINE.as_secs()).into()
     }
-
-    /// Opens the line again, and leaves out an incomplete line.
-    pub(super) fn reopen(&mut self) {
-        self.lines.discard();
-        // A port that is open is not opened again.
-        self.input = None;
-        self.input = OpenInput::open(&self.place).ok();
-        if self.input.is_none() {
-            std::thread::sleep(LOOK_EVERY);
-            self.input = OpenInput::open(&self.place).ok();
-        }
-    }
-}
-
-impl OpenInput {
-    fn open(place: &LineInput) -> Result<Self> {
-        match place {
-            LineInput::Serial(place) => SerialLine::open(place, CONNECT).map(Self::Serial),
-            LineInput::Pipe(path) if path == Path::new("-") => {
-                // Bypasses the program's own buffer, whose content `poll` does not see.
-                let input = io::stdin().as_fd().try_clone_to_owned().map_err(Error::file(path))?;
-                Ok(Self::Pipe(File::from(input)))
-            }
-            LineInput::Pipe(path) => {
-                let file = File::options().read(true).custom_flags(libc::O_NONBLOCK).open(path);
-                Ok(Self::Pipe(file.map_err(Error::file(path))?))
-            }
-        }
-    }
-}
-
-/// Waits until data can be read, or the end was reached.
-fn is_readable(descriptor: RawFd, most: Duration) -> bool {
-    let mut asked = libc::pollfd { fd: descriptor, events: libc::POLLIN, revents: 0 };
-    let most = i32::try_from(most.as_millis()).unwrap_or(i32::MAX);
-    // SAFETY: one entry, on our stack, of a descriptor that the caller holds open.
-    unsafe { libc::poll(&raw mut asked, 1, most) > 0 }
 }
 
 #[cfg(test)]
@@ -364,27 +592,62 @@ mod tests {
 
     #[test]
     fn sources_are_read_as_they_are_written() {
-        let board: SourceKind = "udp:127.0.0.1:5209,array=16x8,preset=2 kHz".parse().unwrap();
+        let open = |text: &str| text.parse::<SourceText>().unwrap().open(None).unwrap();
+        let board = open("board:127.0.0.1:5209,array=16x8,preset=2 kHz");
         let SourceKind::Board(address, array, _) = &board else { panic!("{board:?}") };
         assert_eq!((address.port(), array.rows, array.columns), (5209, 16, 8));
-        let imu: SourceKind = "serial:/dev/ttyACM0@9600,columns=n:ax:ay,time=n:ms".parse().unwrap();
-        let SourceKind::Lines(LineInput::Serial(place), stream, _) = &imu else { panic!("{imu:?}") };
-        assert_eq!(*place, SerialPlace::Port("/dev/ttyACM0".to_owned(), 9600));
+        let imu = open("serial:/dev/ttyACM0,baud=9600,columns=n:ax:ay,time=n:ms");
+        let SourceKind::Numbers(Some(place), stream, _) = &imu else { panic!("{imu:?}") };
+        assert_eq!(place.to_string(), "serial:/dev/ttyACM0,baud=9600");
         assert_eq!((stream.time.as_deref(), stream.unit_us), (Some("n"), 1e3));
+        let mat: SourceText = "mat=lines:-,array=2x3,columns=s:ns:id:a:b:c,time=1+2,leave_out=id,frame_lines=2,rate=50,falls=1023,unit=kPa"
+            .parse()
+            .unwrap();
+        assert_eq!(mat.name(), "mat");
+        let SourceKind::Frames(Some(LinePlace::File(path)), layout, _) = mat.open(None).unwrap() else { panic!() };
+        assert_eq!(path.to_str(), Some("-"));
+        assert_eq!((layout.fields, &layout.values[..], layout.frame_us), (6, &[3, 4, 5][..], 20_000.0));
+        assert_eq!((&layout.time[..], layout.turned, &*layout.unit), (&[(0, 1e6), (1, 1e-3)][..], Some(1023.0), "kPa"));
+    }
+
+    #[test]
+    fn another_source_is_refused() {
         for text in [
             "",
-            "udp:5209",
-            "udp:127.0.0.1:5209,array=16",
-            "udp:127.0.0.1:5209,columns=a",
-            "serial:/dev/x@fast,columns=a",
-            "serial:ttyACM0,columns=a",
-            "serial:/dev/x,columns=a,time=a:h",
-            "given",
-            "given,columns=a,rate=4",
+            "board:5209",
+            "udp:127.0.0.1:5209",
+            "board:127.0.0.1:5209,array=16",
+            "board:127.0.0.1:5209,columns=a",
+            "serial:/dev/x,baud=fast",
+            "serial:localhost:7,baud=9600",
+            "serial:ttyACM0",
+            "lines:x,time=a:h",
+            "lines:x,frame_end=never",
+            "lines:x,frame_lines=0",
+            "lines:x,frame_lines=2,frame_end=blank",
+            "lines:x,rate=0",
+            "lines:x,falls=perhaps",
+            "lines:x,unit=",
             "given,columns",
-            "pipe:,columns=a",
+            "given,speed=4",
+            "pipe:x",
+            "lines:",
+            "lines+tcp:9000",
         ] {
-            assert!(text.parse::<SourceKind>().is_err(), "{text}");
+            assert!(text.parse::<SourceText>().is_err(), "{text}");
+        }
+        for text in [
+            "given",
+            "given,array=2x2",
+            "given,columns=a,time=b",
+            "given,columns=a,time=2",
+            "given,columns=a,leave_out=a",
+            "given,array=2x2,rate=9,columns=a:b:c",
+            "given,array=3x1,rate=9,frame_lines=2",
+            "lines:/nowhere",
+        ] {
+            let source: SourceText = text.parse().unwrap();
+            assert!(source.open(None).is_err(), "{text}");
         }
     }
 }

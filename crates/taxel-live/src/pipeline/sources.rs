@@ -10,14 +10,19 @@ use std::sync::{Arc, Mutex, Weak};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
-use taxel_core::problem;
+use taxel_core::{Array, problem};
 
 use super::counters::{Counters, SourceCounts};
+use super::frame_input::{FrameInput, LineCounts};
 use super::options::LiveOptions;
 use super::record_stage::COUNTS_EVERY;
 use super::running_recording::{Host, RecordingPart};
 use super::shared::PipelineShared;
-use super::source::{FurtherSource, LineInput, LineReader, SourceKind};
+use super::source::{NamedSource, Opened, OpenedLines, SourceKind};
+use crate::capture::{Receiver, ReceiverOptions};
+use crate::frame_lines::FrameLayout;
+use crate::line_input::LineReader;
+use crate::line_place::LinePlace;
 use crate::locked::lock;
 use crate::recording::{self, DamageCounts, SourceWriter, StreamColumns, StreamFaults, fields, now_ns};
 use crate::text_lines::{LeftOut, TextLine};
@@ -142,15 +147,7 @@ impl NumberStream {
     }
 
     fn counts_of(&self, lines: u64, faults: DamageCounts) -> SourceCounts {
-        let LeftOut { in_no_line, unfinished } = faults.left_out();
-        SourceCounts::Numbers {
-            lines,
-            strange: faults.strange(),
-            bytes_in_no_line: in_no_line,
-            bytes_of_unfinished_lines: unfinished,
-            trouble: lock(&self.trouble).clone(),
-            faults,
-        }
+        SourceCounts::Numbers(LineCounts::new(lines, faults, lock(&self.trouble).clone()))
     }
 
     /// Records no more lines: ends its part of the recording with its counts.
@@ -159,14 +156,13 @@ impl NumberStream {
         self.record_into(None);
     }
 
-    /// Reads lines until the end, in a separate thread; a failed line is opened again. `begun` is a reader that was
-    /// opened before and has read up to the start of a line.
-    pub(super) fn read(self: &Arc<Self>, input: &LineInput, begun: Option<LineReader>) -> Result<JoinHandle<()>> {
-        let from_line_start = begun.is_some();
-        let (numbers, mut reader) = (Arc::clone(self), begun.map_or_else(|| LineReader::open(input), Ok)?);
+    /// Reads lines until the end, in a separate thread; a failed line is opened again.
+    pub(super) fn read(self: &Arc<Self>, opened: OpenedLines) -> Result<JoinHandle<()>> {
+        let (numbers, OpenedLines { mut reader, begun }) = (Arc::clone(self), opened);
         let thread = std::thread::Builder::new().name("taxel-lines".to_owned());
         let job = move || {
-            if let Err(error) = numbers.read_lines(&mut reader, !from_line_start)
+            let begun = begun.iter().try_for_each(|(line, at_ns)| numbers.line(*at_ns, line));
+            if let Err(error) = begun.and_then(|()| numbers.read_lines(&mut reader))
                 && !numbers.ends.load(Ordering::Acquire)
                 && let Some(host) = numbers.part.host.upgrade()
             {
@@ -176,23 +172,19 @@ impl NumberStream {
         thread.spawn(job).map_err(Error::socket("thread"))
     }
 
-    /// Reads lines until the end; `first`: a serial line may start in the middle of a line after opening, and the rest of that
-    /// line is skipped.
-    fn read_lines(&self, reader: &mut LineReader, mut first: bool) -> Result<()> {
+    /// Reads lines until the end.
+    fn read_lines(&self, reader: &mut LineReader) -> Result<()> {
         while !self.ends.load(Ordering::Acquire) {
             let ended = match reader.fill() {
                 Ok(ended) => ended,
                 Err(error) => {
                     *lock(&self.trouble) = Some(reader.broken(error).to_string());
                     reader.reopen();
-                    first = true;
                     continue;
                 }
             };
-            let at_ns = reader.came_ns;
-            while let Some(line) = reader.lines.next(ended) {
-                let has_no_beginning = std::mem::take(&mut first) && self.stream.parse(&line.text).is_none();
-                if has_no_beginning && reader.is_serial() {
+            while let Some((line, at_ns)) = reader.next(ended) {
+                if std::mem::take(&mut reader.is_cut) && self.stream.parse(&line.text).is_none() {
                     self.count_left_out(LeftOut { unfinished: line.bytes, ..LeftOut::default() })?;
                 } else {
                     self.line(at_ns, &line)?;
@@ -214,45 +206,92 @@ pub(super) fn losses_of_lines(lines: u64, faults: &DamageCounts) -> recording::R
     recording::RecordingCounts { received: lines, recorded: lines, decoder, ..recording::RecordingCounts::default() }
 }
 
+/// What a pipeline receives.
+pub(super) enum PipelineInput {
+    /// A board that sends to this address.
+    Board(SocketAddr),
+    /// Datagrams that another computer receives.
+    Fed(Receiver),
+    /// Frames of numbers, and the lines to read them from.
+    Frames(Option<LinePlace>, Box<FrameLayout>, Option<OpenedLines>),
+}
+
+impl PipelineInput {
+    /// Frames of a place that may be open already, or of a program.
+    pub(super) fn frames(place: &Option<LinePlace>, layout: &FrameLayout, opened: &Opened) -> Result<Self> {
+        let lines = place.as_ref().map(|place| opened.take_or_open(place)).transpose()?;
+        Ok(Self::Frames(place.clone(), Box::new(layout.clone()), lines))
+    }
+
+    /// The layout of its frames, if it has any.
+    pub(super) fn layout(&self) -> Option<&FrameLayout> {
+        match self {
+            Self::Frames(_, layout, _) => Some(layout),
+            Self::Board(_) | Self::Fed(_) => None,
+        }
+    }
+
+    /// Opens the input: the receiver, and frames with the lines to read.
+    pub(super) fn open(self, options: ReceiverOptions) -> Result<OpenInput> {
+        Ok(match self {
+            Self::Board(address) => (Receiver::bind(address, options)?, None, None),
+            Self::Fed(receiver) => (receiver, None, None),
+            Self::Frames(place, layout, lines) => {
+                let (frames, receiver) = FrameInput::new(place, *layout, options);
+                (receiver, Some(frames), lines)
+            }
+        })
+    }
+}
+
+/// A receiver, and frames of numbers with the lines to read them from.
+pub(super) type OpenInput = (Receiver, Option<Arc<FrameInput>>, Option<OpenedLines>);
+
 /// The running other sources of a pipeline.
-pub(super) struct Others<Board> {
-    /// Other boards, each with its own pipeline.
-    pub(super) boards: Vec<(String, Board)>,
+pub(super) struct Others<Pipeline> {
+    /// Other boards and sources of frames, each with its own pipeline.
+    pub(super) pipelines: Vec<(String, Pipeline)>,
     pub(super) numbers: Vec<(String, Arc<NumberStream>)>,
     pub(super) threads: Vec<JoinHandle<()>>,
 }
 
-impl<Board> Others<Board> {
-    /// Starts the sources of a pipeline; `begin` starts a board.
+impl<Pipeline> Others<Pipeline> {
+    /// Starts the other sources of a pipeline; `begin` starts the pipeline of one.
     pub(super) fn start(
         shared: &Arc<PipelineShared>,
-        begin: impl Fn(SocketAddr, LiveOptions, RecordingPart) -> Result<Board>,
+        begin: impl Fn(PipelineInput, LiveOptions, RecordingPart) -> Result<Pipeline>,
     ) -> Result<Self> {
-        let (mut others, options) = (Self { boards: vec![], numbers: vec![], threads: vec![] }, &shared.options);
-        for FurtherSource { name, kind } in &shared.sources {
+        let (mut others, options) = (Self { pipelines: vec![], numbers: vec![], threads: vec![] }, &shared.options);
+        for NamedSource { name, kind } in &shared.sources {
             let host: Weak<dyn Host> = Arc::<PipelineShared>::downgrade(shared);
             let part = RecordingPart { host, name: name.clone() };
-            let stream = match kind {
+            let of_pipeline = |array: &Array| LiveOptions {
+                record: options.record.clone(),
+                compression: options.compression.clone(),
+                overwrite: options.overwrite,
+                kernel_buffer_bytes: options.kernel_buffer_bytes,
+                queue_bytes: options.queue_bytes,
+                gro: options.gro,
+                ..LiveOptions::new(array.clone())
+            };
+            let (input, stream, opened) = match kind {
                 SourceKind::Board(address, array, registers) => {
-                    let of_board = LiveOptions {
-                        registers: *registers,
-                        record: options.record.clone(),
-                        compression: options.compression.clone(),
-                        overwrite: options.overwrite,
-                        kernel_buffer_bytes: options.kernel_buffer_bytes,
-                        queue_bytes: options.queue_bytes,
-                        gro: options.gro,
-                        ..LiveOptions::new((**array).clone())
-                    };
-                    let board = begin(*address, of_board, part)?;
-                    others.boards.push((name.clone(), board));
+                    let of_board = LiveOptions { registers: *registers, ..of_pipeline(array) };
+                    let board = begin(PipelineInput::Board(*address), of_board, part)?;
+                    others.pipelines.push((name.clone(), board));
                     continue;
                 }
-                SourceKind::Lines(_, stream, _) | SourceKind::Given(stream) => stream,
+                SourceKind::Frames(place, layout, opened) => {
+                    let (input, of_frames) =
+                        (PipelineInput::frames(place, layout, opened)?, of_pipeline(&layout.array));
+                    others.pipelines.push((name.clone(), begin(input, of_frames, part)?));
+                    continue;
+                }
+                SourceKind::Numbers(input, stream, opened) => (input, stream, opened),
             };
             let numbers = Arc::new(NumberStream::new(part, stream.clone(), options.record.is_some()));
-            if let SourceKind::Lines(input, _, opened) = kind {
-                others.threads.push(numbers.read(input, opened.take())?);
+            if let Some(input) = input {
+                others.threads.push(numbers.read(opened.take_or_open(input)?)?);
             }
             others.numbers.push((name.clone(), numbers));
         }
@@ -270,7 +309,10 @@ impl<Board> Others<Board> {
     }
 
     /// Ends all sources, and returns their counts.
-    pub(super) fn stop(&mut self, end: impl Fn(Board) -> Result<Counters>) -> Result<BTreeMap<String, SourceCounts>> {
+    pub(super) fn stop(
+        &mut self,
+        end: impl Fn(Pipeline) -> Result<Counters>,
+    ) -> Result<BTreeMap<String, SourceCounts>> {
         self.end_lines();
         let mut counts = BTreeMap::new();
         for (name, numbers) in &self.numbers {
@@ -278,9 +320,9 @@ impl<Board> Others<Board> {
             counts.insert(name.clone(), numbers.counts());
         }
         let mut ended = Ok(());
-        for (name, board) in self.boards.drain(..) {
-            match end(board) {
-                Ok(counters) => drop(counts.insert(name, SourceCounts::Board(Box::new(counters)))),
+        for (name, pipeline) in self.pipelines.drain(..) {
+            match end(pipeline) {
+                Ok(counters) => drop(counts.insert(name, SourceCounts::Pipeline(Box::new(counters)))),
                 Err(error) => ended = ended.and(Err(error)),
             }
         }
@@ -288,7 +330,7 @@ impl<Board> Others<Board> {
     }
 }
 
-impl<Board> Drop for Others<Board> {
+impl<Pipeline> Drop for Others<Pipeline> {
     fn drop(&mut self) {
         self.end_lines();
     }

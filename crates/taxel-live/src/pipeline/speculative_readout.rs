@@ -54,6 +54,24 @@ impl SpeculativeReadout {
         Ok(())
     }
 
+    /// Processes the next frame, as [`SpeculativeReadout::push`].
+    pub(super) fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Detection>) -> Result<()> {
+        self.end_silence(t);
+        self.certain.push_frame(t, values, &mut self.found)?;
+        self.settle(out);
+        Ok(())
+    }
+
+    /// Ends the input after its last data.
+    pub(super) fn finish(&mut self, out: &mut Vec<Detection>) -> Result<()> {
+        (self.ahead, self.behind) = (None, None);
+        if let Some(last) = self.certain.now() {
+            self.certain.finish(last, &mut self.found)?;
+        }
+        self.settle(out);
+        Ok(())
+    }
+
     /// Assumes that no data arrive before `t` us; adds to `out` the detections that follow.
     pub(super) fn advance_silence(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
         let ahead = self.ahead.get_or_insert_with(|| Advanced::new(&self.certain));

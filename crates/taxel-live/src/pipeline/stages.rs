@@ -6,11 +6,13 @@ use std::time::Duration;
 
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
-use taxel_core::held::UNKNOWN;
+use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::problem;
 
 use super::decode_stage::DecodeStage;
+use super::frame_stage::FrameStage;
 use super::observers::Observers;
+use super::readout_queue::QuietUntil;
 use super::readout_stage::ReadoutStage;
 use super::receive_stage::ReceiveStage;
 use super::record_stage::RecordStage;
@@ -38,10 +40,56 @@ pub(super) enum StagesOutcome {
     Finished,
 }
 
+/// The second stage, by what the source sends.
+enum SourceStage {
+    Board(Box<DecodeStage>),
+    Frames(Box<FrameStage>),
+}
+
+impl SourceStage {
+    fn held(&self) -> &Held {
+        match self {
+            Self::Board(decode) => decode.held(),
+            Self::Frames(frames) => frames.held(),
+        }
+    }
+
+    /// Number of datagrams or frames.
+    fn count(&self) -> u64 {
+        match self {
+            Self::Board(decode) => decode.datagram_count(),
+            Self::Frames(frames) => frames.count(),
+        }
+    }
+
+    /// The interval at which the readout's time is advanced during silence.
+    fn tick(&self) -> Option<Duration> {
+        match self {
+            Self::Board(decode) => decode.tick(),
+            Self::Frames(frames) => Some(frames.tick()),
+        }
+    }
+
+    fn quiet_until(&self, until_ns: Option<i64>) -> Option<QuietUntil> {
+        match self {
+            Self::Board(decode) => decode.quiet_until(until_ns),
+            Self::Frames(frames) => frames.quiet_until(until_ns),
+        }
+    }
+
+    /// The value that a taxel holds.
+    fn value(&self, taxel: usize) -> Option<f64> {
+        match self {
+            Self::Board(decode) => Some(decode.held().values()[taxel]).filter(|&held| held != UNKNOWN).map(f64::from),
+            Self::Frames(frames) => frames.value(taxel).map(f64::from),
+        }
+    }
+}
+
 pub(super) struct Stages {
     shared: Arc<PipelineShared>,
     receive: ReceiveStage,
-    decode: DecodeStage,
+    source: SourceStage,
     record: RecordStage,
     readout: ReadoutStage,
     observers: Observers,
@@ -50,10 +98,18 @@ pub(super) struct Stages {
 
 impl Stages {
     pub(super) fn new(shared: &Arc<PipelineShared>, readout: Option<RunningReadout>) -> Self {
+        let options = &shared.options;
+        let source = match &shared.frames {
+            None => SourceStage::Board(Box::new(DecodeStage::new(options))),
+            Some(input) => {
+                let stage = FrameStage::new(&options.array, input.layout.frame_us, options.guard_frames);
+                SourceStage::Frames(Box::new(stage))
+            }
+        };
         Self {
             shared: Arc::clone(shared),
             receive: ReceiveStage::new(Arc::clone(shared)),
-            decode: DecodeStage::new(&shared.options),
+            source,
             record: RecordStage::new(Arc::clone(shared)),
             readout: ReadoutStage::new(readout),
             observers: Observers::new(Arc::clone(shared)),
@@ -110,7 +166,7 @@ impl Stages {
         if version != 0 {
             self.expect_version(version)?;
         }
-        let tick = if self.readout.is_on() { self.decode.tick() } else { None };
+        let tick = if self.readout.is_on() { self.source.tick() } else { None };
         let (batch, received) = self.receive.next(self.observers.longest_wait(tick.unwrap_or(IDLE)))?;
         let silent_until = if received {
             self.process(&batch)?;
@@ -118,16 +174,20 @@ impl Stages {
             None
         } else {
             let until = self.receive.silent_until();
-            if let (true, Some(quiet)) = (self.readout.is_on(), self.decode.quiet_until(until)) {
+            if let (true, Some(quiet)) = (self.readout.is_on(), self.source.quiet_until(until)) {
                 self.readout.process_silence(&self.shared, quiet);
             }
             until
         };
         self.observers.datagrams(&batch, silent_until);
         self.receive.reuse(batch);
-        self.observers.tick(self.decode.held());
-        self.record.previews(self.decode.datagram_count(), self.decode.held(), false)?;
-        if self.observers.frame(self.decode.held()) {
+        self.observers.tick(self.source.held());
+        self.record.previews(self.source.count(), self.source.held(), false)?;
+        if self.observers.frame(self.source.held()) {
+            if let SourceStage::Frames(frames) = &self.source {
+                let mut published = self.shared.published();
+                frames.last().clone_into(&mut published.values);
+            }
             self.record.progress()?;
         }
         if self.shared.requested.swap(false, Ordering::Acquire) {
@@ -137,55 +197,44 @@ impl Stages {
     }
 
     fn process(&mut self, batch: &Batch) -> Result<()> {
-        for (datagram, bytes) in batch.iter() {
-            let mut decoded = self.decode.push(datagram, bytes);
-            if decoded.info.reset {
-                let later = self.decode.split_at_reset(&mut decoded);
-                self.flush_events()?;
-                self.decode.reset(&later);
-                self.observers.reset(self.decode.held());
-                if decoded.info.version == 2 {
-                    self.readout.reset();
+        let Self { shared, source, record, readout, observers, .. } = self;
+        match source {
+            SourceStage::Board(decode) => {
+                EventFlow { shared: &**shared, decode: &mut **decode, record, readout, observers }.decode(batch)
+            }
+            SourceStage::Frames(stage) => {
+                if stage.push(batch) {
+                    observers.reset(stage.held());
                 }
-            }
-            let now = now_ns();
-            self.decode.note(&decoded, self.readout.announced_until());
-            self.record.record_board_change(&decoded.info, decoded.arrived_ns)?;
-            self.record.find_origin(bytes, decoded.arrived_ns, self.decode.first_stamps(&decoded))?;
-            self.shared.published().decode_latency.note(now - decoded.arrived_ns);
-            if self.decode.events().len() >= FLUSH_AFTER {
-                // A batch has this many events only if reading out is slower than they arrive.
-                self.readout.move_to_thread();
-                self.flush_events()?;
+                {
+                    let (now, mut published) = (now_ns(), shared.published());
+                    batch.iter().for_each(|(message, _)| published.decode_latency.note(now - message.arrived_ns));
+                    stage.publish(&mut published.counters);
+                    published.steps = stage.steps();
+                }
+                let (frames, changes, held) = stage.parts();
+                observers.events(changes, held);
+                readout.push_frames(shared, frames);
+                stage.clear();
+                Ok(())
             }
         }
-        self.flush_events()
-    }
-
-    /// Passes the decoded events to the other stages.
-    fn flush_events(&mut self) -> Result<()> {
-        self.decode.update_held();
-        self.observers.events(self.decode.events(), self.decode.held());
-        self.record.markers(&self.decode.events().markers)?;
-        {
-            let mut published = self.shared.published();
-            published.markers.extend_from_slice(&self.decode.events().markers);
-            self.decode.publish(&mut published.counters);
-        }
-        let promised = self.decode.take_promise();
-        self.readout.push(&self.shared, self.decode.events_mut(), promised);
-        self.decode.clear();
-        Ok(())
     }
 
     /// Ends the input: passes on what waits in each stage.
     fn finish(&mut self) -> Result<()> {
-        self.decode.finish();
-        self.flush_events()?;
-        self.record.previews(self.decode.datagram_count(), self.decode.held(), true)?;
-        let quiet = self.decode.quiet_until(self.receive.silent_until()).filter(|_| self.readout.is_on());
-        self.observers.finish(self.decode.held());
-        self.readout.close(&self.shared, quiet);
+        let Self { shared, source, record, readout, observers, .. } = self;
+        let quiet = match source {
+            SourceStage::Board(decode) => {
+                decode.finish();
+                EventFlow { shared: &**shared, decode: &mut **decode, record, readout, observers }.flush()?;
+                decode.quiet_until(self.receive.silent_until())
+            }
+            SourceStage::Frames(_) => Some(QuietUntil::Ended),
+        };
+        self.record.previews(self.source.count(), self.source.held(), true)?;
+        self.observers.finish(self.source.held());
+        self.readout.close(&self.shared, quiet.filter(|_| self.readout.is_on()));
         self.answer()
     }
 
@@ -195,11 +244,13 @@ impl Stages {
         for request in requests {
             match request {
                 PipelineRequest::Record(next, answer) => drop(answer.send(self.switch_recording(next))),
-                PipelineRequest::View(answer) => self.observers.add_viewer(&answer, self.decode.held()),
+                PipelineRequest::View(answer) => self.observers.add_viewer(&answer, self.source.held()),
                 PipelineRequest::Copy(answer) => self.observers.add_copier(&answer),
                 PipelineRequest::Zero(taxels, answer) => drop(answer.send(self.zero(&taxels))),
                 PipelineRequest::Registers(registers) => {
-                    self.decode.set_frame_us(registers.frame_us());
+                    if let SourceStage::Board(decode) = &mut self.source {
+                        decode.set_frame_us(registers.frame_us());
+                    }
                     self.expect_version(registers.wire_version)?;
                     self.record.registers(&registers)?;
                 }
@@ -209,22 +260,24 @@ impl Stages {
     }
 
     fn switch_recording(&mut self, next: Option<Box<RunningRecording>>) -> Result<EndedRecording> {
-        self.record.previews(self.decode.datagram_count(), self.decode.held(), true)?;
+        self.record.previews(self.source.count(), self.source.held(), true)?;
         if next.is_some() {
             self.move_to_threads()?;
         }
         let begins = next.is_some();
-        let ended = self.record.switch(next, self.decode.held())?;
-        if begins {
-            self.decode.begin_recording();
+        let ended = self.record.switch(next, self.source.held())?;
+        if let (true, SourceStage::Board(decode)) = (begins, &mut self.source) {
+            decode.begin_recording();
         }
         Ok(ended)
     }
 
     /// Notes that the board was set to this version of the wire.
     fn expect_version(&mut self, version: u8) -> Result<()> {
-        if self.decode.expect(version) {
-            self.record.asked_for_version(version, self.decode.latest())?;
+        if let SourceStage::Board(decode) = &mut self.source
+            && decode.expect(version)
+        {
+            self.record.asked_for_version(version, decode.latest())?;
         }
         Ok(())
     }
@@ -245,11 +298,10 @@ impl Stages {
             let mut zeroing = Zeroing { t, x, y, rest: 0.0, before: None };
             zeroing.check(array)?;
             let taxel = array.index(x, y);
-            let held = self.decode.held().values()[taxel];
-            if held == UNKNOWN {
-                return Err(problem!("taxel at row {y}, column {x}: no event so far, so its value is unknown").into());
-            }
-            zeroing.rest = held.into();
+            let Some(held) = self.source.value(taxel) else {
+                return Err(problem!("taxel at row {y}, column {x}: no value so far").into());
+            };
+            zeroing.rest = held;
             let tared = published.rest.get(taxel).copied().flatten();
             zeroing.before = published.zeroed.get(&taxel).map(|earlier| earlier.rest).or(tared);
             zeroings.push(zeroing);
@@ -264,5 +316,58 @@ impl Stages {
         self.shared.preview_around([t]);
         self.readout.zero(&self.shared, &zeroings);
         Ok(zeroings)
+    }
+}
+
+/// The decoded events of a board, on their way to the other stages.
+struct EventFlow<'a> {
+    shared: &'a PipelineShared,
+    decode: &'a mut DecodeStage,
+    record: &'a mut RecordStage,
+    readout: &'a mut ReadoutStage,
+    observers: &'a mut Observers,
+}
+
+impl EventFlow<'_> {
+    fn decode(mut self, batch: &Batch) -> Result<()> {
+        for (datagram, bytes) in batch.iter() {
+            let mut decoded = self.decode.push(datagram, bytes);
+            if decoded.info.reset {
+                let later = self.decode.split_at_reset(&mut decoded);
+                self.flush()?;
+                self.decode.reset(&later);
+                self.observers.reset(self.decode.held());
+                if decoded.info.version == 2 {
+                    self.readout.reset();
+                }
+            }
+            let now = now_ns();
+            self.decode.note(&decoded, self.readout.announced_until());
+            self.record.record_board_change(&decoded.info, decoded.arrived_ns)?;
+            self.record.find_origin(bytes, decoded.arrived_ns, self.decode.first_stamps(&decoded))?;
+            self.shared.published().decode_latency.note(now - decoded.arrived_ns);
+            if self.decode.events().len() >= FLUSH_AFTER {
+                // A batch has this many events only if reading out is slower than they arrive.
+                self.readout.move_to_thread();
+                self.flush()?;
+            }
+        }
+        self.flush()
+    }
+
+    /// Passes the decoded events to the other stages.
+    fn flush(&mut self) -> Result<()> {
+        self.decode.update_held();
+        self.observers.events(self.decode.events(), self.decode.held());
+        self.record.markers(&self.decode.events().markers)?;
+        {
+            let mut published = self.shared.published();
+            published.markers.extend_from_slice(&self.decode.events().markers);
+            self.decode.publish(&mut published.counters);
+        }
+        let promised = self.decode.take_promise();
+        self.readout.push(self.shared, self.decode.events_mut(), promised);
+        self.decode.clear();
+        Ok(())
     }
 }

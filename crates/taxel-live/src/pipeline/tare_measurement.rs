@@ -2,7 +2,7 @@
 
 use taxel_core::detect::{Detector, FrameTime, ReadoutStream};
 use taxel_core::encode::{Tare, TareBuilder};
-use taxel_core::{Events, Intensities, Result};
+use taxel_core::{Events, FramesView, Intensities, Result};
 
 /// Gathers a tare from the first event on for an interval of the board's time, or until the board marks a start. For
 /// any duration, it stores only the last event of each taxel, that is, the taxel's value.
@@ -12,6 +12,8 @@ pub(super) struct TareMeasurement {
     builder: TareBuilder,
     first: Option<i64>,
     last: Vec<Option<LastEvent>>,
+    /// The time and the values of the last frame.
+    frame: Option<(i64, Vec<f32>)>,
     array: taxel_core::Array,
 }
 
@@ -25,7 +27,15 @@ struct LastEvent {
 impl TareMeasurement {
     pub(super) fn new(stretch_us: i64, readout: Box<Detector>, array: &taxel_core::Array) -> Self {
         let builder = TareBuilder::new(array, None);
-        Self { stretch_us, readout, builder, first: None, last: vec![None; array.len()], array: array.clone() }
+        Self {
+            stretch_us,
+            readout,
+            builder,
+            first: None,
+            last: vec![None; array.len()],
+            frame: None,
+            array: array.clone(),
+        }
     }
 
     /// Processes the next events; once the interval is over, returns its end (us) and the number of these events that
@@ -52,10 +62,28 @@ impl TareMeasurement {
         Ok(over.then_some((stop, inside)))
     }
 
+    /// Processes the next frames, as [`TareMeasurement::push`].
+    pub(super) fn push_frames(&mut self, frames: FramesView<'_>) -> Result<Option<(i64, usize)>> {
+        for (k, (t, values)) in frames.iter().enumerate() {
+            let stop = *self.first.get_or_insert(t) + self.stretch_us;
+            if t >= stop {
+                return Ok(Some((stop, k)));
+            }
+            self.builder.push_frame(t, values)?;
+            self.frame = Some((t, values.to_vec()));
+        }
+        Ok(None)
+    }
+
     /// The tare, and the readout that uses it and is initialised with the taxels' values at `stop` us.
     pub(super) fn finish(self, stop: i64, frames: FrameTime) -> Result<(Tare, ReadoutStream)> {
         let tare = self.builder.finish(stop, "taken live")?;
         let mut stream = self.readout.stream(&self.array, frames, Some(&tare))?;
+        if let Some((t, values)) = self.frame {
+            stream.begin_at(stop);
+            stream.push_frame(t, &values, &mut vec![])?;
+            return Ok((tare, stream));
+        }
         let mut held: Vec<(usize, LastEvent)> =
             self.last.iter().enumerate().filter_map(|(taxel, last)| last.map(|last| (taxel, last))).collect();
         held.sort_by_key(|(_, last)| last.t);

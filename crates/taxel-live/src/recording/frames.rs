@@ -20,6 +20,10 @@ pub struct FrameProperties {
     /// The number that each reading was subtracted from, as readings fall with pressure; none if they were not turned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turned: Option<f64>,
+    /// Time from one frame to the next, us, by which a readout knew live when a frame was over; none where the times of
+    /// the frames show it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame_us: Option<f64>,
 }
 
 fn true_by_default() -> bool {
@@ -34,6 +38,9 @@ impl FrameProperties {
         if !self.columns.is_empty() && self.columns.len() != usize::from(columns) {
             let n = self.columns.len();
             return Err(problem!("source {name}: {n} names of columns for {columns} columns"));
+        }
+        if let Some(frame_us) = self.frame_us.filter(|frame_us| !(1.0..=3.6e9).contains(frame_us)) {
+            return Err(problem!("source {name}: frame_us"; " is {frame_us}: must be from 1 to 3600000000 us"));
         }
         Ok(())
     }

@@ -171,6 +171,25 @@ impl SourceWriter {
         }
     }
 
+    /// Writes a frame that arrived at `arrived_ns` (ns since 1970), with its arrival number, its time (us) and the values of
+    /// all taxels.
+    ///
+    /// # Errors
+    ///
+    /// As [`SourceWriter::datagram`].
+    pub(crate) fn frame(
+        &self,
+        arrived_ns: i64,
+        number: u64,
+        t_us: i64,
+        values: &[f32],
+        encoding: FrameEncoding,
+    ) -> Result<()> {
+        let mut message = vec![];
+        write_message(&mut message, &self.name, t_us, self.columns, values, encoding);
+        self.queue.push(self.source, Topic::Frames, (arrived_ns, number), &message, QUEUE_BYTES)
+    }
+
     /// Writes frames, each with its time in the file (ns), its time by the board's clock (us) and the values of all
     /// taxels; `first` is the number of the first of them.
     ///

@@ -33,12 +33,7 @@ impl StreamColumns {
     /// `_s` is the clock.
     #[must_use]
     pub fn of_columns(columns: Vec<String>) -> Self {
-        let unit = |name: &str| {
-            let (stem, unit) = name.rsplit_once('_')?;
-            let unit_us = [("ns", 1e-3), ("us", 1.0), ("ms", 1e3), ("s", 1e6)].into_iter().find(|(u, _)| *u == unit)?.1;
-            ["t", "time", "stamp", "timestamp"].contains(&stem).then_some(unit_us)
-        };
-        let time = columns.iter().find_map(|name| Some((name.clone(), unit(name)?)));
+        let time = columns.iter().find_map(|name| Some((name.clone(), clock_unit_us(name)?)));
         let (time, unit_us) = time.map_or((None, 1.0), |(name, unit_us)| (Some(name), unit_us));
         Self { columns, time, unit_us }
     }
@@ -98,8 +93,18 @@ impl StreamColumns {
     }
 }
 
+/// The units of a source's clock, us.
+pub(crate) const UNITS_US: [(&str, f64); 4] = [("ns", 1e-3), ("us", 1.0), ("ms", 1e3), ("s", 1e6)];
+
+/// The unit of a clock whose column has this name, us; none if it is not the name of a clock.
+pub(crate) fn clock_unit_us(name: &str) -> Option<f64> {
+    let (stem, unit) = name.rsplit_once('_')?;
+    let (_, unit_us) = UNITS_US.into_iter().find(|(known, _)| *known == unit)?;
+    ["t", "time", "stamp", "timestamp"].contains(&stem).then_some(unit_us)
+}
+
 /// Whether a number is a value that frames hold, which have 32 bits, or NaN, a missing one; infinity is none.
-fn is_held(value: f64) -> bool {
+pub(crate) fn is_held(value: f64) -> bool {
     value.is_nan() || value.abs() <= f64::from(f32::MAX)
 }
 
@@ -164,7 +169,7 @@ impl<'a> Sampling<'a> {
             Some(time) => Some(named.get(time)?.as_f64()?),
         };
         let t = self.faults.time(stamp, at_ns)?;
-        self.faults.missing(&values);
+        self.faults.missing(values.iter().copied());
         Some((t, values))
     }
 
@@ -186,18 +191,29 @@ impl StreamFaults {
     /// None so far.
     #[must_use]
     pub fn new(stream: &StreamColumns) -> Self {
-        let clock = StreamClock::new(stream.unit_us);
+        Self::by_clock(stream.unit_us)
+    }
+
+    /// None so far, of lines with stamps in this unit, us.
+    #[must_use]
+    pub fn by_clock(unit_us: f64) -> Self {
+        let clock = StreamClock::new(unit_us);
         Self { strange: 0, missing: 0, left_out: LeftOut::default(), clock }
     }
 
     /// Counts a line that could not be read.
     pub fn strange(&mut self) {
-        self.strange += 1;
+        self.strange_lines(1);
     }
 
-    /// Counts the values of a line that are missing.
-    fn missing(&mut self, values: &[f64]) {
-        self.missing += values.iter().filter(|value| value.is_nan()).count() as u64;
+    /// Counts lines that could not be read.
+    pub fn strange_lines(&mut self, lines: u64) {
+        self.strange += lines;
+    }
+
+    /// Counts the values of a line or a frame that are missing.
+    pub fn missing(&mut self, values: impl IntoIterator<Item = f64>) {
+        self.missing += values.into_iter().filter(|value| value.is_nan()).count() as u64;
     }
 
     /// Counts bytes that are in no line.
@@ -218,7 +234,7 @@ impl StreamFaults {
     pub fn line(&mut self, stream: &StreamColumns, values: &[f64], at_ns: i64) {
         let clock = stream.columns.iter().position(|name| Some(name) == stream.time.as_ref());
         match self.time(clock.map(|column| values[column]), at_ns) {
-            Some(_) => self.missing(values),
+            Some(_) => self.missing(values.iter().copied()),
             None => self.strange(),
         }
     }

@@ -8,6 +8,7 @@ use taxel_core::Array;
 use taxel_core::detect::Detector;
 use taxel_core::encode::Tare;
 use taxel_core::held::UNKNOWN;
+use taxel_core::rest::ValueSteps;
 use taxel_live::Result;
 use taxel_live::clock::Offset;
 use taxel_live::locked::lock;
@@ -18,7 +19,7 @@ use super::clients::MOST_WAITING;
 use crate::array_state::{ArrayState, Keyframe};
 use crate::keyframe_index::live::{LiveIndex, REACH_US};
 use crate::keyframe_index::{Activity, KeyframeIndex};
-use crate::protocol::messages::{Latency, Lost, Message};
+use crate::protocol::messages::{Latency, LiveFrames, Lost, Message};
 use crate::readout_encoders::ReadoutEncoders;
 use crate::time_columns::{COLUMN_US, TimeColumns};
 
@@ -47,6 +48,8 @@ pub(crate) struct LiveSource {
     /// Number of zeroings that the state has applied.
     zeroings: AtomicU64,
     silence: Mutex<SilentTime>,
+    /// The steps of the values of frames of numbers, as clients know them.
+    steps: Mutex<Option<ValueSteps>>,
 }
 
 /// Where the board's time is while no events arrive.
@@ -111,11 +114,29 @@ impl LiveSource {
             rested: AtomicBool::new(false),
             zeroings: AtomicU64::new(0),
             silence: Mutex::default(),
+            steps: Mutex::default(),
         })
     }
 
     pub(crate) fn array(&self) -> &Array {
         self.index.array()
+    }
+
+    /// Unit and steps of frames of numbers; none of a board, and before the first frame.
+    pub(crate) fn frames(&self) -> Option<LiveFrames> {
+        let (unit, steps, begin_us) = self.handle.frame_values()?;
+        Some(LiveFrames { unit, step: steps.size, zero: steps.zero, begin_us })
+    }
+
+    /// The steps of the values; ticks of a board.
+    fn value_steps(&self) -> ValueSteps {
+        self.handle.frame_values().map_or(ValueSteps { size: 1.0, zero: 0 }, |(_, steps, _)| steps)
+    }
+
+    /// Whether those are others than at the last call, so that clients are to be told.
+    pub(crate) fn has_new_steps(&self) -> bool {
+        let now = self.handle.frame_values().map(|(_, steps, _)| steps);
+        std::mem::replace(&mut *lock(&self.steps), now) != now
     }
 
     /// The encoders of the readout that runs, with its tare where that is known.
@@ -153,7 +174,10 @@ impl LiveSource {
             events_per_s: rate(|counters| counters.decoding.events),
             bytes_per_s: rate(|counters| counters.capture.bytes),
             datagrams_per_s: rate(|counters| counters.capture.datagrams),
-            frames_per_s: frame_us.map(|frame_us| 1e6 / frame_us),
+            frames_per_s: match now.lines {
+                Some(_) => rate(|counters| counters.decoding.frames),
+                None => frame_us.map(|frame_us| 1e6 / frame_us),
+            },
             arrival: now.arrival(now_ns()),
             pace: now.board.pace.clone(),
             lost: Lost {
@@ -204,6 +228,7 @@ impl LiveSource {
             }
             if piece.reset {
                 state.clear();
+                self.rested.store(false, Ordering::Relaxed);
                 received.reset = true;
             }
             let stored = self.index.push(piece, &state);
@@ -231,9 +256,8 @@ impl LiveSource {
         }
         let rest = self.handle.rest();
         if rest.len() == self.array().len() {
-            // A rest is a mean of held values, which have 16 bits.
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            let ticks = rest.into_iter().map(|rest| rest.map_or(UNKNOWN, |rest| rest.round() as u16)).collect();
+            let steps = self.value_steps();
+            let ticks = rest.into_iter().map(|rest| rest.map_or(UNKNOWN, |rest| steps.of_rest(rest))).collect();
             lock(&self.state).set_rest(ticks);
             self.rested.store(true, Ordering::Relaxed);
         }
@@ -245,12 +269,10 @@ impl LiveSource {
         if self.zeroings.swap(zeroings, Ordering::Relaxed) == zeroings {
             return false;
         }
-        let columns = usize::from(self.array().columns);
+        let (columns, steps) = (usize::from(self.array().columns), self.value_steps());
         let mut state = lock(&self.state);
         for zeroing in self.handle.latest_zeroings().0 {
-            // The rest is a held value, which has 16 bits.
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            state.zero(usize::from(zeroing.y) * columns + usize::from(zeroing.x), zeroing.rest as u16);
+            state.zero(usize::from(zeroing.y) * columns + usize::from(zeroing.x), steps.of_rest(zeroing.rest));
         }
         true
     }

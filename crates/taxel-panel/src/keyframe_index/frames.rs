@@ -8,13 +8,13 @@ use std::sync::Arc;
 use taxel_core::Array;
 use taxel_core::array::Places;
 use taxel_core::held::UNKNOWN;
-use taxel_core::rest::{FrameNoise, above_noise};
+use taxel_core::rest::{FrameNoise, ValueSteps, above_noise};
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::Remarks;
 
+use super::stepped_frames::SteppedFrames;
 pub use super::stepped_frames::{FrameArea, FrameRest, FrameSource};
-use super::stepped_frames::{SteppedFrames, ValueSteps};
 use super::{ChangeReader, FrameSources, KeyframeIndex, ReadOutcome};
 use crate::array_state::{Keyframe, RestSource};
 use crate::load::Coordinates;

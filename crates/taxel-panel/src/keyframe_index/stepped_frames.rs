@@ -1,12 +1,9 @@
 //! The frames of the sources of a recording, their values in whole steps of the unit.
 
 use taxel_core::held::UNKNOWN;
-use taxel_core::rest::{NOISE_FLOOR, TrackedRest};
+use taxel_core::rest::{NOISE_FLOOR, TrackedRest, ValueSteps};
 
 use crate::array_state::RestSource;
-
-/// Most steps from the least value to the greatest.
-const MOST_STEPS: usize = 65_533;
 
 /// A tracked rest is stored where that of a taxel is further than this from the stored one, in ticks of the noise floor.
 const REST_MOVED: f64 = 0.5;
@@ -113,7 +110,8 @@ pub(super) struct SteppedFrames {
 
 impl SteppedFrames {
     pub(super) fn new(from: FrameSource<'_>, steps: ValueSteps) -> Self {
-        let (ticks, mut rests) = (steps.ticks(from.values), from.rests(steps));
+        let ticks = from.values.iter().map(|&value| steps.ticks(value)).collect();
+        let mut rests = from.rests(steps);
         let FrameRest { source: rest_source, falls, flickering, preload_at, .. } = from.rest;
         for (_, rest) in &mut rests {
             // No value is above the greatest; a taxel without a rest would get that of its first value.
@@ -150,45 +148,5 @@ impl SteppedFrames {
         let (left, width, columns) = (self.area.left, self.area.columns, usize::from(columns));
         (0..usize::from(self.area.rows))
             .flat_map(move |y| (0..usize::from(width)).map(move |x| y * columns + usize::from(left) + x))
-    }
-}
-
-/// The steps in which values are shown: a value is `(ticks - zero) * size`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ValueSteps {
-    pub(super) size: f64,
-    pub(super) zero: u16,
-}
-
-impl ValueSteps {
-    /// Steps for these values: of 1 where all are whole and not too far apart, else as small as 16 bits allow.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub(super) fn fitting<'a>(values: impl Iterator<Item = &'a [f32]>, taxels: usize) -> Self {
-        let (mut least, mut most, mut integers) = (0.0_f32, 0.0_f32, true);
-        for &value in values.flatten().filter(|value| value.is_finite()) {
-            (least, most) = (least.min(value), most.max(value));
-            integers &= value.fract() == 0.0;
-        }
-        let (least, range) = (f64::from(least), f64::from(most) - f64::from(least));
-        // The sum over the array has 32 bits.
-        let steps = MOST_STEPS.min(u32::MAX as usize / taxels.max(1)) as f64;
-        let size = if integers && range <= MOST_STEPS as f64 { 1.0 } else { range / steps };
-        Self { size, zero: (-least / size).ceil() as u16 }
-    }
-
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn ticks(self, values: &[f32]) -> Vec<u16> {
-        let (scale, zero) = (1.0 / self.size, f64::from(self.zero) + 0.5);
-        let tick = |&value: &f32| match value.is_nan() {
-            true => UNKNOWN,
-            false => (f64::from(value) * scale + zero).min(f64::from(UNKNOWN - 1)) as u16,
-        };
-        values.iter().map(tick).collect()
-    }
-
-    /// A rest, which no value is above where it is not finite.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn of_rest(self, value: f64) -> u16 {
-        if value.is_finite() { (value / self.size + f64::from(self.zero)).round() as u16 } else { UNKNOWN }
     }
 }

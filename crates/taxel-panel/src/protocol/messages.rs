@@ -38,6 +38,10 @@ pub(crate) enum Message {
         options: Option<Box<LiveOptions>>,
         /// Where datagrams are received.
         udp: Option<String>,
+        /// Where frames of numbers are read; null of a board.
+        lines: Option<String>,
+        /// The values of those frames, after the first one; null of a board, whose values are ticks.
+        frames: Option<LiveFrames>,
         /// Whether intensities are differences; null without a board.
         delta_intensity: Option<bool>,
         /// The board's serial line; null: registers cannot be written.
@@ -441,6 +445,18 @@ pub(crate) struct FoundDetection {
     pub(crate) label: String,
     pub(crate) t_us: i64,
     pub(crate) known_us: i64,
+}
+
+/// The values of a live source of frames.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
+pub(crate) struct LiveFrames {
+    pub(crate) unit: String,
+    /// A value is `(ticks - zero) * step`.
+    pub(crate) step: f64,
+    pub(crate) zero: u16,
+    /// Time of the first frame, us: seconds are shown since then where times are those since 1970.
+    pub(crate) begin_us: i64,
 }
 
 /// A recording of frames.

@@ -25,6 +25,7 @@ from taxel.recording.description import (
     board_changes_of,
     counts_of,
     detections_of,
+    frame_us_of,
     notes_of,
     turned_of,
     zeroings_of,
@@ -153,7 +154,8 @@ class _Source:
             return {**damage, "received": self.counted().get("received"), **self.rebuilt()}
 
         turned = _read_entry(path, "turned", turned_of, about.get("turned"))
-        frame_table = sections.FrameTable(Once(frames), not about.get("clock", True), turned)
+        frame_us = _read_entry(path, "frame_us", frame_us_of, about.get("frame_us"))
+        frame_table = sections.FrameTable(Once(frames), not about.get("clock", True), turned, frame_us)
         header: dict[str, Any] = {"settings": self.settings(), "marks": self.marks(), "losses": self.losses(counts)}
         if not about.get("columns"):
             return FrameSource(self.origin, self.sensor, frame_table, **header)

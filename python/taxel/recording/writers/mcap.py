@@ -130,6 +130,7 @@ def _write_frames(
                 "clock": not source.untimed,
                 "columns": source.columns or (),
                 "turned": source.frame_table.turned,
+                "frame_us": source.frame_table.frame_us,
             },
         }
         for name, source in sources.items()

@@ -1,0 +1,159 @@
+"""Frames that a sensor prints: 1000 lines a second of 256 numbers, read, recorded, read out and sent to a page.
+
+A process of its own prints lines, each a frame of 16 x 16 counts with noise and touches, into a pipe, at the rate. This
+process reads them live, records them to a .mcap on the disk, runs a readout of level crossings on all taxels, and
+serves the panel to a client in another process, which reads every frame. CPU is of this process, all threads; a wall
+second has one core second.
+
+Peer: NumPy, which only parses the same lines (`numpy.fromstring` of each). Unit: cores. Goal: .1 core for all of it,
+nothing lost, each line a frame.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import taxel
+from taxel import Array, Neuron, Readout
+from taxel.encode import LevelCrossing
+from taxel.live import Live, Panel
+from taxel_benchmarks._goals import Goal
+from taxel_benchmarks._rounds import stamp
+
+SIDE, RATE, SEED = 16, 1000, 20_261_127
+
+#: Prints lines at their times; a late line is printed at once.
+SEND = """
+import sys, time
+import numpy as np
+side, rate, count, seed = map(int, sys.argv[1:])
+draw = np.random.default_rng(seed)
+lines = []
+for k in range(rate):
+    frame = draw.integers(0, 4, (side, side))
+    if k % 500 > 300:
+        frame[4:9, 4:9] += 400
+    lines.append((",".join(map(str, frame.reshape(-1))) + "\\n").encode())
+out, began = sys.stdout.buffer, time.perf_counter()
+for k in range(count):
+    left = began + k / rate - time.perf_counter()
+    if left > 0:
+        time.sleep(left)
+    out.write(lines[k % rate])
+    out.flush()
+"""
+
+#: Reads the frames of a panel until it ends; prints how many there were.
+WATCH = """
+import sys, time
+from taxel.live import PanelClient
+from taxel.live.client import Frame
+count, until = 0, time.monotonic() + float(sys.argv[2])
+with PanelClient(sys.argv[1], rate_hz=60.0) as client:
+    for _, item in client:
+        count += isinstance(item, Frame)
+        if time.monotonic() > until:
+            break
+print(count)
+"""
+
+
+def readout() -> Readout:
+    """Return a readout of every taxel, which fires in each touch."""
+    weights = np.tile([1.0, 0.0], SIDE * SIDE)
+    return Readout(LevelCrossing([100.0]), {"contact": (Neuron(tau=2.0), weights, 2.5)}, array=Array(SIDE, SIDE))
+
+
+def live(seconds: float, folder: Path) -> dict[str, Any]:
+    """Read, record, read out and show lines for so long; return cores, counts and latency."""
+    count = int(seconds * RATE)
+    lines, path = folder / "lines", folder / "lines.mcap"
+    os.mkfifo(lines)
+    sender = [sys.executable, "-c", SEND, *map(str, (SIDE, RATE, count, SEED))]
+    found: list[taxel.Detection] = []
+    reading = os.open(lines, os.O_RDWR)  # so that the sender does not wait
+    with lines.open("wb", buffering=0) as pipe, subprocess.Popen(sender, stdout=pipe):
+        source = f"lines:{lines},array={SIDE}x{SIDE},rate={RATE}"
+        with (
+            Live(readout=readout(), sources=source, record=path, say=found.append) as pipeline,
+            Panel(pipeline, folder=folder) as panel,
+        ):
+            watching = [sys.executable, "-c", WATCH, panel.url, str(seconds)]
+            with subprocess.Popen(watching, stdout=subprocess.PIPE, text=True) as client:
+                while pipeline.counters["frames"] < RATE // 2:
+                    time.sleep(0.01)
+                before, wall, cpu = pipeline.counters, time.perf_counter(), time.process_time()
+                time.sleep(seconds * 0.7)
+                cores = (time.process_time() - cpu) / (time.perf_counter() - wall)
+                passed, after = time.perf_counter() - wall, pipeline.counters
+                while pipeline.counters["frames"] < count:
+                    time.sleep(0.05)
+                shown = int(client.communicate()[0])
+            summary = pipeline.stop()
+    os.close(reading)
+    recorded = taxel.open(path)
+    return {
+        "cores": cores,
+        "lines_per_s": (after["lines"]["lines"] - before["lines"]["lines"]) / passed,
+        "frames": summary.counters["frames"],
+        "frames_missing": count - summary.counters["frames"],
+        "lost": summary.counters["capture"]["dropped_by_queue"] + summary.counters["events_dropped"],
+        "recorded": len(recorded.frames()),
+        "detections": len(found),
+        "page_frames_per_s": shown / seconds,
+        "line_to_frame_us": summary.counters["decode_latency"],
+        "file_mb": path.stat().st_size / 1e6,
+        "verdict": str(summary.verdict),
+    }
+
+
+def parsing() -> float:
+    """Return the cores that NumPy takes to parse lines at this rate, and nothing else."""
+    draw = np.random.default_rng(SEED)
+    lines = [",".join(map(str, draw.integers(0, 400, SIDE * SIDE))) for _ in range(RATE)]
+    cpu = time.process_time()
+    for line in lines:
+        np.fromstring(line, np.float32, sep=",")
+    return time.process_time() - cpu
+
+
+def goals(result: Mapping[str, Any]) -> list[Goal]:
+    """Return the goals."""
+    of = result["live"]
+    return [
+        Goal("cores for all of it", of["cores"], 0.1, at_most=True),
+        Goal("lines that are no frame, or lost", of["frames_missing"] + of["lost"], 0, at_most=True),
+        Goal("frames recorded, of all", of["recorded"] / max(1, of["frames"]), 1.0),
+    ]
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    """Return the result."""
+    load = os.getloadavg()[0]
+    with tempfile.TemporaryDirectory() as folder:
+        measured = live(3.0 if quick else 20.0, Path(folder))
+    parsed = parsing()
+    return {
+        "question": (__doc__ or "").splitlines()[0],
+        **stamp(),
+        "load_before": load,
+        "load_after": os.getloadavg()[0],
+        "live": measured,
+        "numpy_parses_cores": parsed,
+        "largest_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "ratios": {
+            "cores for all of it over .1": measured["cores"] / 0.1,
+            "NumPy's parsing over all of ours": parsed / measured["cores"],
+        },
+        "stable": load < (os.cpu_count() or 1),
+    }

@@ -1,0 +1,299 @@
+//! Frames of the whole array from lines of numbers: a line, or several, make a frame.
+
+use std::borrow::Cow;
+
+use taxel_core::{Array, problem};
+
+use crate::recording::{DamageCounts, FrameProperties, StreamFaults, is_held};
+use crate::text_lines::{LeftOut, TextLine};
+
+/// How lines of numbers make frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameLayout {
+    /// The sensor.
+    pub array: Array,
+    /// Number of fields of a line.
+    pub fields: usize,
+    /// The fields whose sum is the time of the frame, each with its unit, us; without any it is the time of arrival.
+    pub time: Vec<(usize, f64)>,
+    /// The fields with values, in the order of the taxels.
+    pub values: Vec<usize>,
+    /// Where a frame ends.
+    pub end: FrameEnd,
+    /// The number from which each reading is subtracted, if readings fall with pressure.
+    pub turned: Option<f64>,
+    /// Unit of the values.
+    pub unit: String,
+    /// The names of the columns, if each is a quantity of its own.
+    pub names: Vec<String>,
+    /// Time from one frame to the next, us.
+    pub frame_us: f64,
+}
+
+/// Where a frame of several lines ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameEnd {
+    /// After so many lines; an empty line between two frames is allowed.
+    Lines(usize),
+    /// At an empty line.
+    EmptyLine,
+}
+
+impl FrameLayout {
+    /// The properties that a recording states.
+    #[must_use]
+    pub fn properties(&self) -> FrameProperties {
+        FrameProperties {
+            unit: self.unit.clone(),
+            clock: true,
+            columns: self.names.clone(),
+            turned: self.turned,
+            frame_us: Some(self.frame_us),
+        }
+    }
+
+    /// Checks that the values of a frame fill the array.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, with the numbers.
+    pub fn check(&self) -> taxel_core::Result<()> {
+        self.array.check()?;
+        let (rows, columns, n) = (self.array.rows, self.array.columns, self.values.len());
+        let fits = match self.end {
+            FrameEnd::Lines(lines) => lines * n == self.array.len(),
+            FrameEnd::EmptyLine => n > 0 && self.array.len().is_multiple_of(n),
+        };
+        if !fits {
+            let lines = match self.end {
+                FrameEnd::Lines(1) => String::new(),
+                FrameEnd::Lines(lines) => format!(", {lines} lines a frame"),
+                FrameEnd::EmptyLine => ", an empty line after each frame".to_owned(),
+            };
+            return Err(problem!(
+                "array={rows}x{columns}: lines have {n} values{lines}: must be {} a frame",
+                self.array.len()
+            ));
+        }
+        if !(1.0..=3.6e9).contains(&self.frame_us) {
+            return Err(problem!("frames of {} us: must last from 1 us to an hour", self.frame_us));
+        }
+        Ok(())
+    }
+}
+
+/// Makes frames of lines as they arrive, and counts what is in no frame.
+#[derive(Debug)]
+pub struct FrameAssembler {
+    layout: FrameLayout,
+    faults: StreamFaults,
+    lines: u64,
+    /// The values of the frame so far, its first stamp and the arrival of its first line, ns since 1970.
+    values: Vec<f32>,
+    begun: Option<(Option<f64>, i64)>,
+    /// Number of lines of the frame so far.
+    rows: u64,
+    /// Time of the last frame, us.
+    last: Option<i64>,
+}
+
+impl FrameAssembler {
+    /// Begins without any line.
+    #[must_use]
+    pub fn new(layout: FrameLayout) -> Self {
+        let faults = StreamFaults::by_clock(match layout.time[..] {
+            [(_, unit_us)] => unit_us,
+            _ => 1.0,
+        });
+        let values = Vec::with_capacity(layout.array.len());
+        Self { layout, faults, lines: 0, values, begun: None, rows: 0, last: None }
+    }
+
+    /// How lines make frames.
+    #[must_use]
+    pub fn layout(&self) -> &FrameLayout {
+        &self.layout
+    }
+
+    /// Adds a line that arrived at `arrived_ns` (ns since 1970); where it ends a frame, returns the frame's time (us) and
+    /// values, row by row.
+    pub fn push(&mut self, line: &TextLine, arrived_ns: i64) -> Option<(i64, &[f32])> {
+        let text = line.text.trim();
+        if text.is_empty() {
+            return self.end_at_empty_line();
+        }
+        if text.starts_with('#') || (self.begun.is_none() && self.names_columns(text)) {
+            return None;
+        }
+        self.lines += 1;
+        match self.numbers(text).filter(|_| !line.cut) {
+            Some(numbers) => self.push_numbers(&numbers, arrived_ns),
+            None => {
+                self.faults.strange_lines(1);
+                self.discard();
+                None
+            }
+        }
+    }
+
+    /// Adds the numbers of a line, as [`FrameAssembler::push`].
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if a line has another number of fields.
+    pub fn push_values(&mut self, numbers: &[f64], arrived_ns: i64) -> taxel_core::Result<Option<(i64, &[f32])>> {
+        let (n, expected) = (numbers.len(), self.layout.fields);
+        if n != expected {
+            return Err(problem!("{n} values: must be {expected}"));
+        }
+        self.lines += 1;
+        Ok(self.push_numbers(numbers, arrived_ns))
+    }
+
+    /// Whether a line has the numbers of the layout.
+    #[must_use]
+    pub fn fits(&self, line: &TextLine) -> bool {
+        self.numbers(&line.text).is_some()
+    }
+
+    /// The numbers of a line, NaN in the columns that are left out; `None` if it is no line of the layout.
+    fn numbers(&self, text: &str) -> Option<Vec<f64>> {
+        let cells = cells(text);
+        let mut numbers = vec![f64::NAN; cells.len()];
+        if numbers.len() != self.layout.fields {
+            return None;
+        }
+        let clocks = self.layout.time.iter().map(|(field, _)| field);
+        for &field in self.layout.values.iter().chain(clocks) {
+            numbers[field] = number(&cells[field])?;
+        }
+        Some(numbers)
+    }
+
+    fn push_numbers(&mut self, numbers: &[f64], arrived_ns: i64) -> Option<(i64, &[f32])> {
+        if self.begun.is_none() {
+            let stamp = match self.layout.time[..] {
+                [] => None,
+                [(field, _)] => Some(numbers[field]),
+                _ => Some(self.layout.time.iter().map(|&(field, unit_us)| numbers[field] * unit_us).sum()),
+            };
+            self.begun = Some((stamp, arrived_ns));
+            self.values.clear();
+        }
+        let turned = self.layout.turned;
+        // Values of frames have 32 bits, as in recordings.
+        #[allow(clippy::cast_possible_truncation)]
+        let value = |&field: &usize| match turned {
+            Some(from) => from as f32 - numbers[field] as f32,
+            None => numbers[field] as f32,
+        };
+        self.values.extend(self.layout.values.iter().map(value));
+        self.rows += 1;
+        match self.layout.end {
+            FrameEnd::Lines(lines) if self.rows == lines as u64 => self.end_frame(),
+            FrameEnd::EmptyLine if self.values.len() > self.layout.array.len() => {
+                self.discard();
+                None
+            }
+            _ => None,
+        }
+    }
+
+    /// Ends a frame at an empty line; a frame that lacks lines is left out, and its lines are counted.
+    fn end_at_empty_line(&mut self) -> Option<(i64, &[f32])> {
+        if self.begun.is_some() && self.values.len() == self.layout.array.len() {
+            return self.end_frame();
+        }
+        self.discard();
+        None
+    }
+
+    fn end_frame(&mut self) -> Option<(i64, &[f32])> {
+        let (stamp, arrived_ns) = self.begun.take()?;
+        let rows = std::mem::take(&mut self.rows);
+        let Some(t) = self.faults.time(stamp, arrived_ns) else {
+            self.faults.strange_lines(rows);
+            return None;
+        };
+        self.faults.missing(self.values.iter().copied().map(f64::from));
+        // Lines that came in one packet have one arrival time.
+        let t = self.last.map_or(t, |last| t.max(last + 1));
+        self.last = Some(t);
+        Some((t, &self.values))
+    }
+
+    /// Leaves out an unfinished frame.
+    fn discard(&mut self) {
+        self.begun = None;
+        self.values.clear();
+        let rows = std::mem::take(&mut self.rows);
+        self.faults.strange_lines(rows);
+    }
+
+    /// Whether a line names the columns.
+    fn names_columns(&self, text: &str) -> bool {
+        let cells = cells(text);
+        cells.len() == self.layout.fields && cells.iter().all(|cell| number(cell).is_none())
+    }
+
+    /// Handles an interruption: the next line begins a frame.
+    pub fn restart(&mut self) {
+        self.discard();
+    }
+
+    /// Counts bytes that are in no line.
+    pub fn count_left_out(&mut self, bytes: LeftOut) {
+        self.faults.count_left_out(bytes);
+    }
+
+    /// Number of lines, without empty ones and those of names.
+    #[must_use]
+    pub fn lines(&self) -> u64 {
+        self.lines
+    }
+
+    /// What is wrong with the lines so far, as a verdict states it.
+    #[must_use]
+    pub fn found(&self) -> DamageCounts {
+        self.faults.found()
+    }
+}
+
+/// The cells of a line, which semicolons (then a comma may be a decimal one), commas, tabs or blanks separate; a separator may
+/// end the line.
+pub(crate) fn cells(text: &str) -> Vec<Cow<'_, str>> {
+    let text = text.trim();
+    let Some(separator) = [';', ',', '\t'].into_iter().find(|&separator| text.contains(separator)) else {
+        return text.split_whitespace().map(Cow::Borrowed).collect();
+    };
+    let mut cells: Vec<&str> = text.split(separator).map(str::trim).collect();
+    if cells.last().is_some_and(|cell| cell.is_empty()) {
+        cells.pop();
+    }
+    let decimal =
+        |cell: &'_ str| if separator == ';' && cell.contains(',') { Some(cell.replace(',', ".")) } else { None };
+    cells.into_iter().map(|cell| decimal(cell).map_or(Cow::Borrowed(cell), Cow::Owned)).collect()
+}
+
+/// The number in a cell, if it is one that frames hold.
+pub(crate) fn number(cell: &str) -> Option<f64> {
+    cell.parse().ok().filter(|&value| is_held(value))
+}
+
+/// A frame as a message: its time, us, and its values.
+pub fn write_message(t: i64, values: &[f32], out: &mut Vec<u8>) {
+    out.clear();
+    out.extend_from_slice(&t.to_le_bytes());
+    values.iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
+}
+
+/// The time of a frame's message, us, and its values.
+///
+/// # Panics
+///
+/// If the message was not made by [`write_message`].
+pub fn read_message(message: &[u8]) -> (i64, impl Iterator<Item = f32> + '_) {
+    let (t, values) = message.split_first_chunk().expect("a message begins with its time");
+    let value = |four: &[u8]| f32::from_le_bytes([four[0], four[1], four[2], four[3]]);
+    (i64::from_le_bytes(*t), values.chunks_exact(4).map(value))
+}

@@ -1,0 +1,160 @@
+//! Lines of text from a serial line, a pipe, a file that grows, TCP or UDP, as they arrive.
+
+use std::fs::File;
+use std::io::{self, ErrorKind, Read};
+use std::net::UdpSocket;
+use std::os::fd::{AsFd, AsRawFd, RawFd};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use crate::line_place::LinePlace;
+use crate::recording::now_ns;
+use crate::serial_line::{CONNECT, SerialLine};
+use crate::text_lines::{TextLine, TextLines};
+use crate::{Error, Result};
+
+/// Interval at which a failed line is opened again, and the end is checked.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+
+/// Longest line, bytes; a longer one is not a line of numbers, and what follows in it is left out.
+const LONGEST: usize = 1 << 16;
+
+/// The largest datagram that UDP can carry.
+const DATAGRAM_BYTES: usize = 1 << 16;
+
+/// Reads lines as they arrive.
+pub struct LineReader {
+    place: LinePlace,
+    input: Option<OpenInput>,
+    /// The lines that arrived.
+    pub lines: TextLines,
+    /// When the last bytes arrived, ns since 1970.
+    pub came_ns: i64,
+    /// Whether the next line may lack its beginning, as of a serial line that was just opened.
+    pub is_cut: bool,
+    piece: Vec<u8>,
+}
+
+enum OpenInput {
+    Serial(SerialLine),
+    File(File),
+    Udp(UdpSocket),
+}
+
+impl LineReader {
+    /// Opens the place.
+    ///
+    /// # Errors
+    ///
+    /// `Socket` or `File` if it cannot be opened.
+    pub fn open(place: &LinePlace) -> Result<Self> {
+        let input = Some(OpenInput::open(place)?);
+        let bytes = if matches!(place, LinePlace::Udp(_)) { DATAGRAM_BYTES } else { 4096 };
+        let is_cut = matches!(place, LinePlace::Serial(_));
+        let lines = TextLines::new(LONGEST);
+        Ok(Self { place: place.clone(), input, lines, came_ns: 0, is_cut, piece: vec![0; bytes] })
+    }
+
+    /// The next line and when it arrived, ns since 1970, if one waits; the last one may lack its end where no more can
+    /// arrive (`ended`).
+    pub fn next(&mut self, ended: bool) -> Option<(TextLine, i64)> {
+        self.lines.next(ended).map(|line| (line, self.came_ns))
+    }
+
+    /// Waits briefly for more bytes; returns whether no more can arrive.
+    ///
+    /// # Errors
+    ///
+    /// Those of the system: the line has hung up.
+    pub fn fill(&mut self) -> io::Result<bool> {
+        let n = match &mut self.input {
+            None => {
+                std::thread::sleep(LOOK_EVERY);
+                0
+            }
+            Some(OpenInput::Serial(line)) => line.read(&mut self.piece, LOOK_EVERY)?,
+            Some(OpenInput::Udp(socket)) => match socket.recv(&mut self.piece) {
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => 0,
+                received => received?,
+            },
+            Some(OpenInput::File(file)) if is_readable(file.as_raw_fd(), LOOK_EVERY) => {
+                match file.read(&mut self.piece) {
+                    Ok(0) if self.place == LinePlace::File(PathBuf::from("-")) => return Ok(true),
+                    // A pipe without a writer, or the end of a file: a program may still write to it.
+                    Ok(0) => {
+                        std::thread::sleep(LOOK_EVERY);
+                        0
+                    }
+                    Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => 0,
+                    read => read?,
+                }
+            }
+            Some(OpenInput::File(_)) => 0,
+        };
+        if n > 0 {
+            self.came_ns = now_ns();
+            self.lines.push(&self.piece[..n]);
+            if matches!(self.place, LinePlace::Udp(_)) && self.piece[n - 1] != b'\n' {
+                // The end of a datagram ends its last line.
+                self.lines.push(b"\n");
+            }
+        }
+        Ok(false)
+    }
+
+    /// An error of the system, which names the place.
+    #[must_use]
+    pub fn broken(&self, error: io::Error) -> Error {
+        match &self.place {
+            LinePlace::Serial(place) | LinePlace::Tcp(place) => Error::socket(place.name())(error),
+            LinePlace::File(path) => Error::file(path)(error),
+            LinePlace::Udp(address) => Error::socket(format!("UDP {address}"))(error),
+        }
+    }
+
+    /// Opens the line again, and leaves out an incomplete line.
+    pub fn reopen(&mut self) {
+        self.lines.discard();
+        // A port that is open is not opened again.
+        self.input = None;
+        self.input = OpenInput::open(&self.place).ok();
+        if self.input.is_none() {
+            std::thread::sleep(LOOK_EVERY);
+            self.input = OpenInput::open(&self.place).ok();
+        }
+        self.is_cut = matches!(self.place, LinePlace::Serial(_));
+    }
+}
+
+impl OpenInput {
+    fn open(place: &LinePlace) -> Result<Self> {
+        match place {
+            LinePlace::Serial(place) | LinePlace::Tcp(place) => SerialLine::open(place, CONNECT).map(Self::Serial),
+            LinePlace::File(path) if path == Path::new("-") => {
+                // Bypasses the program's own buffer, whose content `poll` does not see.
+                let input = io::stdin().as_fd().try_clone_to_owned().map_err(Error::file(path))?;
+                Ok(Self::File(File::from(input)))
+            }
+            LinePlace::File(path) => {
+                let file = File::options().read(true).custom_flags(libc::O_NONBLOCK).open(path);
+                Ok(Self::File(file.map_err(Error::file(path))?))
+            }
+            LinePlace::Udp(address) => {
+                let socket = UdpSocket::bind(address).and_then(|socket| {
+                    socket.set_read_timeout(Some(LOOK_EVERY))?;
+                    Ok(socket)
+                });
+                Ok(Self::Udp(socket.map_err(Error::socket(format!("UDP {address}")))?))
+            }
+        }
+    }
+}
+
+/// Waits until data can be read, or the end was reached.
+fn is_readable(descriptor: RawFd, most: Duration) -> bool {
+    let mut asked = libc::pollfd { fd: descriptor, events: libc::POLLIN, revents: 0 };
+    let most = i32::try_from(most.as_millis()).unwrap_or(i32::MAX);
+    // SAFETY: one entry, on our stack, of a descriptor that the caller holds open.
+    unsafe { libc::poll(&raw mut asked, 1, most) > 0 }
+}

@@ -1,0 +1,242 @@
+"""Frames of numbers live: a readout detects the same as in the recording that is made beside it."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from loopback import until
+from numpy.typing import NDArray
+from shell import call
+
+import taxel
+from live.boards import LOOPBACK
+from taxel import Array, Frames, Tare
+from taxel.detect import PlainRule, Readout, run
+from taxel.detect.readout import run_counting
+from taxel.detections import Detection
+from taxel.encode import LevelCrossing
+from taxel.live import Live
+from taxel.neuron import Neuron
+
+PERIOD_US = 10_000
+
+
+@contextlib.contextmanager
+def served(text: str, *, at_once: bool = True) -> Iterator[str]:
+    """Yield the address of a server that sends a text to whoever connects, in pieces, and then waits."""
+    over = threading.Event()
+    with socket.create_server((LOOPBACK, 0)) as server:
+
+        def serve() -> None:
+            with contextlib.suppress(OSError):
+                connection, _ = server.accept()
+                with connection:
+                    data, size = text.encode(), 1_000_000 if at_once else 97
+                    for begin in range(0, len(data), size):
+                        connection.sendall(data[begin : begin + size])
+                    over.wait(30)
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        try:
+            yield f"{LOOPBACK}:{server.getsockname()[1]}"
+        finally:
+            over.set()
+            thread.join(10)
+
+
+def touches(rng: np.random.Generator, rows: int, columns: int, count: int, unit: str) -> NDArray[np.float64]:
+    """Return frames with noise and touches, as a maker's sensor prints them: whole counts, else decimals."""
+    values = rng.normal(0.0, 0.4, (count, rows, columns))
+    for begin in range(20, count - 20, 40):
+        y, x = rng.integers(rows), rng.integers(columns)
+        values[begin : begin + 15, max(0, y - 1) : y + 2, max(0, x - 1) : x + 2] += 60.0
+    return np.rint(np.abs(values) * 4) if unit == "counts" else np.round(values - 0.1, 3)
+
+
+def lines_of(
+    values: NDArray[np.float64], t_us: NDArray[np.int64] | None = None, a_frame: int = 1, end: str = ""
+) -> str:
+    """Return a line for each frame, or several, with the time first if it is given."""
+    text = []
+    for k, frame in enumerate(values):
+        for row in frame.reshape(a_frame, -1):
+            stamp = [] if t_us is None else [str(t_us[k])]
+            text.append(",".join([*stamp, *(f"{value:g}" for value in row)]))
+        text.extend([end] * bool(end))
+    return "\n".join(text).replace("BLANK", "") + "\n"
+
+
+def readout_of(rows: int, columns: int, unit: str) -> Readout:
+    """Return a readout that fires when any taxel rises."""
+    taxels, level = rows * columns, 100.0 if unit == "counts" else 25.0
+    weights = np.tile([1.0, 0.0], taxels)
+    encoder = LevelCrossing([level])
+    return Readout(encoder, {"contact": (Neuron(tau=2.0), weights, 0.5)}, array=Array(rows, columns), unit=unit)
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "unit"), [(1, 1, "counts"), (3, 5, "kPa"), (16, 16, "N"), (64, 64, "counts")]
+)
+@pytest.mark.parametrize("kind", ["readout", "rule"])
+def test_a_readout_detects_the_same_live_and_in_the_recording_beside_it(
+    tmp_path: Path, rows: int, columns: int, unit: str, kind: str
+) -> None:
+    rng = np.random.default_rng(rows * columns)
+    values = touches(rng, rows, columns, 300, unit)
+    t = np.cumsum(rng.integers(PERIOD_US - 900, PERIOD_US + 900, len(values))) + 5_000_000_000
+    detector: Readout | PlainRule = readout_of(rows, columns, unit)
+    if kind == "rule":
+        tare = Tare.take(Frames(np.zeros((2, rows, columns)), [0, 1], unit=unit))
+        detector = PlainRule("area", 1.0, 1.0, noise_floor=20.0, unit=unit, tare=tare)
+    path = tmp_path / "mat.mcap"
+    found: list[Detection] = []
+    with served(lines_of(values, t)) as address:
+        source = f"mat=lines+tcp:{address},array={rows}x{columns},time=1:us,unit={unit}"
+        with Live(readout=detector, sources=source, record=path, say=found.append) as live:
+            assert (live.array.shape, live.unit, live.name) == ((rows, columns), unit, "mat")
+            until(lambda: live.counters["frames"] == len(values))
+            assert live.frame.shape == (rows, columns)
+            summary = live.stop()
+    recording = taxel.open(path)
+    frames = recording.frames()
+    assert np.array_equal(frames.t, t)
+    assert np.array_equal(frames.values, values.astype(np.float32))
+    assert (frames.unit, recording.frame_us) == (unit, live.frame_us)
+    assert summary.verdict.status == recording.verdict.status == "complete after arrival"
+    expected = run(detector, recording)
+    # A taxel without neighbours has no area.
+    assert len(expected) >= (0 if (rows, columns, kind) == (1, 1, "rule") else 5)
+    assert [(d.label, d.t, d.known) for d in found] == [(d.label, d.t, d.known) for d in expected]
+    assert [(d.label, d.t, d.known) for d in recording.detections] == [(d.label, d.t, d.known) for d in expected]
+
+
+def test_what_the_frames_are_cut_into_changes_nothing(tmp_path: Path) -> None:
+    values = touches(np.random.default_rng(3), 4, 6, 200, "kPa")
+    t = np.arange(len(values)) * PERIOD_US
+    found = []
+    for k, options in enumerate(["", "frame_lines=4", "frame_end=blank"]):
+        path, lines = tmp_path / f"{k}.mcap", 4 if options else 1
+        text = lines_of(values, t, lines, "BLANK" if "blank" in options else "")
+        with served(text, at_once=False) as address:
+            source = f"lines+tcp:{address},array=4x6,time=1:us,rate=100,unit=kPa" + f",{options}" * bool(options)
+            told: list[Detection] = []
+            with Live(readout=readout_of(4, 6, "kPa"), sources=source, record=path, say=told.append) as live:
+                # An empty line ends a frame: that of the last one came with it.
+                until(lambda live=live: live.counters["frames"] == len(values))  # type: ignore[misc]
+            found.append([(d.t, d.known) for d in told])
+        assert np.array_equal(taxel.open(path).frames().values, values.astype(np.float32))
+    assert found[0]
+    assert found == [found[0]] * 3
+
+
+def test_lines_that_are_no_frame_are_counted_and_the_next_frame_is_whole(tmp_path: Path) -> None:
+    text = "Hello from the mat\n1,2\n3,4\n\n5,6\n7\n9,9\n\nnan,2\n3,4\n\n-1,-2.5\n1e3,4\n\n"
+    with served(text) as address:
+        source = f"lines+tcp:{address},array=2x2,columns=a:b,frame_end=blank,rate=10"
+        with Live(sources=source, record=tmp_path / "a.mcap") as live:
+            until(lambda: live.counters["frames"] == 3)
+            summary = live.stop()
+    frames = taxel.open(tmp_path / "a.mcap").frames()
+    expected = [[[1, 2], [3, 4]], [[np.nan, 2], [3, 4]], [[-1, -2.5], [1e3, 4]]]
+    assert np.array_equal(frames.values, np.array(expected, np.float32), equal_nan=True)
+    assert np.all(np.diff(frames.t) > 0)
+    counts = summary.counters["lines"]
+    assert (counts["lines"], counts["strange"]) == (10, 4)
+    assert summary.verdict.damaged == {"lines_that_could_not_be_read": 4}
+    assert taxel.open(tmp_path / "a.mcap").verdict.damaged == summary.verdict.damaged
+
+
+def test_readings_that_fall_are_turned(tmp_path: Path) -> None:
+    with served("1000,1023\n900,1023\n0,1020\n") as address:
+        source = f"lines+tcp:{address},array=1x2,falls=1023,rate=10"
+        with Live(sources=source, record=tmp_path / "a.mcap") as live:
+            until(lambda: live.counters["frames"] == 3)
+    assert taxel.open(tmp_path / "a.mcap").frames().values[:, 0].tolist() == [[23, 0], [123, 0], [1023, 3]]
+
+
+def test_a_tare_is_measured_and_the_recording_tells_the_same(tmp_path: Path) -> None:
+    rng = np.random.default_rng(11)
+    values = touches(rng, 8, 8, 400, "N") + rng.uniform(5, 9, (8, 8)).round(3)
+    values[:60] = np.round(rng.normal(0, 0.2, (60, 8, 8)) + 7.0, 3)
+    values = np.round(values, 3)
+    t = np.arange(len(values)) * PERIOD_US
+    rule = PlainRule("total", 60.0, 0.6, noise_floor=2.0, unit="N")
+    path = tmp_path / "a.mcap"
+    with served(lines_of(values, t)) as address:
+        source = f"lines+tcp:{address},array=8x8,time=1:us,unit=N"
+        found: list[Detection] = []
+        with Live(readout=rule, tare=0.5, sources=source, record=path, say=found.append) as live:
+            until(lambda: live.counters["frames"] == len(values))
+            summary = live.stop()
+    recording = taxel.open(path)
+    assert summary.tare is not None
+    tare = Tare.take(recording.frames(), start_us=0, stop_us=500_000)
+    assert np.array_equal(summary.tare.rest, tare.rest)
+    expected = run_counting(rule, recording, tare=summary.tare, begin_us=500_000)[0]
+    assert found
+    assert [(d.label, d.t, d.known) for d in found] == [(d.label, d.t, d.known) for d in expected]
+
+
+def test_lines_of_the_standard_input_are_read_to_their_end(tmp_path: Path) -> None:
+    values = touches(np.random.default_rng(5), 16, 16, 200, "counts")
+    detector, path = tmp_path / "a.json", tmp_path / "a.mcap"
+    readout_of(16, 16, "counts").save(detector)
+    text = lines_of(values, np.arange(len(values)) * PERIOD_US)
+    words = ["live", "--source", "lines:-,array=16x16,time=1:us", "--readout", detector, "--record", path, "--json"]
+    done = subprocess.run(
+        [sys.executable, "-m", "taxel", *map(str, words)],
+        input=text,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    expected = run(Readout.load(detector), taxel.open(path))
+    assert len(done.stdout.splitlines()) == len(expected) > 3
+
+
+def test_numbers_that_a_program_passes_are_frames(tmp_path: Path) -> None:
+    values = touches(np.random.default_rng(5), 2, 3, 100, "N")
+    path = tmp_path / "a.mcap"
+    readout, source, found = readout_of(2, 3, "N"), "skin=given,array=2x3,rate=100,unit=N", []
+    with Live(readout=readout, sources=source, record=path, say=found.append) as live:
+        for k, frame in enumerate(values):
+            live.sample("skin", frame.reshape(-1), 1_000_000_000 + k * 10_000_000)
+        summary = live.stop()
+    assert summary.counters["frames"] == len(values)
+    assert found
+    assert [(d.t, d.known) for d in found] == [(d.t, d.known) for d in run(readout, taxel.open(path))]
+
+
+def test_a_readout_of_another_unit_or_shape_is_refused(tmp_path: Path) -> None:
+    for options, why in [
+        ("array=2x2,unit=kPa", "live values in kPa, and the readout was trained on N"),
+        ("array=2x3,unit=N", "trained on 2 x 2"),
+        ("array=2x2,columns=a:b:c", "lines have 3 values: must be 4 a frame"),
+        ("array=2x2,frame_lines=3", "lines have 1 values, 3 lines a frame: must be 4 a frame"),
+    ]:
+        with pytest.raises(taxel.ProblemError, match=why):
+            Live(readout=readout_of(2, 2, "N"), sources=f"given,{options},rate=10", record=tmp_path / "a.mcap")
+        assert not (tmp_path / "a.mcap").exists()
+
+
+def test_where_nothing_arrives_there_is_no_empty_board(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with served("t_ms,a,b\n1,2,3\n11,4,5\n21,6,7\n") as address:
+        path = tmp_path / "a.mcap"
+        words = ("record", path, "--source", f"imu=lines+tcp:{address}", "--seconds", "0.3")
+        code, out, err = call(capsys, *words)
+    assert (code, "UDP" in err) == (0, False), out
+    recording = taxel.open(path)
+    assert (list(recording.sources), recording.frames().values[:, 0].tolist()) == (["imu"], [[2, 3], [4, 5], [6, 7]])
+    assert recording.frames().t.tolist() == [1000, 11_000, 21_000]
+    assert recording.columns == ["a", "b"]
