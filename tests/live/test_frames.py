@@ -152,7 +152,47 @@ def test_lines_that_are_no_frame_are_counted_and_the_next_frame_is_whole(tmp_pat
     counts = summary.counters["lines"]
     assert (counts["lines"], counts["strange"]) == (10, 4)
     assert summary.verdict.damaged == {"lines_that_could_not_be_read": 4}
+    kinds = {kind: (found["lines"], found["first"]) for kind, found in counts["unread"].items()}
+    assert kinds == {
+        "text": (1, "Hello from the mat"), "other_length": (1, "7"), "no_text": (0, ""), "unfinished_frames": (2, ""),
+    }  # fmt: skip
     assert taxel.open(tmp_path / "a.mcap").verdict.damaged == summary.verdict.damaged
+
+
+def test_kinds_of_lines_that_are_no_frame_are_named_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = "Mat 1.0 ready\n1,2\n3\n4,5\nERR 7\n6,7\n8,9\n"
+    with served(text) as address:
+        words = (
+            "record",
+            tmp_path / "a.mcap",
+            "--source",
+            f"lines+tcp:{address},array=1x2,rate=10",
+            "--seconds",
+            "0.4",
+        )
+        code, out, err = call(capsys, *words)
+    assert code == 0
+    assert "4 frames" in out.replace("\n", " ")
+    assert err.count("2 lines of text, the first: 'Mat 1.0 ready'") == 1
+    assert err.count("1 line with another number of values, the first: '3'") == 1
+
+
+def test_a_layout_file_names_a_source(tmp_path: Path) -> None:
+    layout = tmp_path / "mat.layout.toml"
+    with served("t,x,a,b\n0,hi,1000,1023\n20,hi,900,1023\n") as address:
+        layout.write_text(
+            'rows = 1\ncolumns = 2\npitch_mm = 5\nunit = "kPa"\nfalls = 1023\nrate_hz = 50\n\n[source]\n'
+            f'place = "lines+tcp:{address}"\ntime = "t:ms"\nleave_out = ["x"]\n'
+        )
+        with Live(sources=f"mat={layout}", record=tmp_path / "a.mcap") as live:
+            assert (live.name, live.unit, live.frame_us, live.array.shape) == ("mat", "kPa", 20_000.0, (1, 2))
+            until(lambda: live.counters["frames"] == 2)
+    frames = taxel.open(tmp_path / "a.mcap").frames()
+    assert (frames.t.tolist(), frames.values[:, 0].tolist()) == ([0, 20_000], [[23, 0], [123, 0]])
+    assert frames.array.pitch_mm == 5
+    layout.write_text("rows = 1\ncolumns = 2\n")
+    with pytest.raises(taxel.FormatError, match=r"has no \[source\] place"):
+        Live(sources=str(layout))
 
 
 def test_readings_that_fall_are_turned(tmp_path: Path) -> None:

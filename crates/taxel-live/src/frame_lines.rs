@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use serde::Serialize;
 use taxel_core::{Array, problem};
 
 use crate::recording::{DamageCounts, FrameProperties, StreamFaults, is_held};
@@ -82,11 +83,46 @@ impl FrameLayout {
     }
 }
 
+/// Lines that are no part of a frame, by kind, with the first of each.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct UnreadLines {
+    /// Lines of text.
+    pub text: UnreadKind,
+    /// Lines with another number of values.
+    pub other_length: UnreadKind,
+    /// Lines with bytes that are no text, as of another speed of a serial line.
+    pub no_text: UnreadKind,
+    /// Lines of frames that lack lines, or of which the time is none.
+    pub unfinished_frames: UnreadKind,
+}
+
+/// Lines of a kind.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct UnreadKind {
+    /// Their number.
+    pub lines: u64,
+    /// The beginning of the first one.
+    pub first: String,
+}
+
+/// Length of the first line of a kind, as it is kept, characters.
+const SHOWN: usize = 40;
+
+impl UnreadKind {
+    fn count(&mut self, lines: u64, text: &str) {
+        if self.lines == 0 && lines > 0 {
+            self.first = text.chars().take(SHOWN).collect();
+        }
+        self.lines += lines;
+    }
+}
+
 /// Makes frames of lines as they arrive, and counts what is in no frame.
 #[derive(Debug)]
 pub struct FrameAssembler {
     layout: FrameLayout,
     faults: StreamFaults,
+    unread: UnreadLines,
     lines: u64,
     /// The values of the frame so far, its first stamp and the arrival of its first line, ns since 1970.
     values: Vec<f32>,
@@ -106,7 +142,7 @@ impl FrameAssembler {
             _ => 1.0,
         });
         let values = Vec::with_capacity(layout.array.len());
-        Self { layout, faults, lines: 0, values, begun: None, rows: 0, last: None }
+        Self { layout, faults, unread: UnreadLines::default(), lines: 0, values, begun: None, rows: 0, last: None }
     }
 
     /// How lines make frames.
@@ -129,7 +165,7 @@ impl FrameAssembler {
         match self.numbers(text).filter(|_| !line.cut) {
             Some(numbers) => self.push_numbers(&numbers, arrived_ns),
             None => {
-                self.faults.strange_lines(1);
+                self.count_unread(text);
                 self.discard();
                 None
             }
@@ -168,6 +204,19 @@ impl FrameAssembler {
             numbers[field] = number(&cells[field])?;
         }
         Some(numbers)
+    }
+
+    /// Counts a line that is no part of a frame.
+    fn count_unread(&mut self, text: &str) {
+        self.faults.strange();
+        let is_text = !text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t'));
+        let cells = cells(text);
+        let kind = match cells.iter().all(|cell| number(cell).is_some()) {
+            _ if !is_text => &mut self.unread.no_text,
+            true => &mut self.unread.other_length,
+            false => &mut self.unread.text,
+        };
+        kind.count(1, text);
     }
 
     fn push_numbers(&mut self, numbers: &[f64], arrived_ns: i64) -> Option<(i64, &[f32])> {
@@ -212,7 +261,7 @@ impl FrameAssembler {
         let (stamp, arrived_ns) = self.begun.take()?;
         let rows = std::mem::take(&mut self.rows);
         let Some(t) = self.faults.time(stamp, arrived_ns) else {
-            self.faults.strange_lines(rows);
+            self.count_unfinished(rows);
             return None;
         };
         self.faults.missing(self.values.iter().copied().map(f64::from));
@@ -227,7 +276,18 @@ impl FrameAssembler {
         self.begun = None;
         self.values.clear();
         let rows = std::mem::take(&mut self.rows);
+        self.count_unfinished(rows);
+    }
+
+    fn count_unfinished(&mut self, rows: u64) {
         self.faults.strange_lines(rows);
+        self.unread.unfinished_frames.count(rows, "");
+    }
+
+    /// Lines that are no part of a frame, by kind.
+    #[must_use]
+    pub fn unread(&self) -> &UnreadLines {
+        &self.unread
     }
 
     /// Whether a line names the columns.

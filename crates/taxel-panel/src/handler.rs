@@ -202,6 +202,9 @@ pub trait BoardRequests: Send + Sync {
     /// Receives the board's datagrams on another address.
     fn listen(&self, host: &str, port: u16) -> Reply<()>;
 
+    /// Receives another source, as a text names it.
+    fn read_source(&self, source: &str) -> Reply<()>;
+
     /// Interprets intensities as differences, or as values.
     fn set_differences(&self, on: bool) -> Reply<()>;
 

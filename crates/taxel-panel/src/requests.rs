@@ -12,6 +12,7 @@ use taxel_core::Array;
 use taxel_core::encode::Encoder;
 use taxel_core::held::UNKNOWN;
 use taxel_live::locked::lock;
+use taxel_live::pipeline::{SourcePreview, SourceText};
 use taxel_live::ports::ports;
 
 use super::handler::{Cut, Detected, LabelRow, TrainingResult};
@@ -25,6 +26,9 @@ use super::protocol::messages::{FoundDetection, InterfaceAddress, Message};
 use super::protocol::refusal::{Answer, Refusal};
 use super::protocol::request::{Id, RecordRequest, Request, RestHow, Taxel};
 use super::readout_encoders::ReadoutEncoders;
+
+/// How long lines of a source are read to show them.
+const PREVIEW: Duration = Duration::from_secs(2);
 
 /// Carries out a request; `shown` is the recording that the client shows. Returns the message for that client alone.
 ///
@@ -77,6 +81,11 @@ pub(super) async fn carry_out(
         Request::Rest { how } => rest(&hub, how)?,
         Request::Zero { taxels } => zero(&hub, taxels.0).await?,
         Request::Places {} => return places(&hub).await.map(Some),
+        Request::ReadSource { source } => {
+            check_restart(&hub)?;
+            hub.ask(move |handlers| handlers.board.read_source(&source.0)).await?;
+        }
+        Request::PreviewSource { source } => return preview(source.0).await.map(Some),
         Request::DeltaIntensity { on } => {
             check_restart(&hub)?;
             hub.ask(move |handlers| handlers.board.set_differences(on)).await?;
@@ -143,6 +152,14 @@ async fn places(hub: &Hub) -> Answer<Message> {
     let addresses = hub.ask(|handlers| handlers.board.addresses()).await?;
     let addresses = addresses.into_iter().map(|(host, name)| InterfaceAddress { host, name }).collect();
     Ok(Message::Places { serial, addresses })
+}
+
+/// Reads what arrives from a source of lines.
+async fn preview(source: String) -> Answer<Message> {
+    let read = move || source.parse::<SourceText>().and_then(|source| SourcePreview::read(&source, PREVIEW));
+    let found = tokio::task::spawn_blocking(read).await.map_err(|_| Refusal::bug("source:"))?;
+    let SourcePreview { lines, source, about } = found?;
+    Ok(Message::SourcePreview { lines, source, about })
 }
 
 fn rest(hub: &Hub, how: RestHow) -> Answer {

@@ -5,6 +5,7 @@ import { make, part, write } from "./dom.js";
 /** @typedef {import("./messages.js").Hello} Hello */
 /** @typedef {import("./messages.js").Places} Places */
 /** @typedef {import("./messages.js").Port} Port */
+/** @typedef {import("./messages.js").SourcePreview} SourcePreview */
 /** @typedef {import("./server.js").Server} Server */
 /** @typedef {import("./settings.js").Settings} Settings */
 /** @typedef {{ label: string, choices: { address: string, text: string }[] }} Group */
@@ -16,8 +17,8 @@ const MOST_LINES = 200;
 /** An address to choose from a list, or to type, and to connect to: a serial port, or host and port. */
 class AddressForm {
   /**
-   * @param {"control" | "udp"} name of its parts in the page
-   * @param {"lines" | "addresses"} setting the setting that stores earlier addresses
+   * @param {"control" | "udp" | "numbers"} name of its parts in the page
+   * @param {"lines" | "addresses" | "sources"} setting the setting that stores earlier addresses
    * @param {Settings} settings
    * @param {(address: string) => Promise<void>} connect
    */
@@ -104,6 +105,21 @@ export class Connection {
       const [host, port] = hostAndPort(address);
       return server.request({ type: "listen", host, port });
     });
+    this.source = new AddressForm("numbers", "sources", settings, (source) => server.request({ type: "read_source", source }));
+    part("numbers-look", HTMLButtonElement).onclick = () => {
+      write(part("numbers-about", HTMLElement), "Reading for two seconds …");
+      server.request({ type: "preview_source", source: this.source.input.value.trim() }).then(() => this.source.refuse(null), (error) => {
+        write(part("numbers-about", HTMLElement), "");
+        this.source.refuse(error.message);
+      });
+    };
+    const falls = part("numbers-falls", HTMLInputElement);
+    falls.onchange = () => {
+      const others = this.source.input.value.split(",").filter((key) => !key.startsWith("falls="));
+      this.source.input.value = [...others, ...(falls.checked ? ["falls=true"] : [])].join(",");
+      this.showSource();
+    };
+    this.source.input.oninput = () => this.showSource();
     const drop = part("control-drop", HTMLButtonElement);
     drop.onclick = () => server.request({ type: "control", place: null }).then(() => this.line.refuse(null), failed);
     part("places-again", HTMLButtonElement).onclick = () => this.look();
@@ -117,13 +133,32 @@ export class Connection {
       });
   }
 
+  /** Ticks "Turn values" as the source says, and shows the command that reads the same. */
+  showSource() {
+    const source = this.source.input.value.trim();
+    part("numbers-falls", HTMLInputElement).checked = /,falls=(?!false)/.test(source);
+    const command = part("numbers-command", HTMLElement);
+    command.hidden = !source;
+    write(command, source && `In a shell: taxel live --panel --source '${source}'`);
+  }
+
+  /** Shows what arrives from a source, and what it seems to be. @param {SourcePreview} preview */
+  preview({ lines, source, about }) {
+    const list = part("numbers-lines", HTMLElement);
+    list.replaceChildren(...lines.map((line) => make("li", {}, line)));
+    list.hidden = !lines.length;
+    write(part("numbers-about", HTMLElement), about);
+    this.source.input.value = source;
+    this.showSource();
+  }
+
   /** Asks which ports and addresses there are. */
   look() {
     this.server.send({ type: "places" });
   }
 
   /** @param {Hello} hello */
-  greet({ live, options, udp, control, delta_intensity }) {
+  greet({ live, options, udp, lines, control, delta_intensity }) {
     const where = part("where", HTMLDetailsElement);
     where.hidden = !live;
     // Without a line there is something to choose.
@@ -132,17 +167,20 @@ export class Connection {
     this.udp = udp ?? "";
     this.line.at(control);
     this.events.at(udp);
+    if (lines !== null && !this.source.input.value) this.source.at(lines);
     part("control-drop", HTMLButtonElement).disabled = control === null;
     part("delta-intensity", HTMLInputElement).checked = delta_intensity ?? false;
     const stated = Object.entries(options ?? {}).filter(([, value]) => value !== null && String(value) !== "");
     part("session-options", HTMLElement).replaceChildren(...stated.map(([name, value]) => make("li", {}, `${name}: ${value}`)));
-    write(part("where-info", HTMLElement), control ?? "no control line");
+    write(part("where-info", HTMLElement), lines ?? control ?? "no control line");
   }
 
   /** @param {Places} places */
   offer({ serial, addresses }) {
     const ports = serial.map((port) => ({ address: port.place, text: [port.place, described(port)].filter(Boolean).join(" · ") }));
     this.line.offer([{ label: "Serial ports", choices: ports }], "no serial port found: type a place below");
+    const sources = ports.map(({ address, text }) => ({ address: `serial:${address}`, text }));
+    this.source.offer([{ label: "Serial ports", choices: sources }], "no serial port found: type a source below");
     const port = hostAndPort(this.udp)[1] || 5208;
     const each = addresses.map(({ host, name }) => ({ address: `${host}:${port}`, text: `${host}:${port} · ${name}` }));
     const all = { address: `0.0.0.0:${port}`, text: `0.0.0.0:${port} · every address` };

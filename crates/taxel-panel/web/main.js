@@ -254,6 +254,8 @@ function receive(message) {
       return showZeroed();
     case "board_line":
       return board.connection.log(message.text);
+    case "source_preview":
+      return board.connection.preview(message);
     case "places":
       return board.connection.offer(message);
     case "cut":

@@ -405,6 +405,17 @@ export interface Places {
   addresses: InterfaceAddress[];
 }
 
+/** What arrives from a source of lines, when asked. */
+export interface SourcePreview {
+  type: "source_preview";
+  /** The last lines that arrived. */
+  lines: string[];
+  /** The source with what the lines show added to it: array, lines of a frame, time. */
+  source: string;
+  /** What the lines seem to be, in words. */
+  about: string;
+}
+
 /** The recorder, on each change and once a second while it counts or records. */
 export interface Recorder {
   type: "recorder";
@@ -848,6 +859,20 @@ export interface ListenRequest {
   port: number;
 }
 
+/** Receive another source instead, as `taxel live --source` names it. Time, values and the past that can be viewed begin anew. Refused while a recording runs. */
+export interface ReadSourceRequest {
+  type: "read_source";
+  id?: number;
+  source: string;
+}
+
+/** Requests `source_preview`: what arrives from a source of lines, for two seconds at most. */
+export interface PreviewSourceRequest {
+  type: "preview_source";
+  id?: number;
+  source: string;
+}
+
 /** Whether the board sends differences from the value before, not values. Earlier events were decoded with the other meaning, so the source begins anew: time, values, the past that can be viewed, a readout with its tare. Refused while a recording runs. */
 export interface DeltaIntensityRequest {
   type: "delta_intensity";
@@ -878,6 +903,7 @@ export type Message =
   | Zeroed
   | BoardLine
   | Places
+  | SourcePreview
   | Recorder
   | Recordings
   | Trained
@@ -931,6 +957,8 @@ export type Request =
   | ReadOutRequest
   | CutRequest
   | ListenRequest
+  | ReadSourceRequest
+  | PreviewSourceRequest
   | DeltaIntensityRequest
   | PlacesRequest
   | ControlRequest;

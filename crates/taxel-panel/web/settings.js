@@ -19,6 +19,7 @@ const OTHERS = {
   /** Where boards were before: an address a line, the last first. */
   lines: "",
   addresses: "",
+  sources: "",
 };
 
 /** @typedef {typeof OTHERS & Record<`show${string}`, boolean>} Values those of the lanes are in LANES */

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from taxel._base.arguments import shown
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._base.options import about
@@ -232,6 +233,28 @@ def left_out(lines: dict[str, Any]) -> str:
     )
     said = "".join(f", {counted(n, what)} {where}" for n, what, where in parts if n)
     return said + (f"; {lines['trouble']}" if lines["trouble"] else "")
+
+
+#: Kinds of lines that are no part of a frame, by their keys in the counters.
+_UNREAD = {
+    "text": "of text",
+    "other_length": "with another number of values",
+    "no_text": "that are no text: is the speed of the line right?",
+    "unfinished_frames": "of frames that lack lines",
+}
+
+
+def unread(counters: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str]:
+    """Yield what is wrong with lines of each source, each kind once: `told` holds those that were."""
+    for source, counts in {"": counters, **counters["sources"]}.items():
+        lines = counts.get("lines")
+        kinds = (lines if isinstance(lines, dict) else {}).get("unread") or {}
+        for kind, words in _UNREAD.items():
+            found = kinds.get(kind, {"lines": 0})
+            if found["lines"] and (source, kind) not in told:
+                told.add((source, kind))
+                first = f", the first: {shown(found['first'])}" * bool(found["first"])
+                yield f"{source + ': ' * bool(source)}{counted(found['lines'], 'line')} {words}{first}"
 
 
 def _frames_table(now: dict[str, Any], frames: str, lines: str) -> Table:

@@ -36,6 +36,7 @@ from taxel.cli.board import (
     outside,
     received,
     remote,
+    unread,
     with_live_options,
 )
 from taxel.cli.console import Console
@@ -267,6 +268,7 @@ def _watch(
     display = Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
     with asked_to_end() as end_request, display:
         before, warned, silence = None, False, ""
+        told: set[tuple[str, str]] = set()
         while not (end_request.is_set() or (panel is None and pipeline.is_over)) and (
             before is None or seconds is None or before["seconds"] < seconds
         ):
@@ -295,6 +297,8 @@ def _watch(
                 if fresh and pipeline.tare is not None:
                     fresh = False
                     _warn_of_unknown(pipeline.tare)
+            for line in unread(now, told):
+                say(f"taxel: {line}", err=True)
             if not warned and (wrong := outside(now, pipeline.array)):
                 say(f"taxel: {wrong}", err=True)
                 warned = True

@@ -31,6 +31,7 @@ from taxel.cli.board import (
     outside,
     received,
     remote,
+    unread,
     with_live_options,
 )
 from taxel.cli.console import Console
@@ -200,6 +201,7 @@ def _watch(
         console.print(keys)
     with Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True) as display:
         before, warned = live.counters, False
+        told: set[tuple[str, str]] = set()
         began = before["seconds"]
         if trial:
             # Markers that were received before belong to an earlier trial.
@@ -212,6 +214,8 @@ def _watch(
                 if markers and not start:
                     return
             now = live.counters
+            for line in unread(now, told):
+                say(f"taxel: {line}", err=True)
             if not warned and (wrong := outside(now, live.array)):
                 say(f"taxel: {wrong}", err=True)
                 warned = True

@@ -23,7 +23,7 @@ from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places
 
-__all__ = ["Data", "Layout", "Table", "advice", "load_packaged"]
+__all__ = ["Data", "Layout", "PrintedFrames", "Table", "advice", "load_packaged"]
 
 #: Times of a table in units of these, us.
 UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
@@ -114,6 +114,56 @@ class Data:
 
 
 @dataclass(frozen=True)
+class PrintedFrames:
+    """Say where frames that a sensor prints are read, and how; keys as of a source of `taxel.live.Live`.
+
+    Parameters
+    ----------
+    place : str
+        "serial:COM3", "lines:-" ...
+    baud : int, optional
+        Of a serial line.
+    time : str, optional
+        "t:ms", "1+2" ...; default: the time of arrival.
+    columns, leave_out : list of str or int
+        The names of the columns; those without values.
+    frame_lines : int, 1 or more, optional
+        Lines a frame.
+    frame_end : {"blank"}, optional
+        An empty line ends a frame.
+
+    Raises
+    ------
+    ProblemError : a value of another kind
+    """
+
+    place: str
+    baud: int | None = None
+    time: str | None = None
+    columns: Sequence[str] = ()
+    leave_out: Sequence[str | int] = ()
+    frame_lines: int | None = None
+    frame_end: str | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("place", "time", "frame_end"):
+            if getattr(self, name) is not None and "," in text(name, getattr(self, name)):
+                raise refused(name, f" is {shown(getattr(self, name))}: must hold no comma")
+        for name in ("baud", "frame_lines"):
+            if getattr(self, name) is not None:
+                integer(name, getattr(self, name), 1)
+        for name in ("columns", "leave_out"):
+            for column in several(name, getattr(self, name)):
+                _column(name, column)
+
+    def options(self) -> dict[str, str]:
+        """Return the keys of the source that are stated, but for its place."""
+        stated = {name: getattr(self, name) for name in ("baud", "time", "frame_lines", "frame_end")}
+        listed = {name: ":".join(map(str, getattr(self, name))) for name in ("columns", "leave_out")}
+        return {name: str(value) for name, value in (stated | listed).items() if value not in (None, "")}
+
+
+@dataclass(frozen=True)
 class Layout:
     """Hold what a layout file says.
 
@@ -140,6 +190,8 @@ class Layout:
         Frames a second, where the recording has no times.
     table : Table, optional
     data : Data, optional
+    source : PrintedFrames, optional
+        Where its frames are read live.
     ros : mapping, optional
         The topic and what else opens it, by the names of the arguments of `taxel.open`.
 
@@ -160,6 +212,7 @@ class Layout:
     rate_hz: float | None = None
     table: Table | None = None
     data: Data | None = None
+    source: PrintedFrames | None = None
     ros: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -222,6 +275,26 @@ class Layout:
     def turned(self) -> float | None:
         """The number that readings are subtracted from, as they fall with pressure; None if they do not."""
         return 0.0 if self.falls is True else None if self.falls is False or self.falls is None else self.falls
+
+    def source_text(self) -> str:
+        """Return the text of its live source: KIND:PLACE and KEY=VALUE after commas.
+
+        Raises
+        ------
+        FormatError : it names no source, or no rows and columns
+        """
+        if self.source is None or self.rows is None or self.columns is None:
+            what = "no [source] place" if self.source is None else "no rows and columns"
+            raise FormatError(f"{self.path}: has {what}; a live source needs them")
+        pitch = "" if self.pitch_mm is None or isinstance(self.pitch_mm, tuple) else f"x{self.pitch_mm:g}"
+        keys = {"array": f"{self.rows}x{self.columns}{pitch}", **self.source.options()}
+        if self.unit is not None:
+            keys["unit"] = self.unit
+        if self.turned is not None:
+            keys["falls"] = "true" if self.falls is True else f"{self.turned:g}"
+        if self.rate_hz is not None:
+            keys["rate"] = f"{self.rate_hz:.17g}"
+        return ",".join([self.source.place, *(f"{key}={value}" for key, value in keys.items())])
 
     def grid(self) -> Array | None:
         """Return a sensor of its rows and columns; None if it does not say them."""
@@ -296,7 +369,7 @@ def _values(document: dict[str, Any]) -> dict[str, Any]:
 
 
 #: The tables of a layout file by their names.
-_TABLES: dict[str, type[Any]] = {"places": Places, "table": Table, "data": Data, "ros": dict}
+_TABLES: dict[str, type[Any]] = {"places": Places, "table": Table, "data": Data, "source": PrintedFrames, "ros": dict}
 
 
 def _keys(table: type[Any]) -> list[str]:

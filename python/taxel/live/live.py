@@ -177,14 +177,17 @@ class Live:
         #: To begin another one on another address.
         self._options = replace(options, array=self.array)
         self._remote, self._place = remote, self._core.place()
+        #: Where a board is received; nowhere of a source of frames.
+        self._listened_on = self._core.address() if self.frame_us is None else (None, None)
         if remote is not None and feed is not None:
             remote.begin(feed)
         for source, inlet in inlets.items():
             inlet.begin(partial(self._core.sample, _stream_name(source)))
 
-    def _again(self, port: int, host: str, **changed: Any) -> Live:
-        """Return another one that works alike, of a board that sends to this address."""
-        options = replace(self._options, port=port, host=host, remote=None, **changed)
+    def _again(self, **changed: Any) -> Live:
+        """Return another one that works alike, with other options; it receives from the same place by default."""
+        host, port = self._listened_on
+        options = replace(self._options, **{"host": host, "port": port, "remote": None, **changed})
         return Live(**{field.name: getattr(options, field.name) for field in fields(options)})
 
     @property

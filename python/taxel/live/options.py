@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taxel import _core
@@ -14,6 +15,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import PlainRule, Readout
 from taxel.detect.detector import detector
+from taxel.formats.layout import Layout
 from taxel.live._stated_options import StatedOptions
 from taxel.live.remote import RemoteBoard
 from taxel.tare import Tare
@@ -67,14 +69,23 @@ class LiveOptions(StatedOptions):
             return []
         if isinstance(self.sources, Mapping):
             named = {text("name of a source", name): text(f"source {name}", of) for name, of in self.sources.items()}
-            return [f"{name}={of}" for name, of in named.items()]
-        listed = [self.sources] if isinstance(self.sources, str) else several("sources", self.sources)
-        return [text("source", of) for of in listed]
+            listed = [f"{name}={of}" for name, of in named.items()]
+        else:
+            listed = [self.sources] if isinstance(self.sources, str) else several("sources", self.sources)
+        return [_with_layout(text("source", of)) for of in listed]
 
     def for_rust(self, *, send: list[str], sources: list[str]) -> str:
         """Return the options as the compiled part reads them; it opens `send` and `sources` itself."""
         plain = {o.name: _plain(o, getattr(self, o.name)) for o in fields(StatedOptions) if o.name not in _APART}
         return parameters(plain | {"send": send, "sources": sources})
+
+
+def _with_layout(source: str) -> str:
+    """Return the text of a source; that of a layout file, if it names one."""
+    if not source.endswith(".toml") or "," in source:
+        return source
+    name, _, path = source.rpartition("=")
+    return f"{name}=" * bool(name) + Layout.read(Path(path)).source_text()
 
 
 #: Options that are passed in another form: the name of a file may be no text.

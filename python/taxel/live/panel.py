@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 
+import numpy as np
+
 from taxel import _core
 from taxel._base.arguments import callback, checked_path, flag, instance, integer, text
 from taxel._base.errors import refused
@@ -94,7 +96,7 @@ class Panel:
             period_us("rate_hz", how.rate_hz)
         opening = Opening() if opens is None else Opening(callback("opens", opens), shown, how)
         cable = None if control is None else Cable(text("control", control))
-        board = BoardRequests(self.listen, self.delta_intensity, self.read_out, cable)
+        board = BoardRequests(self.listen, self.read_source, self.delta_intensity, self.read_out, cable)
         self._requests = Requests(opening, board)
         stated = self._live is not None and self._live._registers_stated
         try:
@@ -159,8 +161,33 @@ class Panel:
         """
         with self._restarting:
             before = self._restartable("listen")
-            self._attach(before._again(port, host))
+            self._attach(before._again(port=port, host=host, sources=None))
             before.stop()
+
+    def read_source(self, source: str) -> None:
+        """Receive another source, as `sources` of `taxel.live.Live` names it, with all other options unchanged.
+
+        Parameters
+        ----------
+        source : str
+            "serial:/dev/ttyACM0,array=16x16" ...; of a board "board:127.0.0.1:5208".
+
+        Raises
+        ------
+        ProblemError : as `listen`; a text that is no source, or lines that do not fit what it says
+        OSError : the place cannot be opened; the source before stays in use
+        """
+        with self._restarting:
+            before = self._restartable("read_source")
+            chosen = text("source", source)
+            # A serial line has one reader at a time.
+            before.stop()
+            try:
+                after = before._again(port=None, host=None, sources=chosen)
+            except Exception:
+                self._attach(before._again())
+                raise
+            self._attach(after)
 
     def delta_intensity(self, on: bool) -> None:
         """Interpret intensities as differences from the previous value, or as values, from now on.
@@ -182,9 +209,8 @@ class Panel:
             before = self._restartable("delta_intensity")
             if flag("on", on) == before._options.differences:
                 return
-            host, port = before.address
             before.stop()
-            self._attach(before._again(port, host, differences=on))
+            self._attach(before._again(differences=on))
 
     def read_out(self, readout: str | os.PathLike[str]) -> None:
         """Read the board out with another readout from now on: time, values and past restart, on the same address.
@@ -206,16 +232,15 @@ class Panel:
         with self._restarting:
             before = self._restartable("read_out")
             loaded = load(checked_path("readout", readout))
-            host, port = before.address
             tare = before.tare or (before._options.tare if before._options.readout is not None else None)
             if tare is None:
                 tare = _rest_of_held(before)
             before.stop()
             try:
-                after = before._again(port, host, readout=loaded, tare=tare)
+                after = before._again(readout=loaded, tare=tare)
             except Exception:
-                # The board stays in sight, whatever the readout lacks.
-                self._attach(before._again(port, host))
+                # The sensor stays in sight, whatever the readout lacks.
+                self._attach(before._again())
                 raise
             self._attach(after)
 
@@ -285,10 +310,10 @@ def _folder_and_name(path: Path, layout: str | os.PathLike[str] | None) -> tuple
 
 
 def _rest_of_held(live: Live) -> Tare:
-    """Return the values that the taxels of a board hold now as their rest."""
+    """Return the values that the taxels hold now as their rest."""
     values = live.frame.astype(float)
-    if not values.any():
+    if not np.nan_to_num(values).any():
         raise ProblemError("read_out: no value has arrived yet that could be the taxels' rest; wait for the board")
     return Tare.take(
-        Frames([values, values], [0, 1], unit="ticks", array=live.array), note="held when the readout began"
+        Frames([values, values], [0, 1], unit=live.unit, array=live.array), note="held when the readout began"
     )

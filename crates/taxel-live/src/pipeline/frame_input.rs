@@ -10,7 +10,7 @@ use taxel_core::problem;
 use super::source::OpenedLines;
 use crate::Result;
 use crate::capture::{MessageFeed, Origin, Receiver, ReceiverOptions};
-use crate::frame_lines::{FrameAssembler, FrameLayout, write_message};
+use crate::frame_lines::{FrameAssembler, FrameLayout, UnreadLines, write_message};
 use crate::line_input::LineReader;
 use crate::line_place::LinePlace;
 use crate::locked::lock;
@@ -34,6 +34,8 @@ pub struct LineCounts {
     pub bytes_of_unfinished_lines: u64,
     /// The system's last error, if reading failed.
     pub trouble: Option<String>,
+    /// Of a source of frames: its lines that could not be parsed, by kind.
+    pub unread: Option<UnreadLines>,
     /// What is wrong with the lines and stamps, as a verdict states it.
     #[serde(skip)]
     pub faults: DamageCounts,
@@ -49,6 +51,7 @@ impl LineCounts {
             bytes_in_no_line: in_no_line,
             bytes_of_unfinished_lines: unfinished,
             trouble,
+            unread: None,
             faults,
         }
     }
@@ -58,7 +61,8 @@ impl LineCounts {
         let before = |cause: &String| earlier.faults.damage.get(cause).copied().unwrap_or(0);
         let damage = self.faults.damage.iter().map(|(cause, n)| (cause.clone(), n - before(cause))).collect();
         let faults = DamageCounts { damage, ..self.faults.clone() };
-        Self::new(self.lines - earlier.lines, faults, self.trouble.clone())
+        let since = Self::new(self.lines - earlier.lines, faults, self.trouble.clone());
+        Self { unread: self.unread.clone(), ..since }
     }
 }
 
@@ -112,7 +116,8 @@ impl FrameInput {
 
     pub(super) fn counts(&self) -> LineCounts {
         let state = lock(&self.state);
-        LineCounts::new(state.frames.lines(), state.frames.found(), state.trouble.clone())
+        let counts = LineCounts::new(state.frames.lines(), state.frames.found(), state.trouble.clone());
+        LineCounts { unread: Some(state.frames.unread().clone()), ..counts }
     }
 
     /// Reads until the input or the pipeline ends; a line that failed is opened again. `opened` has read up to a line's start.

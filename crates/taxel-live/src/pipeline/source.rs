@@ -536,6 +536,8 @@ impl OpenedLines {
                 return Ok(columns);
             }
             let words: Vec<String> = found.into_iter().map(Cow::into_owned).collect();
+            // Text is counted, but for the names of the columns.
+            self.begun.push((line, at_ns));
             if words.iter().any(|word| clock_unit_us(word).is_some()) {
                 return Ok(words);
             }

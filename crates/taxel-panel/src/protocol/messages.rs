@@ -164,6 +164,15 @@ pub(crate) enum Message {
         /// The IPv4 addresses of the machine.
         addresses: Vec<InterfaceAddress>,
     },
+    /// What arrives from a source of lines, when asked.
+    SourcePreview {
+        /// The last lines that arrived.
+        lines: Vec<String>,
+        /// The source with what the lines show added to it: array, lines of a frame, time.
+        source: String,
+        /// What the lines seem to be, in words.
+        about: String,
+    },
     /// The recorder, on each change and once a second while it counts or records.
     Recorder {
         state: RecorderPhase,

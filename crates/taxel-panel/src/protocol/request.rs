@@ -120,6 +120,11 @@ pub(crate) enum Request {
     Cut { start_us: BoardTime, stop_us: BoardTime, name: Text<100> },
     /// Receive the board's datagrams there instead. Refused while a recording runs.
     Listen { host: Text<255>, port: u16 },
+    /// Receive another source instead, as `taxel live --source` names it. Time, values and the past that can be viewed begin
+    /// anew. Refused while a recording runs.
+    ReadSource { source: Text<1024> },
+    /// Requests `source_preview`: what arrives from a source of lines, for two seconds at most.
+    PreviewSource { source: Text<1024> },
     /// Whether the board sends differences from the value before, not values. Earlier events were decoded with the other
     /// meaning, so the source begins anew: time, values, the past that can be viewed, a readout with its tare. Refused while a
     /// recording runs.

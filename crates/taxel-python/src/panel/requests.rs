@@ -67,6 +67,10 @@ impl BoardRequests for PythonHandler {
         self.call(|handler| handler.call_method1("listen", (host, port)).map(drop))
     }
 
+    fn read_source(&self, source: &str) -> Reply<()> {
+        self.call(|handler| handler.call_method1("read_source", (source,)).map(drop))
+    }
+
     fn set_differences(&self, on: bool) -> Reply<()> {
         self.call(|handler| handler.call_method1("set_differences", (on,)).map(drop))
     }

@@ -26,6 +26,8 @@ class BoardRequests:
     ----------
     listen : function of host and port
         Receives the board's datagrams on another address.
+    read_source : function of a text
+        Receives another source.
     delta_intensity : function of a bool
         Interprets intensities as differences, or as values.
     read_out : function of a path
@@ -37,11 +39,13 @@ class BoardRequests:
     def __init__(
         self,
         listen: Callable[[str, int], None],
+        read_source: Callable[[str], None],
         delta_intensity: Callable[[bool], None],
         read_out: Callable[[Path], None],
         cable: Cable | None,
     ) -> None:
-        self._listen, self._delta_intensity, self._read_out = listen, delta_intensity, read_out
+        self._listen, self._read_source = listen, read_source
+        self._delta_intensity, self._read_out = delta_intensity, read_out
         self._cable, self._lock = cable, threading.Lock()
 
     def close(self) -> None:
@@ -84,6 +88,11 @@ class BoardRequests:
         """Receive the board's datagrams on another address."""
         with reasons():
             self._listen(host, port)
+
+    def read_source(self, source: str) -> None:
+        """Receive another source, as a text names it."""
+        with reasons():
+            self._read_source(source)
 
     def set_differences(self, on: bool) -> None:
         """Interpret intensities as differences, or as values."""

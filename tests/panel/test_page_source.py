@@ -1,0 +1,99 @@
+"""A source of numbers is chosen on the page: a mat on a serial line, in a real browser."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pty
+import threading
+import time
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from loopback import free_port
+from tests.panel.browser import running
+from tests.panel.pages import opened, shows, until
+
+import taxel
+from taxel.live import Live, Panel
+
+pytestmark = pytest.mark.timeout(600)
+
+
+@contextlib.contextmanager
+def mat(rows: int, columns: int) -> Iterator[tuple[str, threading.Event]]:
+    """Yield a serial line on which a mat prints its rows and an empty line, 50 times a second, until the event."""
+    ours, theirs = pty.openpty()
+    tty.setraw(theirs)
+    os.set_blocking(ours, False)
+    over, silent = threading.Event(), threading.Event()
+
+    def send() -> None:
+        rng, k = np.random.default_rng(1), 0
+        text = "Mat 1.0 ready\n"
+        while not over.wait(0.02):
+            frame = rng.integers(0, 3, (rows, columns))
+            frame[2:5, 2:5] += 200 * (k % 100 > 50)
+            text += "\n".join(",".join(map(str, row)) for row in frame) + "\n\n"
+            if not silent.is_set():
+                with contextlib.suppress(BlockingIOError):
+                    os.write(ours, text.encode())
+            k, text = k + 1, ""
+
+    thread = threading.Thread(target=send, daemon=True)
+    thread.start()
+    try:
+        yield os.ttyname(theirs), silent
+    finally:
+        over.set()
+        thread.join(10)
+        os.close(ours)
+        os.close(theirs)
+
+
+def test_a_mat_on_a_serial_line_is_chosen_seen_and_recorded(chromium: Any, tmp_path: Path) -> None:
+    port = str(free_port())
+    with (
+        mat(16, 12) as (line, silent),
+        running("live", "--panel", "--port", port, "--host", "127.0.0.1", folder=tmp_path) as server,
+        opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
+    ):
+        source = page.locator("#numbers")
+        source.fill("serial:ttyX")
+        page.locator("#numbers-look").click()
+        shows(page, "numbers-why", "must be a serial port")
+        source.fill(f"serial:{line}")
+        page.locator("#numbers-look").click()
+        shows(page, "numbers-about", "16 lines of 12 numbers and an empty one: 16 x 12")
+        assert source.input_value() == f"serial:{line},array=16x12,frame_end=blank"
+        page.locator("#numbers-form").get_by_role("button", name="Connect", exact=True).click()
+        shows(page, "pressure-top", "counts")
+        shows(page, "where-info", f"serial:{line}")
+        shows(page, "numbers-command", r"taxel live --panel --source 'serial:.*,array=16x12,frame_end=blank'")
+        page.locator("#numbers-falls").check()
+        assert source.input_value().endswith(",falls=true")
+        silent.set()
+        time.sleep(0.1)
+        until(lambda: "The line is silent" in page.content(), "the page says that the line is silent")
+
+
+def test_what_arrives_is_shown_and_another_source_takes_the_place_of_the_first(tmp_path: Path) -> None:
+    with mat(4, 4) as (line, _), Live(0, host="127.0.0.1", record_later=True) as first, Panel(first) as panel:
+        panel.read_source(f"serial:{line},array=4x4,frame_end=blank,rate=50")
+        live = panel.live
+        assert live is not None
+        assert (live.array.shape, live.unit, first.is_over) == ((4, 4), "counts", True)
+        until(lambda: live.counters["frames"] > 10, "frames arrive")
+        live.record(tmp_path / "mat.mcap")
+        until(lambda: live.counters["frames"] > 40, "more frames arrive")
+        live.end_recording()
+        assert taxel.open(tmp_path / "mat.mcap").frames().array.shape == (4, 4)
+        with pytest.raises(taxel.ProblemError, match="must be 25 a frame"):
+            panel.read_source(f"serial:{line},array=5x5,frame_lines=4,columns=a:b:c:d,rate=50")
+        assert panel.live is not None
+        assert panel.live.array.shape == (4, 4)
+        until(lambda: panel.live is not None and panel.live.counters["frames"] > 5, "the source before is back")
