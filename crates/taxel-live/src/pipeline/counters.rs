@@ -256,5 +256,5 @@ pub enum SourceCounts {
     /// The counts of the pipeline of a board or of frames.
     Pipeline(Box<Counters>),
     /// The counts of a stream of numbers.
-    Numbers(LineCounts),
+    Numbers(Box<LineCounts>),
 }

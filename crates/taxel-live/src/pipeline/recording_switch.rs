@@ -139,7 +139,8 @@ pub(super) fn verdict(
     let others = counters.sources.iter().map(|(name, counts)| {
         let verdict = match counts {
             SourceCounts::Pipeline(counts) => of_source(counts, &losses(counts, None)),
-            SourceCounts::Numbers(LineCounts { lines, faults, .. }) => {
+            SourceCounts::Numbers(counts) => {
+                let LineCounts { lines, faults, .. } = &**counts;
                 Verdict::of_lines(&losses_of_lines(*lines, faults)).doubtful(faults.doubtful_after_us)
             }
         };

@@ -97,7 +97,7 @@ fn guess(lines: &[PreviewLine], array_is_stated: bool) -> (String, String) {
         let keys = format!("array={rows}x{width},frame_end=blank");
         return (keys, format!("{rows} lines of {width} numbers and an empty one: {rows} x {width}{beside}"));
     }
-    let clock = clock_unit(&usual_lines).filter(|_| width > 1 && !(is_square(width) && !is_square(width - 1)));
+    let clock = clock_unit(&usual_lines).filter(|_| width > 1 && (is_square(width - 1) || !is_square(width)));
     let (values, time) = clock.map_or((width, String::new()), |unit| (width - 1, format!(",time=1:{unit}")));
     let (rows, columns) = sides(values);
     let first = clock.map_or_else(String::new, |unit| format!(" after a time in {unit}"));

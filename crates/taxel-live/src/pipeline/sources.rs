@@ -147,7 +147,7 @@ impl NumberStream {
     }
 
     fn counts_of(&self, lines: u64, faults: DamageCounts) -> SourceCounts {
-        SourceCounts::Numbers(LineCounts::new(lines, faults, lock(&self.trouble).clone()))
+        SourceCounts::Numbers(Box::new(LineCounts::new(lines, faults, lock(&self.trouble).clone())))
     }
 
     /// Records no more lines: ends its part of the recording with its counts.

@@ -199,9 +199,7 @@ impl Stages {
     fn process(&mut self, batch: &Batch) -> Result<()> {
         let Self { shared, source, record, readout, observers, .. } = self;
         match source {
-            SourceStage::Board(decode) => {
-                EventFlow { shared: &**shared, decode: &mut **decode, record, readout, observers }.decode(batch)
-            }
+            SourceStage::Board(decode) => EventFlow { shared, decode, record, readout, observers }.decode(batch),
             SourceStage::Frames(stage) => {
                 if stage.push(batch) {
                     observers.reset(stage.held());
@@ -227,7 +225,7 @@ impl Stages {
         let quiet = match source {
             SourceStage::Board(decode) => {
                 decode.finish();
-                EventFlow { shared: &**shared, decode: &mut **decode, record, readout, observers }.flush()?;
+                EventFlow { shared, decode, record, readout, observers }.flush()?;
                 decode.quiet_until(self.receive.silent_until())
             }
             SourceStage::Frames(_) => Some(QuietUntil::Ended),
