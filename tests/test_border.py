@@ -11,7 +11,7 @@ STUB = (Path(taxel.__file__).parent / "_core.pyi").read_text(encoding="utf-8")
 #: What returns JSON as text: that of a file, which is saved or read as it is, and the schemas of the page's messages.
 JSON = {
     "check_encoder", "check_plain_rule", "check_readout", "check_tare", "make_plain_rule",
-    "make_readout", "message_schemas", "tare_of_events", "tare_of_frames", "Live.tare", "Ended.tare",
+    "make_readout", "message_schemas", "pad_tare", "tare_of_events", "tare_of_frames", "Live.tare", "Ended.tare",
 }  # fmt: skip
 #: What returns another text: names and places, and lines for people.
 TEXTS = {

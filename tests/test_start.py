@@ -71,8 +71,9 @@ class Shell:
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:
-    """Return the blocks of a page in order: their language ("" of commands) and their text."""
-    return re.findall(r"^```(|python|text)\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+    """Return the blocks of a page in order: their language ("" of commands) and their text; others are for people."""
+    found = re.findall(r"^```(\w*)\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+    return [(language, text) for language, text in found if language in ("", "python", "text")]
 
 
 def command(line: str) -> str:

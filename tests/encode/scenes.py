@@ -40,6 +40,19 @@ def touch(rng, array, n=300, absent=0.3, late=0.0, repaired=0.0):
     return Events(t, x, y, rng.random(n) > 0.5, array=array, **more)
 
 
+def ended(events, ticks=55):
+    """The same events, after which all taxels rest."""
+    y, x = (places.ravel() for places in np.indices(events.array.shape))
+    last, n = events.t.max() + 1000, len(x)
+    more = {
+        "intensity": np.concatenate([events.intensity, np.full(n, ticks, np.uint16)]),
+        "present": np.concatenate([events.present, np.ones(n, bool)]),
+        "repaired": np.concatenate([events.repaired, np.zeros(n, bool)]),
+    }
+    t, p = np.concatenate([events.t, np.full(n, last)]), np.concatenate([events.p, np.zeros(n, bool)])
+    return Events(t, np.concatenate([events.x, x]), np.concatenate([events.y, y]), p, array=events.array, **more)
+
+
 def at_times(events, t):
     """The same events at other times."""
     more = {"intensity": events.intensity, "present": events.present, "repaired": events.repaired}

@@ -24,7 +24,7 @@ from taxel import Array, Events, Frames, _core
 from taxel._base.parameters import described
 from taxel.encode import FA1, ChangeEvents, ContactArea, Encoder, LevelCrossing, RunningRange
 
-from .scenes import ARRAY, at_times, frames_of, rest, spikes_of, touch, wander
+from .scenes import ARRAY, at_times, ended, frames_of, rest, spikes_of, touch, wander
 
 ROOT = Path(__file__).parents[2]
 #: The composite is made of the others, so it is no line of the registry.
@@ -146,7 +146,7 @@ OF_VALUES = {label: e for label, e in ENCODERS.items() if getattr(FILES[e.name],
 
 @pytest.mark.parametrize("encoder", OF_VALUES.values(), ids=OF_VALUES)
 def test_what_reads_values_takes_a_repaired_one_as_any_other(encoder):
-    events = touch(np.random.default_rng(5), ARRAY, repaired=0.5)
+    events = ended(touch(np.random.default_rng(5), ARRAY, repaired=0.5))
     assert events.repaired is not None
     plain = Events(
         events.t, events.x, events.y, events.p, array=ARRAY, intensity=events.intensity, present=events.present
@@ -284,6 +284,7 @@ def test_permuted_taxels_give_permuted_trains(encoder):
 def test_an_array_that_is_turned_gives_the_same_trains_as_they_stand_then(encoder):
     rng = np.random.default_rng(13)
     frames, t = wander(rng, 200, 12).reshape(200, 3, 4), np.arange(200) * 200
+    frames[-10:] = 55  # at rest
     plain, turned = (encoder.encode(Frames(p, t, array=ARRAY)) for p in (frames, frames[:, ::-1, ::-1]))
     assert spikes_of(plain)
     assert spikes_of(turned) == spikes_of(plain.select(FILES[encoder.name].turned(encoder)))

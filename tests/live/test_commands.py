@@ -108,7 +108,8 @@ def test_taxel_record_says_how_much_a_board_of_version_2_sent(tmp_path: Path) ->
     # A verdict of losses has several lines.
     counted, verdict = said.rstrip().split("\n", 1)
     kept = taxel.open(tmp_path / "two.mcap").datagrams()
-    assert f"{len(kept)} datagrams, {kept.payload.size} bytes, " in counted
+    assert f"{len(kept)} datagrams, " in counted
+    assert f", {kept.payload.size} bytes, " in counted
     # The system drops datagrams of a recorder that a busy machine keeps waiting; then the verdict says so.
     assert (verdict == "nothing lost") == (len(kept) == report.datagrams)
     if verdict == "nothing lost":

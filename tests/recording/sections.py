@@ -37,6 +37,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "losses.rebuilt": ("what reading had to put up with",),
     "frame_table.untimed": ("that its frames have no times",),
     "frame_table.turned": ("that its readings were turned",),
+    "frame_table.frame_us": ("that a readout took its frames to last",),
     "stream.columns": ("the names of the columns",),
     "stream.samples": ("the lines of the stream as they came",),
     "wire.datagrams": ("raw datagrams", "where datagrams begin"),

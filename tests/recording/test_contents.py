@@ -50,7 +50,7 @@ def full(folder: Path, kind: type[RecordedSource]) -> Contents:
     one = replace(one, sensor=replace(one.sensor, side="left", heel="top"), losses=losses, wire=wire)
     header = {name: getattr(one, name) for name in ("origin", "sensor", "settings", "marks", "timing", "losses")}
     drawn = as_frames(one, 100)
-    readings, five = replace(drawn.frame_table, untimed=True, turned=255.0), np.arange(5)
+    readings, five = replace(drawn.frame_table, untimed=True, turned=255.0, frame_us=9000.0), np.arange(5)
     samples = Samples({}, five, five.astype(np.uint64), five, five[:, None] * 1.0)
     every: dict[type[RecordedSource], RecordedSource] = {
         BoardSource: one,

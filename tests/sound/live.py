@@ -118,6 +118,7 @@ LEFT_OUT: dict[str, str] = {
     "taxel.live.Live.zero": "waits for events, each time anew; tried in tests/live/test_zero.py",
     "taxel.live.Panel.delta_intensity": "needs a panel each time, 0.25 s; tried in tests/panel/test_server.py",
     "taxel.live.Panel.listen": "needs a panel each time, 0.25 s; tried in tests/panel/test_board.py",
+    "taxel.live.Panel.read_source": "needs a panel each time, 0.25 s; tried in tests/panel/test_page_source.py",
     "taxel.live.Panel.read_out": "needs a panel each time, 0.25 s; tried in tests/panel/test_windows.py",
     "taxel.live.RemoteBoard": "is a base of classes of such packages; tried in tests/live/test_remote.py",
     "taxel.live.RemoteBoard.begin": "is called by a Live; tried in tests/live/test_remote.py",

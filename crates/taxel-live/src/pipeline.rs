@@ -10,6 +10,7 @@
 mod copies;
 mod counters;
 mod decode_stage;
+mod frame_block;
 mod frame_input;
 mod frame_stage;
 mod handle;
@@ -252,7 +253,7 @@ impl Live {
             let recording = lock(&shared.recording.running).take();
             drop(recording.map(|recording| recording.finish(&Counters::default())));
         })?;
-        let pipelines = others.pipelines.iter().map(|(name, other)| (name.clone(), Arc::clone(&other.shared)));
+        let pipelines = others.pipelines.iter().map(|(name, live)| (name.clone(), Arc::clone(&live.shared)));
         let recording_switch = RecordingSwitch::new(Arc::clone(&shared), pipelines.collect(), others.numbers.clone());
         let others = Mutex::new(others);
         let mut live = Self {
@@ -357,8 +358,7 @@ impl Live {
     #[must_use]
     pub fn counters(&self) -> Counters {
         let others = lock(&self.others);
-        let counted =
-            |(name, other): &(String, Live)| (name.clone(), SourceCounts::Pipeline(Box::new(other.counters())));
+        let counted = |(name, live): &(String, Live)| (name.clone(), SourceCounts::Pipeline(Box::new(live.counters())));
         let numbers = others.numbers.iter().map(|(name, numbers)| (name.clone(), numbers.counts()));
         Counters { sources: others.pipelines.iter().map(counted).chain(numbers).collect(), ..self.shared.counters() }
     }
@@ -366,7 +366,7 @@ impl Live {
     /// The address on which another board of the recording is received; `None` if there is no such source.
     #[must_use]
     pub fn source_address(&self, name: &str) -> Option<SocketAddr> {
-        lock(&self.others).pipelines.iter().find(|(known, _)| known == name).map(|(_, other)| other.address())
+        lock(&self.others).pipelines.iter().find(|(known, _)| known == name).map(|(_, live)| live.address())
     }
 
     /// Records one line of a source whose values a program passes, with a number for each of its columns; it arrived at
@@ -378,9 +378,10 @@ impl Live {
     pub fn sample(&self, name: &str, arrived_ns: i64, values: &[f64]) -> Result<()> {
         let others = lock(&self.others);
         let numbers = others.numbers.iter().find(|(known, _)| known == name).map(|(_, n)| Arc::clone(n));
-        let own = (self.shared.options.name == name).then_some(&self.shared);
-        let all =
-            own.into_iter().chain(others.pipelines.iter().filter(|(known, _)| known == name).map(|(_, o)| &o.shared));
+        let main = (self.shared.options.name == name).then_some(&self.shared);
+        let all = main
+            .into_iter()
+            .chain(others.pipelines.iter().filter(|(known, _)| known == name).map(|(_, live)| &live.shared));
         let frames = all.filter_map(|shared| shared.frames.as_ref()).map(Arc::clone).next();
         drop(others);
         match (numbers, frames) {

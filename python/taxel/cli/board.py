@@ -231,8 +231,8 @@ def left_out(lines: dict[str, Any]) -> str:
         (lines["strange"], "line", "that could not be read"),
         (lines["bytes_in_no_line"], "byte", "in no line"),
     )
-    said = "".join(f", {counted(n, what)} {where}" for n, what, where in parts if n)
-    return said + (f"; {lines['trouble']}" if lines["trouble"] else "")
+    counts = "".join(f", {counted(n, unit)} {where}" for n, unit, where in parts if n)
+    return counts + (f"; {lines['trouble']}" if lines["trouble"] else "")
 
 
 #: Kinds of lines that are no part of a frame, by their keys in the counters.

@@ -335,8 +335,8 @@ def _silence(now: dict[str, Any], place: str) -> str:
     if arrival["state"] == "quiet":
         return f"quiet: {since}"
     within_ms = to_ms(arrival["heartbeat_us"])
-    what = "heartbeat" if now["lines"] is None else "frame"
-    return f"silent: {since} from {place}, though it sent a {what} every {within_ms:g} ms or sooner"
+    sign = "heartbeat" if now["lines"] is None else "frame"
+    return f"silent: {since} from {place}, though it sent a {sign} every {within_ms:g} ms or sooner"
 
 
 def _state(now: dict[str, Any], place: str) -> Text:

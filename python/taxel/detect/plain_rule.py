@@ -96,7 +96,8 @@ class PlainRule(_Detector):
         unit: str | None = None,
         tare: Tare | None = None,
     ) -> None:
-        age = age_ms if age_ms is None or age_ms == "end" else number("age_ms", age_ms, "ms")
+        is_end = isinstance(age_ms, str) and age_ms == "end"
+        age = age_ms if age_ms is None or is_end else number("age_ms", age_ms, "ms")
         self._hold(
             _core.make_plain_rule(
                 parameters(

@@ -135,6 +135,11 @@ class PrintedFrames:
     Raises
     ------
     ProblemError : a value of another kind
+
+    Examples
+    --------
+    >>> PrintedFrames("serial:COM3", baud=9600, leave_out=["name", 2]).options()
+    {'baud': '9600', 'leave_out': 'name:2'}
     """
 
     place: str
@@ -284,8 +289,8 @@ class Layout:
         FormatError : it names no source, or no rows and columns
         """
         if self.source is None or self.rows is None or self.columns is None:
-            what = "no [source] place" if self.source is None else "no rows and columns"
-            raise FormatError(f"{self.path}: has {what}; a live source needs them")
+            lacks = "no [source] place" if self.source is None else "no rows and columns"
+            raise FormatError(f"{self.path}: has {lacks}; a live source needs them")
         pitch = "" if self.pitch_mm is None or isinstance(self.pitch_mm, tuple) else f"x{self.pitch_mm:g}"
         keys = {"array": f"{self.rows}x{self.columns}{pitch}", **self.source.options()}
         if self.unit is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import Field, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -68,11 +68,13 @@ class LiveOptions(StatedOptions):
         if self.sources is None:
             return []
         if isinstance(self.sources, Mapping):
-            named = {text("name of a source", name): text(f"source {name}", of) for name, of in self.sources.items()}
-            listed = [f"{name}={of}" for name, of in named.items()]
+            listed: Iterable[str] = (
+                f"{text('name of a source', name)}={text(f'source {name}', place)}"
+                for name, place in self.sources.items()
+            )
         else:
             listed = [self.sources] if isinstance(self.sources, str) else several("sources", self.sources)
-        return [_with_layout(text("source", of)) for of in listed]
+        return [_with_layout(text("source", source)) for source in listed]
 
     def for_rust(self, *, send: list[str], sources: list[str]) -> str:
         """Return the options as the compiled part reads them; it opens `send` and `sources` itself."""

@@ -176,6 +176,13 @@ class Panel:
         ------
         ProblemError : as `listen`; a text that is no source, or lines that do not fit what it says
         OSError : the place cannot be opened; the source before stays in use
+
+        Examples
+        --------
+        >>> with Live(0, host="127.0.0.1") as live, Panel(live) as panel:
+        ...     panel.read_source("skin=given,array=2x2,rate=100")
+        ...     panel.live.array
+        Array(2x2: 2 rows x 2 columns, 4 taxels, pitch unknown)
         """
         with self._restarting:
             before = self._restartable("read_source")

@@ -239,7 +239,10 @@ class FrameTable:
     def losses(self) -> list[str]:
         """Return what a file without this section does not hold, but for the frames."""
         lines = ["that its frames have no times"] * self.untimed
-        return lines + ([] if self.turned is None else [f"that its readings were turned (falls = {self.turned:g})"])
+        lines += [] if self.turned is None else [f"that its readings were turned (falls = {self.turned:g})"]
+        return lines + (
+            [] if self.frame_us is None else [f"that a readout took its frames to last {self.frame_us:g} us"]
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,10 @@ use std::time::Duration;
 
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::rest::ValueSteps;
-use taxel_core::{Array, Events, FramesView, Intensities};
+use taxel_core::{Array, Events, Intensities};
 
 use super::counters::Counters;
+use super::frame_block::FrameBlock;
 use super::readout_queue::QuietUntil;
 use crate::capture::Batch;
 use crate::clock::{BoardClock, Pace};
@@ -18,36 +19,6 @@ const TICK: Duration = Duration::from_micros(500);
 
 /// Number of differences between frames from which the noise is measured.
 const NOISE_FRAMES: usize = 32;
-
-/// Frames in order of time.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct FrameBlock {
-    /// Time of each frame, us.
-    pub(super) t: Vec<i64>,
-    /// The values of all frames, each row by row.
-    pub(super) values: Vec<f32>,
-}
-
-impl FrameBlock {
-    pub(super) fn is_empty(&self) -> bool {
-        self.t.is_empty()
-    }
-
-    pub(super) fn clear(&mut self) {
-        self.t.clear();
-        self.values.clear();
-    }
-
-    /// Appends frames and clears them there.
-    pub(super) fn append(&mut self, later: &mut Self) {
-        self.t.append(&mut later.t);
-        self.values.append(&mut later.values);
-    }
-
-    pub(super) fn view<'a>(&'a self, array: &'a Array) -> FramesView<'a> {
-        FramesView { array, t: &self.t, values: &self.values }
-    }
-}
 
 pub(super) struct FrameStage {
     frame_us: f64,

@@ -6,7 +6,7 @@ use taxel_core::encode::Zeroing;
 use taxel_core::events::FARTHEST_BACK_US;
 use taxel_core::{Array, Events};
 
-use super::frame_stage::FrameBlock;
+use super::frame_block::FrameBlock;
 use crate::locked::lock;
 
 /// Events that wait for the readout, and the time up to which there are no more.

@@ -4,7 +4,7 @@ use taxel_core::Events;
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 
-use super::frame_stage::FrameBlock;
+use super::frame_block::FrameBlock;
 use super::readout_queue::{BatchEnd, QuietUntil};
 use super::running_readout::RunningReadout;
 use super::shared::PipelineShared;

@@ -5,7 +5,7 @@ use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::problem;
 use taxel_core::{Array, Events};
 
-use super::frame_stage::FrameBlock;
+use super::frame_block::FrameBlock;
 use super::options::{LiveOptions, StatedTare};
 use super::output::DetectionOutput;
 use super::readout_queue::{BatchEnd, QuietUntil};

@@ -102,7 +102,7 @@ pub struct OpenedLines {
 }
 
 impl Opened {
-    fn of(lines: OpenedLines) -> Self {
+    fn from_lines(lines: OpenedLines) -> Self {
         Self(Arc::new(Mutex::new(Some(lines))))
     }
 
@@ -151,7 +151,7 @@ impl FromStr for SourceText {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let refused = |what: String| -> Error { problem!("source {text:?}: {what}").into() };
+        let refused = |reason: String| -> Error { problem!("source {text:?}: {reason}").into() };
         let mut parts = text.split(',');
         let head = parts.next().unwrap_or_default();
         let kind_end = head.find(':').unwrap_or(head.len());
@@ -314,7 +314,7 @@ impl SourceText {
             (None, Some(input)) => {
                 let mut lines = OpenedLines::open(input)?;
                 let columns = lines.first(input, &self.leave_out)?;
-                Ok((columns, Opened::of(lines)))
+                Ok((columns, Opened::from_lines(lines)))
             }
         }
     }
@@ -391,7 +391,7 @@ impl SourceText {
             opened = Some(lines);
         }
         layout.check()?;
-        Ok((layout, opened.map(Opened::of).unwrap_or_default()))
+        Ok((layout, opened.map(Opened::from_lines).unwrap_or_default()))
     }
 
     /// The columns of lines without names that fill the stated array.

@@ -78,22 +78,22 @@ fn guess(lines: &[PreviewLine], array_is_stated: bool) -> (String, String) {
         lines.iter().filter_map(|line| Some((line.numbers.as_deref()?, line.at_ns))).collect();
     let text = lines.iter().filter(|line| line.numbers.is_none() && !line.is_empty).count();
     let Some(width) = usual(numbers.iter().map(|(line, _)| line.len())) else {
-        let what = match text {
+        let reason = match text {
             0 => "Nothing arrived: is it connected, and on?",
             _ => "No line of numbers arrived: another speed?",
         };
-        return (String::new(), what.to_owned());
+        return (String::new(), reason.to_owned());
     };
     let usual_lines: Vec<(&[f64], i64)> = numbers.iter().copied().filter(|(line, _)| line.len() == width).collect();
-    let other = numbers.len() - usual_lines.len() + text;
-    let beside = if other > 0 { format!("; {other} other lines") } else { String::new() };
+    let unlike = numbers.len() - usual_lines.len() + text;
+    let beside = if unlike > 0 { format!("; {unlike} other lines") } else { String::new() };
     if array_is_stated {
         return (String::new(), format!("{width} numbers a line{beside}"));
     }
     // Whole groups lie between two empty lines.
     let groups: Vec<usize> = lines.split(|line| line.is_empty).map(<[PreviewLine]>::len).collect();
-    let whole = groups.get(1..groups.len().saturating_sub(1)).unwrap_or_default();
-    if let Some(rows) = usual(whole.iter().copied().filter(|&rows| rows > 0)) {
+    let complete = groups.get(1..groups.len().saturating_sub(1)).unwrap_or_default();
+    if let Some(rows) = usual(complete.iter().copied().filter(|&rows| rows > 0)) {
         let keys = format!("array={rows}x{width},frame_end=blank");
         return (keys, format!("{rows} lines of {width} numbers and an empty one: {rows} x {width}{beside}"));
     }

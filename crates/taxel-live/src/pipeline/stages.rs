@@ -297,7 +297,7 @@ impl Stages {
             zeroing.check(array)?;
             let taxel = array.index(x, y);
             let Some(held) = self.source.value(taxel) else {
-                return Err(problem!("taxel at row {y}, column {x}: no value so far").into());
+                return Err(problem!("taxel at row {y}, column {x}: no event so far, so its value is unknown").into());
             };
             zeroing.rest = held;
             let tared = published.rest.get(taxel).copied().flatten();
