@@ -552,7 +552,7 @@ export interface Labels {
   conflict: Conflict | null;
 }
 
-/** By the rules of `taxel.Recording` health (`taxel info`). A taxel is reported dead or stuck only where its neighbours were touched three times or more, or are known to rest above 0 and it is known to hold 0. */
+/** By the rules of `taxel.Recording` health (`taxel info`). A taxel is reported dead or stuck only where its neighbours were touched three times or more, or are known to rest above 0 and it is known to hold 0; or stuck where it holds the greatest value of all while its neighbours move. */
 export interface Health {
   type: "health";
   source: string | null;

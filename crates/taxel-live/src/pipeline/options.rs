@@ -189,7 +189,9 @@ impl LiveOptions {
             let name = text.name();
             if texts[..k].iter().any(|earlier| earlier.name() == name) {
                 let text = &text.text;
-                return Err(problem!("source {text:?}: there are two named {name}; name it, as second={text}").into());
+                return Err(
+                    problem!("source {text:?}: there are two named {name}; begin one with another NAME=").into()
+                );
             }
         }
         Ok(texts)

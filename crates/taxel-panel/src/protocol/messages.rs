@@ -281,7 +281,8 @@ pub(crate) enum Message {
         conflict: Option<Conflict>,
     },
     /// By the rules of `taxel.Recording` health (`taxel info`). A taxel is reported dead or stuck only where its neighbours were
-    /// touched three times or more, or are known to rest above 0 and it is known to hold 0.
+    /// touched three times or more, or are known to rest above 0 and it is known to hold 0; or stuck where it holds the greatest
+    /// value of all while its neighbours move.
     Health {
         source: Option<String>,
         taxels: usize,
