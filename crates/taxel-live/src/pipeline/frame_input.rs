@@ -35,6 +35,7 @@ pub struct LineCounts {
     /// The system's last error, if reading failed.
     pub trouble: Option<String>,
     /// Of a source of frames: its lines that could not be parsed, by kind.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub unread: Option<UnreadLines>,
     /// What is wrong with the lines and stamps, as a verdict states it.
     #[serde(skip)]
