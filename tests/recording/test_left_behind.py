@@ -165,8 +165,8 @@ def test_few_events_on_a_large_sensor_take_little_memory(tmp_path: Path) -> None
     code += "print(re.search(r'VmHWM:\\s+(\\d+) kB', pathlib.Path('/proc/self/status').read_text())[1])"
     said = subprocess.run([sys.executable, "-c", code, tmp_path / "a.npz"], capture_output=True, text=True, check=True)
     assert "contact area" in said.stdout
-    # Whole frames of this second would be 1.6 GB, and counts of touches of all taxels .4 GB.
-    assert int(said.stdout.split()[-1]) < 300_000
+    # Whole frames of this second would be 1.6 GB, counts of touches of all taxels .4 GB; the libraries take .3.
+    assert int(said.stdout.split()[-1]) < 330_000
 
 
 def test_pressure_over_time_is_that_of_whole_frames(tmp_path: Path) -> None:
