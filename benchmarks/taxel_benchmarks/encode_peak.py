@@ -21,7 +21,7 @@ LEVELS = (5.0, 6.0, 8.0, 12.0, 20.0)
 
 
 def numpy_peak(frames: Frames, tare: Tare) -> list[Any]:
-    """Return (t, level, rise or fall) of the peak above the tracked rest."""
+    """Return (t, train) of the peak above the tracked rest: rises to each level, then falls below it."""
     sigma = np.maximum(tare.noise, LEAST)
     near_step, far_step = -np.expm1(-PERIOD_US / 1e6), -np.expm1(-PERIOD_US / 20e6)
     baseline, above = tare.rest.copy(), np.zeros(frames.array.shape)
@@ -32,7 +32,7 @@ def numpy_peak(frames: Frames, tare: Tare) -> list[Any]:
         units = above / sigma
         peak = np.float32(max(units.max(), np.sqrt(np.square(units[units >= 4]).sum())))
         now = np.where(reached, peak >= 0.7 * levels, peak >= levels)
-        spikes += [(t, level, now[level]) for level in np.flatnonzero(now != reached)]
+        spikes += [(t, level if now[level] else len(LEVELS) + level) for level in np.flatnonzero(now != reached)]
         reached = now
     return spikes
 
