@@ -201,6 +201,8 @@ export class Board {
     this.failed = failed;
     this.array = { rows: 64, columns: 64 };
     this.writable = false;
+    /** Whether the live source is a board. */
+    this.hasRegisters = true;
     /** @type {Record<string, number>} */
     this.values = {};
     /** @type {PresetsMessage | null} */
@@ -244,6 +246,7 @@ export class Board {
   /** @param {Hello} hello */
   greet(hello) {
     this.array = hello.array ?? this.array;
+    this.hasRegisters = hello.lines === null;
     this.writable = hello.live && hello.control !== null;
     part("losses", HTMLElement).hidden = !hello.live;
     this.connection.greet(hello);
@@ -288,6 +291,8 @@ export class Board {
 
   /** @param {RegistersMessage} message */
   take(message) {
+    part("registers-held", HTMLElement).hidden = !this.hasRegisters;
+    if (!this.hasRegisters) return write(part("registers-why", HTMLElement), "A source of numbers has no registers.");
     const assumed = message.known || message.stated ? "" : "; these are those of a board at reset";
     write(part("registers-why", HTMLElement), this.writable ? "" : `No control line: registers are neither read nor set${assumed}. Choose a port above.`);
     this.show(message.values, message.frame_us, message.preset, message.known, message.stated);

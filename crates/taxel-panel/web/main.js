@@ -294,6 +294,7 @@ function greet(message) {
   }
   labels.offer(message.readout ?? []);
   showAssumed();
+  showRegisters();
   recorder.able = message.live;
   recorder.write();
   part("record", HTMLButtonElement).hidden = !message.live;

@@ -13,6 +13,7 @@ use crate::allowed::Range;
 use crate::parameters::parameters;
 use crate::rest::{Baseline, FAR_NOISE, Value};
 use crate::spikes::ms;
+use crate::vectors::{LANES, wide};
 use crate::{Array, Result, Spike, SpikeKind, problem};
 
 /// From so many units of noise on, what a taxel reads adds to what others read.
@@ -78,6 +79,22 @@ impl Encoding for Peak {
     }
 }
 
+wide! {
+    /// The largest value in units of its noise, at least 0, and the sum of the squares of those that add.
+    fn extent(above: &[f32], per_noise: &[f32]) -> (f32, f64) {
+        let (mut largest, mut squares) = ([0.0_f32; LANES], [0.0_f64; LANES]);
+        for (above, per_noise) in above.as_chunks::<LANES>().0.iter().zip(per_noise.as_chunks::<LANES>().0) {
+            for lane in 0..LANES {
+                let units = above[lane] * per_noise[lane];
+                largest[lane] = if units > largest[lane] { units } else { largest[lane] };
+                let adds = f64::from(if units >= ADDS_FROM { units } else { 0.0 });
+                squares[lane] += adds * adds;
+            }
+        }
+        (largest.into_iter().fold(0.0, f32::max), squares.into_iter().sum())
+    }
+}
+
 /// Computes the peak of values above a tracked rest.
 #[derive(Clone)]
 pub(super) struct PeakLoad {
@@ -119,18 +136,15 @@ impl PeakLoad {
         for &taxel in &self.waiting {
             values[taxel] = if rest[taxel] == f64::NO_REST { 0.0 } else { rest[taxel] as f32 };
         }
-        let above = self.baseline.take(t, &self.values);
-        let (mut largest, mut squares) = (0.0_f32, 0.0_f64);
-        for (above, per_noise) in above.iter().zip(&self.per_noise) {
-            let units = above * per_noise;
-            if units > largest {
-                largest = units;
-            }
-            if units >= ADDS_FROM {
-                squares += f64::from(units) * f64::from(units);
-            }
+        let (above, per_noise) = (self.baseline.take(t, &self.values), &self.per_noise[..]);
+        // Those behind the last whole group stand in one of their own, beside zeros.
+        let whole = above.len() / LANES * LANES;
+        let mut rest = [[0.0; LANES]; 2];
+        for (group, values) in rest.iter_mut().zip([above, per_noise]) {
+            group[..values.len() - whole].copy_from_slice(&values[whole..]);
         }
-        f64::from(largest).max(squares.sqrt())
+        let (first, last) = (extent(&above[..whole], &per_noise[..whole]), extent(&rest[0], &rest[1]));
+        f64::from(first.0.max(last.0)).max((first.1 + last.1).sqrt())
     }
 
     /// Sets the rest of a taxel, by index, from now on.

@@ -34,7 +34,7 @@ pub struct LineCounts {
     pub bytes_of_unfinished_lines: u64,
     /// The system's last error, if reading failed.
     pub trouble: Option<String>,
-    /// Of a source of frames: its lines that could not be parsed, by kind.
+    /// The lines of a source of frames that could not be parsed, by kind.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unread: Option<UnreadLines>,
     /// What is wrong with the lines and stamps, as a verdict states it.

@@ -194,7 +194,7 @@ impl FrameStage {
 
 /// The noise of the first frames.
 struct FirstNoise {
-    /// Of each taxel the sum of its squared differences from frame to frame.
+    /// The sum of each taxel's squared differences from frame to frame.
     squares: Vec<f64>,
     frames: usize,
 }

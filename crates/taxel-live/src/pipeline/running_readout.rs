@@ -58,7 +58,7 @@ pub(super) struct RunningReadout {
     /// Detections that do not wait for output yet.
     pub(super) found: Vec<Detection>,
     events: Events,
-    /// Of a source of frames, in place of events.
+    /// Frames, in place of events, if the source sends them.
     block: FrameBlock,
     zeroings: Vec<Zeroing>,
     frames: FrameTime,

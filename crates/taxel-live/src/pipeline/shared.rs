@@ -39,8 +39,8 @@ pub(super) struct PublishedState {
     pub(super) report_latency: Latencies,
     pub(super) markers: Vec<Marker>,
     pub(super) frame: Vec<u16>,
-    /// Of a source of frames: the steps of those values and the time of the first frame, us; and the values of the same
-    /// frame.
+    /// The steps of those values and the time of the first frame, us, and the values of the same frame, if the source sends
+    /// frames.
     pub(super) steps: Option<(ValueSteps, i64)>,
     pub(super) values: Vec<f32>,
     pub(super) tare: Option<Tare>,

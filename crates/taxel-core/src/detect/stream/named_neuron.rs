@@ -55,7 +55,7 @@ pub(in crate::detect) struct NamedNeuron {
     repaired: Option<f64>,
     /// The time of the latest input outside its range in training, ms.
     outside: Option<f64>,
-    /// Of a neuron that decides as a touch ends: the input with its duration.
+    /// The input with the duration of a touch, if the neuron decides as it ends.
     duration: Option<u32>,
     /// When touches ended, ms, and how long they lasted, us; those that a crossing may still rest on.
     ended: Vec<(f64, f64)>,
