@@ -24,13 +24,16 @@ from typing import Any
 import numpy as np
 
 import taxel
-from taxel import Array, Neuron, Readout
+from taxel import Array, Neuron, ProblemError, Readout
 from taxel.encode import LevelCrossing
 from taxel.live import Live, Panel
 from taxel_benchmarks._goals import Goal
+from taxel_benchmarks._peer import missing
 from taxel_benchmarks._rounds import stamp
 
 SIDE, RATE, SEED = 16, 1000, 20_261_127
+#: The module that the client of the page needs.
+PEERS = {"all of it": "websockets"}
 
 #: Prints lines at their times; a late line is printed at once.
 SEND = """
@@ -139,6 +142,11 @@ def goals(result: Mapping[str, Any]) -> list[Goal]:
 
 def run(*, quick: bool) -> dict[str, Any]:
     """Return the result."""
+    absent = missing(PEERS)
+    if absent and not quick:
+        raise ProblemError("lines: the client of the page needs websockets: pip install websockets")
+    if absent:
+        return stamp() | {"left out": absent, "ratios": {}}
     load = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as folder:
         measured = live(3.0 if quick else 20.0, Path(folder))
