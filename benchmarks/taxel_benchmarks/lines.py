@@ -132,6 +132,8 @@ def parsing() -> float:
 
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals."""
+    if "live" not in result:
+        return []
     of = result["live"]
     return [
         Goal("cores for all of it", of["cores"], 0.1, at_most=True),
