@@ -138,12 +138,12 @@ impl PeakLoad {
         }
         let (above, per_noise) = (self.baseline.take(t, &self.values), &self.per_noise[..]);
         // Those behind the last whole group stand in one of their own, beside zeros.
-        let whole = above.len() / LANES * LANES;
+        let grouped = above.len() / LANES * LANES;
         let mut rest = [[0.0; LANES]; 2];
         for (group, values) in rest.iter_mut().zip([above, per_noise]) {
-            group[..values.len() - whole].copy_from_slice(&values[whole..]);
+            group[..values.len() - grouped].copy_from_slice(&values[grouped..]);
         }
-        let (first, last) = (extent(&above[..whole], &per_noise[..whole]), extent(&rest[0], &rest[1]));
+        let (first, last) = (extent(&above[..grouped], &per_noise[..grouped]), extent(&rest[0], &rest[1]));
         f64::from(first.0.max(last.0)).max((first.1 + last.1).sqrt())
     }
 
