@@ -187,7 +187,7 @@ impl Encoding for LocalLoad {
         if self.levels.is_empty() {
             return Ok(Box::new(self.sampled(array, Emit::Spikes)?));
         }
-        let loaded = Loaded::new("local load", array, self.tare.as_ref(), self.noise_floor)?;
+        let loaded = Loaded::never("local load", array, self.tare.as_ref())?;
         let sums = self.sums(array, &self.running_us())?;
         let level = |&at: &f64| SumLevel { at, left_below: self.release * at, reached: false };
         let levels = (0..self.sums_with_levels()).flat_map(|_| self.levels.iter().map(level)).collect();

@@ -59,7 +59,7 @@ impl Encoding for Peak {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let loaded = Loaded::new("peak", array, self.tare.as_ref(), 0.0)?;
+        let loaded = Loaded::never("peak", array, self.tare.as_ref())?;
         let load = PeakLoad::new(array, self.tare.as_ref(), self.least_noise)?;
         let reached = vec![false; self.levels.len()];
         let crossings = PeakCrossings { load, levels: self.levels.clone(), release: self.release, reached };

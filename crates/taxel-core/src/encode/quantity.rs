@@ -49,7 +49,8 @@ impl Quantity {
                 _ => array.check_neighbours(quantity.rule())?,
             }
         }
-        let loaded = Loaded::new("plain rule", array, tare, noise_floor)?;
+        let by_loaded = several.iter().any(|quantity| matches!(quantity, Self::Area | Self::Total));
+        let loaded = Loaded::new("plain rule", array, tare, if by_loaded { noise_floor } else { f64::INFINITY })?;
         let mut local = LocalLoad { noise_floor, tare: tare.cloned(), ..LocalLoad::default() };
         local.least_noise *= step_of(noise_floor);
         // The least noise of a taxel belongs to the floor: .3 is of a board's 3 ticks, and of values in whole steps.
