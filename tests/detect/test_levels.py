@@ -41,6 +41,17 @@ def test_readings_below_or_beyond_the_levels_are_learnt(scale: float) -> None:
     assert judged.together.rank[0] <= 1
 
 
+@pytest.mark.parametrize(("scale", "unit", "noise"), [(3.0, "N", 0.02), (300.0, "N", 0.02), (10.0, "counts", 0.005)])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_labels_before_the_first_input_are_learnt(scale: float, unit: str, noise: float, seed: int) -> None:
+    """The label is the true onset; what the sensor reads of it reaches a level after the trained delay."""
+    examples = [steps(scale, unit=unit, noise=noise, seed=seed, count=25) for seed in (seed, seed + 10)]
+    readout = taxel.detect.fit(examples[:1], recipe())
+    scored = taxel.detect.score(taxel.detect.run(readout, examples[1].source), examples[1].labels, 50.0)
+    for label in ("contact", "foot_off"):
+        assert scored[label].missed + scored[label].false <= 2
+
+
 def test_levels_follow_the_unit_and_those_within_stay() -> None:
     levels = {}
     for scale in (0.01, 1.0, 100.0, 1e4):

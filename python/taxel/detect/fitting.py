@@ -29,7 +29,7 @@ from taxel.detect.ages import (
     later_us,
     silent_windows,
 )
-from taxel.detect.alignment import Alignment, align, align_by
+from taxel.detect.alignment import WINDOW_MS, Alignment, align, align_by
 from taxel.detect.examples import Example, array_of, check_examples, name_of, sizes_of, unit_of
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
 from taxel.detect.levels import fit_levels
@@ -58,6 +58,10 @@ _FEWER = 3
 _FEWER_SHARE = 0.05
 #: Two folds need this many labels.
 TWO_FOLDS = 4
+#: A first input that is later than that after its label, ms, is of something else.
+_MOST_WAIT_MS = 100.0
+#: Where a neuron waits for its first inputs, those of this share of the labels have come.
+_MOST_LABELS = 0.9
 #: With so many of the quantities that follow the labels best a point is tried.
 _FOLLOWED = 2
 
@@ -262,8 +266,10 @@ def _best(examples: EncodedExamples, recipe: Recipe, label: str, array: Array | 
     They are tried in turn. A later one counts if it leaves as many fewer as its `fewer` says, else `_FEWER`, and
     `_FEWER_SHARE` of the labels, as some more or less are chance; with 0 it counts if it leaves no more. Where an
     encoder has quantities that labels may follow, a point is tried with each of the `_FOLLOWED` that follow them best.
-    A later point that cannot be learnt is left out. If the first felt nothing, which counts as all labels missed, a
-    later one must leave as many fewer, or none. Warnings are those of the point that counts.
+    Where most events are missed whose targets come before the inputs that tell them, as with the true onsets of slow
+    steps, the neuron is trained to fire after the first input. A later point that cannot be learnt is left out. If the
+    first felt nothing, which counts as all labels missed, a later one must leave as many fewer, or none. Warnings are
+    those of the point that counts.
     """
     points = recipe._choices_of(label)
     known: Known = {}
@@ -273,7 +279,16 @@ def _best(examples: EncodedExamples, recipe: Recipe, label: str, array: Array | 
         with collected() as caught:
             fitting = Fitting(patterns, plan, label, array, report, rank, known)
             learner = fitting.fit(plan)
-        wrong = fitting.wrong(learner, plan.run_threshold) if len(points) > 1 else 0
+        wrong = 0
+        if len(points) > 1 or fitting.precedes_input(learner):
+            wrong = fitting.wrong(learner, plan.run_threshold)
+        if fitting.precedes_input(learner) and 2 * wrong > fitting.count:
+            with collected() as caught_later:
+                later = Fitting(patterns, plan, label, array, report, rank, known, behind_input=True)
+                by_later = later.fit(plan)
+            if (fewer := later.wrong(by_later, plan.run_threshold)) < wrong:
+                caught = [_waits(label, fitting, later), *caught_later]
+                wrong, fitting, learner = fewer, later, by_later
         return _FittedPoint(wrong, fitting, learner, point, caught)
 
     count = sum(len(pattern.labels.get(label, ())) for pattern in examples.patterns)
@@ -305,6 +320,12 @@ def _best(examples: EncodedExamples, recipe: Recipe, label: str, array: Array | 
     for caught in best.caught:
         warn(caught, stacklevel=5)
     return best
+
+
+def _waits(label: str, planned: Fitting, later: Fitting) -> str:
+    """Return the warning that a neuron waits for its inputs."""
+    more = later.delay_ms - planned.delay_ms
+    return f"{label}: labels come up to {more:.3g} ms before the first input; it is known that much later"
 
 
 def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
@@ -340,6 +361,8 @@ class Fitting:
         report: Progress,
         rank: int = 0,
         known: Known | None = None,
+        *,
+        behind_input: bool = False,
     ) -> None:
         self._label, self._needs = label, rows_of(recipe, label)
         #: The places of the examples that say when the label happened; the others are left out.
@@ -355,7 +378,7 @@ class Fitting:
         acts_after_ms = ACTS_AFTER_MS if neuron.kernel == "exponential" else neuron.step_ms
         self.delay_ms = delay_ms + (0.0 if ages is None else acts_after_ms)
         label_times = self._label_times = [_times(k, example, label) for k, example in enumerate(examples)]
-        if not (count := sum(map(len, label_times))):
+        if not self.count:
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
         sources = [_inputs(k, example, recipe, label, array) for k, example in enumerate(examples)]
         self._graded = received.kind == "graded"
@@ -379,7 +402,7 @@ class Fitting:
         felt = label_times if self.alignment is None else [self.alignment.felt(k) for k in range(len(label_times))]
         for name, times in zip(self._names, felt, strict=True):
             self._check_apart(name, times, neuron.refractory)
-        later = self._later(sources, felt, ages, delay_ms)
+        later = self._later(sources, felt, ages, delay_ms, received.latency_ms if behind_input else None)
         shift_ms = received.latency_ms + self.delay_ms
         self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
         if self._duration is None:
@@ -389,7 +412,7 @@ class Fitting:
         trains = lasting if self._graded or self.alignment is None else self._until_targets(distinct(self._sources))
         self._check_felt(trains)
         silent = self._silent(followed, sources, lasting, ages, neuron)
-        self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
+        self._what, self._report = f"learning {label} from {counted(self.count, 'event')}", report
         report(self._what, 0, 0)
         try:
             self._rows = learner.prepare(trains, self._targets, silence=silent)
@@ -422,8 +445,12 @@ class Fitting:
         felt: Sequence[NDArray[np.int64]],
         ages: Ages | None,
         delay_ms: float,
+        behind_input_ms: float | None,
     ) -> list[NDArray[np.int64]]:
-        """Return how much later than the trained delay after what was felt each target is, us."""
+        """Return how much later than the trained delay after what was felt each target is, us.
+
+        Targets behind the first inputs have the latency of the encoder in `behind_input_ms`.
+        """
         if self._duration is not None:
             if self.alignment is None or self.alignment.train is None:
                 raise ProblemError(
@@ -432,7 +459,17 @@ class Fitting:
             return [_lasted(source, self._duration, times) for source, times in zip(sources, felt, strict=True)]
         if ages is not None and self.alignment is not None and self.alignment.train == ages.trains[0]:
             return [later_us(source, ages, to_ms(t), delay_ms) for source, t in zip(sources, felt, strict=True)]
-        return [np.zeros(len(times), np.int64) for times in felt]
+        wait_ms = 0.0 if behind_input_ms is None else _first_input_ms(sources, felt, behind_input_ms)
+        return [np.full(len(times), round(to_us(wait_ms)), np.int64) for times in felt]
+
+    @property
+    def count(self) -> int:
+        """The number of events."""
+        return sum(map(len, self._label_times))
+
+    def precedes_input(self, cone: ConeR) -> bool:
+        """Whether most labels, which are not aligned, are so early that no neuron can fire by their targets."""
+        return self.alignment is None and self._duration is None and 2 * len(cone.unreachable_) > self.count
 
     def _until_targets(self, sources: Sequence[SpikeTrains]) -> list[SpikeTrains]:
         """Return trains with an end after the last target, which may come after the last spike."""
@@ -522,6 +559,17 @@ class Fitting:
 def _learns_one(encoder: Encoder) -> bool:
     """Whether a neuron learns from one of an encoder's trains alone."""
     return all(part._learns_one for part in encoder._each())
+
+
+def _first_input_ms(sources: Sequence[SpikeTrains], felt: Sequence[NDArray[np.int64]], latency_ms: float) -> float:
+    """Return how long after its label the first input spike comes, ms, of nine in ten labels that have one."""
+    waits = []
+    for source, times in zip(sources, felt, strict=True):
+        spikes, labels = np.append(np.sort(source.times), np.inf), to_ms(times) + latency_ms
+        waits.append(spikes[np.searchsorted(spikes, labels - WINDOW_MS)] - labels)
+    wait = np.concatenate(waits)
+    wait = wait[wait <= _MOST_WAIT_MS]
+    return max(0.0, float(np.quantile(wait, _MOST_LABELS))) if len(wait) else 0.0
 
 
 def _lasted(source: SpikeTrains, duration: int, felt: NDArray[np.int64]) -> NDArray[np.int64]:
