@@ -13,6 +13,7 @@ from taxel import _core, formats
 from taxel._base import limits
 from taxel._base.archive import stored_names
 from taxel._base.arguments import checked_path
+from taxel._base.encodings import as_utf_8
 from taxel._base.files import open_file
 from taxel._core import FormatError
 from taxel.formats.layout import Layout, advice
@@ -275,15 +276,19 @@ def _companion(path: Path, *, has_layout: bool) -> str:
 
 
 def _is_table_of_taxel(path: Path) -> bool:
-    """Return whether the first line of a .csv begins as taxel's own recordings do, which are separated by commas."""
+    """Return whether the first line of a .csv begins as taxel's own recordings do."""
     names = _first_line(path)
     return names[0] == "t_us" and len(names) > 1
 
 
 def _first_line(path: Path) -> list[str]:
     """Return the names in the first line of a table, as far as they are within 64 kB."""
-    with open_file(path) as table:
-        return names_in(table.readline(1 << 16))
+    with open_file(path) as file:
+        try:
+            return names_in(as_utf_8(path.name, file).readline(1 << 16))
+        except FormatError:
+            # The reader of tables reports what is no text.
+            return [""]
 
 
 def _is_of_another_program(path: Path, layout: GivenLayout) -> bool:
