@@ -187,7 +187,7 @@ def test_any_table_that_can_be_read_keeps_its_rows(text: bytes, kept, table: Pat
         (b"\xef\xbb\xbft_us,label\r\n1,heel\r\n", b"\xef\xbb\xbft_us,label\r\n1,heel\r\n7,toe\r\n"),
         (b"t_us,label\r1,heel\r", b"t_us,label\r1,heel\r7,toe\r"),
         (b'\xef\xbb\xbft_us,label\n1,"a\r\nb"\n', b'\xef\xbb\xbft_us,label\n1,"a\r\nb"\n7,toe\n'),
-        (b"t_us;label;kg\n1;heel;1,5\n", b"t_us;label;kg\n1;heel;1,5\n7;toe;\n"),
+        (b"t_us;label;comment\n1;heel;1,5\n", b"t_us;label;comment\n1;heel;1,5\n7;toe;\n"),
         (
             "\ufefflabel\tt_us\r\nhéel\t1\r\n".encode("utf-16-be"),
             "\ufefflabel\tt_us\r\nhéel\t1\r\ntoe\t7\r\n".encode("utf-16-be"),

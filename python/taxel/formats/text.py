@@ -146,15 +146,18 @@ def head(path: Path) -> str:
     return (_lines(path, _bytes(path, _BEGINNING).removeprefix(_UTF_8).partition(b"\n")[0]) or [""])[0]
 
 
-def beginning(path: Path) -> list[str]:
-    """Read the whole lines in the first 64 KiB of a text file, as `lines` does.
+def beginning(path: Path, most: int = _BEGINNING) -> list[str]:
+    """Read the whole lines in the first `most` bytes of a text file, as `lines` does.
 
     Raises
     ------
-    FormatError : not a text, or a damaged gzip file
+    FormatError : not a text, a damaged gzip file, or a line of more than 4 MiB
     """
-    data = _bytes(path, _BEGINNING).removeprefix(_UTF_8)
-    return _lines(path, data if len(data) < _BEGINNING else data[: data.rfind(b"\n") + 1])
+    data = _bytes(path, most)
+    whole = data if len(data) < most else data[: max(data.rfind(b"\n"), data.rfind(b"\r", 0, -1)) + 1]
+    if not whole and len(data) > LINE:
+        raise FormatError(f"{path.name}, line 1: more than {LINE} bytes; at most that are read")
+    return _lines(path, whole.removeprefix(_UTF_8))
 
 
 def first_bytes(path: Path, count: int) -> bytes:

@@ -51,11 +51,20 @@ _PIECE, _TIMES_AT_ONCE = 1 << 22, 1 << 16
 #: Cells that tables hold where a value is missing.
 MISSING = ("", "nan", "NaN", "NA", "-", "null")
 
-_UNIT = "s|secs?|seconds?|ms|us|µs|ns"
+#: Units of time as people write them.
+_UNITS_OF_TIME = {
+    "s": ("s", "sec", "secs", "second", "seconds", "sek", "sekunden"),
+    "ms": ("ms", "msec", "millis", "milliseconds"),
+    "us": ("us", "µs", "μs", "usec", "micros", "microseconds"),
+    "ns": ("ns", "nsec", "nanos", "nanoseconds"),
+}
+_UNIT = "|".join(word for words in _UNITS_OF_TIME.values() for word in words)
+#: What people call times, in some languages.
+_TIME = "t|time|timestamps?|elapsed|elapsed[ _]time|(mess|uhr)?zeit|zeit(stempel|punkt)|temps|tiempo|tempo|tijd|tid"
 
 #: Names of columns that hold times, with or without a unit: time, timestamp_us, Time (ms), t [s].
 _TIMES = re.compile(
-    rf"(t|time|timestamps?)([ _.]*[\[(/] *(?P<within>{_UNIT}) *[\])]?|[ _.]+(?P<after>{_UNIT}))?", re.IGNORECASE
+    rf"({_TIME})([ _.]*[\[(/] *(?P<within>{_UNIT}) *[\])]?|(, *(in )?| in |[ _.]+)(?P<after>{_UNIT}))?", re.IGNORECASE
 )
 
 
@@ -98,9 +107,10 @@ def read_foreign(path: Path, layout: Layout, array: Array | None = None) -> Reco
             hint = _frames_hint(layout, taxels) if is_table else ""
             raise FormatError(f"{path}: {read.size}; {layout.path} says {layout.rows} x {layout.columns} taxels{hint}")
         grid = Array(values.shape[1], values.shape[2], name=path.stem) if values.ndim == 3 else None
-        array = layout.array(
-            taxels, grid or Array(1, taxels, name=path.stem, names=read.names if any(read.names or ()) else None)
-        )
+        # More channels than a sensor may have columns are a grid by the layout.
+        grid = grid or (None if taxels <= 65_535 else layout.grid())
+        names = read.names if any(read.names or ()) else None
+        array = layout.array(taxels, grid or Array(1, taxels, name=path.stem, names=names))
         shaped = values.astype(np.float32, copy=False).reshape(-1, *array.shape)
         frames = Frames(frozen_whole(shaped), frozen_whole(t), array=array)
     except ProblemError as error:
@@ -173,7 +183,10 @@ def unit_of(name: str) -> str | None:
     ('ms', '', None)
     """
     found = _TIMES.fullmatch(name.strip("\"'").rpartition("/")[2])
-    return None if found is None else (found["within"] or found["after"] or "").lower()
+    if found is None:
+        return None
+    word = (found["within"] or found["after"] or "").lower()
+    return next((unit for unit, words in _UNITS_OF_TIME.items() if word in words), "")
 
 
 def list_arrays(shapes: Mapping[str, tuple[int, ...]]) -> str:
