@@ -26,23 +26,10 @@ def layout_said_of(place: Path) -> str:
     return lines
 
 
-@pytest.mark.parametrize(
-    ("rows", "said"),
-    [
-        (["s;a", "0;1;2"], "2 cells, must have 3"),
-        (
-            ["0,00\t1,5", "0,02\t2"],
-            r"column 1 has a decimal comma \('0,00'\); say in a layout file: \[table\] decimal = ','",
-        ),
-    ],
-)
-def test_a_decimal_comma_that_no_layout_says_is_named(tmp_path, rows, said):
-    (tmp_path / "glove.layout.toml").write_text(
-        '[table]\nseparator = "\t"\n' if "\t" in rows[0] else '[table]\nseparator = ";"\n'
-    )
-    (tmp_path / "glove.csv").write_text("\n".join(rows) + "\n")
-    with pytest.raises(FormatError, match=rf"glove.csv, line \d: {said}"):
-        taxel.open(tmp_path / "glove.csv")
+def test_a_decimal_comma_that_no_layout_says_is_named(tmp_path: Path) -> None:
+    said = r"step.txt, line 1: column 1 has a decimal comma \('0,00'\); say in a layout file: \[table\] decimal = ','"
+    with pytest.raises(FormatError, match=said):
+        table(tmp_path, "0,00\t1,5\n0,02\t2\n", '[table]\nseparator = "\t"\n')
 
 
 @pytest.mark.parametrize(

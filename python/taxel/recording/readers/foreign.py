@@ -547,7 +547,8 @@ def _without(row: list[str], left: Collection[int], columns: int, path: Path, li
 
 def _is_number(cell: str, how: Table) -> bool:
     try:
-        float_of(cell.replace(how.decimal, "."))
+        # A decimal comma that the layout does not say makes no name of a number.
+        float_of(cell.replace(",", ".", 1))
     except ValueError:
         return how.missing is not None and cell == _unquote(how.missing)
     return True

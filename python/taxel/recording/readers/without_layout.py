@@ -140,10 +140,7 @@ class _TextTable:
     def _of(cls, fit: _Fit) -> _TextTable:
         rows, numeric, separator = fit.rows, fit.numeric, fit.separator
         first = next(k for k, row in enumerate(rows) if _fits(row, numeric, fit.decimal))
-        # Programs that number columns begin with 0.
-        numbered = [cell for cell in rows[first] if cell]
-        is_numbered = _FEWEST < len(numbered) >= len(numeric) - 1 and numbered == [str(k) for k in range(len(numbered))]
-        is_numbered &= len(rows) > first + 1
+        is_numbered = _numbers_columns(rows[max(first - 1, 0) :], numeric, fit.decimal, below=first > 0)
         first += is_numbered
         in_units = first > 1 and are_units(rows[first - 2], rows[first - 1])
         head = first - 1 - in_units
@@ -274,6 +271,19 @@ class _Fit:
         last = self.rows[-1]
         within = [k for k, cell in enumerate(last) if not self.numeric[k] and (";" in cell or "\t" in cell)]
         return sum(self.numeric), -len(within)
+
+
+def _numbers_columns(rows: Sequence[Sequence[str]], numeric: Sequence[bool], decimal: str, *, below: bool) -> bool:
+    """Return whether the first line of numbers numbers the columns, from 0 on as programs do; `below`: another line."""
+    first, *rest = rows[below:]
+    cells = [cell for cell in first if cell]
+    if not rest or not _FEWEST < len(cells) >= len(numeric) - 1 or cells != [str(k) for k in range(len(cells))]:
+        return False
+    if below and len(rows[0]) == len(numeric):
+        return False
+    # A time may begin with 0.
+    ascending = [_number(row[0], decimal) for row in (first, *rest) if row]
+    return not first[0] or not bool((np.diff(ascending) > 0).all())
 
 
 def _between_empty(numbers: Sequence[int]) -> int:
