@@ -191,7 +191,11 @@ def _places(path: Path, names: list[str], array: Array | None) -> tuple[list[tup
     """Return column and row of each taxel, and their names where those do not say them."""
     matches = [_TAXEL.fullmatch(name) for name in names]
     if all(matches):
-        return [(int(m[1]), int(m[2])) for m in matches if m is not None], None
+        places = [(int(m[1]), int(m[2])) for m in matches if m is not None]
+        if array is not None and array.rows > 1 and places == [(k, 0) for k in range(array.rows * array.columns)]:
+            # A row of as many channels.
+            places = [(k % array.columns, k // array.columns) for k in range(len(places))]
+        return places, None
     if any(matches):
         odd = names[matches.index(None)]
         raise FormatError(f"{path}, line 1: column {shown(odd)} among taxels: must be named like x3y5")
