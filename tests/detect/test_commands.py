@@ -115,7 +115,7 @@ def test_the_recording_of_a_folder_that_does_not_fit_is_named(tmp_path: Path, tr
 
 def test_detections_go_to_a_table(folder: Path, trained: Path, capsys) -> None:
     table = folder / "found.csv"
-    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--csv", table)
+    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--out", table)
     assert call(capsys, *arguments)[0] == 0
     found = taxel.Detections.from_csv(table)
     assert found == taxel.detect.run(taxel.Readout.load(trained), taxel.open(folder / "9.npz"), tare=tare())
@@ -587,7 +587,7 @@ def test_a_folder_of_trials_is_trained_on_and_heard_as_its_recordings_are(tmp_pa
         "--truth",
         "notes",
         "--json",
-        "--csv",
+        "-o",
         table,
         "--report",
         tmp_path / "r",

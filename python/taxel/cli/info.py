@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -98,12 +98,7 @@ def info(
                 raise ProblemError(_several(file, recordings))
             infos = [taxel.tasks.info(each, tare) for each in recordings]
             of_each = [found.facts for found in infos]
-            if as_json:
-                say(json.dumps(of_each if len(recordings) > 1 else of_each[0]))
-            elif each or len(recordings) == 1:
-                say(*chain.from_iterable(map(_pages, of_each)))
-            else:
-                say(*_overview(file, of_each))
+            say(*_of_several(file, of_each, as_json=as_json, each=each))
             say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
             return
         found = taxel.tasks.info(recording, tare)
@@ -170,6 +165,15 @@ def _several(file: Path, recordings: Sequence[Recording]) -> str:
         f"{file}: holds {len(recordings[0].sources)} sources ({names}); a picture or a table is of one: taxel convert "
         "--source NAME writes it to a file of its own"
     )
+
+
+def _of_several(place: Path, of_each: Sequence[dict[str, Any]], *, as_json: bool, each: bool) -> Iterable[str]:
+    """Return the facts of several recordings, or of one with several sources, as JSON or as lines for people."""
+    if as_json:
+        return [json.dumps(of_each if len(of_each) > 1 else of_each[0])]
+    if each or len(of_each) == 1:
+        return chain.from_iterable(map(_pages, of_each))
+    return _overview(place, of_each)
 
 
 def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:

@@ -117,7 +117,7 @@ def recognise(path: Path, layout: GivenLayout = None) -> TaxelFile | FormatFile 
 
 
 def _kind_of_taxel(path: Path, ending: str) -> str | None:
-    """Return the kind of a file of taxel with an ending that other programs give too, by its content; None of others."""
+    """Return the kind of a file of taxel with an ending that other programs give too, by its content, else None."""
     if ending == ".npy":
         return "records" if set(EVENTS) <= set(fields_of(path)) else None
     is_of_taxel = (ending == ".csv" and _is_table_of_taxel(path)) or (ending == ".h5" and is_h5_of_taxel(path))
