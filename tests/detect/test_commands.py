@@ -643,7 +643,11 @@ def test_times_since_1970_are_written_from_the_beginning_on(folder: Path, traine
     found = json.loads(call(capsys, *arguments, "--json")[1])["detections"]
     assert len(found) == 12
     assert all(one["t_us"] > 1_700_000_000_000_000 for one in found)
-    written = [line.split()[1:3] for line in out.splitlines() if line.startswith(("contact  ", "lift  "))]
+    written = [
+        line.split()[1:3]
+        for line in out.partition("times are from")[2].splitlines()
+        if line.startswith(("contact  ", "lift  "))
+    ]
     of = [[one[name] - 1_700_000_000_000_000 for name in ("t_us", "known_us")] for one in found]
     assert written[: len(found)] == [[f"{us / 1000:.3f}" for us in each] for each in of]
     page = (tmp_path / "page" / "report.html").read_text()

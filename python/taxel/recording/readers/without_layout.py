@@ -18,19 +18,8 @@ from taxel._base.number_text import float_of
 from taxel._core import FormatError
 from taxel.formats import text
 from taxel.formats.layout import ISO, UNITS_US, advice
-from taxel.recording.readers.foreign import (
-    ARRAYS,
-    MISSING,
-    are_units,
-    arrays_of,
-    cells,
-    ends_in_separator,
-    list_arrays,
-    seconds_of,
-    shapes_of,
-    times_of,
-    unit_of,
-)
+from taxel.recording.readers.cells import MISSING, are_units, cells, ends_in_separator, seconds_of, times_of, unit_of
+from taxel.recording.readers.foreign import ARRAYS, arrays_of, list_arrays, shapes_of
 
 #: A column is one of times, if its name does not say so, if it ascends for so many lines.
 _ASCENDS = 20
