@@ -154,10 +154,10 @@ def beginning(path: Path, most: int = _BEGINNING) -> list[str]:
     FormatError : not a text, a damaged gzip file, or a line of more than 4 MiB
     """
     data = _bytes(path, most)
-    whole = data if len(data) < most else data[: max(data.rfind(b"\n"), data.rfind(b"\r", 0, -1)) + 1]
-    if not whole and len(data) > LINE:
+    ended = data if len(data) < most else data[: max(data.rfind(b"\n"), data.rfind(b"\r", 0, -1)) + 1]
+    if not ended and len(data) > LINE:
         raise FormatError(f"{path.name}, line 1: more than {LINE} bytes; at most that are read")
-    return _lines(path, whole.removeprefix(_UTF_8))
+    return _lines(path, ended.removeprefix(_UTF_8))
 
 
 def first_bytes(path: Path, count: int) -> bytes:

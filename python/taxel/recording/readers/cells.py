@@ -58,7 +58,8 @@ def cells(line: str, separator: str) -> list[str]:
     if '"' in line and separator != " ":
         with suppress(csv.Error):
             texts = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    return [unquote(text.strip()) for text in texts]
+    stripped = list(map(str.strip, texts))
+    return [unquote(text) for text in stripped] if '"' in line or "'" in line else stripped
 
 
 def unquote(cell: str) -> str:

@@ -191,13 +191,13 @@ def read_table(path: Path, layout: Layout) -> Readings:
     width, rows = values.shape[1], len(values)
     lines = _lines_of_frame(head, rows, None if taxels is None else taxels // width)
     names_of_taxels = [name for k, name in enumerate(names) if k != time] if head.named and lines == 1 else None
-    lost, whole = head.lost, rows // lines * lines
-    if whole < rows:
-        lost = (*lost, f"lines at the end that make no whole frame: {rows - whole} of {lines}")
+    lost, end = head.lost, rows // lines * lines
+    if end < rows:
+        lost = (*lost, f"lines at the end that make no whole frame: {rows - end} of {lines}")
     size = counted(width, "column") if lines == 1 else f"{lines} lines of {counted(width, 'column')} a frame"
     if how.frame_lines or how.frame_end:
-        values = values[:whole].reshape(-1, lines, width)
-        t = None if t is None else t[:whole:lines].copy()
+        values = values[:end].reshape(-1, lines, width)
+        t = None if t is None else t[:end:lines].copy()
     return Readings(values, t, size, lambda frame: head.line(frame * lines), names_of_taxels, lost)
 
 

@@ -120,7 +120,7 @@ class _TextTable:
         """Find the parts; None of a text that does not end in lines of numbers, or of numbers beside texts."""
         for texts in (False, True):
             marks = [(mark, decimal) for decimal in ".," for mark in ",;\t " if mark != decimal]
-            fits = [fit for mark, decimal in marks if (fit := _Fit.of(lines, mark, decimal, texts=texts)) is not None]
+            fits = [fit for mark, decimal in marks if (fit := _Fit.find(lines, mark, decimal, texts=texts)) is not None]
             if fits:
                 return cls._of(max(fits, key=lambda fit: fit.score))
         return None
@@ -247,7 +247,7 @@ class _Fit:
     numeric: Sequence[bool]
 
     @classmethod
-    def of(cls, lines: Sequence[str], separator: str, decimal: str, *, texts: bool) -> _Fit | None:
+    def find(cls, lines: Sequence[str], separator: str, decimal: str, *, texts: bool) -> _Fit | None:
         """Return the cells; None if they make no columns of numbers, `texts`: beside others of texts."""
         there = [(k, row) for k, line in enumerate(lines) if line.strip() and any(row := cells(line, separator))]
         rows = [row for _, row in there]
@@ -389,7 +389,7 @@ def _unit(name: str, times: NDArray[np.float64], count: float) -> list[str]:
 
     unit = stated or (min(fitting, key=unlike) if step > 0 and fitting else fitting[0] if fitting else "us")
     notes = [f"{1e6 / (step * UNITS_US[unit]):.4g} frames/s"] if step > 0 else []
-    others = [_quote(other) for other in UNITS_US if other != unit]
+    others = [_quote(name) for name in UNITS_US if name != unit]
     notes += [f"a guess; or {', '.join(others[:-1])} or {others[-1]}"] * (not stated)
     return [f"time_unit = {_quote(unit)}" + "  # " * bool(notes) + ", ".join(notes)]
 
