@@ -111,7 +111,7 @@ def encode(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:
 def detect(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:
     readout = ["--readout", places["readout"]]
     yield ["detect", places[".mcap"], *readout]
-    yield ["detect", places[".mcap"], *readout, "--truth", places["labels"], "--csv", out / f"{FILE}.csv"]
+    yield ["detect", places[".mcap"], *readout, "--truth", places["labels"], "-o", out / f"{FILE}.csv"]
     yield ["detect", places[".mcap"], *readout, "--truth", "notes", "--report", out / FILE]
     yield ["detect", places["bag"], *readout, "--topic", f"/{NAME}"]
     yield ["detect", places["table"].parent, *readout]

@@ -89,9 +89,9 @@ class Labels:
     Parameters
     ----------
     path : path
-        A CSV ``recording,source,label,t_us,host_ns,replaces_us``, its columns in any order; all but `label` and `t_us`
-        may be absent. A label without a source is of all sources of its recording; a source that was a topic of a ROS
-        bag may have the topic's name. A row with `replaces_us` stands for
+        A CSV ``recording,source,label,t_us,host_ns,replaces_us``, its columns in any order, with commas, semicolons or
+        tabs between; all but `label` and `t_us` may be absent. A label without a source is of all sources of its
+        recording; a source that was a topic of a ROS bag may have the topic's name. A row with `replaces_us` stands for
         the recording's own note of that time; one without a label says that this note is none. Other columns are kept
         (`Note.others`). An empty text has no labels.
 
@@ -282,7 +282,7 @@ def rows_of(location: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...
     return rows, table.header
 
 
-def text_with(rows: Iterable[Note], columns: Iterable[str] = (), end: str = "\n") -> str:
+def text_with(rows: Iterable[Note], columns: Iterable[str] = (), end: str = "\n", separator: str = ",") -> str:
     r"""Return the text of a table with these rows, in the order of time.
 
     Parameters
@@ -293,6 +293,8 @@ def text_with(rows: Iterable[Note], columns: Iterable[str] = (), end: str = "\n"
         rows by it. New ones follow.
     end : str
         What ends a line.
+    separator : str
+        Between cells.
 
     Examples
     --------
@@ -316,7 +318,7 @@ def text_with(rows: Iterable[Note], columns: Iterable[str] = (), end: str = "\n"
     there = list(columns)
     header = [*there, *(name for name in dict.fromkeys([*_WANTED, *kept, *others]) if name not in there)]
     text = io.StringIO(newline="")
-    table = csv.writer(text, lineterminator=end)
+    table = csv.writer(text, lineterminator=end, delimiter=separator)
     table.writerow(header)
     table.writerows([[row.get(name, "") for name in header] for row in cells])
     return text.getvalue()

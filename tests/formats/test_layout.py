@@ -327,7 +327,7 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
     ("layout", "match"),
     [
         ("pich_mm = 3", "unknown key pich_mm; there are rows, columns, pitch_mm"),
-        ("[table]\nsep = ';'", r"unknown key table\.sep; there are separator, skip_lines"),
+        ("[table]\nsep = ';'", r"unknown key table\.sep; there are separator, decimal, skip_lines"),
         ("[ros]\ntopics = 'a'", r"unknown key ros\.topics"),
         ("[places]\nx = [1]\ny = [1]\nz = [1]", r"unknown key places\.z"),
         ("rows = 2", "rows and columns: give both or neither"),

@@ -133,8 +133,8 @@ def test_a_line_that_is_being_written_is_waited_for(table: Path, tables) -> None
         (b"# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
         (b'label,t_us\n"heel,1\n', "a quote opens"),
         (
-            "label,t_us\nheel,1\n".encode("utf-16"),
-            r"csv, line 1, byte 0: not text in UTF-8 \(UTF-16\); save it as UTF-8",
+            "label,t_us\nheel,1\n".encode("utf-16") + b"\0",
+            r"csv, line 3, byte 38: not text in UTF-16 \(truncated data\); save it as UTF-8",
         ),
         (b"label,t_us\r\nheel,1\r\nf\xfc\xdf,2\r\n", "csv, line 3, byte 21: not text in UTF-8 .*; save it as UTF-8"),
         (b"\xef\xbb\xbflabel,t_us\rf\xfc\xdf,2\r", "csv, line 2, byte 15: not text in UTF-8 .*; save it as UTF-8"),
@@ -187,6 +187,11 @@ def test_any_table_that_can_be_read_keeps_its_rows(text: bytes, kept, table: Pat
         (b"\xef\xbb\xbft_us,label\r\n1,heel\r\n", b"\xef\xbb\xbft_us,label\r\n1,heel\r\n7,toe\r\n"),
         (b"t_us,label\r1,heel\r", b"t_us,label\r1,heel\r7,toe\r"),
         (b'\xef\xbb\xbft_us,label\n1,"a\r\nb"\n', b'\xef\xbb\xbft_us,label\n1,"a\r\nb"\n7,toe\n'),
+        (b"t_us;label;comment\n1;heel;1,5\n", b"t_us;label;comment\n1;heel;1,5\n7;toe;\n"),
+        (
+            "\ufefflabel\tt_us\r\nhéel\t1\r\n".encode("utf-16-be"),
+            "\ufefflabel\tt_us\r\nhéel\t1\r\ntoe\t7\r\n".encode("utf-16-be"),
+        ),
     ],
 )
 def test_a_table_keeps_its_columns_in_their_order_and_its_ends_of_lines(

@@ -15,7 +15,7 @@ from taxel import _core
 from taxel.labels import TURN_US
 from taxel.live._requests.labels import LabelRequests
 from taxel.live._shown_files import Opening
-from taxel.recording.recognition import is_recording
+from taxel.recording.recognition import is_label_table, is_recording
 
 ARRAY = {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}
 BEGAN_NS = 1_700_000_000_000_000_000
@@ -204,6 +204,20 @@ def test_columns_that_taxel_does_not_know_stay_with_their_labels_on_the_page(row
             for one in again
         ]
         assert sorted(found) == sorted(left)
+
+
+@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_table_of_a_spreadsheet_is_the_one_with_commas(tmp_path: Path, separator: str, code: str) -> None:
+    kg = '"1,5"' if separator == "," else "1,5"
+    rows = [["recording", "label", "t_us", "Größe (kg)"], ["walk", "Fuß", "5", kg], ["", '"heel; or, toe\t"', "7", ""]]
+    place = tmp_path / "labels.csv"
+    place.write_bytes("".join(separator.join(row) + "\r\n" for row in rows).encode(code))
+    assert [(row.text, row.t, row.recording, row.others) for row in taxel.Labels(place).rows] == [
+        ("Fuß", 5, "walk", (("Größe (kg)", "1,5"),)),
+        ("heel; or, toe", 7, "", (("Größe (kg)", ""),)),
+    ]
+    assert is_label_table(place)
 
 
 def test_a_cell_in_a_column_without_a_name_is_refused_and_an_empty_one_is_not(tmp_path: Path) -> None:

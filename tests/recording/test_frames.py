@@ -240,7 +240,9 @@ def test_info_of_a_folder_takes_each_source_as_a_recording(tmp_path: Path, capsy
     (tmp_path / "feet").mkdir()
     taxel.convert(Frames(np.ones((5, 2, 2)), np.arange(5), array=Array(2, 2)), tmp_path / "feet" / "hand.mcap")
     call(capsys, "convert", write_pedar(tmp_path), tmp_path / "feet" / "walk.mcap")
-    code, shown, said = call(capsys, "info", tmp_path / "feet")
+    rows = call(capsys, "info", tmp_path / "feet")[1].splitlines()[2:5]
+    assert [row.split("  ")[1] for row in rows] == ["hand.mcap", "walk.mcap left", "walk.mcap right"]
+    code, shown, said = call(capsys, "info", tmp_path / "feet", "--each")
     assert (code, said) == (0, "")
     assert [
         f"{tmp_path / 'feet' / name}: .mcap" in shown for name in ("hand.mcap", "walk.mcap left", "walk.mcap right")

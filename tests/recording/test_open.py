@@ -48,7 +48,7 @@ def npz(**columns: object) -> bytes:
         ("a.csv", b"\x89PNG\r\n", "a PNG picture, no recording"),
         ("a.csv", b"", "line 1: '': must be"),
         ("a.csv", b"time,x,y\n", "line 1: 'time,x,y': must be t_us,x,y,p[,intensity]"),
-        ("a.csv", b"\xff\xfe\x00", "byte 2: a zero byte; it is in UTF-16: save it as UTF-8"),
+        ("a.csv", b"\xff\xfe\x00", "byte 2: not text in UTF-16 (truncated data); save it as UTF-8"),
         ("a.csv", b"t_us,x,y,p,colour\n", "line 1: 'colour' after p"),
         ("a.csv", b"t_us,x,y,p\n1,2,3\n", "must be 4 numbers a line"),
         ("a.csv", b"t_us,x,y,p\n1,2,3,1\n5,6,abc,1\n", "line 3, column y"),

@@ -121,8 +121,13 @@ def test_info_of_a_folder_says_all_of_them(tmp_path: Path) -> None:
         taxel.convert(some_events(40, seed=k), tmp_path / f"walk{k}.npz")
     said = run("info", tmp_path)
     assert said.returncode == 0, said.stderr
-    assert "walk0.npz: " in said.stdout
-    assert "walk1.npz: " in said.stdout
+    head, _, *rows, last, end = said.stdout.splitlines()
+    assert head == f"{tmp_path}: 2 recordings"
+    assert [row.split()[0] for row in rows] == ["walk0.npz", "walk1.npz"]
+    assert last.split()[2:4] == ["80", "events"]
+    assert end == "--each prints all of each"
+    each = run("info", tmp_path, "--each").stdout
+    assert [f"walk{k}.npz: .npz" in each for k in range(2)] == [True, True]
 
 
 # cut and merge

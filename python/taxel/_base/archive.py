@@ -77,6 +77,26 @@ def shapes(path: str | os.PathLike[str]) -> dict[str, tuple[int, ...]]:
             raise FormatError(f"{path}: no whole {Path(path).suffix} ({first_line(error)}); write it again") from None
 
 
+def fields_of(path: str | os.PathLike[str]) -> tuple[str, ...]:
+    """Return the names of the fields of a .npy with records, and their second names; empty of any other file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> place = Path(tempfile.mkdtemp()) / "a.npy"
+    >>> np.save(place, np.zeros(3, [("t", "<i8"), ("x", "<i2")]))
+    >>> fields_of(place)
+    ('t', 'x')
+    """
+    try:
+        with open_file(path) as file:
+            dtype = _described(file)[2]
+    # As in `stored_names`.
+    except Exception:
+        return ()
+    return tuple(dtype.fields or ())
+
+
 def read_array(path: str | os.PathLike[str], dtype: DTypeLike | None = None) -> NDArray[Any]:
     """Read the one array of a .npy.
 

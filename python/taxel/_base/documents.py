@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import json
 import os
 import re
@@ -13,6 +12,7 @@ from collections.abc import Iterator
 from typing import Any, NoReturn
 
 from taxel._base.arguments import shown
+from taxel._base.encodings import mark_of
 from taxel._base.files import open_file
 from taxel._base.limits import UNPACKED, unpacked
 from taxel._base.messages import first_line
@@ -40,11 +40,11 @@ class NotTomlError(FormatError):
 
 
 def read_text(path: str | os.PathLike[str], most: int = BY_HAND) -> str:
-    """Return the text of a file, UTF-8 with or without BOM.
+    """Return the text of a file (`decoded`).
 
     Raises
     ------
-    FormatError : more than `most` bytes, not UTF-8 (names line and byte), or no file but a pipe, a socket or a device
+    FormatError : more than `most` bytes, no text (names line and byte), or no file but a pipe, a socket or a device
     OSError : the file is not there, or cannot be read
     """
     with open_file(path) as file:
@@ -55,20 +55,23 @@ def read_text(path: str | os.PathLike[str], most: int = BY_HAND) -> str:
 
 
 def decoded(path: str | os.PathLike[str], data: bytes) -> str:
-    """Return the text of a file's bytes, UTF-8 with or without BOM.
+    """Return the text of a file's bytes, UTF-8 with or without BOM, or UTF-16 with one.
 
     Raises
     ------
-    FormatError : not UTF-8 (names line and byte)
+    FormatError : neither (names line and byte)
     """
+    mark, encoding = mark_of(data)
     try:
-        return data.decode("utf-8-sig")
+        return data[len(mark) :].decode(encoding)
     except UnicodeDecodeError as error:
         # Counted in the whole file, with its BOM.
-        at = error.start + len(data) - len(error.object)
-        line = len(data[:at].replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n"))
-        reason = "UTF-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else error.reason
-        raise FormatError(f"{path}, line {line}, byte {at}: not text in UTF-8 ({reason}); save it as UTF-8") from None
+        before = error.object[: error.start].decode(encoding, "replace")
+        line = len(before.replace("\r\n", "\n").replace("\r", "\n").split("\n"))
+        at, name = len(mark) + error.start, encoding[:6].upper()
+        raise FormatError(
+            f"{path}, line {line}, byte {at}: not text in {name} ({error.reason}); save it as UTF-8"
+        ) from None
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:

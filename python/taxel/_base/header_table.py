@@ -1,4 +1,4 @@
-"""Tables of text: comma-separated cells below a line of column names; errors name file and line."""
+"""Tables of text: cells below a line of column names, with commas, semicolons or tabs between; errors name the line."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ import io
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 from taxel._base.arguments import shown
 from taxel._base.documents import read_text
 from taxel._base.limits import TEXT, unpacked
 from taxel._core import FormatError
-
-#: The names of other separators than the comma, for errors.
-_PARTED = {";": "semicolons", "\t": "tabs"}
 
 #: Bytes in memory, at most about: of a line with the row that is made of it, and of a cell beside the first.
 _LINE, _CELL = 440, 130
@@ -126,10 +124,6 @@ class HeaderTable:
         """
         missing = [name for name in required if name not in self.header]
         if missing:
-            first = self.header[0] if len(self.header) == 1 else ""
-            parted = next((delimiter for mark, delimiter in _PARTED.items() if mark in first), None)
-            if parted:
-                raise FormatError(f"{self.location}, line 1: its cells are parted by {parted}; must be commas")
             there = f"there are {', '.join(map(shown, self.header))}" if self.header else "it is empty"
             raise FormatError(
                 f"{self.location}, line 1: no column {missing[0]!r}; {there}; must be {','.join(required)} ..."
@@ -154,7 +148,13 @@ class HeaderTable:
 
 def _rows(location: str | Path, lines: Iterable[str]) -> Iterator[tuple[int, tuple[str, ...]]]:
     """Yield the rows of a table that are not empty, each with the number of its line."""
-    reader = csv.reader(lines, strict=True)
+    rest = iter(lines)
+    above = list[str]()
+    for first in rest:
+        above.append(first)
+        if first.strip():
+            break
+    reader = csv.reader(chain(above, rest), strict=True, delimiter=separator_of(above[-1] if above else ""))
     line = 1
     try:
         for cells in reader:
@@ -166,19 +166,33 @@ def _rows(location: str | Path, lines: Iterable[str]) -> Iterator[tuple[int, tup
         raise FormatError(f"{location}, line {line}: {reason}") from None
 
 
+def separator_of(names: str) -> str:
+    """Return what separates the names of a table's columns: the comma, the semicolon or the tab that is most in them.
+
+    Examples
+    --------
+    >>> separator_of('label;"t_us";comment'), separator_of('label,"first; second; third",t_us'), separator_of("label")
+    (';', ',', ',')
+    """
+    # Pairs of quotes hold no separators.
+    bare = "".join(names.split('"')[::2])
+    return max(",;\t", key=bare.count)
+
+
 def text_of(path: Path) -> list[str]:
-    """Read the lines of a UTF-8 text, with or without BOM, including line ends, as a quoted cell may contain one.
+    """Read the lines of a text (`read_text`), including line ends, as a quoted cell may contain one.
 
     Raises
     ------
-    FormatError : no UTF-8 text
+    FormatError : no text
     OSError : the file is not there, or cannot be read
     """
     text = read_text(path, TEXT)
     # As in JSON, a character is in the text, in its line and in its cell.
     characters = len(text) * (6 if text.isascii() else 12)
     lines = max(text.count("\n"), text.count("\r"))
-    unpacked(str(path), characters + _LINE * lines + _CELL * text.count(","))
+    cells = max(map(text.count, ",;\t"))
+    unpacked(str(path), characters + _LINE * lines + _CELL * cells)
     return lines_of(text)
 
 

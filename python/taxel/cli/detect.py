@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from taxel.detect import Outcome
-    from taxel.tasks import Detected
+    from taxel.tasks import Detected, Detecting
 
 app = App()
 
-#: Rows of the table that is printed; all go to --csv and --json.
+#: Rows of the table that is printed without --list; all go to --out and --json.
 _ROWS = 40
 
 
@@ -49,17 +49,23 @@ def detect(
         ),
     ] = None,
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
-    csv: Annotated[Path | None, typer.Option(help="Write the detections to this .csv.")] = None,
+    lists: Annotated[
+        bool,
+        typer.Option(
+            "--list", help="Print all detections. Default: the first 40 of each recording, and with --truth none."
+        ),
+    ] = False,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write the detections to this .csv.")] = None,
     report: ReportOption = None,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Detect events in a recording, or in each of a folder, by a trained readout or a plain rule.
 
-    Example: taxel detect walk.mcap --readout gait.json --truth steps.csv --csv found.csv
+    Example: taxel detect walk.mcap --readout gait.json --truth steps.csv -o found.csv
     """
-    if csv is not None:
-        check_writable(csv, overwrite=overwrite)
+    if out is not None:
+        check_writable(out, overwrite=overwrite)
     if report is not None:
         try_report(report)
     options = taxel.tasks.DetectOptions(tare, frame_us, window_ms)
@@ -68,28 +74,28 @@ def detect(
         update(f"reading {recording}", 0, 0)
         opened = files.opener.open_sensors([recording])
         found = taxel.tasks.detect(loaded, opened, truth, options, progress=update)
-    if csv is not None:
-        write_whole(csv, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
+    if out is not None:
+        write_whole(out, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
     if report is not None:
         taxel.report.write_detections(report, loaded, found.outcomes, title=f"Detections of {readout} in {recording}")
     say_warnings(found.warnings)
-    written = {"written": csv, "report": None if report is None else report / "report.html"}
+    written = {"written": out, "report": None if report is None else report / "report.html"}
     files_written = {name: str(path) for name, path in written.items() if path is not None}
     if as_json:
         say(json.dumps(_result(recording, readout, found.to_dict()) | files_written))
         return
-    for each in found.each:
-        if recording.is_dir() or len(found.each) > 1:
-            say(f"{each.outcome.name}:")
-        _print(each, given=tare is not None)
-        if isinstance(loaded, taxel.Readout):
-            say(each.outcome.outside_text)
+    several = recording.is_dir() or len(found.each) > 1
     if found.score is not None:
-        say("", f"against {truth} (window {window_ms:g} ms):", *repr(found.score).split("\n"))
-        for label, sources in found.unlabelled.items():
-            say(f"not scored, as no row of {truth} names it: {label} of {', '.join(sources)}")
-        if found.not_scored:
-            say(f"not scored, as the readout has {', '.join(loaded.labels)}: {', '.join(found.not_scored)}")
+        _print_score(found, loaded.labels, truth, several=several)
+    for each in found.each:
+        if found.score is None or lists or not several:
+            _print(each, given=tare is not None, named=several, rows=None if lists else _ROWS * (found.score is None))
+            if isinstance(loaded, taxel.Readout):
+                say(each.outcome.outside_text)
+        elif each.hint is not None:
+            say(f"{each.outcome.name}: {each.hint}")
+    if found.score is not None and not lists:
+        say("--list prints the detections")
     for name, path in files_written.items():
         say(f"written to {path}" if name == "written" else f"{name}: {path}")
 
@@ -122,25 +128,51 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     return text.getvalue()
 
 
-def _print(each: Detected, *, given: bool) -> None:
-    """Print detections, with times from the recording's beginning on, and what may have kept others away."""
+def _print_score(found: Detecting, labels: Sequence[str], truth: str | None, *, several: bool) -> None:
+    """Print the score of all recordings, by label, and that of each."""
+    say(f"against {truth} (window {found.window_ms:g} ms):", *repr(found.score).split("\n"))
+    for label, sources in found.unlabelled.items():
+        say(f"not scored, as no row of {truth} names it: {label} of {', '.join(sources)}")
+    if found.not_scored:
+        say(f"not scored, as the readout has {', '.join(labels)}: {', '.join(found.not_scored)}")
+    if not several:
+        return
+    rows: list[tuple[str, ...]] = [("recording", "label", "events", "found", "missed", "false")]
+    for outcome in found.outcomes:
+        scores = {} if outcome.score is None else outcome.score.by_label or {outcome.score.label: outcome.score}
+        rows += [
+            (Path(outcome.name).name, label, *map(str, (score.events, score.found, score.missed, score.false)))
+            for label, score in scores.items()
+        ]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        say("  ".join([*map(str.ljust, row[:2], widths), *map(str.rjust, row[2:], widths[2:])]))
+
+
+def _print(each: Detected, *, given: bool, named: bool, rows: int | None) -> None:
+    """Print detections, with times from the recording's beginning on, and what may have kept others away.
+
+    `rows`: how many at most; None for all.
+    """
     found, begin_us = each.outcome.found, each.outcome.begin_us
     detections = Detections._of(found.label, found.t - begin_us, found.known - begin_us, found.slope)
+    if named:
+        say(f"{each.outcome.name}:")
     say(repr(detections))
     if each.rest is not None and not given:
         say(f"rest taken: {each.rest}; --tare gives another")
     if each.hint is not None:
         say(each.hint)
-    if not len(detections):
+    first = detections[:rows]
+    if not len(first):
         return
     if begin_us:
         say(f"times are from {begun(begin_us)} on")
     width = max(5, *(len(label) for label in detections.labels))
-    first = detections[:_ROWS]
     # A plain rule has no slope; levels of frames come in steps, and may give one for all.
     sloped = len({f"{slope:.4g}" for slope in detections.slope}) > 1
     say(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped)
     for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):
         say(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13.4g}" * sloped)
-    if len(detections) > _ROWS:
-        say(f"... and {len(detections) - _ROWS} more; --csv and --json hold all")
+    if len(detections) > len(first):
+        say(f"... and {len(detections) - len(first)} more; --list prints all, --out and --json hold them")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 app = App()
 
 _PICTURES = (".png", ".svg", ".pdf")
+#: Verdicts that name no fault.
+_SOUND = ("complete", "complete after arrival", "unknown")
 
 
 @app.command()
@@ -54,6 +57,7 @@ def info(
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
     tare: Annotated[str | None, tare_option("Default: that of a quiet stretch.")] = None,
+    each: Annotated[bool, typer.Option("--each", help="Print all of each recording of a folder.")] = False,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -62,6 +66,8 @@ def info(
     Of spike trains that taxel encode wrote: how many, their kind, duration and spikes.
 
     Of a ROS bag without --topic: the topics that hold numbers, with shapes and rates.
+
+    Of several recordings, as of a folder: a row each, and their sum.
 
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
@@ -92,8 +98,7 @@ def info(
                 raise ProblemError(_several(file, recordings))
             infos = [taxel.tasks.info(each, tare) for each in recordings]
             of_each = [found.facts for found in infos]
-            result = [json.dumps(of_each if len(recordings) > 1 else of_each[0])]
-            say(*(result if as_json else chain.from_iterable(map(_pages, of_each))))
+            say(*_of_several(file, of_each, as_json=as_json, each=each))
             say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
             return
         found = taxel.tasks.info(recording, tare)
@@ -162,6 +167,61 @@ def _several(file: Path, recordings: Sequence[Recording]) -> str:
     )
 
 
+def _of_several(place: Path, of_each: Sequence[dict[str, Any]], *, as_json: bool, each: bool) -> Iterable[str]:
+    """Return the facts of several recordings, or of one with several sources, as JSON or as lines for people."""
+    if as_json:
+        return [json.dumps(of_each if len(of_each) > 1 else of_each[0])]
+    if each or len(of_each) == 1:
+        return chain.from_iterable(map(_pages, of_each))
+    return _overview(place, of_each)
+
+
+def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:
+    """Return a row for each sensor of recordings, then their sum, as lines for people."""
+    sensors = [sensor for facts in of_each for sensor in _sensors(facts)]
+    sums = {noun: sum(facts.get(f"{noun}s", 0) for facts in sensors) for noun in ("event", "frame")}
+    notes = Counter(note["text"] for facts in of_each for note in _notes(facts))
+    faults = Counter(str(facts["verdict"]) for facts in of_each if facts["verdict"].status not in _SOUND)
+    head = ("recording", "array", "time (s)", "contents", "rate (1/s)", "notes", "verdict")
+    contents = ", ".join(counted(total, noun) for noun, total in sums.items() if total)
+    last = ("sum", "", f"{sum(facts['seconds'] for facts in sensors):.3f}", contents, "", str(notes.total()), "")
+    rows = [head, *map(_row, sensors), last]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    of_notes = ", ".join(f"{text} {count}" for text, count in sorted(notes.items()))
+    return [
+        f"{place}: {counted(len(of_each), 'recording')}",
+        *("  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows),
+        *([f"notes: {of_notes}"] if notes else []),
+        *(f"{counted(count, 'recording')}: {verdict}" for verdict, count in faults.items()),
+        "--each prints all of each",
+    ]
+
+
+def _sensors(facts: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the facts of each source of a recording, or of its only one."""
+    return list(facts["sources"].values()) if "sources" in facts else [facts]
+
+
+def _notes(facts: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the notes of a recording, those of several sources from the first that has any."""
+    return next((notes for sensor in _sensors(facts) if (notes := sensor["notes"])), [])
+
+
+def _row(facts: dict[str, Any]) -> tuple[str, ...]:
+    """Return the cells of a sensor in the table of several recordings."""
+    array, events = Array._from_geometry(facts["array"]), facts.get("events")
+    rate = facts["frames_per_s"] if events is None else facts["events_per_s_board"]
+    return (
+        Path(facts["file"]).name,
+        f"{array.rows} x {array.columns}",
+        f"{facts['seconds']:.3f}" if facts["timed"] else "none",
+        f"{counted(facts['frames'], 'frame')} ({facts['unit']})" if events is None else counted(events, "event"),
+        "" if rate is None else f"{rate:.4g}",
+        str(len(facts["notes"])),
+        facts["verdict"].status,
+    )
+
+
 def _pages(facts: dict[str, Any]) -> list[str]:
     """Return the facts of a recording, or of each source of one, as lines for people."""
     if "sources" not in facts:
@@ -198,11 +258,13 @@ def _page(facts: dict[str, Any]) -> list[str]:
 
 
 def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    from taxel.recording import kind_of_file  # noqa: PLC0415
+
     array = Array._from_geometry(facts["array"])
     size = f"{array.rows} x {array.columns} taxels, {array._apart()}"
     # The default's name, and that of --array, say nothing more.
     size += "" if re.fullmatch(r"array|\d+x\d+\S*", array.name) else f", {array.name}"
-    yield "array", size + (f"; a .{facts['kind']} does not hold it: --array" if facts["array_assumed"] else "")
+    yield "array", size + f"; a {kind_of_file(facts['kind'])} does not hold it: --array" * facts["array_assumed"]
     names = array.names or ()
     of_it = {"names": ", ".join(names[:8]) + " ..." * (len(names) > 8), "side": facts["side"], "heel": facts["heel"]}
     yield from ((name, value) for name, value in of_it.items() if value)

@@ -88,8 +88,15 @@ def whole_us(location: str, seconds: NDArray[np.float64], first_line: int = 1) -
     return t
 
 
-def ascending(location: str, t: NDArray[np.int64], first_line: int = 1) -> NDArray[np.int64]:
+def ascending(location: str, t: NDArray[np.int64], first_line: int | Callable[[int], int] = 1) -> NDArray[np.int64]:
     """Return a file's times in us, which must ascend.
+
+    Parameters
+    ----------
+    location : str
+    t : int64, us
+    first_line : int, or function of int
+        The line of the first time, each in a line; or the line of each.
 
     Raises
     ------
@@ -98,5 +105,6 @@ def ascending(location: str, t: NDArray[np.int64], first_line: int = 1) -> NDArr
     back = np.flatnonzero(t[1:] <= t[:-1])
     if len(back):
         k = int(back[0]) + 1
-        raise FormatError(f"{location}, line {first_line + k}: time {t[k] / 1e6:g} s does not ascend")
+        line = first_line(k) if callable(first_line) else first_line + k
+        raise FormatError(f"{location}, line {line}: time {t[k] / 1e6:g} s does not ascend")
     return t

@@ -26,29 +26,39 @@ from taxel.array import Array, Places
 __all__ = ["Data", "Layout", "PrintedFrames", "Table", "advice", "load_packaged"]
 
 #: Times of a table in units of these, us.
-UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
+UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
 #: The unit of times of a table that are texts.
 ISO = "iso"
 
 
 @dataclass(frozen=True)
 class Table:
-    """Say how to read a table of text: a line a frame, a column a taxel.
+    """Say how to read a table of text: frames, a line or several each, a column a taxel; or events, a line each.
 
     Parameters
     ----------
     separator : str
         Between cells; " " stands for any number of blanks.
+    decimal : {".", ","}
+        What stands before the decimals of a number.
     skip_lines : int, 0 or more
         Lines before the names of the columns, or before the numbers if there are no names.
+    columns : list of str, optional
+        The names of the columns, for a table without names.
     time_column : str or int, optional
         The column of times, by its name or its number from 1; default: none.
-    time_unit : {"s", "ms", "us", "iso"}
+    time_unit : {"s", "ms", "us", "ns", "iso"}
         "iso": texts as of ISO 8601, dates with times, of UTC where they state no zone, or times of a day.
     missing : str, optional
         A cell without a value; default: every cell is a number.
     leave_out : list of str or int
         The columns that are no taxels, by name or number from 1, which may hold texts. All others are taxels.
+    frame_lines : int, 1 or more, optional
+        Lines a frame, of which the first has its time; default: 1.
+    frame_end : {"blank"}, optional
+        An empty line ends a frame.
+    events : bool
+        Whether each line is an event, in the columns x, y and p (the polarity: 1 for more pressure, 0 or -1 for less).
 
     Raises
     ------
@@ -56,15 +66,27 @@ class Table:
     """
 
     separator: str = ","
+    decimal: str = "."
     skip_lines: int = 0
+    columns: Sequence[str] = ()
     time_column: str | int | None = None
     time_unit: str = "s"
     missing: str | None = None
     leave_out: Sequence[str | int] = ()
+    frame_lines: int | None = None
+    frame_end: str | None = None
+    events: bool = False
 
     def __post_init__(self) -> None:
         if len(text("separator", self.separator)) != 1:
             raise refused("separator", f" is {shown(self.separator)}: must be one character")
+        if text("decimal", self.decimal, (".", ",")) == self.separator:
+            raise refused("decimal", f" is {shown(self.decimal)}, and so is separator: must differ")
+        for column in several("columns", self.columns):
+            text("columns", column)
+        _check_end(self)
+        if flag("events", self.events) and (self.time_column is None or self.frame_lines or self.frame_end):
+            raise refused("events", " is true: must have a time_column, and no frame_lines or frame_end")
         integer("skip_lines", self.skip_lines, 0)
         if self.time_column is not None:
             _column("time_column", self.time_column)
@@ -75,6 +97,16 @@ class Table:
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
         if self.missing is not None:
             text("missing", self.missing)
+
+
+def _check_end(how: Table | PrintedFrames) -> None:
+    """Refuse what does not say where a frame of several lines ends."""
+    if how.frame_lines is not None:
+        integer("frame_lines", how.frame_lines, 1, 65_535)
+    if how.frame_end is not None:
+        text("frame_end", how.frame_end, ("blank",))
+        if how.frame_lines is not None:
+            raise refused("frame_end", " is given, and so is frame_lines: give one")
 
 
 def _column(name: str, value: object) -> None:
@@ -95,7 +127,7 @@ class Data:
         Of shape (frames, rows, columns) or (frames, taxels); in a group of a .h5 by its path, "run1/pressure".
     time : str, optional
         An array of one time a frame; default: none.
-    time_unit : {"s", "ms", "us"}
+    time_unit : {"s", "ms", "us", "ns"}
 
     Raises
     ------
@@ -151,12 +183,12 @@ class PrintedFrames:
     frame_end: str | None = None
 
     def __post_init__(self) -> None:
-        for name in ("place", "time", "frame_end"):
+        for name in ("place", "time"):
             if getattr(self, name) is not None and "," in text(name, getattr(self, name)):
                 raise refused(name, f" is {shown(getattr(self, name))}: must hold no comma")
-        for name in ("baud", "frame_lines"):
-            if getattr(self, name) is not None:
-                integer(name, getattr(self, name), 1)
+        if self.baud is not None:
+            integer("baud", self.baud, 1)
+        _check_end(self)
         for name in ("columns", "leave_out"):
             for column in several(name, getattr(self, name)):
                 _column(name, column)

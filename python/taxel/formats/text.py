@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from taxel._base import limits
 from taxel._base.arguments import short, shown
 from taxel._base.columns import Growing
+from taxel._base.encodings import as_utf_8
 from taxel._base.errors import helped
 from taxel._base.files import open_file
 from taxel._base.header_table import HeaderTable
@@ -58,7 +59,7 @@ _UTF_8 = b"\xef\xbb\xbf"
 def lines(path: Path) -> list[str]:
     """Read the lines of a text file, compressed by gzip or not, without line ends; `stream` holds none of them.
 
-    The text is UTF-8 with or without BOM, or else Latin-1, which instruments of the 1990s write.
+    The text is UTF-8 with or without BOM, UTF-16 with one, or else Latin-1, which instruments of the 1990s write.
 
     Raises
     ------
@@ -145,15 +146,18 @@ def head(path: Path) -> str:
     return (_lines(path, _bytes(path, _BEGINNING).removeprefix(_UTF_8).partition(b"\n")[0]) or [""])[0]
 
 
-def beginning(path: Path) -> list[str]:
-    """Read the whole lines in the first 64 KiB of a text file, as `lines` does.
+def beginning(path: Path, most: int = _BEGINNING) -> list[str]:
+    """Read the whole lines in the first `most` bytes of a text file, as `lines` does.
 
     Raises
     ------
-    FormatError : not a text, or a damaged gzip file
+    FormatError : not a text, a damaged gzip file, or a line of more than 4 MiB
     """
-    data = _bytes(path, _BEGINNING).removeprefix(_UTF_8)
-    return _lines(path, data if len(data) < _BEGINNING else data[: data.rfind(b"\n") + 1])
+    data = _bytes(path, most)
+    ended = data if len(data) < most else data[: max(data.rfind(b"\n"), data.rfind(b"\r", 0, -1)) + 1]
+    if not ended and len(data) > LINE:
+        raise FormatError(f"{path.name}, line 1: more than {LINE} bytes; at most that are read")
+    return _lines(path, ended.removeprefix(_UTF_8))
 
 
 def first_bytes(path: Path, count: int) -> bytes:
@@ -172,10 +176,10 @@ def _bytes(path: Path, most: int) -> bytes:
 
 @contextmanager
 def _open(path: Path) -> Iterator[BinaryIO]:
-    """Open a text file, to be read unpacked."""
+    """Open a text file, to be read unpacked and in UTF-8, or else in Latin-1."""
     with open_file(path) as raw:
         try:
-            yield cast(BinaryIO, gzip.GzipFile(fileobj=raw)) if path.suffix == ".gz" else raw
+            yield as_utf_8(path.name, cast(BinaryIO, gzip.GzipFile(fileobj=raw)) if path.suffix == ".gz" else raw)
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
             raise FormatError(f"{path.name}: not a whole gzip file ({error}); get it again") from None
 
@@ -183,8 +187,10 @@ def _open(path: Path) -> Iterator[BinaryIO]:
 def _lines(path: Path, data: bytes, begin: int = 0) -> list[str]:
     """Return the lines of bytes that begin at an offset of a file."""
     if b"\0" in data:
-        is_utf_16 = not begin and data.startswith((b"\xff\xfe", b"\xfe\xff"))
-        why = "it is in UTF-16: save it as UTF-8" if is_utf_16 else "this is not a text file"
+        # Every second byte of an English text in UTF-16 is zero.
+        zeros = [not data[parity:8:2].strip(b"\0") for parity in (0, 1)]
+        is_utf_16 = not begin and len(data) > 3 and zeros[0] != zeros[1]
+        why = "UTF-16 without its mark: save it as UTF-8" if is_utf_16 else "this is not a text file"
         raise FormatError(f"{path.name}, byte {begin + data.index(0)}: a zero byte; {why}")
     ends = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     try:
@@ -216,7 +222,8 @@ def number(cell: str, path: Path, line: int, noun: str, *, unmarked: bool = Fals
         value = float_of(text)
     except ValueError:
         if _DECIMAL_COMMA.fullmatch(text):
-            problem = f"has a decimal comma ({shown(text)}); export with decimal points"
+            problem = f"has a decimal comma ({shown(text)}); "
+            problem += "say in a layout file: [table] decimal = ','" if unmarked else "export with decimal points"
         else:
             problem = f"is {shown(text)}, not a number" if text else "is empty, not a number"
             problem += remedy
@@ -252,7 +259,7 @@ def numbers(
 
 
 def blocks(
-    rows: Iterable[Sequence[str]],
+    rows: Iterable[Sequence[str] | None],
     path: Path,
     first_line: int,
     names: Sequence[str],
@@ -261,6 +268,8 @@ def blocks(
     unmarked: bool = False,
 ) -> Iterator[tuple[int, NDArray[np.float64]]]:
     """Yield the numbers of a table as `numbers` returns them, some rows after the others, each with its first line.
+
+    None among the rows stands for a line that is none.
 
     Raises
     ------
@@ -271,9 +280,9 @@ def blocks(
 
 
 def group_rows(
-    rows: Iterable[Sequence[str]], path: Path, first_line: int, columns: int
+    rows: Iterable[Sequence[str] | None], path: Path, first_line: int, columns: int
 ) -> Iterator[tuple[int, list[Sequence[str]]]]:
-    """Yield the rows of a table some after the others, each time with the number of the first line.
+    """Yield the rows of a table some after the others, each time with the first one's line; None as of `blocks`.
 
     Raises
     ------
@@ -281,6 +290,11 @@ def group_rows(
     """
     line, some, characters = first_line, list[Sequence[str]](), 0
     for row in rows:
+        if row is None:
+            if some:
+                yield line, some
+            line, some, characters = line + len(some) + 1, [], 0
+            continue
         if len(row) != columns:
             raise FormatError(f"{path.name}, line {line + len(some)}: {len(row)} cells, must have {columns}")
         some.append(row)

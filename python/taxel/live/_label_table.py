@@ -11,7 +11,6 @@ in between leaves a state that the text of the table decides.
 
 from __future__ import annotations
 
-import codecs
 import contextlib
 import ctypes
 import errno
@@ -31,8 +30,9 @@ from typing import Any
 
 from taxel._base.arguments import shown
 from taxel._base.documents import decoded
+from taxel._base.encodings import mark_of
 from taxel._base.files import check_writable
-from taxel._base.header_table import lines_of
+from taxel._base.header_table import lines_of, separator_of
 from taxel._core import FormatError, ProblemError, open_regular
 from taxel.labels import Note, rows_of, text_with
 from taxel.live._label_join import Acknowledged, Conflict, Edit, Joined, conflict_of, fold, join, minus, settled
@@ -136,7 +136,8 @@ class _File:
             if final or not is_new:
                 raise
             raise _BeingWritten(error) from None
-        if not text.endswith((b"\n", b"\r")) and not final and is_new:
+        mark, encoding = mark_of(text)
+        if not text[len(mark) :].endswith(("\n".encode(encoding), "\r".encode(encoding))) and not final and is_new:
             raise _BeingWritten(None)
         return replace(self, text=text, rows=rows, columns=columns)
 
@@ -146,12 +147,13 @@ class _File:
         return self.link or self.path
 
     def text_with(self, rows: Sequence[Note]) -> bytes:
-        """Return the text of a table with these rows, with the columns, the ends of lines and the BOM of this one."""
+        """Return the text of a table with these rows; its columns, separator, line ends and encoding stay."""
         text = self.text or b""
         lines = lines_of(decoded(self.path, text))
         end = next((end for end in ("\r\n", "\r") if lines and lines[0].endswith(end)), "\n")
-        bom = codecs.BOM_UTF8 if text.startswith(codecs.BOM_UTF8) else b""
-        return bom + text_with(rows, self.columns, end).encode()
+        separator = separator_of(next((line for line in lines if line.strip()), ""))
+        mark, encoding = mark_of(text)
+        return mark + text_with(rows, self.columns, end, separator).encode(encoding)
 
     def is_current(self) -> bool:
         """Return whether the table is still the file that was read, with the same text."""

@@ -136,7 +136,7 @@ class Opening:
 
     def is_recording(self, file: Path) -> bool:
         """Return whether a file is a recording by its name, its first bytes and its layout."""
-        return is_recording(file, self.options_of(file).layout)
+        return is_recording(file, self.options_of(file).layout_of(file))
 
     def options_of(self, file: Path) -> TextOptions:
         """Return the options by which a file is opened."""

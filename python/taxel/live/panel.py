@@ -89,7 +89,7 @@ class Panel:
                 raise refused("control", ": a recording has no board; give a taxel.live.Live")
             if folder is not None:
                 raise refused("folder", ": is the recording's own")
-            folder, opened = _folder_and_name(shown_path, how.layout)
+            folder, opened = _folder_and_name(shown_path, how)
             opens = how.open_joined if opens is None and how.given() else opens
             shown = None if is_folder(shown_path) else folder / opened
         if how.rate_hz is not None:
@@ -295,19 +295,19 @@ class Panel:
         return f"Panel({'ended' if self._stopped else self._url.partition('#')[0]})"
 
 
-def _folder_and_name(path: Path, layout: str | os.PathLike[str] | None) -> tuple[Path, str]:
+def _folder_and_name(path: Path, options: TextOptions) -> tuple[Path, str]:
     """Return the folder of a recording and its name there; of a folder its first recording.
 
     The server indexes it when a client opens it; what is no recording is refused now.
     """
     if is_folder(path):
-        files = recordings_in(path, layout)
+        files = recordings_in(path, options.layout)
         if not files:
             raise ProblemError(f"{path}: holds no recording; name a file, or one of its folders")
         path = files[0]
     if not path.exists():
         raise FileNotFoundError(2, "no such recording", str(path))
-    check_recording(path, layout)
+    check_recording(path, options.layout_of(path))
     path = path.resolve()
     try:
         path.name.encode()

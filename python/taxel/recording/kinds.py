@@ -24,7 +24,7 @@ def kind_of_file(kind: str) -> str:
 
 
 #: Kinds of files that are no recordings of one format.
-_OTHERS = {"arrays": "file of arrays", "table": "table", "ros": "ROS bag"}
+_OTHERS = {"arrays": "file of arrays", "records": "file of events", "table": "table", "ros": "ROS bag"}
 
 
 def verdict_of(source: RecordedSource) -> Verdict:

@@ -40,6 +40,12 @@ def check_size(path: Path, size: tuple[int, ...], array: Array) -> None:
         raise refused("array", f": {array.rows} x {array.columns} taxels; {path} holds frames of {shape}")
 
 
+def is_row_of(stated: Array, array: Array) -> bool:
+    """Return whether a sensor is a row of as many channels as another has taxels, as tables and arrays hold a grid."""
+    is_row = stated.shape == (1, array.rows * array.columns) and stated.taxels == stated.columns
+    return is_row and array.rows > 1 and not stated._is_measured
+
+
 def on_array(source: S, array: Array) -> S:
     """Return the same source on another description of its sensor, of as many taxels; their names stay."""
     if array.names is None and source.sensor.array.names is not None:

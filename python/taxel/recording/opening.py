@@ -35,7 +35,7 @@ from taxel.recording.readers.foreign import read_foreign
 from taxel.recording.readers.h5 import read_h5
 from taxel.recording.readers.lsa import read_lsa
 from taxel.recording.readers.mcap import read_mcap
-from taxel.recording.readers.npz import read_npz
+from taxel.recording.readers.npz import read_npz, read_records
 from taxel.recording.readers.ros import Topics, read_ros
 from taxel.recording.recording import Recording, add_notes
 from taxel.recording.sidecars import labels_of, with_sidecars
@@ -219,13 +219,16 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
                 assert layout is not None  # one without is refused
                 if options.topics.are_given:
                     raise ProblemError(f"{path}: no ROS bag; topic, field, types and ros are of one")
-                contents = Contents.single(read_foreign(path, layout))
-                if options.array is not None:
-                    contents = Contents.single(_on_given(contents.main, instance("array", options.array, Array)))
+                array = None if options.array is None else instance("array", options.array, Array)
+                contents = Contents.single(read_foreign(path, layout, array))
+                if array is not None and not contents.main.has_events:
+                    contents = Contents.single(_on_given(contents.main, array))
             case recognition.TaxelFile(kind):
                 if options.topics.are_given:
                     raise ProblemError(f"{path}: a .{kind}; topic, field, types and ros are of a ROS bag")
                 array = None if options.array is None else instance("array", options.array, Array)
+                if kind == "records" and array is None and layout is not None:
+                    array = layout.grid()
                 contents = _read(path, kind, array, options.pairing, options.differences)
         return [_with_layout(contents, layout, given=options.layout is not None)]
     except MemoryError:
@@ -261,7 +264,8 @@ def _read(path: Path, kind: str, array: Array | None, pairing: str, differences:
         return read_mcap(path, pairing)
     if kind == "lsa":
         return Contents.single(read_lsa(path, array or Array.thesis(), pairing, differences))
-    return Contents.single({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](path, array))
+    readers = {"npz": read_npz, "records": read_records, "csv": read_csv, "h5": read_h5}
+    return Contents.single(readers[kind](path, array))
 
 
 def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:

@@ -11,13 +11,15 @@ from typing import TypeAlias
 
 from taxel import _core, formats
 from taxel._base import limits
-from taxel._base.archive import stored_names
+from taxel._base.archive import fields_of, stored_names
 from taxel._base.arguments import checked_path
+from taxel._base.encodings import as_utf_8
 from taxel._base.files import open_file
 from taxel._core import FormatError
 from taxel.formats.layout import Layout, advice
 from taxel.formats.ros import is_bag
 from taxel.recording.kinds import ENDINGS, LABELS
+from taxel.recording.readers.columns import EVENTS
 from taxel.recording.readers.csv import check_head, names_in
 from taxel.recording.readers.foreign import ARRAYS
 from taxel.recording.readers.h5 import is_h5_of_taxel
@@ -52,7 +54,7 @@ GivenLayout: TypeAlias = str | os.PathLike[str] | Layout | None
 
 @dataclass(frozen=True)
 class TaxelFile:
-    """A file of a kind that taxel writes: "mcap", "lsa", "npz", "csv" or "h5"."""
+    """A file of a kind that taxel writes: "mcap", "lsa", "npz", "csv" or "h5"; or a .npy of "records", one an event."""
 
     kind: str
 
@@ -103,8 +105,8 @@ def recognise(path: Path, layout: GivenLayout = None) -> TaxelFile | FormatFile 
         return RosBag()
     if why := _companion(path, has_layout=has_layout):
         return Refusal(FormatError(f"{path}{why}"), is_companion=True)
-    if (ending == ".csv" and _is_table_of_taxel(path)) or (ending == ".h5" and is_h5_of_taxel(path)):
-        return TaxelFile(ENDINGS[ending])
+    if (kind := _kind_of_taxel(path, ending)) is not None:
+        return TaxelFile(kind)
     if found := formats_of(path):
         return FormatFile(next(iter(found)))
     # The reader of a .npz reports one that is damaged.
@@ -112,6 +114,14 @@ def recognise(path: Path, layout: GivenLayout = None) -> TaxelFile | FormatFile 
     if _is_of_another_program(path, layout) and (has_layout or not is_damaged):
         return ForeignFile(has_layout)
     return _by_first_bytes(path)
+
+
+def _kind_of_taxel(path: Path, ending: str) -> str | None:
+    """Return the kind of a file of taxel with an ending that other programs give too, by its content, else None."""
+    if ending == ".npy":
+        return "records" if set(EVENTS) <= set(fields_of(path)) else None
+    is_of_taxel = (ending == ".csv" and _is_table_of_taxel(path)) or (ending == ".h5" and is_h5_of_taxel(path))
+    return ENDINGS[ending] if is_of_taxel else None
 
 
 def recognise_recording(path: Path, layout: GivenLayout = None) -> TaxelFile | FormatFile | RosBag | ForeignFile:
@@ -275,15 +285,19 @@ def _companion(path: Path, *, has_layout: bool) -> str:
 
 
 def _is_table_of_taxel(path: Path) -> bool:
-    """Return whether the first line of a .csv begins as taxel's own recordings do, which are separated by commas."""
+    """Return whether the first line of a .csv begins as taxel's own recordings do."""
     names = _first_line(path)
     return names[0] == "t_us" and len(names) > 1
 
 
 def _first_line(path: Path) -> list[str]:
     """Return the names in the first line of a table, as far as they are within 64 kB."""
-    with open_file(path) as table:
-        return names_in(table.readline(1 << 16))
+    with open_file(path) as file:
+        try:
+            return names_in(as_utf_8(path.name, file).readline(1 << 16))
+        except FormatError:
+            # The reader of tables reports what is no text.
+            return [""]
 
 
 def _is_of_another_program(path: Path, layout: GivenLayout) -> bool:

@@ -14,7 +14,7 @@ from taxel._core import ProblemError
 from taxel.array import Array, of_size
 from taxel.formats.layout import Layout
 from taxel.recording.contents import Contents
-from taxel.recording.layout import on_array
+from taxel.recording.layout import is_row_of, on_array
 from taxel.recording.opening import SharedOptions, join_feet, open_all, sensors
 from taxel.recording.readers.foreign import is_lone_array
 from taxel.recording.recognition import ForeignFile, recognise
@@ -50,7 +50,7 @@ class TextOptions(SharedOptions):
         arrays = [of_size(text("array", size), of_wire=False) for size in sizes]
         options = {option.name: getattr(self, option.name) for option in fields(SharedOptions)}
         options["array"] = arrays if len(arrays) > 1 else arrays[0] if arrays else None
-        options["layout"] = self.layout or self._instead_of_layout(file)
+        options["layout"] = self.layout_of(file)
         opened = open_all(file, **options)
         placed = map(self._on_array, opened)
         return [recording if self.rate_hz is None else recording.at_rate(self.rate_hz) for recording in placed]
@@ -77,9 +77,11 @@ class TextOptions(SharedOptions):
         layout = self.layout or Layout.beside(bag)
         return bool(self.topic) or (layout is not None and "topic" in Layout.read(Path(layout)).ros)
 
-    def _instead_of_layout(self, path: Path) -> Any:
-        """Return an empty layout for an array without one, whose rate `rate_hz` says; else None."""
-        if self.rate_hz is None or not path.is_file() or recognise(path) != ForeignFile(has_layout=False):
+    def layout_of(self, path: Path) -> Any:
+        """Return the layout that is given, or an empty one for an array without one, whose rate `rate_hz` says."""
+        if self.layout is not None or self.rate_hz is None:
+            return self.layout
+        if not path.is_file() or recognise(path) != ForeignFile(has_layout=False):
             return None
         return Layout(path) if is_lone_array(path) else None
 
@@ -135,7 +137,6 @@ def _on_sensor(recording: Recording, array: Array) -> Recording:
 
 
 def _is_row_of(recording: Recording, array: Array) -> bool:
-    """Return whether frames are a row of as many channels as a sensor has taxels, as tables and arrays may be."""
-    stated, is_one = recording.array, len(recording.sources) < 2
-    row = stated.shape == (1, array.rows * array.columns) and array.rows > 1 and stated.taxels == stated.columns
-    return is_one and row and not stated._is_measured and not recording.has_events and not recording.is_stream
+    """Return whether a recording is of frames that are a row of as many channels as a sensor has taxels."""
+    are_frames = not recording.has_events and not recording.is_stream and len(recording.sources) < 2
+    return are_frames and is_row_of(recording.array, array)

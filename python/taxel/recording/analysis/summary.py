@@ -46,7 +46,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "array": {name: value for name, value in array._geometry().items() if name != "exists"},
         "side": recording.side,
         "heel": recording.heel,
-        "array_assumed": recording.kind in ("csv", "lsa") and recording.has_events,
+        "array_assumed": recording.kind in ("csv", "lsa", "records") and recording.has_events,
         "timed": recording.timed,
         "from_us": span[0] if span else None,
         "to_us": span[1] if span else None,

@@ -1,7 +1,8 @@
 """Reads tables of text: a .csv of events or of frames.
 
 A .csv has either the columns ``t_us,x,y,p[,intensity][,repaired]`` (an empty intensity is an absent one), or ``t_us``
-and a column a taxel, named ``x3y5``, or, of channels, as they are called.
+and a column a taxel, named ``x3y5``, or, of channels, as they are called. A spreadsheet may have saved it: with
+semicolons or tabs, then with decimal commas too, and in UTF-16.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import shown
 from taxel._base.columns import Growing
+from taxel._base.encodings import as_utf_8
 from taxel._base.files import open_file
+from taxel._base.header_table import separator_of
 from taxel._base.limits import COLUMNS, LINE, TAXELS, VALUE
 from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
@@ -35,6 +38,8 @@ from taxel.recording.sections import Origin
 #: Columns of events: those that a table must have, and those that may follow.
 EVENTS = ("t_us", "x", "y", "p")
 MORE = ("intensity", "repaired")
+#: The first column, and what separates it from the second.
+_FIRST = re.compile(rb" *t_us *([,;\t])")
 _TAXEL = re.compile(r"x([0-9]{1,5})y([0-9]{1,5})")
 #: Columns of events: the least and the largest number in the file, and the type in memory. -1 is an absent intensity.
 _LIMITS: dict[str, tuple[int, int, type[Any]]] = {
@@ -70,27 +75,29 @@ def check_head(path: Path) -> None:
     FormatError : another header
     """
     with open_file(path) as file:
-        _head(path, file)
+        _head(path, as_utf_8(str(path), file))
 
 
-def _head(path: Path, file: BinaryIO) -> list[str]:
+def _head(path: Path, file: BinaryIO) -> tuple[list[str], bytes]:
+    """Return the names of the columns, and what separates the cells."""
     head = file.readline(_HEAD + 1)
     if len(head) > _HEAD:
         raise FormatError(f"{path}, line 1: more than {_HEAD} bytes; at most that are read")
-    return _names(path, head)
+    return _names(path, head), _separator(head)
 
 
 def _table(path: Path, array: Array | None) -> Events | Frames:
-    with open_file(path) as file:
-        names = _head(path, file)
+    with open_file(path) as raw:
+        file = as_utf_8(str(path), raw)
+        names, separator = _head(path, file)
         if tuple(names[:4]) == EVENTS:
-            return _csv_events(path, names, _blocks(path, file), array)
-        return _csv_frames(path, names, _blocks(path, file), array)
+            return _csv_events(path, names, _blocks(path, file, separator), array)
+        return _csv_frames(path, names, _blocks(path, file, separator), array)
 
 
 def _names(path: Path, head: bytes) -> list[str]:
     """Return the names of the columns in the first line."""
-    columns = head.count(b",") + 1
+    columns = head.count(_separator(head)) + 1
     if columns > COLUMNS:
         raise FormatError(f"{path}, line 1: {columns} columns; at most {COLUMNS} are read")
     names = names_in(head)
@@ -119,7 +126,13 @@ def names_in(head: bytes) -> list[str]:
     except UnicodeDecodeError:
         # As in other tables of text.
         text = _text_of(head).decode("latin-1")
-    return [name.strip() for name in text.split(",")]
+    return [name.strip() for name in text.split(_separator(head).decode())]
+
+
+def _separator(head: bytes) -> bytes:
+    """Return what separates the cells of a table by its first line, in which other names may hold it too."""
+    first = _FIRST.match(_text_of(head))
+    return separator_of(head.decode("latin-1")).encode() if first is None else first[1]
 
 
 def _text_of(head: bytes) -> bytes:
@@ -127,14 +140,19 @@ def _text_of(head: bytes) -> bytes:
     return head.removeprefix(b"\xef\xbb\xbf").rstrip(b"\r\n")
 
 
-def _blocks(path: Path, file: BinaryIO) -> Iterator[_Block]:
-    """Yield whole lines below the header, and the number of the first of them: a large table is not in memory twice."""
+def _blocks(path: Path, file: BinaryIO, separator: bytes) -> Iterator[_Block]:
+    """Yield whole lines below the header, and the number of the first of them: a large table is not in memory twice.
+
+    Cells are separated by commas in them, and decimal commas are points.
+    """
     first = 2
     while block := file.read(_AT_ONCE):
         block += (end := file.readline(LINE + 1))
         if len(end) > LINE:
             line = first + block.count(b"\n")
             raise FormatError(f"{path}, line {line}: more than {LINE} bytes; at most that are read")
+        if separator != b",":
+            block = block.replace(b",", b".").replace(separator, b",")
         yield first, block.replace(b"\r\n", b"\n")
         first += block.count(b"\n")
 
@@ -173,7 +191,11 @@ def _places(path: Path, names: list[str], array: Array | None) -> tuple[list[tup
     """Return column and row of each taxel, and their names where those do not say them."""
     matches = [_TAXEL.fullmatch(name) for name in names]
     if all(matches):
-        return [(int(m[1]), int(m[2])) for m in matches if m is not None], None
+        places = [(int(m[1]), int(m[2])) for m in matches if m is not None]
+        if array is not None and array.rows > 1 and places == [(k, 0) for k in range(array.rows * array.columns)]:
+            # A row of as many channels.
+            places = [(k % array.columns, k // array.columns) for k in range(len(places))]
+        return places, None
     if any(matches):
         odd = names[matches.index(None)]
         raise FormatError(f"{path}, line 1: column {shown(odd)} among taxels: must be named like x3y5")

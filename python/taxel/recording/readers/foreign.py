@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import json
 import math
-import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
-from datetime import UTC, datetime
-from itertools import islice
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,41 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.archive import read_array, read_arrays, shapes
-from taxel._base.arguments import short, shown
-from taxel._base.columns import Growing, frozen_whole
+from taxel._base.columns import frozen_whole
 from taxel._base.h5_file import H5File
-from taxel._base.limits import COLUMNS, VALUE
+from taxel._base.limits import VALUE
 from taxel._base.messages import counted, first_line
-from taxel._base.number_text import float_of
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
-from taxel.formats import text
 from taxel.formats.checks import ascending, whole_us
 from taxel.formats.checks import table as limited
-from taxel.formats.layout import ISO, UNITS_US, Data, Layout, Table, as_size
+from taxel.formats.layout import UNITS_US, Data, Layout, as_size
 from taxel.frames import Frames
 from taxel.recording.contents import RecordedSource, source_from
 from taxel.recording.once import known
+from taxel.recording.readers.table import Readings, frames_hint, read_events, read_table
 from taxel.recording.sections import Losses, Origin
 
 #: The endings of files of arrays.
 ARRAYS = (".npy", ".npz", ".h5", ".hdf5")
-
-#: A cell that says a unit, as N, [kPa] or (m/s^2).
-_UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
 #: Characters of the name of an array that errors show; a path in a .h5 may have thousands.
 _NAME = 60
 #: Bytes of frames that are compared at once, and times that are converted at once.
 _PIECE, _TIMES_AT_ONCE = 1 << 22, 1 << 16
-#: Cells that tables hold where a value is missing.
-MISSING = ("", "nan", "NaN", "NA", "-", "null")
-
-_UNIT = "s|secs?|seconds?|ms|us|µs|ns"
-
-#: Names of columns that hold times, with or without a unit: time, timestamp_us, Time (ms), t [s].
-_TIMES = re.compile(
-    rf"(t|time|timestamps?)([ _.]*[\[(/] *(?P<within>{_UNIT}) *[\])]?|[ _.]+(?P<after>{_UNIT}))?", re.IGNORECASE
-)
 
 
 def is_lone_array(path: Path) -> bool:
@@ -61,7 +40,7 @@ def is_lone_array(path: Path) -> bool:
     return len(shapes) == 1 and all(len(shape) in (2, 3) for shape in shapes.values())
 
 
-def read_foreign(path: Path, layout: Layout) -> RecordedSource:
+def read_foreign(path: Path, layout: Layout, array: Array | None = None) -> RecordedSource:
     """Read a file whose layout says how.
 
     Parameters
@@ -69,6 +48,8 @@ def read_foreign(path: Path, layout: Layout) -> RecordedSource:
     path : Path
         A table of text, or a file of arrays.
     layout : Layout
+    array : Array, optional
+        The sensor of events, where the layout does not say it; default: one large enough for them.
 
     Returns
     -------
@@ -82,17 +63,20 @@ def read_foreign(path: Path, layout: Layout) -> RecordedSource:
         column), an array that is not there
     """
     is_table = path.suffix.lower() not in ARRAYS
-    read = _table(path, layout) if is_table else _data(path, layout.data or Data())
-    values, t = read.values, np.arange(len(read.values)) if read.t is None else ascending(path.name, read.t, read.first)
+    if is_table and layout.table is not None and layout.table.events:
+        return read_events(path, layout, array)
+    read = read_table(path, layout) if is_table else _data(path, layout.data or Data())
+    values, t = read.values, np.arange(len(read.values)) if read.t is None else ascending(path.name, read.t, read.line)
     try:
         taxels = math.prod(values.shape[1:])
         if layout.rows is not None and layout.columns is not None and taxels != layout.rows * layout.columns:
-            size = counted(taxels, "column") if is_table else f"frames of {' x '.join(map(str, values.shape[1:]))}"
-            raise FormatError(f"{path}: {size}; {layout.path} says {layout.rows} x {layout.columns} taxels")
+            hint = frames_hint(layout, taxels) if is_table else ""
+            raise FormatError(f"{path}: {read.size}; {layout.path} says {layout.rows} x {layout.columns} taxels{hint}")
         grid = Array(values.shape[1], values.shape[2], name=path.stem) if values.ndim == 3 else None
-        array = layout.array(
-            taxels, grid or Array(1, taxels, name=path.stem, names=read.names if any(read.names or ()) else None)
-        )
+        # More channels than a sensor may have columns are a grid by the layout.
+        grid = grid or (None if taxels <= 65_535 else layout.grid())
+        names = read.names if any(read.names or ()) else None
+        array = layout.array(taxels, grid or Array(1, taxels, name=path.stem, names=names))
         shaped = values.astype(np.float32, copy=False).reshape(-1, *array.shape)
         frames = Frames(frozen_whole(shaped), frozen_whole(t), array=array)
     except ProblemError as error:
@@ -100,24 +84,6 @@ def read_foreign(path: Path, layout: Layout) -> RecordedSource:
     limited(path, frames)
     origin = Origin(path, path.name, "table" if is_table else "arrays")
     return source_from(frames, origin, untimed=read.t is None, losses=Losses(lost=known(read.lost)))
-
-
-def times_of(names: Sequence[str]) -> list[int]:
-    """Return which columns hold times by their names."""
-    # A letter may be the name of a taxel too: t is the time only where it comes first.
-    return [k for k, name in enumerate(names) if unit_of(name) is not None and (k == 0 or len(name) > 1)]
-
-
-def unit_of(name: str) -> str | None:
-    """Return the unit that the name of a column or an array of times states, "" if none; None of another name.
-
-    Examples
-    --------
-    >>> unit_of("Time (ms)"), unit_of("run1/time"), unit_of("palm")
-    ('ms', '', None)
-    """
-    found = _TIMES.fullmatch(name.strip("\"'").rpartition("/")[2])
-    return None if found is None else (found["within"] or found["after"] or "").lower()
 
 
 def list_arrays(shapes: Mapping[str, tuple[int, ...]]) -> str:
@@ -132,211 +98,7 @@ def _short(name: str) -> str:
     return name if len(name) <= _NAME else f"...{name[3 - _NAME :]}"
 
 
-@dataclass(frozen=True, eq=False)
-class _Read:
-    """Hold what a file of another program says: readings, times in us, and the names of the taxels and of the rest."""
-
-    values: NDArray[Any]
-    t: NDArray[np.int64] | None
-    #: The number of the first line of numbers.
-    first: int = 0
-    names: Sequence[str] | None = None
-    lost: tuple[str, ...] = ()
-
-
-def _table(path: Path, layout: Layout) -> _Read:
-    how = layout.table or Table()
-    first = how.skip_lines + 1
-    lines = list(islice(_lines(path, how), 3))
-    if not lines:
-        raise FormatError(f"{path.name}, line {first}: no line after {how.skip_lines} skipped ones")
-    names = cells(lines[0], how.separator)
-    if len(names) > COLUMNS:
-        raise FormatError(f"{path.name}, line {first}: {len(names)} columns; at most {COLUMNS} are read")
-    separator = next((mark for mark in ",;\t " if all(mark in line.strip() for line in lines[:2])), None)
-    if len(names) == 1 and separator is not None:
-        raise FormatError(
-            f"{path.name}, line {first}: one column by the separator {shown(how.separator)}, and {shown(separator)} "
-            "within it; say in the layout which it is: [table] separator"
-        )
-    # An empty cell, as at the end of a line that ends in a separator, makes no name of the others.
-    named = not all(_is_number(cell, how) for cell in names if cell) or not any(names)
-    below = lines[1:] if named else lines
-    # A line of units may stand between names and numbers.
-    units = cells(below[0], how.separator) if named and len(below) > 1 else []
-    in_units = are_units(names, units) and (how.missing is None or _unquote(how.missing) not in units)
-    above = named + in_units
-    begin = next(islice(_lines(path, how), above, None), None)
-    # A last column may be empty everywhere, as of a taxel that is dead.
-    taxels = None if layout.rows is None or layout.columns is None else layout.rows * layout.columns
-    others = len(how.leave_out) + (how.time_column is not None)
-    is_whole = begin is not None and taxels is not None and len(cells(begin, how.separator)) == taxels + others
-    body: Iterator[str] = islice(_lines(path, how), above, None)
-    if not is_whole and begin is not None and _all_end(names if named else None, begin, path, how, above):
-        body = (line.rstrip(" ").removesuffix(how.separator) for line in body)
-        names = names[: len(cells(begin.rstrip(" ").removesuffix(how.separator), how.separator))]
-    names = names if named else [f"column {k}" for k in range(1, len(names) + 1)]
-    first += above
-    column = None if how.time_column is None else _column(path, "time_column", how.time_column, names, named)
-    left = {_column(path, "leave_out", column, names, named) for column in how.leave_out}
-    if column in left:
-        raise FormatError(f"{path.name}: column {shown(names[column or 0])} is time_column, and left out")
-    times = times_of([name if k not in left else "" for k, name in enumerate(names)])
-    if column is None and times:
-        time = names[times[0]]
-        raise FormatError(
-            f"{path.name}, line {first - 1}: column {shown(time)} holds times by its name; say in the layout: [table] "
-            f"time_column = {json.dumps(time, ensure_ascii=False)}, and time_unit if not s; or, if it is a taxel, skip "
-            f"the names: skip_lines = {first - 1}"
-        )
-    rows = (cells(line, how.separator) for line in body)
-    if column is not None and how.time_unit == ISO:
-        rows = (_with_seconds(row, column, path, line) for line, row in enumerate(rows, first))
-    if left:
-        rows = (_without(row, left, len(names), path, line) for line, row in enumerate(rows, first))
-    read_names = [name for k, name in enumerate(names) if k not in left]
-    lost = ", ".join(names[k] or f"column {k + 1}" for k in sorted(left))
-    lines_of_lost = (f"columns that are no taxels: {lost}",) if lost else ()
-    at = None if column is None else column - sum(k < column for k in left)
-    values, t = _read(rows, path, first, read_names, at, how)
-    taxel_names = [name for k, name in enumerate(read_names) if k != at] if named else None
-    return _Read(values, t, first, taxel_names, lines_of_lost)
-
-
-def _read(
-    rows: Iterable[Sequence[str]], path: Path, first: int, names: Sequence[str], time: int | None, how: Table
-) -> tuple[NDArray[np.float32], NDArray[np.int64] | None]:
-    """Return the readings of a table and its times, us, which are the column `time`."""
-    missing = frozenset() if how.missing is None else frozenset({_unquote(how.missing), "nan"})
-    read = Growing(str(path), values=((len(names) - (time is not None),), np.float32), t=((), np.int64))
-    for line, block in text.blocks(rows, path, first, names, missing, unmarked=how.missing is None):
-        if time is None:
-            read.add(values=block, t=np.zeros(len(block)))
-        else:
-            t = _us(block[:, time], names[time], how, path, line)
-            read.add(values=np.delete(block, time, axis=1), t=t)
-    return read.column("values"), None if time is None else read.column("t")
-
-
-def _lines(path: Path, how: Table) -> Iterator[str]:
-    """Yield the lines of a table that are not empty, below those that its layout skips."""
-    return (line for line in islice(text.stream(path), how.skip_lines, None) if line.strip())
-
-
-def _all_end(names: Sequence[str] | None, begin: str, path: Path, how: Table, above: int) -> bool:
-    """Return whether each line of numbers ends in a separator (`ends_in_separator`), of which `begin` is the first."""
-    if not ends_in_separator(names, [begin], how.separator):
-        return False
-    return all(line.rstrip(" ").endswith(how.separator) for line in islice(_lines(path, how), above, None))
-
-
-def _us(times: NDArray[np.float64], name: str, how: Table, path: Path, first: int) -> NDArray[np.int64]:
-    """Return the times of some lines in us; `first` is the number of the first."""
-    missing = np.flatnonzero(np.isnan(times))
-    if len(missing):
-        raise FormatError(f"{path.name}, line {first + missing[0]}: {short(name)} is missing; every frame has a time")
-    return whole_us(path.name, times * UNITS_US.get(how.time_unit, UNITS_US["s"]) / 1e6, first)
-
-
-def cells(line: str, separator: str) -> list[str]:
-    """Return the cells of a line, without blanks and quotes around them; by " " any number of blanks stands between."""
-    texts = line.split() if separator == " " else line.split(separator)
-    if '"' in line and separator != " ":
-        with suppress(csv.Error):
-            texts = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    return [_unquote(text.strip()) for text in texts]
-
-
-def _unquote(cell: str) -> str:
-    return cell.strip("\"'")
-
-
-def are_units(names: Sequence[str], below: Sequence[str]) -> bool:
-    """Return whether the cells below names say units: as many, each of a name, none a number or the name of times.
-
-    Examples
-    --------
-    >>> are_units(["time", "thumb"], ["[ms]", "N"]), are_units(["time", "thumb"], ["2024-05-01", "0.5"])
-    (True, False)
-    >>> are_units(["Trial 1", ""], ["time", "thumb"])
-    False
-    """
-    are_texts = any(cell not in MISSING for cell in below) and all(_UNITS.fullmatch(cell) for cell in below)
-    of_names = len(below) == len(names) and all(name for name, cell in zip(names, below, strict=True) if cell)
-    return are_texts and of_names and not times_of(below)
-
-
-def ends_in_separator(names: Sequence[str] | None, lines: Sequence[str], separator: str) -> bool:
-    """Return whether each line of numbers ends in a separator, after which there is no column."""
-    if separator == " " or not lines or not all(line.rstrip(" ").endswith(separator) for line in lines):
-        return False
-    return names is None or not names[-1] or len(names) < len(cells(lines[0], separator))
-
-
-def seconds_of(cell: str) -> float:
-    """Return the seconds since 1970, or of the day, of a text of ISO 8601; NaN of any other text.
-
-    Examples
-    --------
-    >>> seconds_of("1970-01-02T00:00:00.5"), seconds_of("1970-01-01 01:00:00+01:00"), seconds_of("00:01:00.25")
-    (86400.5, 0.0, 60.25)
-    """
-    for read in (datetime.fromisoformat, lambda cell: datetime.fromisoformat(f"1970-01-01T{cell}")):
-        try:
-            at = read(cell)
-        except ValueError:
-            continue
-        return (at if at.tzinfo else at.replace(tzinfo=UTC)).timestamp()
-    return math.nan
-
-
-def _with_seconds(row: list[str], column: int, path: Path, line: int) -> list[str]:
-    """Return the cells of a line with its time as a number."""
-    if column >= len(row):
-        return row
-    seconds = seconds_of(row[column])
-    if math.isnan(seconds):
-        raise FormatError(
-            f"{path.name}, line {line}: time is {shown(row[column])}; must be as 2024-05-01T10:00:00.25, or 10:00:00.25"
-        )
-    return [*row[:column], repr(seconds), *row[column + 1 :]]
-
-
-def _without(row: list[str], left: Collection[int], columns: int, path: Path, line: int) -> list[str]:
-    """Return the cells of a line but those of columns that are left out."""
-    if len(row) != columns:
-        raise FormatError(f"{path.name}, line {line}: {len(row)} cells, must have {columns}")
-    return [cell for k, cell in enumerate(row) if k not in left]
-
-
-def _is_number(cell: str, how: Table) -> bool:
-    try:
-        float_of(cell)
-    except ValueError:
-        return how.missing is not None and cell == _unquote(how.missing)
-    return True
-
-
-def _column(path: Path, key: str, column: str | int, names: Sequence[str], named: bool) -> int:
-    """Return the place of a column that a layout names."""
-    if isinstance(column, int):
-        if column > len(names):
-            raise FormatError(f"{path.name}: {counted(len(names), 'column')}; {key} is {column}")
-        return column - 1
-    # Quotes are no part of a name.
-    name = column.strip("\"'")
-    if name not in names:
-        known_names = (
-            ", ".join(map(short, names[:8])) + " ..." * (len(names) > 8)
-            if named
-            else "no names, so give its number from 1"
-        )
-        kind = " of times" if key == "time_column" else ""
-        raise FormatError(f"{path.name}: no column {shown(name)}{kind}; there are {known_names}")
-    return names.index(name)
-
-
-def _data(path: Path, how: Data) -> _Read:
+def _data(path: Path, how: Data) -> Readings:
     if path.suffix.lower() == ".npy":
         key = next((key for key in ("array", "time") if getattr(how, key) is not None), None)
         if key is not None:
@@ -383,8 +145,9 @@ def _data(path: Path, how: Data) -> _Read:
             f"{path}, {wanted[0] or 'the array'}, frame {frame}, {at}: {values[large]}; must fit 32 "
             "bits, or be NaN where it is missing"
         )
+    size = f"frames of {' x '.join(map(str, values.shape[1:]))}"
     if len(wanted) == 1:
-        return _Read(values, None, lost=lost)
+        return Readings(values, None, size, lost=lost)
     times = arrays[wanted[1]]
     if times.dtype.kind not in "uif":
         raise FormatError(f"{path}, {wanted[1]}: {times.dtype}; must be times as numbers")
@@ -397,7 +160,7 @@ def _data(path: Path, how: Data) -> _Read:
     for begin in range(0, len(times), _TIMES_AT_ONCE):
         block = slice(begin, begin + _TIMES_AT_ONCE)
         t[block] = whole_us(path.name, times[block].astype(np.float64) * UNITS_US[how.time_unit] / 1e6, begin)
-    return _Read(values, t, lost=lost)
+    return Readings(values, t, size, lost=lost)
 
 
 def _too_large(values: NDArray[Any]) -> tuple[int, ...] | None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.archive import read_arrays, stored_names
+from taxel._base.archive import read_array, read_arrays, stored_names
 from taxel._base.columns import frozen_whole
 from taxel._base.errors import refused
 from taxel._base.limits import MARKERS, TAXELS
@@ -23,7 +23,7 @@ from taxel.formats.checks import table as limited
 from taxel.frames import Frames
 from taxel.recording.contents import RecordedSource
 from taxel.recording.description import about_of, described_source
-from taxel.recording.layout import check_size
+from taxel.recording.layout import check_size, is_row_of
 from taxel.recording.readers.columns import COLUMNS, DIGEST, EVENTS, PIECE_BYTES, TEXTS, digest_of
 from taxel.recording.sections import Origin
 
@@ -104,7 +104,11 @@ def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], a
     says_less = array is not None and described is not None and not array._is_measured and described.fits(array)
     sensor = described if says_less else array or described
     if array is not None and values is not None and values.ndim == 3:
-        check_size(path, values.shape[1:], array)
+        row = described or Array(*values.shape[1:])
+        if is_row_of(row, array):
+            columns["values"] = values.reshape(-1, *array.shape)
+        else:
+            check_size(path, values.shape[1:], array)
     try:
         if "values" in columns and "t" in columns:
             unit = str(columns.get("unit", "counts"))
@@ -146,6 +150,21 @@ def read_npz(path: Path, array: Array | None) -> RecordedSource:
         name: np.empty(0) for name in stored_names(path)[:8]
     }
     return source_of_columns(path, "npz", columns, array)
+
+
+def read_records(path: Path, array: Array | None) -> RecordedSource:
+    """Read a .npy of events, with the fields ``t x y p`` (`Events.to_numpy`, `Events.to_tonic`, `Events.to_faery`).
+
+    Raises
+    ------
+    FormatError : damage, or a value that no event has
+    """
+    records = read_array(path)
+    if records.ndim != 1:
+        raise FormatError(f"{path}: records of shape {records.shape}: must be one an event")
+    names = records.dtype.fields or ()
+    columns = {name: records[name].copy() for name in _OF_EVENTS if name in names}
+    return source_of_columns(path, "records", columns, array)
 
 
 def around(x: NDArray[Any], y: NDArray[Any]) -> Array:

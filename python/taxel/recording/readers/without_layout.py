@@ -4,36 +4,51 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.limits import TIME_US
+from taxel._base.limits import LINE, TIME_US
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._core import FormatError
 from taxel.formats import text
 from taxel.formats.layout import ISO, UNITS_US, advice
-from taxel.recording.readers.foreign import (
-    ARRAYS,
-    MISSING,
-    are_units,
-    arrays_of,
-    cells,
-    ends_in_separator,
-    list_arrays,
-    seconds_of,
-    shapes_of,
-    times_of,
-    unit_of,
-)
+from taxel.recording.readers.cells import MISSING, are_units, cells, ends_in_separator, seconds_of, times_of, unit_of
+from taxel.recording.readers.foreign import ARRAYS, arrays_of, list_arrays, shapes_of
 
-#: A column without a name is one of times if it ascends for so many lines.
+#: A column is one of times, if its name does not say so, if it ascends for so many lines.
 _ASCENDS = 20
+#: A grid is guessed where its longer side has at most so many times the taxels of the other.
+_FLATTEST = 2
+#: The fewest columns that may be a square grid, also with names that are numbered, and a grid of other sides.
+_GRID, _NAMED_GRID, _LARGE = 9, 25, 64
+#: The fewest columns, less one, that may be numbered in a line above them.
+_FEWEST = 3
+#: Fewer lines than these are not enough to see where frames end, and how much of a text is then read.
+_FEW, _MORE = 200, 1 << 20
+#: What a time column's unit is guessed by: the rate and the duration of a usual recording, Hz and s.
+_USUAL_HZ, _USUAL_S = 100.0, 30.0
+#: Names of columns that number the lines.
+_COUNTS = re.compile(
+    r"(frames?|index|idx|samples?|records?|no|nr|num|number|count|#|bild|lfd)[ ._]*(nr|no|number|#|id)?\.?",
+    re.IGNORECASE,
+)
+#: Names of columns with a number each, as taxels of a grid have, and no words.
+_NUMBERED = re.compile(r"[^\W\d]{0,12}[ _\-\[(.]*\d+[\])]?", re.UNICODE)
 _NO_RATE = "# rate_hz = 100  # frames a second: the file does not say it, and without it frames are numbered"
+#: Names of the columns of events in the orders that programs write without names.
+_EVENTS = (("x", "y", "p", "t"), ("t", "x", "y", "p"))
+_EVENT_NAMES: dict[str, Callable[[str], bool]] = {
+    "x": lambda name: name.lower() == "x",
+    "y": lambda name: name.lower() == "y",
+    "p": lambda name: name.lower() in ("p", "pol", "polarity", "on"),
+    "t": lambda name: unit_of(name) is not None or name.lower() == "ts",
+}
 
 
 def refuse_without_layout(path: Path) -> None:
@@ -46,14 +61,13 @@ def refuse_without_layout(path: Path) -> None:
     FormatError : it holds a table or arrays, or is damaged
     """
     if path.suffix.lower() not in ARRAYS:
-        lines = text.beginning(path)
-        found = _TextTable.find(lines, texts=False)
-        if found is None:
-            _refuse_decimal_commas(path, lines)
-            found = _TextTable.find(lines, texts=True)
+        lines = _beginning(path)
+        found = _TextTable.find(lines)
         if found is None:
             return
-        holds, lines = _of_table(found)
+        # Compressed texts are several times larger.
+        size = path.stat().st_size * (4 if path.suffix.lower() == ".gz" else 1)
+        holds, lines = _of_table(found, max(1.0, size / sum(len(line) + 1 for line in lines)))
         says = "says how to read it"
     else:
         shapes = shapes_of(path)
@@ -68,13 +82,22 @@ def refuse_without_layout(path: Path) -> None:
     raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
 
 
+def _beginning(path: Path) -> list[str]:
+    """Return the first lines of a text, 64 KiB of them, and more where these are few lines."""
+    lines = text.beginning(path)
+    if len(lines) < _FEW:
+        lines = text.beginning(path, _MORE)
+    return lines or text.beginning(path, LINE + 1)
+
+
 def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
     """Return the layout of the array of a name."""
     count, *shape = shapes[name]
     time = next((name for name, shape_of in shapes.items() if shape_of == (count,) and unit_of(name) is not None), None)
-    times = [] if time is None else [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time])]
+    times = [] if time is None else [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time], count)]
     data = [f"array = {_quote(name)}"] * bool(name) + times
-    return [*_size(shape), *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
+    size = [f"rows = {shape[0]}", f"columns = {shape[1]}"] if len(shape) == 2 else _size(shape[0], ())
+    return [*size, *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
 
 
 @dataclass(frozen=True)
@@ -82,152 +105,305 @@ class _TextTable:
     """Hold the parts of a table: the cells of its names (none), of its units (none) and of its lines of numbers."""
 
     separator: str
+    decimal: str
     skipped: int
     names: Sequence[str]
     units: Sequence[str]
     body: Sequence[Sequence[str]]
     #: Which columns hold numbers; the others hold texts.
     numeric: Sequence[bool]
+    #: Lines a frame, if empty lines are between frames, else 1.
+    between_empty: int
 
     @classmethod
-    def find(cls, lines: Sequence[str], *, texts: bool) -> _TextTable | None:
-        """Find the parts; None of a text that does not end in lines of numbers, with `texts` beside texts."""
-        there = [(k, line) for k, line in enumerate(lines) if line.strip()]
-        # The separator that makes most columns of numbers.
-        rows_by = {mark: [cells(line, mark) for _, line in there] for mark in (",", ";", "\t", " ")}
-        fits = {mark: numeric for mark, rows in rows_by.items() if (numeric := _numeric(rows, texts=texts))}
-        if not fits:
-            return None
-        separator = max(fits, key=lambda mark: sum(fits[mark]))
-        rows, numeric = rows_by[separator], fits[separator]
-        first = next(k for k, row in enumerate(rows) if _fits(row, numeric))
+    def find(cls, lines: Sequence[str]) -> _TextTable | None:
+        """Find the parts; None of a text that does not end in lines of numbers, or of numbers beside texts."""
+        for texts in (False, True):
+            marks = [(mark, decimal) for decimal in ".," for mark in ",;\t " if mark != decimal]
+            fits = [fit for mark, decimal in marks if (fit := _Fit.find(lines, mark, decimal, texts=texts)) is not None]
+            if fits:
+                return cls._of(max(fits, key=lambda fit: fit.score))
+        return None
+
+    @classmethod
+    def _of(cls, fit: _Fit) -> _TextTable:
+        rows, numeric, separator = fit.rows, fit.numeric, fit.separator
+        first = next(k for k, row in enumerate(rows) if _fits(row, numeric, fit.decimal))
+        is_numbered = _numbers_columns(rows[max(first - 1, 0) :], numeric, fit.decimal, below=first > 0)
+        first += is_numbered
         in_units = first > 1 and are_units(rows[first - 2], rows[first - 1])
         head = first - 1 - in_units
-        below, columns = [line for _, line in there[first:]], len(numeric)
+        below, columns = [fit.lines[number] for number in fit.numbers[first:]], len(numeric)
         ends = ends_in_separator(None, below, separator)
         names = rows[head] if head >= 0 and len(rows[head]) in {columns, columns - ends} else []
         columns -= ends_in_separator(names or None, below, separator)
         units = rows[first - 1] if names and in_units else []
         body = [row[:columns] for row in rows[first:] if len(row) >= columns]
-        skipped = there[head if names else first][0]
-        return cls(separator, skipped, names[:columns], units, body, numeric[:columns])
+        skipped = fit.numbers[head if names else first]
+        if is_numbered:
+            # Read as numbers they would be a frame.
+            names, skipped = [""] * columns, fit.numbers[first - 1] + 1
+        between = _between_empty(fit.numbers[first:])
+        return cls(separator, fit.decimal, skipped, names[:columns], units, body, numeric[:columns], between)
 
     def numbers(self, column: int) -> NDArray[np.float64]:
-        return np.array([_number(row[column]) for row in self.body])
+        return np.array([_number(row[column], self.decimal) for row in self.body])
 
     def called(self, column: int) -> str:
         """Return how a layout names a column: by its name, or by its number from 1 without one of its own."""
         name = self.names[column] if self.names else ""
         return _quote(name) if name and list(self.names).count(name) == 1 else str(column + 1)
 
-    def time(self) -> tuple[int | None, list[str]]:
-        """Return which column holds the times, and the lines that say so."""
+    def events(self) -> list[str]:
+        """Return the names of the columns if they are those of events, else none; "" is one that is none of theirs."""
+        orders: Sequence[Sequence[str]] = _EVENTS
+        if self.names:
+            orders = [[next((e for e, found in _EVENT_NAMES.items() if found(name)), "") for name in self.names]]
+        for order in orders:
+            if len(order) == len(self.numeric) and sorted(filter(None, order)) == ["p", "t", "x", "y"]:
+                t, x, y, p = (self.numbers(order.index(name)) for name in "txyp")
+                are_places = all((axis >= 0).all() and (axis == np.rint(axis)).all() for axis in (x, y))
+                if are_places and (set(p) <= {0, 1} or set(p) <= {-1, 1}) and len(t) > 1 and (np.diff(t) >= 0).all():
+                    return list(order)
+        return []
+
+    def time(self) -> int | None:
+        """Return which column holds the times."""
         named = next(iter(times_of(self.names)), None)
         if named is not None and self.numeric[named]:
-            unit = f"{self.names[named]} {self.units[named].strip('[]()')}" if self.units else self.names[named]
-            unit = unit if unit_of(unit) else self.names[named]
-            return named, [f"time_column = {_quote(self.names[named])}", *_unit(unit, self.numbers(named))]
+            return named
         for column in (k for k, is_numeric in enumerate(self.numeric) if not is_numeric):
             seconds = np.array([seconds_of(row[column]) for row in self.body])
-            if np.isfinite(seconds).all() and (np.diff(seconds) > 0).all():
-                return column, [f"time_column = {self.called(column)}", f"time_unit = {_quote(ISO)}"]
-        if self._ascends and len(self.numeric) > 1:
-            lines = ["time_column = 1  # it ascends; leave this out if it is a taxel"]
-            return 0, [*lines, *_unit("", self.numbers(0))]
-        return None, []
+            if np.isfinite(seconds).all() and (np.diff(seconds[:: self.lines_of(seconds)]) > 0).all():
+                return column
+        return 0 if self._ascends and not self.counts and len(self.numeric) > 1 else None
+
+    def of_time(self, column: int, longer: float) -> list[str]:
+        """Return the lines that say which column holds the times; the file is `longer` than what was read of it."""
+        lines = [f"time_column = {self.called(column)}"]
+        if not self.numeric[column]:
+            return [*lines, f"time_unit = {_quote(ISO)}"]
+        name = self.names[column] if self.names else ""
+        if unit_of(name) is None and not self._is_unit_of_time(column):
+            lines = [f"{lines[0]}  # it ascends; leave this out if it is a taxel"]
+        unit = f"{name} {self.units[column].strip('[]()')}" if self.units else name
+        times = self.numbers(column)
+        times = times[:: self.lines_of(times)]
+        return [*lines, *_unit(unit if unit_of(unit) or not unit_of(name) else name, times, len(times) * longer)]
+
+    def _is_unit_of_time(self, column: int) -> bool:
+        return bool(self.units) and unit_of(f"t {self.units[column].strip('[]()')}") not in (None, "")
+
+    def lines_of(self, times: NDArray[np.float64]) -> int:
+        """Return how many lines a frame has: those between empty lines, or those of the same time."""
+        if self.between_empty > 1 or len(times) < 2:
+            return self.between_empty
+        begins = np.flatnonzero(np.diff(times, prepend=np.nan) != 0)
+        steps = np.diff(begins)
+        return int(steps[0]) if len(steps) and (steps == steps[0]).all() and len(times) - begins[-1] <= steps[0] else 1
 
     @property
     def _ascends(self) -> bool:
-        """Whether a first column without a name ascends."""
+        """Whether a first column of numbers ascends, one without a name, or else in like steps."""
+        if not self.numeric[0]:
+            return False
+        times = self.numbers(0)
+        steps = np.diff(times[:: self.lines_of(times)])
+        is_ascending = len(self.body) >= _ASCENDS and bool(len(steps) and (steps > 0).all())
         unnamed = not self.names or not self.names[0]
-        return unnamed and len(self.body) >= _ASCENDS and bool((np.diff(self.numbers(0)) > 0).all())
+        return is_ascending and (unnamed or bool(steps.max() <= 3 * np.median(steps)))
+
+    @property
+    def counts(self) -> bool:
+        """Whether a first column, of names that are none of a time, numbers the lines."""
+        if not self._ascends or not self.names or not (not self.names[0] or _COUNTS.fullmatch(self.names[0])):
+            return False
+        numbers = self.numbers(0)
+        return bool((np.diff(numbers[:: self.lines_of(numbers)]) == 1).all())
 
     def left_out(self, time: int | None) -> list[int]:
         """Return which columns are no taxels: those of texts and of other times, and one that numbers the lines."""
         times = [] if time is None else times_of(self.names)
         left = [k for k, is_numeric in enumerate(self.numeric) if k != time and (not is_numeric or k in times)]
-        counts = time and self.names and self._ascends and bool((np.diff(self.numbers(0)) == 1).all())
-        return sorted({0, *left}) if counts else left
+        return sorted({0, *left}) if self.counts and time != 0 else left
+
+    def form(self) -> list[str]:
+        """Return the lines that say how its lines are read."""
+        lines = [f"separator = {_quote(self.separator)}"] * (self.separator != ",")
+        lines += [f"decimal = {_quote(self.decimal)}"] * (self.decimal != ".")
+        return lines + [f"skip_lines = {self.skipped}"] * (self.skipped > 0)
 
 
-def _of_table(found: _TextTable) -> tuple[str, list[str]]:
-    """Return what a table holds, and its layout."""
-    time, of_time = found.time()
+@dataclass(frozen=True)
+class _Fit:
+    """Hold the cells of lines by a separator and a decimal mark, which make columns of numbers."""
+
+    separator: str
+    decimal: str
+    lines: Sequence[str]
+    #: The places of the lines that are not empty, and their cells.
+    numbers: Sequence[int]
+    rows: Sequence[Sequence[str]]
+    numeric: Sequence[bool]
+
+    @classmethod
+    def find(cls, lines: Sequence[str], separator: str, decimal: str, *, texts: bool) -> _Fit | None:
+        """Return the cells; None if they make no columns of numbers, `texts`: beside others of texts."""
+        there = [(k, row) for k, line in enumerate(lines) if line.strip() and any(row := cells(line, separator))]
+        rows = [row for _, row in there]
+        numeric = _numeric(rows, decimal, texts=texts)
+        return cls(separator, decimal, lines, [k for k, _ in there], rows, numeric) if numeric else None
+
+    @property
+    def score(self) -> tuple[int, int]:
+        """How many columns hold numbers, and, less, how many hold texts with a separator within them."""
+        last = self.rows[-1]
+        within = [k for k, cell in enumerate(last) if not self.numeric[k] and (";" in cell or "\t" in cell)]
+        return sum(self.numeric), -len(within)
+
+
+def _numbers_columns(rows: Sequence[Sequence[str]], numeric: Sequence[bool], decimal: str, *, below: bool) -> bool:
+    """Return whether the first line of numbers numbers the columns, from 0 on as programs do; `below`: another line."""
+    first, *rest = rows[below:]
+    cells = [cell for cell in first if cell]
+    if not rest or not _FEWEST < len(cells) >= len(numeric) - 1 or cells != [str(k) for k in range(len(cells))]:
+        return False
+    if below and len(rows[0]) == len(numeric):
+        return False
+    # A time may begin with 0.
+    ascending = [_number(row[0], decimal) for row in (first, *rest) if row]
+    return not first[0] or not bool((np.diff(ascending) > 0).all())
+
+
+def _between_empty(numbers: Sequence[int]) -> int:
+    """Return how many lines are between two empty ones, if it is a number of them everywhere; else 1."""
+    breaks = np.flatnonzero(np.diff(np.array(numbers)) > 1) + 1
+    sizes = np.diff(breaks, prepend=0)
+    if not len(sizes) or (sizes != sizes[0]).any():
+        return 1
+    # The last ones may be the beginning of a frame.
+    rest = len(numbers) - breaks[-1]
+    return int(sizes[0]) if rest == sizes[0] or (rest < sizes[0] and len(sizes) > 1) else 1
+
+
+def _of_table(found: _TextTable, longer: float) -> tuple[str, list[str]]:
+    """Return what a table holds, and its layout; the file is `longer` than what was read of it."""
+    if events := found.events():
+        return _of_events(found, events)
+    time = found.time()
     left = found.left_out(time)
     taxels = [k for k in range(len(found.numeric)) if k not in left and k != time]
-    table = [f"separator = {_quote(found.separator)}"] * (found.separator != ",")
-    table += [f"skip_lines = {found.skipped}"] * (found.skipped > 0)
-    table += of_time
+    table = found.form()
+    lines = found.between_empty
+    if lines > 1:
+        table.append('frame_end = "blank"')
+    elif time is not None:
+        times = found.numbers(time) if found.numeric[time] else np.array([seconds_of(row[time]) for row in found.body])
+        lines = found.lines_of(times)
+        table += [f"frame_lines = {lines}"] * (lines > 1)
+    table += [] if time is None else found.of_time(time, longer)
     table += [f"leave_out = [{', '.join(map(found.called, left))}]"] * bool(left)
     missing = {row[k] for row in found.body for k in taxels if row[k] in MISSING}
     table += [f"missing = {_quote(cell)}" for cell in sorted(missing - {"nan"} or missing)[-1:]]
     units = {found.units[k].strip("[]()") for k in taxels} if found.units else set()
     unit = [f"unit = {_quote(name)}" for name in units if name and len(units) == 1]
     rate = [_NO_RATE] if time is None else []
-    holds = f"a table of {counted(len(found.numeric), 'column')}"
-    return holds, [*_size([len(taxels)]), *unit, *rate, *(["[table]", *table] if table else [])]
+    holds = f"a table of {counted(len(found.numeric), 'column')}" + f", {lines} lines a frame" * (lines > 1)
+    names = [found.names[k] for k in taxels] if found.names else []
+    size = _size(len(taxels), names) if lines == 1 else [f"rows = {lines}", f"columns = {len(taxels)}"]
+    return holds, [*size, *unit, *rate, *(["[table]", *table] if table else [])]
 
 
-def _numeric(rows: Sequence[Sequence[str]], *, texts: bool) -> list[bool]:
+def _of_events(found: _TextTable, order: Sequence[str]) -> tuple[str, list[str]]:
+    """Return that a table holds events, and its layout; `order` are the names of the columns of events."""
+    at = order.index("t")
+    name = found.names[at] if found.names else ""
+    times = found.numbers(at)
+    unit = unit_of(name) or ("us" if (times == np.rint(times)).all() else "s")
+    columns = [event or f"column {k}" for k, event in enumerate(order, 1)]
+    left = [k for k, event in enumerate(order, 1) if not event]
+    skipped = replace(found, skipped=found.skipped + (1 + bool(found.units)) * bool(found.names))
+    table = [
+        *skipped.form(),
+        f"columns = [{', '.join(map(_quote, columns))}]",
+        'time_column = "t"',
+        f"time_unit = {_quote(unit)}" + "  # if it is not another" * (not unit_of(name)),
+        *([f"leave_out = [{', '.join(map(str, left))}]"] if left else []),
+        "events = true",
+    ]
+    x, y = (int(found.numbers(order.index(axis)).max()) + 1 for axis in "xy")
+    size = f"# rows = {y} and columns = {x} at least, or those of the sensor: the file does not say them"
+    return f"a table of events ({', '.join(filter(None, order))})", [size, "[table]", *table]
+
+
+def _numeric(rows: Sequence[Sequence[str]], decimal: str, *, texts: bool) -> list[bool]:
     """Return which columns hold numbers; none if others hold texts, which `texts` allows."""
     alike = [row for row in rows if len(row) == len(rows[-1])]
-    numeric = [_holds_numbers(column) for column in zip(*alike, strict=True)]
-    if not rows or not _fits(rows[-1], numeric):
+    numeric = [_holds_numbers(column, decimal) for column in zip(*alike, strict=True)]
+    if not rows or not _fits(rows[-1], numeric, decimal):
         return []
     # A line of prose may hold a number, too.
-    return numeric if all(numeric) or (texts and len(rows) > 1 and _fits(rows[-2], numeric)) else []
+    return numeric if all(numeric) or (texts and len(rows) > 1 and _fits(rows[-2], numeric, decimal)) else []
 
 
-def _holds_numbers(column: Sequence[str]) -> bool:
+def _holds_numbers(column: Sequence[str], decimal: str) -> bool:
     """Return whether a column holds a number somewhere, or is empty below its name and unit."""
     below = column[2:] or column[-1:]
-    return any(math.isfinite(_number(cell)) for cell in column) or all(cell in MISSING for cell in below)
+    return any(math.isfinite(_number(cell, decimal)) for cell in column) or all(cell in MISSING for cell in below)
 
 
-def _fits(row: Sequence[str], numeric: Sequence[bool]) -> bool:
+def _fits(row: Sequence[str], numeric: Sequence[bool], decimal: str) -> bool:
     """Whether a row has as many cells, with numbers where they are."""
-    return len(row) == len(numeric) and _are_numbers(
-        [c for c, is_number in zip(row, numeric, strict=True) if is_number]
-    )
+    if len(row) != len(numeric):
+        return False
+    return _are_numbers([cell for cell, is_number in zip(row, numeric, strict=True) if is_number], decimal)
 
 
-def _refuse_decimal_commas(path: Path, lines: Sequence[str]) -> None:
-    """Refuse a table with a line that would hold numbers if its commas were decimal points."""
-    for number, line in enumerate(lines, 1):
-        for mark in (";", "\t", " "):
-            row = cells(line, mark)
-            if len(row) > 1 and _are_numbers([cell.replace(",", ".", 1) for cell in row]):
-                for k, cell in enumerate(row, 1):
-                    if cell not in MISSING:
-                        text.number(cell, path, number, f"column {k}")
+def _size(taxels: int, names: Sequence[str]) -> list[str]:
+    """Return the lines that say rows and columns of so many taxels, a grid only where their names are no words."""
+    words = any(names) and not all(_NUMBERED.fullmatch(name) for name in names)
+    rows = next(rows for rows in range(math.isqrt(taxels), 0, -1) if not taxels % rows)
+    columns = taxels // rows
+    is_grid = rows == columns if taxels < _LARGE else columns <= _FLATTEST * rows
+    if words or not is_grid or taxels < (_NAMED_GRID if any(names) else _GRID):
+        note = "" if words or taxels < 2 else "  # if they are a grid row by row: its rows and columns"
+        return ["rows = 1", f"columns = {taxels}{note}"]
+    guess = f"  # a guess from {taxels} taxels: if they are another grid, or a row, its rows and columns"
+    return [f"rows = {rows}{guess}", f"columns = {columns}"]
 
 
-def _size(shape: Sequence[int]) -> list[str]:
-    """Return the lines that say rows and columns, of frames of rows x columns, or of so many taxels."""
-    if len(shape) == 2:
-        return [f"rows = {shape[0]}", f"columns = {shape[1]}"]
-    taxels = shape[0]
-    return ["rows = 1", f"columns = {taxels}  # if they are a grid row by row: its rows and columns"]
+def _unit(name: str, times: NDArray[np.float64], count: float) -> list[str]:
+    """Return the line that says the unit of times: that in their name, else that of the most usual rate and duration.
 
-
-def _unit(name: str, times: NDArray[np.float64]) -> list[str]:
-    """Return the line that says the unit of times: that in their name, else the largest that fits, and their rate."""
-    stated = (unit_of(name) or "").replace("µ", "u")
-    most = float(np.nanmax(np.abs(times), initial=0.0))
-    unit = stated if stated in UNITS_US else next((u for u in UNITS_US if most * UNITS_US[u] <= TIME_US), "us")
+    `count` are the frames of the recording, of which `times` may be the first.
+    """
+    stated = unit_of(name)
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    most = float(np.nanmax(np.abs(times), initial=0.0))
+    fitting = [unit for unit in UNITS_US if most * UNITS_US[unit] <= TIME_US]
+
+    def unlike(unit: str) -> float:
+        """Return how far rate and duration by a unit are from usual ones, in powers of ten."""
+        step_s = step * UNITS_US[unit] / 1e6
+        return abs(math.log10(step_s * _USUAL_HZ)) + abs(math.log10(max(count - 1, 1) * step_s / _USUAL_S))
+
+    unit = stated or (min(fitting, key=unlike) if step > 0 and fitting else fitting[0] if fitting else "us")
     notes = [f"{1e6 / (step * UNITS_US[unit]):.4g} frames/s"] if step > 0 else []
-    notes += [" ".join(f"or {_quote(unit_name)}" for unit_name in UNITS_US if unit_name != unit)] * (not stated)
+    others = [_quote(name) for name in UNITS_US if name != unit]
+    notes += [f"a guess; or {', '.join(others[:-1])} or {others[-1]}"] * (not stated)
     return [f"time_unit = {_quote(unit)}" + "  # " * bool(notes) + ", ".join(notes)]
 
 
-def _are_numbers(cells: Sequence[str]) -> bool:
+def _are_numbers(cells: Sequence[str], decimal: str) -> bool:
     """Whether cells are numbers, at least one of them, or marks of missing values."""
-    finite = [math.isfinite(_number(cell)) for cell in cells]
+    finite = [math.isfinite(_number(cell, decimal)) for cell in cells]
     return any(finite) and all(is_finite or cell in MISSING for is_finite, cell in zip(finite, cells, strict=True))
 
 
-def _number(cell: str) -> float:
+def _number(cell: str, decimal: str) -> float:
+    """Return the number of a cell with a decimal mark; NaN of one that is none."""
+    if decimal == ",":
+        cell = "" if "." in cell else cell.replace(",", ".")
     try:
         return float_of(cell)
     except ValueError:
