@@ -15,9 +15,9 @@ from shell import call
 import taxel
 from taxel import Array, Frames, Tare
 from taxel.detect import Example, score
-from taxel.detect.advice import _chance
+from taxel.detect.causes import _chance
 from taxel.detect.examples import check_examples
-from taxel.detect.label_times import held_by_tare, off_by
+from taxel.detect.label_times import FeltLoads, held_by_tare
 
 ARRAY = Array(6, 6, pitch_mm=5.0)
 FLOOR = 0.05
@@ -50,7 +50,7 @@ def example(seed: int, shift_ms: float, **more: Any) -> Example:
 
 @given(st.integers(0, 1000), st.floats(-900, 900))
 def test_labels_that_are_off_are_measured_and_others_are_not_called_so(seed: int, shift_ms: float) -> None:
-    found = off_by([example(seed, shift_ms)], ["contact", "lift"], FLOOR)
+    found = FeltLoads([example(seed, shift_ms)], FLOOR).off_by(["contact", "lift"])
     if abs(shift_ms) < 40:
         assert found == {}
     if abs(shift_ms) > 60:
@@ -62,7 +62,7 @@ def test_labels_that_are_off_are_measured_and_others_are_not_called_so(seed: int
 
 @given(st.integers(0, 1000))
 def test_labels_of_touches_that_all_last_as_long_are_not_off_by_that(seed: int) -> None:
-    assert off_by([example(seed, 0, hold_s=(0.4, 0.4))], ["contact", "lift"], FLOOR) == {}
+    assert FeltLoads([example(seed, 0, hold_s=(0.4, 0.4))], FLOOR).off_by(["contact", "lift"]) == {}
 
 
 @given(st.integers(0, 1000))
@@ -71,7 +71,7 @@ def test_labels_that_nothing_follows_are_not_off(seed: int) -> None:
     random = np.random.default_rng(seed)
     labels = {"odd": np.sort(random.integers(3_000_000, int(frames.t[-1]), 12))}
     (one,) = check_examples([Example(frames, labels, Tare.take(frames, stop_us=2_000_000))])
-    assert off_by([one], ["odd"], FLOOR) == {}
+    assert FeltLoads([one], FLOOR).off_by(["odd"]) == {}
 
 
 @given(st.integers(0, 1000), st.floats(0, 0.9))

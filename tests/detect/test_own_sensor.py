@@ -21,7 +21,7 @@ from taxel import Array, Frames, SpikeTrains, Tare
 from taxel._base import progress
 from taxel.cli import _recordings
 from taxel.detect import Example, PlainRule, Recipe, choose, judge, load, recipes, run, score
-from taxel.detect.advice import advise
+from taxel.detect.causes import Evidence, Mistakes
 from taxel.detect.fitting import fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.followed import follow

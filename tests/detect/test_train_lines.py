@@ -12,7 +12,7 @@ from test_readout import ARRAY, recipe, tare, touches
 
 import taxel
 from taxel.detect import Example, PlainRule, run, score
-from taxel.detect.advice import advise, loaded_at_rest
+from taxel.detect.causes import Evidence, Mistakes, loaded_at_rest
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.encode import ContactArea, LevelCrossing
 
