@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import comb
@@ -159,6 +159,16 @@ class Evidence:
         names = sorted({label for example in self.sound for label in example.labels})
         return {name: sum(len(example.labels.get(name, ())) for example in self.sound) for name in names}
 
+    def without(self, places: Collection[int]) -> Evidence:
+        """Return the same of the other examples."""
+        left = [k for k in range(len(self.sound)) if k not in places]
+        return Evidence([self.examples[k] for k in left], [self.sound[k] for k in left], self.plan)
+
+    @property
+    def falls(self) -> bool:
+        """Whether values fall from their rest."""
+        return bool(self._fall[0])
+
     @cached_property
     def _fall(self) -> tuple[str, str]:
         """What turns values that fall, and that they do; empty where none do."""
@@ -251,7 +261,7 @@ class Evidence:
         if not self.plan.fit_levels:
             stretches = [(k, -np.inf, np.inf) for k in range(len(self.sound))]
             loaded = loaded_levels(self.plan.encoder, self.sound, stretches)
-            if loaded is not None and loaded.within < LEAST_LEVELS:
+            if loaded is not None and loaded.within < min(LEAST_LEVELS, len(self.plan.encoder.levels)):  # type: ignore[attr-defined]
                 measured = (
                     f"{loaded.within} of the encoder's levels {_lie(loaded.within)} within what "
                     f"loaded taxels read, {loaded.low:.3g} to {loaded.high:.3g}"
@@ -307,9 +317,20 @@ class Mistakes:
             for label, score in self.scored.by_label.items()
             if label in self.trained.readout.labels and max(score.missed, score.false) > _MANY * score.events
         }
-        found = evidence.causes(wrong)
+        sources: dict[int, list[Cause]] = {}
+        for label in wrong if not evidence.falls else ():
+            for place, cause in self._of_sources(evidence.sound, label):
+                sources.setdefault(place, []).append(cause)
+        found = [cause for causes in sources.values() for cause in causes]
+        if sources:
+            # All else is measured on the others.
+            evidence = evidence.without(sources)
+            for label in wrong:
+                scores = (self.each[place].by_label.get(label) for place in sources)
+                wrong[label] -= sum(score.rank[0] for score in scores if score is not None)
+            wrong = {label: count for label, count in wrong.items() if count > 0}
+        found += evidence.causes(wrong)
         if not any(cause.kind in ("falling_values", "shifted_labels") for cause in found):
-            found += [cause for label in wrong for cause in self._of_sources(evidence.sound, label)]
             for label, mistakes in wrong.items():
                 found += [*self._unlabelled_time(evidence.sound, label), *self._name(label, mistakes)]
                 # More labels and other parameters are for what nothing else explains.
@@ -319,7 +340,7 @@ class Mistakes:
                     found += self._rule(label, mistakes)
         return _ordered([cause for cause in found if cause.mistakes > 0])
 
-    def _of_sources(self, examples: Sequence[Example], label: str) -> Iterator[Cause]:
+    def _of_sources(self, examples: Sequence[Example], label: str) -> Iterator[tuple[int, Cause]]:
         """Yield the sources of one recording whose labels are those of another source, or which have none beside it."""
         if len(self.each) != len(examples):
             return
@@ -336,20 +357,16 @@ class Mistakes:
             best = max(places, key=share)
             times = examples[best].labels.get(label, ())
             for k in places:
-                score = self.each[k].by_label.get(label)
-                own = examples[k].labels.get(label, ())
-                shared = not len(own) or np.array_equal(own, times)
-                if k == best or score is None or not shared or 2 * share(k) > share(best):
+                score, labelled = self.each[k].by_label.get(label), examples[k].labels.get(label, ())
+                if k == best or score is None or 2 * share(k) > share(best):
                     continue
-                name, labelled = (examples[place].name.removeprefix(group) for place in (k, best))
-                wrong = f"{score.missed} missed and {score.false} false in {name}"
-                same = (
-                    f"where its labels are those of {labelled}"
-                    if len(own)
-                    else f"which has no labels beside {labelled}"
-                )
-                advice = f"a column source in the labels, {labelled} in its rows"
-                yield Cause("unlabelled_source", (label,), score.rank[0], f"{wrong}, {same}", advice)
+                if len(labelled) and not np.array_equal(labelled, times):
+                    continue
+                name, other_name = (examples[place].name.removeprefix(group) for place in (k, best))
+                same = f"where its labels are those of {other_name}" if len(labelled) else "which has no labels"
+                measured = f"{score.missed} missed and {score.false} false in {name}, {same}"
+                advice = f"a column source in the labels, {other_name} in its rows"
+                yield k, Cause("unlabelled_source", (label,), score.rank[0], measured, advice)
 
     def _unlabelled_time(self, examples: Sequence[Example], label: str) -> Iterator[Cause]:
         """Yield that events may lack labels before the first and behind the last, where much time lies there."""
@@ -380,7 +397,7 @@ class Mistakes:
 
     def _of_learning(self, evidence: Evidence, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the causes where labels and tares are right: inputs, kinds, too few examples, parameters."""
-        chance = _chance(label, self.scored, self.plain)
+        chance = _chance(label, self.scored, self.plain) if self.scored[label].events >= _FIVE_FOLDS else ""
         learnt = min(self.learnt[label].rank[0], wrong)
         if rules := list(self._rule(label, wrong)):
             yield from rules
