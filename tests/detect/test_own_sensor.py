@@ -208,7 +208,7 @@ def test_advice_names_the_rule_that_won_or_the_recipe_of_its_inputs() -> None:
     rule = PlainScore({"contact": PlainRule("area", 2)}, scored(12))
     floor = measured_floor([example])
     of_area = fit_aligned([example], Recipe.load("touch", None, LABELS, floor), None)
-    other = of_area._replace(recipe=Recipe(LevelCrossing([1.0])))
+    other = of_area._replace(recipe=Recipe(LevelCrossing([40.0])))
     for made, helps in ((of_area, "the plain rule (--rule FILE)"), (other, "--recipe touch")):
         cause = first_cause(made, [example], scored(6), scored(12), rule)
         assert (cause.advice, "leaves 0 missed and false on the same labels, the neuron 6" in cause.measured) == (
@@ -507,9 +507,11 @@ def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed
         [example], Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example])), None
     )
     none = score(taxel.Detections([], [], []), labels)
-    advice = advise(made, [example], none, none, 1.0)["contact"]
-    assert advice.helps == "other labels, or another tare"
-    assert advice.because.startswith("nothing was felt of 12 of 12 labels: they are of another recording, or")
+    cause = first_cause(made, [example], none, none)
+    assert cause.kind == "foreign_labels"
+    assert cause.measured.startswith(
+        "12 of 12 labels lie more than 50 ms from where a load begins or ends: they are of"
+    )
 
 
 @pytest.mark.parametrize(("sides", "count"), [((2, 1), 24), pytest.param((1, 3), 60, marks=pytest.mark.slow)])

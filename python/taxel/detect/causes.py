@@ -37,6 +37,8 @@ KINDS = (
     "overfitting", "parameters",
 )  # fmt: skip
 
+#: What helps against labels that lie elsewhere.
+_FOREIGN = "labels of this recording, where it was touched"
 #: From which share of the events on missed or false ones are many.
 _MANY = 0.05
 #: Labels are a question before a training if at most this share of them lies near anything that was felt ...
@@ -213,7 +215,7 @@ class Evidence:
 
     def refused(self) -> tuple[Cause, ...]:
         """Return the causes that the data show of a training that was refused: all labels count as missed."""
-        return _ordered(self.causes(self._counts))
+        return _ordered([cause for cause in self.causes(self._counts) if cause.kind != "few_labels"])
 
     def causes(self, wrong: Mapping[str, int]) -> list[Cause]:
         """Return the causes that the data show, for each of the labels of which so many are missed or false."""
@@ -234,10 +236,11 @@ class Evidence:
         away = total - at_edge
         measured = (
             f"{away} of {counted(total, 'label')} {_lie(away)} more than {WINDOW_MS:.0f} ms from where a load begins "
-            "or ends: they are of another recording, or off by another time each, or name what the sensor does not feel"
+            "or ends: they are of another recording, or off by another time each, or name what the sensor does not "
+            "feel, or a tare from elsewhere does not fit"
         )
         mistakes = wrong if 2 * away > total else min(away, wrong)
-        yield Cause("foreign_labels", (label,), mistakes, measured, "labels of this recording, where it was touched")
+        yield Cause("foreign_labels", (label,), mistakes, measured, _FOREIGN)
 
     def _shifts(self, wrong: Mapping[str, int]) -> Iterator[Cause]:
         """Yield by how much labels are off, which one option moves if all are alike."""
@@ -333,6 +336,8 @@ class Mistakes:
         if not any(cause.kind in ("falling_values", "shifted_labels") for cause in found):
             for label, mistakes in wrong.items():
                 found += [*self._unlabelled_time(evidence.sound, label), *self._name(label, mistakes)]
+                if not any(cause.kind == "foreign_labels" and label in cause.labels for cause in found):
+                    found += self._unpaired(label)
                 # More labels and other parameters are for what nothing else explains.
                 if all(2 * cause.mistakes < mistakes for cause in found if label in cause.labels):
                     found += self._of_learning(evidence, label, mistakes)
@@ -382,6 +387,16 @@ class Mistakes:
                 "labelled",
                 "labels of all events",
             )
+
+    def _unpaired(self, label: str) -> Iterator[Cause]:
+        """Yield how many labels lie far from what the neuron learnt them by."""
+        alignment = self.trained.alignments.get(label)
+        if alignment is not None and (unpaired := int(alignment.unpaired.sum())):
+            measured = (
+                f"nothing that {label} is known by was felt within {WINDOW_MS:.0f} ms of {counted(unpaired, 'label')}"
+            )
+            mistakes = min(unpaired, self.scored[label].missed)
+            yield Cause("foreign_labels", (label,), mistakes, measured, _FOREIGN)
 
     def _name(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield that a label without its name may be the end of a touch, where it was learnt as a kind of touch."""
