@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -13,14 +15,14 @@ from numpy.typing import NDArray
 from taxel._base.arguments import instance
 from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, counted, warn
-from taxel._base.progress import Progress, reporting
+from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
 from taxel.detect.causes import Evidence, Mistakes
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor
-from taxel.detect.folds import count_of_folds
+from taxel.detect.folds import INNER, count_of_folds
 from taxel.detect.loads import clock_of
 from taxel.detect.plain_score import floor_of, plain_score
 from taxel.detect.readout import run_counting
@@ -35,6 +37,9 @@ from taxel.tare import Tare
 from taxel.tasks.labels import GivenLabels, labelled_trials, references, sources_without
 from taxel.tasks.rest import GivenTare, given_tare, tare_before, tare_if_any
 from taxel.tasks.train_result import Training, TrainOptions
+
+#: Work that takes longer says so before it begins, s.
+_LONG_S = 60.0
 
 
 def train(
@@ -225,6 +230,10 @@ class _Work:
     def _training(self, plan: Recipe, evidence: Evidence) -> Training:
         folds, search, window_ms = self.options.folds, self.options.search, self.options.window_ms
         count, why = count_of_folds(self.examples) if folds is None else (folds, "" if folds else "folds is 0")
+        begun = perf_counter()
+        with collected() if search else nullcontext():  # after a search it is trained again
+            trained = fit_aligned(self.examples, plan, self.update)
+        self._say_how_long(plan, perf_counter() - begun, count)
         scored = None
         if count:
             registers = self.opened[0].registers
@@ -239,7 +248,7 @@ class _Work:
                 count, why = 0, f"a part of the training data cannot be learnt from: {error}"
         if search:
             plan = choose(self.examples, plan, window_ms=window_ms, progress=self.update)
-        trained = fit_aligned(self.examples, plan, self.update)
+            trained = fit_aligned(self.examples, plan, self.update)
         outcomes = self._outcomes(trained)
         trained_on = _own(outcomes, window_ms)
         if scored is None:
@@ -250,6 +259,18 @@ class _Work:
         causes = Mistakes(trained, *scores, search, scored.plain).causes(evidence)
         taken = _taken(self.examples) if self.options.tare is None else ()
         return Training(self.options, self.opened, trained, scored, why, causes, outcomes, taken)
+
+    def _say_how_long(self, plan: Recipe, once_s: float, folds: int) -> None:
+        """Say how long all takes by what one training on all data took, if that is more than a minute."""
+        trainings = folds - 1
+        if self.options.search:
+            points = [len(plan.points_of(label)) for label in plan.neurons] or [1]
+            trainings += (folds + 1) * (INNER - 1) * round(sum(points) / len(points))
+        if once_s * trainings < _LONG_S:
+            return
+        what = "the search and the folds take" if self.options.search else "the folds take"
+        ground = f"one training on all data took {once_s:.1f} s, and {what} about as long as {trainings} of them"
+        self.update(Forecast(f"about {once_s * trainings / 60:.0f} min from here on: {ground}"), 0, 0)
 
     def _outcomes(self, trained: Trained) -> list[Outcome]:
         """Return the outcomes of the readout on the recordings that it was trained on."""
