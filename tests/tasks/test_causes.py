@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,10 @@ from shell import call
 from tests.detect.test_levels import steps
 
 import taxel
+from taxel._base.messages import collected
+from taxel._base.progress import Forecast
+from taxel.detect import Example
+from taxel.detect.examples import array_of
 from taxel.recording.contents import alone, source_from
 from taxel.recording.sections import Origin
 
@@ -193,3 +199,91 @@ def test_the_first_advice_halves_what_is_missed_and_false(name: str, seed: int, 
         after = wrong([line for line in printed_after.splitlines() if ", plain rule: " in line])
     assert before > 0.1
     assert 2 * after <= before
+
+
+def unfelt(folder: Path) -> tuple[Path, Path]:
+    """Write a recording, and labels of which none lies near anything felt."""
+    frames, labels = pressed(1)
+    taxel.convert(frames, folder / "a.npz")
+    before = {label: 100_000 * np.arange(1, 7) + k for k, label in enumerate(labels)}
+    return folder / "a.npz", table(folder / "a.csv", before)
+
+
+def test_labels_near_nothing_are_refused_in_one_line_that_names_the_option(tmp_path: Path, capsys: Any) -> None:
+    recording, labels = unfelt(tmp_path)
+    code, out, error = call(capsys, "train", recording, "--labels", labels, "-o", tmp_path / "r.json")
+    assert (code, out, error.count("\n")) == (2, "", 1)
+    assert error.startswith(
+        "taxel: labels: 0 of 12 labels lie within 50 ms of anything that was felt; what may help is "
+    )
+    assert error.endswith("; to go on nonetheless, give --labels-as-given\n")
+    assert not (tmp_path / "r.json").exists()
+    with pytest.raises(taxel.ProblemError, match="to go on nonetheless, give labels_as_given") as refusal:
+        taxel.train(taxel.open(recording), labels)
+    assert refusal.value.argument == "labels_as_given"
+
+
+def test_labels_near_nothing_are_learnt_as_given_where_that_is_asked(tmp_path: Path, capsys: Any) -> None:
+    recording, labels = unfelt(tmp_path)
+    words = ("train", recording, "--labels", labels, "--tare", "0.5", "--folds", 0, "--labels-as-given")
+    code, out, _ = call(capsys, *words, "-o", tmp_path / "r.json")
+    assert (code, (tmp_path / "r.json").exists()) == (0, True)
+    assert out.startswith("not held out, on its own training data")
+
+
+@pytest.mark.parametrize("answer", [True, False])
+def test_on_a_terminal_it_is_a_question(
+    answer: bool, tmp_path: Path, capsys: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording, labels = unfelt(tmp_path)
+    asked: list[str] = []
+    monkeypatch.setattr("taxel.cli.train._on_terminal", lambda: True)
+    monkeypatch.setattr("typer.confirm", lambda question, **_: asked.append(question) or answer)
+    words = ("train", recording, "--labels", labels, "--tare", "0.5", "--folds", 0, "-o", tmp_path / "r.json")
+    code, _, error = call(capsys, *words)
+    assert asked == ["Train on these labels nonetheless?"]
+    assert "0 of 12 labels lie within 50 ms of anything that was felt" in error
+    assert (code, (tmp_path / "r.json").exists()) == ((0, True) if answer else (2, False))
+
+
+def test_causes_are_data_and_their_arguments_are_options_of_a_training(tmp_path: Path) -> None:
+    frames, labels = pressed(1)
+    taxel.convert(frames, tmp_path / "a.npz")
+    late = [{label: times + 300_000 for label, times in labels.items()}]
+    options = taxel.tasks.TrainOptions()
+    training = taxel.train(taxel.open(tmp_path / "a.npz"), late, options)
+    cause = training.causes[0]
+    assert (cause.kind, set(cause.labels), cause.option) == ("shifted_labels", {"contact", "lift"}, "--shift-ms -300")
+    assert training.to_dict()["causes"][0] == json.loads(json.dumps(cause.to_dict()))
+    assert training.to_dict()["options"] == ["--shift-ms -300"]
+    again = taxel.train(taxel.open(tmp_path / "a.npz"), late, replace(options, **cause.arguments))
+    assert (again.score.found, again.score.false, again.causes) == (20, 0, ())
+    assert "labels moved by -300 ms before, as asked" in again.lines()
+
+
+def test_two_feet_are_no_two_sensors_at_different_places() -> None:
+    pattern = {"left": taxel.Array(2, 2, pitch_mm=5.0), "right": taxel.Array(2, 2, pitch_mm=6.0)}
+    examples = [
+        Example(taxel.Frames(np.zeros((2, 2, 2)), [0, 1000], array=array), {}, None, walk, f"{walk}{foot}")
+        for walk in ("a ", "b ")
+        for foot, array in pattern.items()
+    ]
+    with collected() as warned:
+        array_of(examples)
+    assert warned == []
+    with collected() as warned:
+        array_of([examples[0], examples[1]._replace(group="c ", name="c left")])
+    assert len(warned) == 1
+
+
+def test_a_long_training_says_how_long_before_its_folds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(import_module("taxel.tasks.train"), "_LONG_S", 0.0)
+    frames, labels = pressed(1)
+    taxel.convert(frames, tmp_path / "a.npz")
+    steps: list[str] = []
+    taxel.train(taxel.open(tmp_path / "a.npz"), [labels], progress=lambda step, *_: steps.append(step))
+    (said,) = [step for step in steps if isinstance(step, Forecast)]
+    assert re.fullmatch(
+        r"about \d+ min from here on: one training on all data took [\d.]+ s, and the folds .* 4 of them", said
+    )
+    assert steps.index(said) < steps.index("fold 1 of 5")

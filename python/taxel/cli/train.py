@@ -166,10 +166,14 @@ def _trained(opened: Sequence[Recording], labels: str, options: TrainOptions, *,
 
 def _confirmed(error: ProblemError) -> bool:
     """Ask on a terminal whether to train nonetheless; elsewhere nobody can answer."""
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+    if not _on_terminal():
         return False
     say(f"taxel: {error.args[0]}", err=True)
     return typer.confirm("Train on these labels nonetheless?", err=True)
+
+
+def _on_terminal() -> bool:
+    return sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def _try_rules(given: Path | None, labels: str, recordings: Sequence[Recording], *, overwrite: bool) -> None:

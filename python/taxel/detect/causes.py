@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from taxel import _core
+from taxel._base.arguments import integer, mapping, several, shown, text
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
@@ -65,13 +67,15 @@ _CHANCE = 0.05
 class Cause:
     """Hold one cause of missed and false events: what was measured, and what helps.
 
-    Attributes
+    Parameters
     ----------
     kind : str
-        One of `KINDS`: "falling_values", "shifted_labels" ...
+        "falling_values", "shifted_labels", "few_labels", "unlabelled_source", "levels", "foreign_labels", "tare",
+        "durations", "recipe", "unlabelled_time", "label_name", "plain_rule", "no_neighbours", "indistinct_kinds",
+        "overfitting" or "parameters"; the page on training explains each.
     labels : tuple of str
         The labels that it concerns.
-    mistakes : int, 1 or more
+    mistakes : int, 0 or more
         How many missed and false events it concerns, at most.
     measured : str
         What was measured.
@@ -81,6 +85,16 @@ class Cause:
         That option, as it is typed; empty where none helps.
     arguments : mapping of str to value
         The same in Python: fields of `taxel.tasks.TrainOptions`. Those of "changes" are added to the others.
+
+    Raises
+    ------
+    ProblemError : another kind, or a value of another type
+
+    Examples
+    --------
+    >>> cause = Cause("shifted_labels", ("contact",), 12, "12 of 12 lie 203 ms late", "--shift-ms -203")
+    >>> str(cause)
+    'what may help is --shift-ms -203: 12 of 12 lie 203 ms late'
     """
 
     kind: str
@@ -90,6 +104,15 @@ class Cause:
     advice: str
     option: str = ""
     arguments: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if text("kind", self.kind) not in KINDS:
+            raise refused("kind", f" is {shown(self.kind)}: must be one of {', '.join(KINDS)}")
+        object.__setattr__(self, "labels", tuple(text("labels", label) for label in several("labels", self.labels)))
+        integer("mistakes", self.mistakes, 0)
+        for name in ("measured", "advice", "option"):
+            text(name, getattr(self, name))
+        mapping("arguments", self.arguments)
 
     def __str__(self) -> str:
         return f"what may help is {self.advice}: {self.measured}"
