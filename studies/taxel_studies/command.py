@@ -14,6 +14,7 @@ import typer
 from taxel import ProblemError
 from taxel.cli import SET_HELP, App, assignments, say
 from taxel_studies import DRAWN, FIGURES, STUDIES, load
+from taxel_studies.durations import forecast_all
 
 if TYPE_CHECKING:
     from taxel_studies.runner import Workers
@@ -103,6 +104,9 @@ def every(
     changes = {} if realisations is None else {"realisations": realisations}
     for name in STUDIES:
         load(name).set(size)  # refused before any study begins
+    begun = [name for name in STUDIES if load(name).cannot_run(_data(data)) is None]
+    if not as_json and (text := forecast_all(begun, size, jobs)):
+        say(f"all: {text}", err=True)
     sections = {}
     try:
         for name in STUDIES:

@@ -24,6 +24,7 @@ from matplotlib.figure import Figure
 from taxel import FormatError, ProblemError, __version__
 from taxel.report import write_whole
 from taxel_studies.commit import code_version
+from taxel_studies.durations import forecast
 from taxel_studies.runner import HERE, Results, SharedFolder, Task, Workers, one_of, run, whole
 
 __all__ = [
@@ -272,6 +273,8 @@ class Study:
             given["data"] = self._recordings(data)
             if not quiet:
                 print(f"{self.name}: reading the recordings in {data}; hundreds of them take minutes", file=sys.stderr)
+                # What is there already is known once they are read.
+                self._say_how_long(size, 1.0, workers)
             unread = self.unread(parameters, given["data"])
             refuse(unread, strict=strict)
         folder = report / self.name
@@ -282,6 +285,10 @@ class Study:
             given["courses"] = SharedFolder(report / "courses", code)
             given["courses"].path.mkdir(exist_ok=True)
         results = Results(folder / "results.jsonl", code)
+        if not (quiet or self.data):
+            kept = {t.key("") for t in self.tasks(self.set(size))}
+            left = [t for t in self.tasks(parameters) if t not in results]
+            self._say_how_long(size, len(left) / max(1, len(kept)), workers)
         begun = time.time()
         rows: dict[str, Row] = {}
 
@@ -317,6 +324,11 @@ class Study:
         }
         _write_section(folder, section, drawn(self, parameters, summary))
         return section
+
+    def _say_how_long(self, size: str, share: float, workers: Workers) -> None:
+        """Print about how long a share of the study takes, if that is more than a minute and known."""
+        if text := forecast(self.name, size, share, workers.jobs):
+            print(f"{self.name}: {text}", file=sys.stderr)
 
     def _recordings(self, data: Path | None) -> Path:
         if data is not None and not data.is_dir():

@@ -21,8 +21,9 @@ from taxel import Array, Frames, SpikeTrains, Tare
 from taxel._base import progress
 from taxel.cli import _recordings
 from taxel.detect import Example, PlainRule, Recipe, choose, judge, load, recipes, run, score
-from taxel.detect.advice import advise
-from taxel.detect.fitting import fit_aligned
+from taxel.detect.causes import Cause, Evidence, Mistakes
+from taxel.detect.examples import check_examples
+from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.followed import follow
 from taxel.detect.plain_score import PlainScore
@@ -207,20 +208,34 @@ def test_advice_names_the_rule_that_won_or_the_recipe_of_its_inputs() -> None:
     rule = PlainScore({"contact": PlainRule("area", 2)}, scored(12))
     floor = measured_floor([example])
     of_area = fit_aligned([example], Recipe.load("touch", None, LABELS, floor), None)
-    other = of_area._replace(recipe=Recipe(LevelCrossing([1.0])))
-    for made, helps in ((of_area, "the plain rule"), (other, "--recipe touch")):
-        advice = advise(made, [example], scored(6), scored(12), None, rule)["contact"]
-        assert (advice.helps, "leaves 0 missed and false on the same labels, the neuron 6" in advice.because) == (
+    other = of_area._replace(recipe=Recipe(LevelCrossing([40.0])))
+    for made, helps in ((of_area, "the plain rule (--rule FILE)"), (other, "--recipe touch")):
+        cause = first_cause(made, [example], scored(6), scored(12), rule)
+        assert (cause.advice, "leaves 0 missed and false on the same labels, the neuron 6" in cause.measured) == (
             helps,
             True,
         )
-    assert advise(other, [example], scored(6), scored(12), None)["contact"].helps == "more labels"
+    assert first_cause(other, [example], scored(6), scored(12)).advice == "more labels"
     row = Example(Frames(np.zeros((2, 1, 4)), [0, 1], unit="V", array=Array(1, 4)), labels)
-    assert advise(other, [row], scored(6), scored(12), None)["contact"].helps == "--array 8x8xMM"
+    assert first_cause(other, [row], scored(6), scored(12)).advice == "--array 8x8xMM"
     learners = dict(zip(("contact", "foot_off"), of_area.learners.values(), strict=True))
     gait = other._replace(readout=taxel.Readout(of_area.readout.encoder, learners))
-    assert advise(gait, [row], scored(6), scored(12), None)["contact"].helps == "more labels"
-    assert advise(gait, [example], scored(6), scored(12), None, rule)["contact"].helps == "the plain rule"
+    assert first_cause(gait, [row], scored(6), scored(12)).advice == "more labels"
+    assert first_cause(gait, [example], scored(6), scored(12), rule).advice == "the plain rule (--rule FILE)"
+
+
+def first_cause(
+    made: Trained,
+    examples: list[Example],
+    scored: taxel.detect.Score,
+    learnt: taxel.detect.Score,
+    plain: PlainScore | None = None,
+    label: str = "contact",
+) -> Cause:
+    """Return the cause of most mistakes of a label, after a search."""
+    evidence = Evidence(examples, check_examples(examples), made.recipe)
+    causes = Mistakes(made, scored, learnt, searched=True, plain=plain).causes(evidence)
+    return next(cause for cause in causes if label in cause.labels)
 
 
 def test_where_only_the_first_touches_have_labels_those_of_the_others_may_help() -> None:
@@ -232,8 +247,9 @@ def test_where_only_the_first_touches_have_labels_those_of_the_others_may_help()
         first = {label: times[:count] for label, times in labels.items()}
         example, times = Example(frames, first, tare), labels["contact"]
         some = score(taxel.Detections(["contact"] * found, times[:found], times[:found]), {"contact": first["contact"]})
-        advice = advise(fit_aligned([example], plan, None), [example], some, some, None)
-        return f"{advice['contact'].helps}: {advice['contact'].because}" if advice else ""
+        made = fit_aligned([example], plan, None)
+        causes = Mistakes(made, some, some, searched=True).causes(Evidence([example], check_examples([example]), plan))
+        return f"{causes[0].advice}: {causes[0].measured}" if causes else ""
 
     assert helps(5, 12).startswith("labels of all events: 7.2 of 13.0 s lie before the first or behind the last one")
     assert helps(5, 3).startswith("more labels: ")
@@ -250,7 +266,7 @@ def test_a_name_that_is_not_known_as_an_end_is_said_where_no_input_follows_it() 
         example = Example(frames, times, tare)
         plan = Recipe.load("touch", None, list(times), measured_floor([example]))
         none = score(taxel.Detections([], [], []), times)
-        assert advise(fit_aligned([example], plan, None), [example], none, none, None)[name].helps == helps
+        assert first_cause(fit_aligned([example], plan, None), [example], none, none, label=name).advice == helps
 
 
 def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail(
@@ -291,8 +307,8 @@ def test_a_training_estimates_how_long_it_takes_by_the_folds_that_are_done(monke
         now[0] = float(at)
         steps.update(*step)
         said.append(str(steps))
-    # Reading is no part of a fold; the training on all data and the plain rules count as two.
-    told = ["fold 2 of 5, after 20 s; about 80 s in all", "learning, after 29 s; about 80 s in all"]
+    # Reading is no part of a fold; the plain rules count as one.
+    told = ["fold 2 of 5, after 20 s; about 70 s in all", "learning, after 29 s; about 70 s in all"]
     assert said == ["reading, after 0 s", "fold 1 of 5, after 10 s", "learning, after 15 s", *told]
     now[0] = 90.0
     assert str(steps) == "learning, after 90 s"
@@ -491,9 +507,11 @@ def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed
         [example], Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example])), None
     )
     none = score(taxel.Detections([], [], []), labels)
-    advice = advise(made, [example], none, none, 1.0)["contact"]
-    assert advice.helps == "other labels, or another tare"
-    assert advice.because.startswith("nothing was felt of 12 of 12 labels: they are of another recording, or")
+    cause = first_cause(made, [example], none, none)
+    assert cause.kind == "foreign_labels"
+    assert cause.measured.startswith(
+        "12 of 12 labels lie more than 50 ms from where a load begins or ends: they are of"
+    )
 
 
 @pytest.mark.parametrize(("sides", "count"), [((2, 1), 24), pytest.param((1, 3), 60, marks=pytest.mark.slow)])

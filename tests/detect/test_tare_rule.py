@@ -12,7 +12,7 @@ from shell import call
 import taxel
 from taxel import Array, Events, Frames, Tare
 from taxel.detect import PlainRule, run
-from taxel.detect.advice import count_drifted
+from taxel.detect.causes import count_drifted
 from taxel.detect.readout import run_counting
 
 FLOOR = 6.0

@@ -12,7 +12,8 @@ from test_readout import ARRAY, recipe, tare, touches
 
 import taxel
 from taxel.detect import Example, PlainRule, run, score
-from taxel.detect.advice import advise, loaded_at_rest
+from taxel.detect.causes import Cause, Evidence, Mistakes, loaded_at_rest
+from taxel.detect.examples import check_examples
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.encode import ContactArea, LevelCrossing
 
@@ -64,7 +65,8 @@ def test_a_label_of_which_nothing_was_felt_is_named_by_recording_and_time(tmp_pa
     assert result["alignment"]["contact"]["unpaired"] == [{"recording": str(second), "t_us": alone}]
     assert result["alignment"]["lift"]["unpaired"] == []
     assert (result["held_out"], result["score"]["missed"]) == (True, 1)
-    assert "contact: 8% missed, 0% false; what may help is another tare: nothing was felt of 1 label, unless" in out
+    helps = "contact: what may help is labels of this recording, where it was touched: nothing that contact is known by"
+    assert f"{helps} was felt within 50 ms of 1 label\n" in out
 
 
 @pytest.mark.parametrize(("folds", "which"), [(2, "held-out labels"), (0, "labels that it was trained on")])
@@ -179,7 +181,7 @@ def test_a_recording_without_a_spike_is_refused_in_one_line(tmp_path: Path, caps
     assert code == 2
     assert error.startswith("taxel: contact: nothing was felt in the recording up to the last of its 3 events; ")
     assert error.count("\n") == 1
-    assert "the tare holds a touch" in error, "labels that are late let the tare end after a touch began"
+    assert "what may help is labels of this recording, where it was touched: 3 of 3 labels lie more than" in error
 
 
 def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Path, capsys) -> None:
@@ -241,6 +243,12 @@ def test_a_recording_without_one_of_the_labels_has_a_row_on_the_page(tmp_path: P
     assert '2.npz</td><td class="left">lift</td><td>0</td>' in (tmp_path / "page" / "report.html").read_text()
 
 
+def causes(made: Trained, examples: list[Example], *scores: taxel.detect.Score, searched: bool = False) -> list[Cause]:
+    """Return the causes of what is missed and false, those of most mistakes first."""
+    evidence = Evidence(examples, check_examples(examples), made.recipe)
+    return list(Mistakes(made, *scores, searched=searched).causes(evidence))
+
+
 def scored(found: int, missed: int, false: int) -> taxel.detect.Score:
     times = np.arange(found + false) * 1_000_000
     there = np.concatenate([times[:found], 500_000 + np.arange(missed) * 1_000_000])
@@ -255,23 +263,24 @@ def made() -> tuple[Trained, Example]:
 
 
 @pytest.mark.parametrize(
-    ("held", "own", "search_s", "helps"),
+    ("held", "own", "searched", "helps"),
     [
-        ((95, 5, 5), (100, 0, 0), 2.0, None),
-        ((94, 6, 0), (100, 0, 0), 2.0, "more labels"),
-        ((94, 6, 0), (97, 3, 0), 2.0, "more labels"),
-        ((94, 6, 0), (96, 4, 0), 2.0, "--search"),
-        ((100, 0, 6), (100, 0, 6), 2.0, "--search"),
-        ((94, 6, 0), (94, 6, 0), None, "more labels"),
-        ((0, 4, 0), (0, 4, 0), 2.0, "--search"),
-        ((0, 3, 0), (0, 3, 0), 2.0, "more labels"),
+        ((95, 5, 5), (100, 0, 0), False, None),
+        ((94, 6, 0), (100, 0, 0), False, "more labels"),
+        ((94, 6, 0), (97, 3, 0), False, "more labels"),
+        ((94, 6, 0), (96, 4, 0), False, "--search"),
+        ((100, 0, 6), (100, 0, 6), False, "--search"),
+        ((94, 6, 0), (94, 6, 0), True, "more labels"),
+        ((0, 4, 0), (0, 4, 0), False, "--search"),
     ],
 )
-def test_what_may_help_is_named_where_many_are_missed_or_false(made, held, own, search_s, helps) -> None:
-    advice = advise(made[0], [made[1]], scored(*held), scored(*own), search_s)
-    assert ({} if helps is None else {"contact": helps}) == {label: one.helps for label, one in advice.items()}
+def test_what_may_help_is_named_where_many_are_missed_or_false(made, held, own, searched, helps) -> None:
+    found = causes(made[0], [made[1]], scored(*held), scored(*own), searched=searched)
+    assert (None if helps is None else (helps, ("contact",))) == ((found[0].advice, found[0].labels) if found else None)
+    assert [cause.mistakes for cause in found] == sorted((cause.mistakes for cause in found), reverse=True)
     if helps == "--search":
-        assert advice["contact"].because == "it tries 5 sets of parameters, in about 10 s"
+        assert "it tries 5 sets of parameters" in found[0].measured
+        assert found[0].to_dict()["arguments"] == {"search": True}
 
 
 def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
@@ -282,25 +291,25 @@ def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
     assert loaded_at_rest([example, stale], ContactArea()) == 64
     assert loaded_at_rest([example, stale._replace(tare=None)], ContactArea()) == 0
     assert loaded_at_rest([stale], LevelCrossing([10.0])) == 0
-    few = advise(readout, [stale], scored(0, 1, 0), scored(0, 1, 0), 2.0)["contact"]
-    assert (few.helps, few.because) == (
+    few = causes(readout, [example._replace(labels={"contact": [9000]})], scored(0, 1, 0), scored(0, 1, 0))[0]
+    assert (few.advice, few.measured) == (
         "more labels",
         "there is 1; 4 are the least to score it held out, 10 for five folds",
     )
-    advice = advise(readout, [stale], scored(9, 1, 0), scored(9, 1, 0), 2.0)
-    assert advice["contact"].helps == "another tare"
-    assert advice["contact"].because == "64 taxels read above theirs while nothing touches them"
+    (cause, *_) = causes(readout, [stale], scored(9, 1, 0), scored(9, 1, 0))
+    assert (cause.kind, cause.advice) == ("tare", "another tare, of the time just before (--tare FILE)")
+    assert cause.measured == "of the tare: 64 taxels read above theirs while nothing touches them"
 
 
 def test_another_recipe_may_help_where_it_is_made_for_the_labels(made) -> None:
     readout, example = made
     frames = taxel.Frames(np.zeros((2, 8, 8)), [0, 1000], unit="N", array=ARRAY)
-    tared = example._replace(source=frames, tare=taxel.Tare.take(frames), labels={})
-    assert advise(readout, [tared], scored(9, 1, 0), scored(9, 1, 0), None)["contact"].helps == "more labels"
+    tared = example._replace(source=frames, tare=taxel.Tare.take(frames))
     by_gait = readout._replace(recipe=taxel.detect.Recipe.load("gait_insole", None, ["contact", "lift"]))
-    advice = advise(by_gait, [tared], scored(9, 1, 0), scored(9, 1, 0), None)["contact"]
+    (cause,) = [one for one in causes(by_gait, [tared], scored(9, 1, 0), scored(9, 1, 0)) if one.kind == "recipe"]
     why = "it is made for contact and lift on a grid of 8 x 8 taxels; this training took gait_insole"
-    assert (advice.helps, advice.because) == ("--recipe touch", why)
+    assert (cause.advice, cause.measured, cause.arguments) == ("--recipe touch", why, {"recipe": "touch"})
+    assert not [one for one in causes(readout, [tared], scored(9, 1, 0), scored(9, 1, 0)) if one.kind == "recipe"]
 
 
 def test_a_tare_that_drifts_away_is_noticed_at_the_end() -> None:

@@ -70,6 +70,18 @@ SOUND: dict[str, Sound] = {
         folds=2,
         search=False,
         window_ms=50.0,
+        shift_ms=-20.0,
+        labels_as_given=True,
+    ),
+    "taxel.tasks.Cause": plain(
+        tasks.Cause,
+        kind="shifted_labels",
+        labels=("contact",),
+        mistakes=3,
+        measured="12 of 12 lie 203 ms after what the sensor felt (median)",
+        advice="--shift-ms -203",
+        option="--shift-ms -203",
+        arguments={"shift_ms": -203.0},
     ),
     "taxel.tasks.detect": on(
         lambda **given: tasks.detect(**{"readout": RULE, **given}),

@@ -17,6 +17,12 @@ def reporting(progress: Progress | None) -> Progress:
     return (lambda *_: None) if progress is None else callback("progress", progress)
 
 
+class Forecast(str):
+    """A step that says how long the work takes, and how that is known: those who show steps print it as a line."""
+
+    __slots__ = ()
+
+
 class Steps:
     """Holds the current step of a task, and about how long all of them take by the folds that are done."""
 
@@ -39,7 +45,7 @@ class Steps:
         after_s, all_s = perf_counter() - self._begun, 0.0
         if self._fold is not None and self._fold[0] > 1:
             number, count, at_s = self._fold
-            # The training on all data and the plain rules take as long as two more folds.
-            all_s = self._first_fold_s + (at_s - self._first_fold_s) / (number - 1) * (count + 2)
+            # The plain rules, or a search on all data, take as long as one more fold.
+            all_s = self._first_fold_s + (at_s - self._first_fold_s) / (number - 1) * (count + 1)
         expected = f"; about {all_s:.0f} s in all" if all_s > after_s else ""
         return f"{self._step}, after {after_s:.0f} s{expected}"

@@ -15,7 +15,7 @@ from taxel._base.arguments import short
 from taxel._base.documents import NotTomlError, of_toml
 from taxel._base.files import check_writable
 from taxel._base.messages import collected, escaped
-from taxel._base.progress import Steps
+from taxel._base.progress import Forecast, Steps
 from taxel._core import ProblemError
 from taxel.cli._say import say
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from taxel.recording import Recording
 
 #: Without a terminal a line says the step after so long, then after so long again; the last repeats, s.
-_REPORT_S = (2.0, 8.0, 20.0, 30.0)
+_REPORT_S = (0.5, 9.5, 20.0, 30.0)
 
 #: What every command that works on recordings reads.
 READ_HELP = ".mcap, .lsa, .npz, .csv or .h5, a ROS bag or a file of another maker"
@@ -101,7 +101,8 @@ def _report(steps: Steps, ended: Event) -> None:
 def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """Show the current step of a task, and warnings as single lines; on stderr, so that results can be piped.
 
-    Without a terminal a line is said first after 2 s, then after 10 s and every 30 s.
+    Without a terminal a line is said first after half a second, so that it is there within 2 s of the command's begin,
+    then after 10 s and every 30 s. How long the work takes is said as a line of its own.
     """
     from rich.text import Text  # noqa: PLC0415  the command line starts quickly
 
@@ -115,6 +116,8 @@ def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
             with console.status("") as status:
 
                 def show(step: str, done: int, total: int) -> None:
+                    if isinstance(step, Forecast):
+                        console.print(Text(escaped(step)))
                     steps.update(step, done, total)
                     status.update(Text(escaped(steps)))
 
@@ -123,8 +126,14 @@ def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
             ended = Event()
             reporting = Thread(target=_report, args=(steps, ended), daemon=True)
             reporting.start()
+
+            def update(step: str, done: int, total: int) -> None:
+                if isinstance(step, Forecast):
+                    say(f"taxel: {step}", err=True)
+                steps.update(step, done, total)
+
             try:
-                yield steps.update
+                yield update
             finally:
                 ended.set()
                 reporting.join()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
@@ -32,7 +34,7 @@ from taxel.cli._say import say
 if TYPE_CHECKING:
     from taxel.detect import PlainScore
     from taxel.recording import Recording
-    from taxel.tasks import Training
+    from taxel.tasks import Training, TrainOptions
 
 app = App()
 
@@ -90,6 +92,16 @@ def train(
             "--search", help="Choose each neuron's parameters among those that the recipe lists, on held-out data."
         ),
     ] = False,
+    shift_ms: Annotated[
+        float, typer.Option(help="Move all labels by so many ms before all else, as those of another clock.")
+    ] = 0.0,
+    labels_as_given: Annotated[
+        bool,
+        typer.Option(
+            "--labels-as-given",
+            help="Train also where nearly no label lies near anything that the sensor felt, without a question.",
+        ),
+    ] = False,
     report: ReportOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -110,14 +122,14 @@ def train(
     changes = assignments(values or []) | {
         key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None
     }
-    options = taxel.tasks.TrainOptions(recipe, changes, tare, folds, search, window_ms)
+    options = taxel.tasks.TrainOptions(recipe, changes, tare, folds, search, window_ms, shift_ms, labels_as_given)
     with progress(as_json) as update:
         update(f"reading {', '.join(map(str, recordings[:3]))}" + " ..." * (len(recordings) > 3), 0, 0)
         opened = files.opener.open_sensors(recordings)
         _try_rules(rule, labels, opened, overwrite=overwrite)
-        training = taxel.train(opened, labels, options, progress=update)
-        training.readout.save(out, overwrite=overwrite)
-        rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
+    training = _trained(opened, labels, options, as_json=as_json)
+    training.readout.save(out, overwrite=overwrite)
+    rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
     if report is not None:
         taxel.report.write_detections(
             report,
@@ -139,6 +151,29 @@ def train(
     lines += [f"plain rule of {' and '.join(each)}: written to {path}" for path, each in rules.items()]
     lines += [] if report is None else [f"report: {report / 'report.html'}"]
     say(*lines, *(f"warning: {warning}" for warning in training.unreliable()))
+
+
+def _trained(opened: Sequence[Recording], labels: str, options: TrainOptions, *, as_json: bool) -> Training:
+    """Train; where nearly no label lies near anything felt, ask first, if somebody can answer."""
+    try:
+        with progress(as_json) as update:
+            return taxel.train(opened, labels, options, progress=update)
+    except ProblemError as error:
+        if error.argument != "labels_as_given" or as_json or not _confirmed(error):
+            raise
+    return _trained(opened, labels, replace(options, labels_as_given=True), as_json=as_json)
+
+
+def _confirmed(error: ProblemError) -> bool:
+    """Ask on a terminal whether to train nonetheless; elsewhere nobody can answer."""
+    if not _on_terminal():
+        return False
+    say(f"taxel: {error.args[0]}", err=True)
+    return typer.confirm("Train on these labels nonetheless?", err=True)
+
+
+def _on_terminal() -> bool:
+    return sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def _try_rules(given: Path | None, labels: str, recordings: Sequence[Recording], *, overwrite: bool) -> None:

@@ -184,13 +184,17 @@ def array_of(examples: Sequence[Example]) -> Array | None:
     """
     arrays = [None if isinstance(example.source, SpikeTrains) else example.source.array for example in examples]  # type: ignore[union-attr]
     first = arrays[0]
+    sources: dict[str, Array] = {}
     for k, array in enumerate(arrays):
         if (array is None) != (first is None) or (array is not None and first is not None and not first.fits(array)):
             difference = f"{name_of(k, examples[k])} is of {array!r}, {name_of(0, examples[0])} of {first!r}"
             raise ProblemError(f"{difference}: must have the same taxels")
-    if first is not None:
-        # One line for all, as every second recording may be of the other foot.
-        any(first._warn_apart(array, "examples", stacklevel=3) for array in arrays if array is not None)
+    # The sources of a recording, as two feet, are different sensors; each is compared with the same one of others, and
+    # one line stands for all.
+    for example, array in zip(examples, arrays, strict=True):
+        source = example.name.removeprefix(example.group) if example.group else ""
+        if array is not None and sources.setdefault(source, array)._warn_apart(array, "examples", stacklevel=3):
+            break
     return first
 
 

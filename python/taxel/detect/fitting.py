@@ -635,13 +635,8 @@ def _remarks(
         why = f"cannot be learnt, as too few input spikes come before them ({listed})"
         if count < TWO_FOLDS:
             there = f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from"
-            yield f"{there}; {TWO_FOLDS} are the least to score it held out: label more. {len(missed)} {why}"
-        elif len(missed) == count:
-            yield f"{count} of {count} events {why}. Their times may be off, or of another recording"
+            yield f"{there}; {len(missed)} {why}"
         else:
-            yield (
-                f"{len(missed)} of {count} events {why}; the others were. A larger delay_ms or tau, wider lb and ub, "
-                "or another of the recipe's points (taxel train --search) may help"
-            )
+            yield f"{len(missed)} of {count} events {why}" + "; the others were" * (len(missed) < count)
     # The learner names unreachable targets, if any, first.
     yield from caught[bool(missed) :]

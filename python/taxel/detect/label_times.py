@@ -17,8 +17,8 @@ from taxel.detect.loads import Loads, clock_of, lacks_neighbours
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 
-#: The number of loaded taxels of the smallest touch.
-TOUCH = 2.0
+#: The number of loaded taxels of the smallest touch, and the peak that noise does not reach.
+TOUCH, PEAK = 2.0, 6.0
 #: Distances between labels and touches are looked at up to this, ms, and are the same that differ by this.
 _FARTHEST_MS, _SAME_MS = 1000.0, 50.0
 #: Labels are off where this share of them has the same distance, and so many; of fewer chance may do so. They are not
@@ -28,6 +28,8 @@ _SHARE, _LEAST = 0.8, 5
 _MOST_A_LABEL = 4
 #: This share of a tare, at its beginning, holds no touch.
 _EARLY = 0.25
+#: These shares of a tare are looked at for a touch, to say how much of it is quiet.
+_SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, _EARLY)
 #: A taxel varies more than its noise at the beginning from so many times that on, and this part of the noise floor.
 _TIMES, _OF_FLOOR = 3.0, 6.0
 
@@ -44,35 +46,61 @@ class Off(NamedTuple):
         return f"{self.alike} of {self.labels} lie {abs(self.ms):.0f} ms {side} what the sensor felt (median)"
 
 
-def off_by(examples: Sequence[Example], labels: Sequence[str], noise_floor: float) -> dict[str, Off]:
-    """Return which labels lie at one distance from what was felt that is too large for them to be aligned.
+class FeltLoads:
+    """Hold when (checked) examples were loaded, to compare labels with: by area, of channels by the peak.
 
-    What was felt are the begins or the ends of loads on two taxels or more, whichever more labels follow. Loads are
-    measured from the beginning of a tare that is of its own recording, as late labels let it end in a touch.
+    Loads are measured from the beginning of a tare that is of its own recording, as late labels let it end in a touch.
 
     Parameters
     ----------
     examples : sequence of Example, checked
-    labels : sequence of str
+        Nothing is known where one has no tare, or is of spike trains.
     noise_floor : float, in the sensor's unit
         Of a board; that of other sensors is measured.
     """
-    sources = [
-        example for example in examples if example.tare is not None and not isinstance(example.source, SpikeTrains)
-    ]
-    if len(sources) < len(examples) or lacks_neighbours(examples):
-        return {}
-    early = [example if (tare := _early(example)) is None else example._replace(tare=tare) for example in examples]
-    floor = measured_floor(early) or noise_floor
-    loads = Loads(early, [clock_of(example) for example in early], floor, reporting(None), ("area",))
-    felt = [edge.t for edge in loads.edges("area", TOUCH, 1.0, 1)]
-    found = {}
-    for label in labels:
-        times = loads.truth(label, loads.whole_examples)
-        steady = [felt_edge for edge in felt for felt_edge in _steady(times, edge)]
-        if steady and all(abs(shift.ms) > WINDOW_MS for shift, _ in steady):
-            found[label], _ = min(steady, key=lambda found_edge: (-found_edge[0].alike, found_edge[1]))
-    return found
+
+    def __init__(self, examples: Sequence[Example], noise_floor: float) -> None:
+        known = all(example.tare is not None and not isinstance(example.source, SpikeTrains) for example in examples)
+        early = [example if (tare := _early(example)) is None else example._replace(tare=tare) for example in examples]
+        self._loads, self._felt = None, {"peak": PEAK} | ({} if lacks_neighbours(examples) else {"area": TOUCH})
+        if known and examples:
+            floor = measured_floor(early) or noise_floor
+            clocks = [clock_of(example) for example in early]
+            self._loads = Loads(early, clocks, floor, reporting(None), list(self._felt))
+
+    def near(self, label: str) -> tuple[int, int, int] | None:
+        """Return how many labels of a name lie within 50 ms of a load, of its begin or end, and how many there are.
+
+        None where it is not known.
+        """
+        if self._loads is None:
+            return None
+        reach = round(to_us(WINDOW_MS))
+        times = self._loads.truth(label, self._loads.whole_examples)
+        near, at_edge = np.zeros(len(times), np.bool_), np.zeros(len(times), np.bool_)
+        for quantity, threshold in self._felt.items():
+            edges = begins, ends = [np.sort(edge.t) for edge in self._loads.edges(quantity, threshold, 1.0, 1)]
+            near |= np.searchsorted(begins, times + reach, side="right") > np.searchsorted(ends, times - reach)
+            for edge in edges:
+                at_edge |= np.diff(np.searchsorted(edge, [times - reach, times + reach]), axis=0)[0] > 0
+        return int(near.sum()), int(at_edge.sum()), len(times)
+
+    def off_by(self, labels: Sequence[str]) -> dict[str, Off]:
+        """Return which labels lie at one distance from what was felt that is too large for them to be aligned.
+
+        What was felt are the begins or the ends of loads, whichever more labels follow.
+        """
+        if self._loads is None:
+            return {}
+        quantity = "area" if "area" in self._felt else "peak"
+        felt = [edge.t for edge in self._loads.edges(quantity, self._felt[quantity], 1.0, 1)]
+        found = {}
+        for label in labels:
+            times = self._loads.truth(label, self._loads.whole_examples)
+            steady = [felt_edge for edge in felt for felt_edge in _steady(times, edge)]
+            if steady and all(abs(shift.ms) > WINDOW_MS for shift, _ in steady):
+                found[label], _ = min(steady, key=lambda found_edge: (-found_edge[0].alike, found_edge[1]))
+        return found
 
 
 def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple[Off, float]]:
@@ -126,27 +154,49 @@ def held_by_tare(examples: Sequence[Example], noise_floor: float) -> int:
     ----------
     examples : sequence of Example, checked
     noise_floor : float, in the sensor's unit
-        As of `off_by`.
+        As of `FeltLoads`.
     """
-    return max((_held(example, noise_floor) for example in examples), default=0)
+    return max((_held(example, noise_floor, 1.0) for example in examples), default=0)
 
 
-def _held(example: Example, noise_floor: float) -> int:
-    early = _early(example)
-    if early is None or example.tare is None:
+def quiet_s(examples: Sequence[Example], noise_floor: float) -> float | None:
+    """Return how many seconds at the beginning of each recording hold no touch, of its tare; None if not known.
+
+    Parameters
+    ----------
+    examples : sequence of Example, checked
+    noise_floor : float, in the sensor's unit
+        As of `FeltLoads`.
+    """
+    least = []
+    for example in examples:
+        tare, source = example.tare, example.source
+        if _early(example) is None or tare is None or tare.start_us > int(source.t[0]):  # type: ignore[union-attr]
+            return None
+        share = next(share for share in _SHARES if _held(example, noise_floor, share) < TOUCH)
+        least.append(share * (tare.stop_us - tare.start_us) / 1e6)
+    seconds = min(least, default=0.0)
+    digits = 10 ** (2 - int(np.floor(np.log10(seconds)))) if seconds > 0 else 1
+    return float(np.floor(seconds * digits) / digits) if seconds > 0 else None
+
+
+def _held(example: Example, noise_floor: float, share: float) -> int:
+    """Return how many taxels vary far more in that share of a tare than at its beginning."""
+    early, late = _early(example), _early(example, share)
+    if early is None or late is None:
         return 0
     floor = measured_floor([example._replace(tare=early)]) or noise_floor
-    return int(np.count_nonzero(example.tare.noise > _TIMES * early.noise + floor / _OF_FLOOR))
+    return int(np.count_nonzero(late.noise > _TIMES * early.noise + floor / _OF_FLOOR))
 
 
-def _early(example: Example) -> Tare | None:
+def _early(example: Example, share: float = _EARLY) -> Tare | None:
     """Return the beginning of a tare that is of its own recording; None of another."""
     tare, source = example.tare, example.source
     if tare is None or isinstance(source, SpikeTrains):
         return None
     try:
         tare_again = Tare.take(source, start_us=tare.start_us, stop_us=tare.stop_us)
-        early = tare.start_us + round(_EARLY * (tare.stop_us - tare.start_us))
+        early = tare.start_us + round(share * (tare.stop_us - tare.start_us))
         return (
             Tare.take(source, start_us=tare.start_us, stop_us=early)
             if np.array_equal(tare_again.rest, tare.rest, equal_nan=True)

@@ -44,6 +44,17 @@ class _Readings(NamedTuple):
     """Whether unloaded taxels have noise."""
 
 
+class LoadedLevels(NamedTuple):
+    """Hold how many of an encoder's levels lie within what loaded taxels read, and levels that do."""
+
+    within: int
+    low: float
+    """The 10th percentile of what loaded taxels read, in the sensor's unit ..."""
+    high: float
+    """... and the 90th."""
+    fitted: list[float]
+
+
 def fit_levels(recipe: Recipe, examples: Sequence[Example], parts: Iterable[Stretch]) -> Recipe:
     """Return a recipe with the levels that parts of (checked) examples give it; itself where its levels are within.
 
@@ -54,22 +65,27 @@ def fit_levels(recipe: Recipe, examples: Sequence[Example], parts: Iterable[Stre
     A taxel is loaded while it reads more than a hundredth of the largest reading above its rest, and more than its
     noise: five standard deviations of it. Its rest is that of the tare, else the least that it reads.
     """
-    encoder = recipe.encoder
-    if not (recipe.fit_levels and _has_levels(encoder)):
+    loaded = loaded_levels(recipe.encoder, examples, parts) if recipe.fit_levels else None
+    if loaded is None or loaded.within >= LEAST_LEVELS:
         return recipe
+    return replace(recipe, encoder=copy(recipe.encoder).set_params(levels=loaded.fitted), fit_levels=False)
+
+
+def loaded_levels(encoder: Encoder, examples: Sequence[Example], parts: Iterable[Stretch]) -> LoadedLevels | None:
+    """Return which levels lie within what parts of (checked) examples read; None without levels or loads."""
+    if not _has_levels(encoder):
+        return None
     each = [_readings(examples[k], start, stop) for k, start, stop in parts]
     readings = np.concatenate([found.values for found in each if found is not None] or [np.empty(0)])
     if not len(readings):
-        return recipe
+        return None
     levels = np.asarray(encoder.levels, np.float64)  # type: ignore[attr-defined]
-    low, high = np.quantile(readings, [_LOW, _HIGH])
+    low, high = (float(quantile) for quantile in np.quantile(readings, [_LOW, _HIGH]))
     noisy = any(found.noisy for found in each if found is not None)
-    if np.count_nonzero((levels >= low if noisy else levels > 0.0) & (levels <= high)) >= LEAST_LEVELS:
-        return recipe
+    within = int(np.count_nonzero((levels >= low if noisy else levels > 0.0) & (levels <= high)))
     begins = max(found.begins for found in each if found is not None)
     quantiles = np.quantile(readings[readings >= begins], np.geomspace(*_FITTED, max(1, len(levels) - 1)))
-    fitted = sorted({float(f"{level:.3g}") for level in (begins, *quantiles)})
-    return replace(recipe, encoder=copy(encoder).set_params(levels=fitted), fit_levels=False)
+    return LoadedLevels(within, low, high, sorted({float(f"{level:.3g}") for level in (begins, *quantiles)}))
 
 
 def _has_levels(encoder: Encoder) -> bool:

@@ -16,7 +16,7 @@ from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, score
-from taxel.detect.advice import count_drifted
+from taxel.detect.causes import count_drifted
 from taxel.detect.detector import detector
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import score_together

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -13,16 +14,15 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
 from taxel._base.errors import helped, refused
-from taxel._base.messages import collected, warn
-from taxel._base.progress import Progress, reporting
+from taxel._base.messages import collected, counted, warn
+from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
-from taxel.detect.advice import advise, fallen
+from taxel.detect.causes import Evidence, Mistakes
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.folds import INNER, count_of_folds
-from taxel.detect.label_times import off_by
 from taxel.detect.loads import clock_of
 from taxel.detect.plain_score import floor_of, plain_score
 from taxel.detect.readout import run_counting
@@ -30,12 +30,16 @@ from taxel.detect.scoring import score_together
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.analysis.rest import BY_UNIT
+from taxel.recording.cut import span_us
 from taxel.recording.opening import sensors_of
-from taxel.spikes import SpikeTrains
+from taxel.spikes import SpikeTrains, to_us
 from taxel.tare import Tare
 from taxel.tasks.labels import GivenLabels, labelled_trials, references, sources_without
 from taxel.tasks.rest import GivenTare, given_tare, tare_before, tare_if_any
 from taxel.tasks.train_result import Training, TrainOptions
+
+#: Work that takes longer says so before it begins, s.
+_LONG_S = 60.0
 
 
 def train(
@@ -103,6 +107,7 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
             raise helped(ProblemError(f"notes: names no event in {titles}"), "labels", "give")
         raise refused("labels", f" is {_named(labels)}: names no event in {titles}")
     unlabelled = sources_without(labels, opened, labelled)
+    labelled = [_moved(events, each, options.shift_ms) for events, each in zip(labelled, opened, strict=True)]
     names = sorted({label for events in labelled for label in events})
     without = [{label for label in names if each.label in unlabelled.get(label, ())} for each in opened]
     # A source without any label takes no part.
@@ -123,6 +128,24 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
     return replace(_Work(opened, examples, options, update).training(plan), unlabelled=unlabelled)
+
+
+def _moved(
+    events: Mapping[str, NDArray[np.int64]], recording: Recording, shift_ms: float
+) -> dict[str, NDArray[np.int64]]:
+    """Return labels so much later; those that then lie outside the recording are left out."""
+    if not shift_ms:
+        return dict(events)
+    first, last = span_us(recording)
+    moved = {label: times + round(to_us(shift_ms)) for label, times in events.items()}
+    inside = {label: times[(times >= first) & (times <= last)] for label, times in moved.items()}
+    outside = sum(map(len, events.values())) - sum(map(len, inside.values()))
+    if outside:
+        lie = "lies" if outside == 1 else "lie"
+        warn(
+            f"{counted(outside, 'label')} of {recording.title} {lie} outside it when moved by {shift_ms:g} ms: left out"
+        )
+    return inside
 
 
 def _named(labels: GivenLabels) -> str:
@@ -188,23 +211,29 @@ class _Work:
     def training(self, plan: Recipe) -> Training:
         """Return the readout with its scores, held out where that can be, and its outcomes on the training data.
 
-        Say first where values fall from their rest. An error says that too, or by how much labels are off.
+        Labels of which nearly none lies near anything felt are refused first. An error says what may help, where the
+        data show it.
         """
-        if fall := fallen(self.examples):
-            warn(fall, stacklevel=2)
+        self.update("looking for what was felt at the labels", 0, 0)
+        evidence = Evidence(self.examples, check_examples(self.examples), plan)
+        if not self.options.labels_as_given and (unfelt := evidence.unfelt()):
+            raise helped(ProblemError(f"labels: {unfelt}; {evidence.refused()[0]}"), "labels_as_given", "go_on")
         try:
-            return self._training(plan)
+            return self._training(plan, evidence)
         except ProblemError as error:
-            if fall and error.hint == "unfelt":
-                raise ProblemError(f"{error.args[0]}: {fall}") from None
-            names = sorted({label for example in self.examples for label in example.labels})
-            off = off_by(check_examples(self.examples), names, floor_of(plan.encoder))
-            others = (f"{label}: {distance}" for label, distance in off.items())
-            raise ProblemError("; ".join([str(error), *others])) from None
+            causes = evidence.refused()
+            if not causes:
+                raise
+            text = error.args[0] if error.hint == "unfelt" else str(error)
+            raise ProblemError(f"{text}; {causes[0]}") from None
 
-    def _training(self, plan: Recipe) -> Training:
+    def _training(self, plan: Recipe, evidence: Evidence) -> Training:
         folds, search, window_ms = self.options.folds, self.options.search, self.options.window_ms
         count, why = count_of_folds(self.examples) if folds is None else (folds, "" if folds else "folds is 0")
+        begun = perf_counter()
+        with collected() if search else nullcontext():  # after a search it is trained again
+            trained = fit_aligned(self.examples, plan, self.update)
+        self._say_how_long(plan, perf_counter() - begun, count)
         scored = None
         if count:
             registers = self.opened[0].registers
@@ -219,18 +248,29 @@ class _Work:
                 count, why = 0, f"a part of the training data cannot be learnt from: {error}"
         if search:
             plan = choose(self.examples, plan, window_ms=window_ms, progress=self.update)
-        begun = perf_counter()
-        trained = fit_aligned(self.examples, plan, self.update)
+            trained = fit_aligned(self.examples, plan, self.update)
         outcomes = self._outcomes(trained)
-        a_point_s = None if search else (perf_counter() - begun) * INNER * (count + 1)
         trained_on = _own(outcomes, window_ms)
         if scored is None:
             truths, sound = [outcome.example.labels for outcome in outcomes], check_examples(self.examples)
             loads = sound, list(truths[0]), [clock_of(example) for example in self.examples], floor_of(plan.encoder)
             scored = replace(trained_on, plain=plain_score(*loads, [], truths, window_ms, self.update))
-        advice = advise(trained, self.examples, scored.together, trained_on.together, a_point_s, scored.plain)
+        scores = scored.together, trained_on.together, scored.scores
+        causes = Mistakes(trained, *scores, search, scored.plain).causes(evidence)
         taken = _taken(self.examples) if self.options.tare is None else ()
-        return Training(self.options, self.opened, trained, scored, why, advice, outcomes, taken)
+        return Training(self.options, self.opened, trained, scored, why, causes, outcomes, taken)
+
+    def _say_how_long(self, plan: Recipe, once_s: float, folds: int) -> None:
+        """Say how long all takes by what one training on all data took, if that is more than a minute."""
+        trainings = folds - 1
+        if self.options.search:
+            points = [len(plan.points_of(label)) for label in plan.neurons] or [1]
+            trainings += (folds + 1) * (INNER - 1) * round(sum(points) / len(points))
+        if once_s * trainings < _LONG_S:
+            return
+        what = "the search and the folds take" if self.options.search else "the folds take"
+        ground = f"one training on all data took {once_s:.1f} s, and {what} about as long as {trainings} of them"
+        self.update(Forecast(f"about {once_s * trainings / 60:.0f} min from here on: {ground}"), 0, 0)
 
     def _outcomes(self, trained: Trained) -> list[Outcome]:
         """Return the outcomes of the readout on the recordings that it was trained on."""

@@ -11,7 +11,7 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._base.times import beginning_us
 from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained
-from taxel.detect.advice import Advice
+from taxel.detect.causes import Cause
 from taxel.detect.levels import LEAST_LEVELS
 from taxel.detect.recipe import change_values, with_floor
 from taxel.recorded import recorded
@@ -46,6 +46,10 @@ class TrainOptions:
         Whether each neuron's parameters are chosen among those that the recipe lists, on held-out data.
     window_ms : float, ms
         Largest distance of a detection from its event.
+    shift_ms : float, ms
+        By how much labels are moved before all else, as those of another clock; later is positive.
+    labels_as_given : bool
+        Whether it trains also where nearly no label lies near anything that the sensor felt, which is refused else.
 
     Raises
     ------
@@ -63,12 +67,16 @@ class TrainOptions:
     folds: int | None = None
     search: bool = False
     window_ms: float = 50.0
+    shift_ms: float = 0.0
+    labels_as_given: bool = False
 
     def __post_init__(self) -> None:
         """Refuse values that no recordings and labels could make valid, before these are read."""
         mapping("changes", self.changes)
         check_tare(self.tare)
         flag("search", self.search)
+        flag("labels_as_given", self.labels_as_given)
+        finite("shift_ms", self.shift_ms, "ms", least=-3.6e9, most=3.6e9)
         finite("window_ms", self.window_ms, "ms", least=0.0)
         if self.folds is not None and integer("folds", self.folds, 0) == 1:
             raise refused("folds", " is 1: must be 2 or more, or 0 for none")
@@ -98,8 +106,8 @@ class Training:
         The scores of each recording and of all, and of the plain rules beside them.
     why : str
         Why the scores are those on the training data; empty where they are held out.
-    advice : mapping of str to Advice
-        What may help each label of which many are missed or false, and the cause.
+    causes : sequence of Cause
+        Why more than 5 % of the labels of a name are missed or false, and what helps; those of most mistakes first.
     outcomes : sequence of taxel.detect.Outcome
         What the readout detects in its own training data.
     tares_us : sequence of (int, int, int), us
@@ -116,7 +124,7 @@ class Training:
     made: Trained
     scored: Judged
     why: str
-    advice: Mapping[str, Advice]
+    causes: Sequence[Cause]
     outcomes: Sequence[Outcome]
     tares_us: Sequence[tuple[int, int, int]]
     warned: tuple[str, ...] = ()
@@ -168,8 +176,9 @@ class Training:
             ],
             "score": self.scored.together.to_dict(),
             "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
-            "helps": {label: advice.helps for label, advice in self.advice.items()},
-            "options": sorted({advice.option for advice in self.advice.values() if advice.option is not None}),
+            "causes": [cause.to_dict() for cause in self.causes],
+            "options": list(dict.fromkeys(cause.option for cause in self._first_causes() if cause.option)),
+            "shift_ms": self.options.shift_ms,
             "fitted_levels": list(self.fitted_levels),
             "warnings": list(self.warnings),
             "unlabelled": {label: list(sources) for label, sources in self.unlabelled.items()},
@@ -194,6 +203,8 @@ class Training:
         for label in self.readout.labels:
             lines += self._scores(label)
         lines += [*self._better(), *self._advised(), *self._aligned()]
+        if self.options.shift_ms:
+            lines.append(f"labels moved by {self.options.shift_ms:+g} ms before, as asked")
         if recipe is not None:
             about = self.made.recipe.about
             lines += ["", f"recipe {recipe}" + (f": {about}" if about else "")]
@@ -269,12 +280,20 @@ class Training:
         if plain.lacks:
             yield plain.lacks
 
+    def _first_causes(self) -> list[Cause]:
+        """Return the first cause of each label, in their order."""
+        known: set[str] = set()
+        first = []
+        for cause in self.causes:
+            if not known.issuperset(cause.labels):
+                first.append(cause)
+                known.update(cause.labels)
+        return first
+
     def _advised(self) -> Iterator[str]:
-        """Yield what may help each label of which many are missed or false."""
-        for label, (helps, because, _) in self.advice.items():
-            score = self.scored.together[label]
-            many = f"{score.missed / score.events:.0%} missed, {score.false / score.events:.0%} false"
-            yield f"{label}: {many}; what may help is {helps}: {because}"
+        """Yield what may help the labels of which many are missed or false."""
+        for cause in self._first_causes():
+            yield f"{', '.join(cause.labels)}: {cause}"
 
     def unreliable(self) -> Iterator[str]:
         """Yield the labels that the readout detects no better than one that detects nothing, and what may help."""
@@ -282,11 +301,11 @@ class Training:
             score = self.scored.together[label]
             if score.rank[0] < score.events:
                 continue
+            helps = next((f"; what may help is {cause.advice}" for cause in self.causes if label in cause.labels), "")
             labels = "labels that it was trained on" if self.why else "held-out labels"
             yield (
                 f"{label}: do not rely on this readout: {score.found} of {score.events} {labels} found, {score.false} "
-                "false, no better than to detect nothing"
-                + (f"; what may help is {self.advice[label].helps}" if label in self.advice else "")
+                f"false, no better than to detect nothing{helps}"
             )
 
     def _aligned(self) -> Iterator[str]:

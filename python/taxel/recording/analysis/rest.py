@@ -111,12 +111,19 @@ class Rest:
     @staticmethod
     def fall(path: Path | None = None) -> str:
         """Return what to do of values that fall; of the recording of a path it names the layout file."""
+        layout, turning = Rest.turning(path)
+        if layout:
+            return f"values fall from their rest as {layout} turns them: leave falls out of it, if that is wrong"
+        return f"values fall from their rest: if less means more pressure, say {turning}"
+
+    @staticmethod
+    def turning(path: Path | None = None) -> tuple[str, str]:
+        """Return the layout file that turns a recording's values ("" if none does), and what turns them anew."""
         file = None if path is None else Layout.beside(path)
         with suppress(FormatError, OSError):
             if file is not None and Layout.read(file).turned is not None:
-                return f"values fall from their rest as {file.name} turns them: leave falls out of it, if that is wrong"
-        where = "" if path is None else f" {or_given(path)}"
-        return f"values fall from their rest: if less means more pressure, say falls = true in a layout file{where}"
+                return file.name, f"no falls in {file.name}"
+        return "", "falls = true in a layout file" + ("" if path is None else f" {or_given(path)}")
 
     def described(self) -> dict[str, object]:
         """Return source, quiet stretch, number of zeroed taxels and whether values fall, as JSON values."""

@@ -1,0 +1,289 @@
+"""Each situation in which a training misses much: its first advice, carried out as printed, halves missed and false."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from shell import call
+from tests.detect.test_levels import steps
+
+import taxel
+from taxel._base.messages import collected
+from taxel._base.progress import Forecast
+from taxel.detect import Example
+from taxel.detect.examples import array_of
+from taxel.recording.contents import alone, source_from
+from taxel.recording.sections import Origin
+
+Labels = dict[str, np.ndarray]
+
+
+def table(place: Path, labels: Labels, source: str = "") -> Path:
+    """Write labels, of one source if it is named."""
+    head, more = ("source,", f"{source},") if source else ("", "")
+    rows = [f"{more}{label},{t}\n" for label, times in labels.items() for t in times]
+    place.write_text(f"{head}label,t_us\n" + "".join(rows))
+    return place
+
+
+@dataclass
+class Situation:
+    """The words of a training, and what carries out an advice that is no option."""
+
+    words: list[Any]
+    carried: Callable[[], object] = field(default=lambda: None)
+
+
+def saved(folder: Path, frames: taxel.Frames, labels: Labels, *words: Any) -> list[Any]:
+    taxel.convert(frames, folder / "a.npz")
+    return [folder / "a.npz", "--labels", table(folder / "a.csv", labels), *words]
+
+
+def pressed(
+    seed: int, count: int = 10, *, begin_s: float = 1.0, kinds: float = 0.0, still: bool = False
+) -> tuple[taxel.Frames, Labels]:
+    """Return presses on 6 x 6 taxels at 100 Hz, `still` at one place; hard ones are harder by the share `kinds`."""
+    random = np.random.default_rng(seed)
+    begins = np.rint(100 * (begin_s + np.cumsum(random.uniform(0.6, 1.4, count)))).astype(int)
+    ends, values = begins + random.integers(12, 35, count), random.normal(50, 0.5, (int(begins[-1]) + 150, 6, 6))
+    hard = np.arange(count) % 2 == 1
+    for begin, end, more in zip(begins, ends, kinds * hard, strict=True):
+        y, x = (2, 2) if still else random.integers(0, 5, 2)
+        values[begin:end, y : y + 2, x : x + 2] += random.uniform(40, 50) * (1 + more)
+    t = 10_000 * np.arange(len(values))
+    labels = {"soft": t[begins[~hard]], "hard": t[begins[hard]]} if kinds else {"contact": t[begins], "lift": t[ends]}
+    return taxel.Frames(values, t, unit="counts", array=taxel.Array(6, 6)), labels
+
+
+def levels(folder: Path, seed: int) -> Situation:
+    """Levels of newtons, readings of less than one."""
+    example = steps(1.0, seed=seed)
+    words = saved(folder, example.source, example.labels, "--recipe", "gait_insole")
+    return Situation([*words, "--set", "encoder.levels=[5.0, 10.0, 20.0, 30.0, 40.0, 50.0]"])
+
+
+def falling(folder: Path, seed: int) -> Situation:
+    """Readings that fall where they are pressed."""
+    frames, labels = pressed(seed, kinds=1.0)
+    np.save(folder / "a.npy", 200 - frames.values)
+    layout = folder / "a.layout.toml"
+    layout.write_text("rate_hz = 100\n")
+    words = [folder / "a.npy", "--labels", table(folder / "a.csv", labels)]
+    return Situation(words, lambda: layout.write_text("rate_hz = 100\nfalls = true\n"))
+
+
+def strange(folder: Path, seed: int) -> Situation:
+    """Labels of another recording."""
+    frames, labels = pressed(seed)
+    words = saved(folder, frames, pressed(seed + 100)[1])
+    return Situation(words, lambda: table(folder / "a.csv", labels))
+
+
+def feet(folder: Path, seed: int) -> Situation:
+    """Two feet, of which one was labelled, in a table without sources."""
+    (left, labels), (right, _) = pressed(seed), pressed(seed + 100)
+    labels = {"contact": labels["contact"]}
+    sources = {name: source_from(each, Origin(folder, label=name)) for name, each in (("left", left), ("right", right))}
+    taxel.convert(taxel.Recording(alone(sources)), folder / "both.mcap")
+    words = [folder / "both.mcap", "--labels", table(folder / "a.csv", labels)]
+    return Situation(words, lambda: table(folder / "a.csv", labels, "left"))
+
+
+def tare(folder: Path, seed: int) -> Situation:
+    """A tare of seconds that ends in the first touch."""
+    frames, labels = pressed(seed, begin_s=0.0, still=True)
+    end = (labels["contact"][0] + labels["lift"][0]) / 2e6
+    return Situation(saved(folder, frames, labels, "--tare", f"{end:.3f}"))
+
+
+def few(folder: Path, seed: int) -> Situation:
+    """Four labels of each kind of press, where kinds differ little."""
+    frames, kinds = pressed(seed, 40, kinds=0.3)
+    first = {kind: times[:4] for kind, times in kinds.items()}
+    words = saved(folder, frames.between(0, max(times[-1] for times in first.values()) + 450_000), first)
+
+    def carried() -> None:
+        taxel.convert(frames, folder / "a.npz", overwrite=True)
+        table(folder / "a.csv", kinds)
+
+    return Situation(words, carried)
+
+
+def durations(folder: Path, seed: int) -> Situation:
+    """Taps and presses, learnt by a recipe of levels."""
+    random = np.random.default_rng(seed)
+    lasting = random.permutation([8] * 8 + [80] * 6)
+    begins = 150 + np.cumsum([0, *(lasting[:-1] + random.integers(40, 60, 13))])
+    values = random.normal(50, 0.5, (int(begins[-1]) + 200, 3, 3))
+    for begin, last in zip(begins, lasting, strict=True):
+        values[begin : begin + last, :2, :2] += random.uniform(40, 60)
+    frames = taxel.Frames(values, 10_000 * np.arange(len(values)), unit="counts", array=taxel.Array(3, 3))
+    labels = {"tap": 10_000 * begins[lasting == 8], "press": 10_000 * begins[lasting == 80]}
+    return Situation(saved(folder, frames, labels, "--recipe", "gait_channel"))
+
+
+def shifted(folder: Path, seed: int, shift_ms: int = 300) -> Situation:
+    """Labels of a clock that is late."""
+    frames, labels = pressed(seed)
+    return Situation(saved(folder, frames, {label: t + 1000 * shift_ms for label, t in labels.items()}))
+
+
+def early(folder: Path, seed: int) -> Situation:
+    """Labels of a clock that is early."""
+    return shifted(folder, seed, -300)
+
+
+def recipe(folder: Path, seed: int) -> Situation:
+    """Contact and lift of a mat, learnt by the recipe of insoles."""
+    frames, labels = pressed(seed)
+    frames = taxel.Frames(np.maximum(frames.values - 50, 0), frames.t, unit="N", array=frames.array)
+    return Situation(saved(folder, frames, labels, "--recipe", "gait_insole"))
+
+
+#: Each situation, and the kind of cause that is to be found first.
+SITUATIONS = {
+    "levels": levels,
+    "falling_values": falling,
+    "foreign_labels": strange,
+    "unlabelled_source": feet,
+    "tare": tare,
+    "few_labels": few,
+    "recipe durations": durations,
+    "shifted_labels": shifted,
+    "shifted_labels early": early,
+    "recipe": recipe,
+}
+
+
+def trained(capsys: Any, folder: Path, words: list[Any]) -> tuple[float, str, str]:
+    """Train; return missed and false in shares of the labels, the first advice, and what was printed.
+
+    What is refused counts as all missed.
+    """
+    code, out, error = call(capsys, "train", *words, "-o", folder / "r.json", "--overwrite")
+    found = re.search(r"what may help is (.*?): ", out + error)
+    advice = "" if found is None else found[1]
+    if code:
+        return 1.0, advice, error
+    return wrong([line for line in out.splitlines() if ", neuron: " in line]), advice, out + error
+
+
+def wrong(lines: list[str]) -> float:
+    """Return how many are missed and false in lines of labels, in shares of the labels."""
+    counts = [int(count) for line in lines for count in re.findall(r"(\d+) (?:missed|false)", line)]
+    return sum(counts) / sum(int(count) for line in lines for count in re.findall(r"of (\d+) found", line))
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
+@pytest.mark.parametrize("name", SITUATIONS)
+def test_the_first_advice_halves_what_is_missed_and_false(name: str, seed: int, tmp_path: Path, capsys: Any) -> None:
+    situation = SITUATIONS[name](tmp_path, seed)
+    before, advice, printed = trained(capsys, tmp_path, situation.words)
+    assert advice, printed
+    words = situation.words
+    if option := re.search(r"--.*(?=\)|$)", advice):
+        words = [*words, *shlex.split(option[0].replace("FILE", str(tmp_path / "rule.json")))]
+    else:
+        situation.carried()
+    after, _, printed_after = trained(capsys, tmp_path, words)
+    if "--rule" in words:
+        after = wrong([line for line in printed_after.splitlines() if ", plain rule: " in line])
+    assert before > 0.1
+    assert 2 * after <= before
+
+
+def unfelt(folder: Path) -> tuple[Path, Path]:
+    """Write a recording, and labels of which none lies near anything felt."""
+    frames, labels = pressed(1)
+    taxel.convert(frames, folder / "a.npz")
+    before = {label: 100_000 * np.arange(1, 7) + k for k, label in enumerate(labels)}
+    return folder / "a.npz", table(folder / "a.csv", before)
+
+
+def test_labels_near_nothing_are_refused_in_one_line_that_names_the_option(tmp_path: Path, capsys: Any) -> None:
+    recording, labels = unfelt(tmp_path)
+    code, out, error = call(capsys, "train", recording, "--labels", labels, "-o", tmp_path / "r.json")
+    assert (code, out, error.count("\n")) == (2, "", 1)
+    assert error.startswith(
+        "taxel: labels: 0 of 12 labels lie within 50 ms of anything that was felt; what may help is "
+    )
+    assert error.endswith("; to go on nonetheless, give --labels-as-given\n")
+    assert not (tmp_path / "r.json").exists()
+    with pytest.raises(taxel.ProblemError, match="to go on nonetheless, give labels_as_given") as refusal:
+        taxel.train(taxel.open(recording), labels)
+    assert refusal.value.argument == "labels_as_given"
+
+
+def test_labels_near_nothing_are_learnt_as_given_where_that_is_asked(tmp_path: Path, capsys: Any) -> None:
+    recording, labels = unfelt(tmp_path)
+    words = ("train", recording, "--labels", labels, "--tare", "0.5", "--folds", 0, "--labels-as-given")
+    code, out, _ = call(capsys, *words, "-o", tmp_path / "r.json")
+    assert (code, (tmp_path / "r.json").exists()) == (0, True)
+    assert out.startswith("not held out, on its own training data")
+
+
+@pytest.mark.parametrize("answer", [True, False])
+def test_on_a_terminal_it_is_a_question(
+    answer: bool, tmp_path: Path, capsys: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording, labels = unfelt(tmp_path)
+    asked: list[str] = []
+    monkeypatch.setattr("taxel.cli.train._on_terminal", lambda: True)
+    monkeypatch.setattr("typer.confirm", lambda question, **_: asked.append(question) or answer)
+    words = ("train", recording, "--labels", labels, "--tare", "0.5", "--folds", 0, "-o", tmp_path / "r.json")
+    code, _, error = call(capsys, *words)
+    assert asked == ["Train on these labels nonetheless?"]
+    assert "0 of 12 labels lie within 50 ms of anything that was felt" in error
+    assert (code, (tmp_path / "r.json").exists()) == ((0, True) if answer else (2, False))
+
+
+def test_causes_are_data_and_their_arguments_are_options_of_a_training(tmp_path: Path) -> None:
+    frames, labels = pressed(1)
+    taxel.convert(frames, tmp_path / "a.npz")
+    late = [{label: times + 300_000 for label, times in labels.items()}]
+    options = taxel.tasks.TrainOptions()
+    training = taxel.train(taxel.open(tmp_path / "a.npz"), late, options)
+    cause = training.causes[0]
+    assert (cause.kind, set(cause.labels), cause.option) == ("shifted_labels", {"contact", "lift"}, "--shift-ms -300")
+    assert training.to_dict()["causes"][0] == json.loads(json.dumps(cause.to_dict()))
+    assert training.to_dict()["options"] == ["--shift-ms -300"]
+    again = taxel.train(taxel.open(tmp_path / "a.npz"), late, replace(options, **cause.arguments))
+    assert (again.score.found, again.score.false, again.causes) == (20, 0, ())
+    assert "labels moved by -300 ms before, as asked" in again.lines()
+
+
+def test_two_feet_are_no_two_sensors_at_different_places() -> None:
+    pattern = {"left": taxel.Array(2, 2, pitch_mm=5.0), "right": taxel.Array(2, 2, pitch_mm=6.0)}
+    examples = [
+        Example(taxel.Frames(np.zeros((2, 2, 2)), [0, 1000], array=array), {}, None, walk, f"{walk}{foot}")
+        for walk in ("a ", "b ")
+        for foot, array in pattern.items()
+    ]
+    with collected() as warned:
+        array_of(examples)
+    assert warned == []
+    with collected() as warned:
+        array_of([examples[0], examples[1]._replace(group="c ", name="c left")])
+    assert len(warned) == 1
+
+
+def test_a_long_training_says_how_long_before_its_folds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(import_module("taxel.tasks.train"), "_LONG_S", 0.0)
+    frames, labels = pressed(1)
+    taxel.convert(frames, tmp_path / "a.npz")
+    steps: list[str] = []
+    taxel.train(taxel.open(tmp_path / "a.npz"), [labels], progress=lambda step, *_: steps.append(step))
+    (said,) = [step for step in steps if isinstance(step, Forecast)]
+    assert re.fullmatch(
+        r"about \d+ min from here on: one training on all data took [\d.]+ s, and the folds .* 4 of them", said
+    )
+    assert steps.index(said) < steps.index("fold 1 of 5")
