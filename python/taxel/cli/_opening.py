@@ -54,6 +54,25 @@ class FileOptions:
         str | None,
         typer.Option(metavar="NAME", help="The release of ROS, as humble, whose messages a bag holds undefined."),
     ] = None
+    region: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A:B,C:D",
+            help="Read columns A to B - 1 and rows C to D - 1 of an event camera's file, as 100:420,60:300.",
+        ),
+    ] = None
+    bin: Annotated[
+        int | None,
+        typer.Option(metavar="PIXELS", help="So many pixels of an event camera along a side become one taxel."),
+    ] = None
+    window_ms: Annotated[
+        float | None,
+        typer.Option(metavar="MS", help="Read an event camera's file as frames of counts, one each so many ms."),
+    ] = None
+    polarity: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Which events of an event camera are read: both (default), on or off."),
+    ] = None
     rate_hz: Annotated[
         float | None,
         typer.Option(metavar="HZ", help="Frames a second, for recordings without times, whose frames are numbered."),

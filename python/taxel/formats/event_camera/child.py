@@ -1,0 +1,71 @@
+"""Reads an event camera's file by faery in a child process, which `taxel._base.reading_child` runs by its path.
+
+faery panics, aborts and reads memory that is not its own at damaged files. After the line that says that it runs, the
+child sends the size of the sensor. To each request it answers with lines, and with columns of events after those that
+state how many; the last one is of what it counted.
+"""
+
+import json
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+#: Bytes that the child may take beyond its libraries, and events that it sends at once.
+MEMORY, PIECE = 256 << 20, 1 << 16
+#: Events after which a line says that reading goes on.
+_ALIVE = 1 << 22
+
+
+def main() -> None:
+    """Answer requests until there are no more."""
+    path = f"/dev/fd/{int(sys.argv[1])}"
+    sys.path[:] = json.loads(sys.stdin.readline())
+    import faery  # noqa: PLC0415  its path was read just now
+
+    from taxel._base.h5_child import bound_memory, memory, orders, send  # noqa: PLC0415
+
+    send(running=True)
+    bound_memory(memory() + MEMORY)
+    try:
+        for order in orders():
+            # A header without a size has that of no event.
+            stream = faery.events_stream_from_file(path, file_type=order["kind"], dimensions_fallback=(0, 0))
+            if "bounds" not in order:
+                send(size=stream.dimensions())
+                continue
+            count = total = alive = 0
+            ends: list[int] = []
+            for events in pieces(stream):
+                ends = [min([*ends[:1], int(events["t"].min())]), max([*ends[1:], int(events["t"].max())])]
+                total += len(events)
+                kept = reduced(events, *order["bounds"], order["polarity"], order["side"])
+                count += len(kept[0])
+                if order["columns"]:
+                    send(*(column.tobytes() for column in kept), events=len(kept[0]))
+                elif total - alive > _ALIVE:
+                    alive = total
+                    send(alive=True)
+            send(count=count, total=total, ends=ends)
+    # faery's panics are exceptions of no documented class.
+    except BaseException as error:
+        send(error=(str(error).splitlines() or [type(error).__name__])[0][:200])
+
+
+def pieces(stream: Any) -> Iterator[Any]:
+    """Yield the events of a file, some at a time."""
+    for packet in stream:
+        for begin in range(0, len(packet), PIECE):
+            yield packet[begin : begin + PIECE]
+
+
+def reduced(events: Any, left: int, right: int, top: int, bottom: int, polarity: str, side: int) -> tuple[Any, ...]:
+    """Return time, column, row and polarity of the events of a region and a polarity, on taxels of several pixels."""
+    x, y, p = events["x"], events["y"], events["on"]
+    kept = (x >= left) & (x < right) & (y >= top) & (y < bottom)
+    if polarity != "both":
+        kept &= p == (polarity == "on")
+    return events["t"][kept], (x[kept] - left) // side, (y[kept] - top) // side, p[kept]
+
+
+if __name__ == "__main__":
+    main()
