@@ -33,8 +33,8 @@ class ReadingChild:
     program : Path
         What the child runs; its argument is the descriptor of the open file.
     path : path
-    whole : str
-        What a whole file is, for errors.
+    kind : str
+        What a file must be, for errors: "a whole HDF5 file".
     patience_s : float, s
         The longest time between two lines of the child.
 
@@ -44,8 +44,8 @@ class ReadingChild:
     OSError : the file is not there, or cannot be read
     """
 
-    def __init__(self, program: Path, path: str | os.PathLike[str], whole: str, patience_s: float) -> None:
-        self.path, self._whole, self._patience_s = Path(path), whole, patience_s
+    def __init__(self, program: Path, path: str | os.PathLike[str], kind: str, patience_s: float) -> None:
+        self.path, self._kind, self._patience_s = Path(path), kind, patience_s
         # Opening the file here raises Python's own errors.
         with open_file(self.path) as file:
             self._child = ChildProcess(
@@ -87,7 +87,7 @@ class ReadingChild:
             location = f"{self.path}, {shown(answer['entry'])}" if answer["entry"] else str(self.path)
             raise FormatError(f"{location}: {answer['refused']}")
         if "error" in answer:
-            raise FormatError(f"{self.path}: not {self._whole} ({answer['error']})")
+            raise FormatError(f"{self.path}: not {self._kind} ({answer['error']})")
         return answer
 
     def _bytes(self, size: int) -> NDArray[np.uint8]:
@@ -105,11 +105,11 @@ class ReadingChild:
     def _more(self, most: int, patience_s: float) -> bytes:
         """Return what the child has written since, as soon as there is something."""
         if not self._answers.select(patience_s):
-            raise FormatError(f"{self.path}: not {self._whole} (the library has read nothing for {patience_s:g} s)")
+            raise FormatError(f"{self.path}: not {self._kind} (the library has read nothing for {patience_s:g} s)")
         more = os.read(self._stdout.fileno(), most)
         if not more:
             raise FormatError(
-                f"{self.path}: not {self._whole} (reading it ended the library, status {self._child.wait()})"
+                f"{self.path}: not {self._kind} (reading it ended the library, status {self._child.wait()})"
             )
         return more
 

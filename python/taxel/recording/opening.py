@@ -178,7 +178,9 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     ----------
     path : path
         A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as of `taxel.open`.
-    array, layout, topic, field, types, ros, region, bin, window_ms, polarity
+    array, layout, topic, field, types, ros
+        As of `taxel.open`.
+    region, bin, window_ms, polarity : str, int, float (ms) and str, optional
         As of `taxel.open`.
     limit : int, bytes, 1 or more, optional
         As of `taxel.open`, for all recordings together.

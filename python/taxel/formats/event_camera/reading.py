@@ -52,13 +52,13 @@ def read(path: Path, reduction: Reduction) -> Events | Frames:
 class _EventFile(ReadingChild):
     """Open an event camera's file as a context manager."""
 
-    def __init__(self, path: Path, kind: str) -> None:
+    def __init__(self, path: Path, encoding: str) -> None:
         super().__init__(_CHILD, path, "a whole file of an event camera", PATIENCE_S)
-        self._kind = kind
+        self._encoding = encoding
 
     def read(self, reduction: Reduction) -> Events | Frames:
         """Return the events, or their counts."""
-        self._order({"kind": self._kind})
+        self._order({"kind": self._encoding})
         columns, rows = self._answer()["size"]
         if not columns or not rows:
             raise FormatError(f"{self.path}: its header says no size; give it a line such as % geometry 640x480")
@@ -68,7 +68,7 @@ class _EventFile(ReadingChild):
             str(self.path), Array(-(-(bottom - top) // side), -(-(right - left) // side), name="event camera")
         )
         how = {
-            "kind": self._kind,
+            "kind": self._encoding,
             "bounds": [left, right, top, bottom],
             "side": side,
             "polarity": reduction.polarity or "both",

@@ -55,7 +55,7 @@ class Reduction:
         if self.window_ms is not None:
             window_us = to_us(finite("window_ms", self.window_ms, "ms", least=0.001, most=_LONGEST_MS))
             if round(window_us, 6) % 1:
-                raise refused("window_ms", f" is {shown(self.window_ms)}: must be whole us")
+                raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be whole us")
         if self.polarity is not None:
             text("polarity", self.polarity, POLARITIES)
 
@@ -90,7 +90,9 @@ class Reduction:
         right, bottom = columns if right is None else right, rows if bottom is None else bottom
         if not (left < right <= columns and top < bottom <= rows):
             size = f"{columns} columns and {rows} rows"
-            raise ProblemError(f"region {shown(self.region)}: must lie within the sensor's {size}, as 0:{columns},0:{rows}")
+            raise ProblemError(
+                f"region {shown(self.region)}: must lie within the sensor's {size}, as 0:{columns},0:{rows}"
+            )
         return left, right, top, bottom
 
 
