@@ -79,8 +79,8 @@ def test_counts_are_those_of_events_one_after_the_other(
     frames = taxel.open(path, region=region, bin=side, window_ms=window_ms, polarity=polarity).frames()
     assert (frames.values == counted(rows, reduction)).all()
     first = rows[0, 0] // reduction.window_us
-    # A frame is known at the end of its window.
-    assert (frames.t == (first + 1 + np.arange(len(frames))) * reduction.window_us).all()
+    # The time of a frame is its begin: what is detected in it is known at its end.
+    assert (frames.t == (first + np.arange(len(frames))) * reduction.window_us).all()
     assert frames.unit == f"events/{window_ms:g} ms"
     assert frames.values.sum() == len(rows) or (region, polarity or "both") != (None, "both")
 

@@ -121,7 +121,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     region, bin, window_ms, polarity : str, int, float (ms) and str, optional
         What is read of an event camera's file: columns and rows as "100:420,60:300", of which the last are not
         included; the side of the square of pixels that becomes a taxel; frames of counts, one each `window_ms`, at
-        the window's end; and "on" or "off" events alone, not "both".
+        the window's begin; and "on" or "off" events alone, not "both".
     limit : int, bytes, 1 or more, optional
         How much may be read into memory; default: three quarters of what is available, and at most the sizes of
         docs/files.md.

@@ -118,5 +118,5 @@ class _EventFile(ReadingChild):
             if len(window) and not 0 <= window.min() <= window.max() < count:
                 raise FormatError(f"{self.path}: was changed while it was read")
             np.add.at(values, (window, piece["y"], piece["x"]), np.float32(1))
-        t = (begin + 1 + np.arange(count, dtype=np.int64)) * window_us
+        t = (begin + np.arange(count, dtype=np.int64)) * window_us
         return Frames(frozen_whole(values), frozen(t), unit=unit, array=array)
