@@ -212,6 +212,27 @@ def test_without_the_extra_one_line_says_what_to_install(tmp_path: Path, monkeyp
         taxel.open(path)
 
 
+def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(tmp_path: Path) -> None:
+    rng, begins = np.random.default_rng(4), 1_000_000 + 400_000 * np.arange(12)
+    noise = np.stack([rng.integers(0, 6_000_000, 600), *rng.integers(0, 48, (2, 600)), rng.integers(0, 2, 600)], 1)
+    bursts = [
+        np.stack([t + rng.integers(0, 15_000, 300), *rng.integers(10, 30, (2, 300)), rng.random(300) < 0.9], 1)
+        for t in begins
+    ]
+    rows = np.concatenate([noise, *bursts]).astype(np.int64)
+    path = write(tmp_path / "a.raw", rows[np.argsort(rows[:, 0], kind="stable")])
+    labels = [{"contact": begins.tolist()}]
+    with refused("events without intensities, which the recipe touch and its encoders need: frames of an event camera"):
+        taxel.train(taxel.open(path), labels)
+    training = taxel.train(taxel.open(path, bin=4, window_ms=5), labels)
+    assert training.score["contact"].found == 12
+    assert any("recipe event_counts" in line for line in training.lines())
+    found = taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=5), tare=0.5)
+    assert len(found) == 12
+    with refused("in events/2 ms, and the readout was trained on events/5 ms"):
+        taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=2), tare=0.5)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -38,7 +38,7 @@ def main() -> None:
             for events in pieces(stream):
                 ends = [min([*ends[:1], int(events["t"].min())]), max([*ends[1:], int(events["t"].max())])]
                 total += len(events)
-                kept = reduced(events, *order["bounds"], order["polarity"], order["side"])
+                kept = reduced(events, order["bounds"], order["polarity"], order["side"])
                 count += len(kept[0])
                 if order["columns"]:
                     send(*(column.tobytes() for column in kept), events=len(kept[0]))
@@ -58,8 +58,9 @@ def pieces(stream: Any) -> Iterator[Any]:
             yield packet[begin : begin + PIECE]
 
 
-def reduced(events: Any, left: int, right: int, top: int, bottom: int, polarity: str, side: int) -> tuple[Any, ...]:
+def reduced(events: Any, bounds: list[int], polarity: str, side: int) -> tuple[Any, ...]:
     """Return time, column, row and polarity of the events of a region and a polarity, on taxels of several pixels."""
+    left, right, top, bottom = bounds
     x, y, p = events["x"], events["y"], events["on"]
     kept = (x >= left) & (x < right) & (y >= top) & (y < bottom)
     if polarity != "both":

@@ -26,7 +26,12 @@ _CHILD = Path(__file__).with_name("child.py")
 #: The longest time between two lines of the child, s.
 PATIENCE_S = 30.0
 #: The columns of events, in the order in which the child sends them.
-_COLUMNS = {"t": np.dtype(np.int64), "x": np.dtype(np.uint16), "y": np.dtype(np.uint16), "p": np.dtype(np.bool_)}
+_COLUMNS: dict[str, np.dtype[Any]] = {
+    "t": np.dtype(np.int64),
+    "x": np.dtype(np.uint16),
+    "y": np.dtype(np.uint16),
+    "p": np.dtype(np.bool_),
+}
 
 
 def read(path: Path, reduction: Reduction) -> Events | Frames:
@@ -104,7 +109,8 @@ class _EventFile(ReadingChild):
             at = end
         if at != count:
             raise FormatError(f"{self.path}: was changed while it was read")
-        return Events(**{name: frozen(column) for name, column in read.items()}, array=array)
+        t, x, y, p = (frozen(column) for column in read.values())
+        return Events(t, x, y, p, array=array)
 
     def _counts(self, array: Array, first: int, last: int, window_us: int, unit: str) -> Frames:
         begin, count = first // window_us, last // window_us - first // window_us + 1
