@@ -227,10 +227,10 @@ def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(t
     training = taxel.train(taxel.open(path, bin=4, window_ms=5), labels)
     assert training.score["contact"].found == 12
     assert any("recipe event_counts" in line for line in training.lines())
-    found = taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=5), tare=0.5)
-    assert len(found) == 12
+    frames = taxel.open(path, bin=4, window_ms=5).frames()
+    assert len(taxel.detect.run(training.readout, frames, tare=taxel.Tare.take(frames, stop_us=500_000))) == 12
     with refused("in events/2 ms, and the readout was trained on events/5 ms"):
-        taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=2), tare=0.5)
+        taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=2).frames())
 
 
 @pytest.mark.parametrize(

@@ -38,10 +38,10 @@ def main() -> None:
             for events in pieces(stream):
                 ends = [min([*ends[:1], int(events["t"].min())]), max([*ends[1:], int(events["t"].max())])]
                 total += len(events)
-                kept = reduced(events, order["bounds"], order["polarity"], order["side"])
-                count += len(kept[0])
+                kept = chosen(events, order["bounds"], order["polarity"])
+                count += len(kept)
                 if order["columns"]:
-                    send(*(column.tobytes() for column in kept), events=len(kept[0]))
+                    send(*columns(kept, order["bounds"], order["side"]), events=len(kept))
                 elif total - alive > _ALIVE:
                     alive = total
                     send(alive=True)
@@ -58,14 +58,22 @@ def pieces(stream: Any) -> Iterator[Any]:
             yield packet[begin : begin + PIECE]
 
 
-def reduced(events: Any, bounds: list[int], polarity: str, side: int) -> tuple[Any, ...]:
-    """Return time, column, row and polarity of the events of a region and a polarity, on taxels of several pixels."""
+def chosen(events: Any, bounds: list[int], polarity: str) -> Any:
+    """Return the events of a region and a polarity."""
     left, right, top, bottom = bounds
-    x, y, p = events["x"], events["y"], events["on"]
+    x, y = events["x"], events["y"]
     kept = (x >= left) & (x < right) & (y >= top) & (y < bottom)
     if polarity != "both":
-        kept &= p == (polarity == "on")
-    return events["t"][kept], (x[kept] - left) // side, (y[kept] - top) // side, p[kept]
+        kept &= events["on"] == (polarity == "on")
+    return events if kept.all() else events[kept]
+
+
+def columns(events: Any, bounds: list[int], side: int) -> Iterator[bytes]:
+    """Yield time, column, row and polarity of events on taxels of several pixels."""
+    yield events["t"].tobytes()
+    for name, begin in (("x", bounds[0]), ("y", bounds[2])):
+        yield ((events[name] - begin) // side if side > 1 or begin else events[name]).astype("<u2").tobytes()
+    yield events["on"].tobytes()
 
 
 if __name__ == "__main__":

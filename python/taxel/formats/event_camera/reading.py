@@ -123,6 +123,8 @@ class _EventFile(ReadingChild):
             window = piece["t"] // window_us - begin
             if len(window) and not 0 <= window.min() <= window.max() < count:
                 raise FormatError(f"{self.path}: was changed while it was read")
-            np.add.at(values, (window, piece["y"], piece["x"]), np.float32(1))
+            np.add.at(
+                values.reshape(-1), (window * array.rows + piece["y"]) * array.columns + piece["x"], np.float32(1)
+            )
         t = (begin + np.arange(count, dtype=np.int64)) * window_us
         return Frames(frozen_whole(values), frozen(t), unit=unit, array=array)
