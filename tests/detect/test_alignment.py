@@ -163,9 +163,9 @@ def test_without_align_labels_are_learnt_as_they_are_given() -> None:
     assert fit(off, plain) != fit(off, aligned)
 
 
-def test_it_is_on_for_touch_and_off_for_all_other_recipes() -> None:
+def test_it_is_on_for_touch_and_bursts_and_off_for_all_other_recipes() -> None:
     assert {name: Recipe.load(name).align for name in recipes.names()} == {
-        name: name == "touch" for name in recipes.names()
+        name: name in ("touch", "event_counts") for name in recipes.names()
     }
     assert Recipe.load("touch", {"align": False}).align is False
     with pytest.raises(taxel.ProblemError, match="align is 'yes'"):

@@ -62,6 +62,14 @@ def test_every_kind_of_recording_has_one_recipe() -> None:
     assert recipes.fitting(Events([0], [0], [0], [True], array=Array(1, 1))) in recipes.names()
 
 
+def test_counts_of_an_event_camera_have_their_recipe_whatever_window_and_label() -> None:
+    frames = Frames(np.zeros((2, 3, 4)), [0, 1000], unit="events/2.5 ms")
+    for labels in (["contact", "lift"], ["slip"], ["foot_off"], []):
+        assert recipes.fitting(frames, labels) == "event_counts"
+    # A row of channels has no neighbours, which moments need.
+    assert recipes.fitting(Frames(np.zeros((2, 1, 4)), [0, 1000], unit="events/5 ms")) == "gait_channel"
+
+
 def test_for_events_contact_and_lift_have_their_own_neurons_and_any_other_label_that_of_kinds() -> None:
     assert recipes.fitting(Events([0], [0], [0], [True], array=Array(1, 1))) == "touch"
     assert list(Recipe.load("touch").neurons) == ["contact", "lift"]
@@ -93,7 +101,9 @@ def test_the_last_word_of_a_label_counts_where_one_label_alone_has_it(labels: li
 
 def test_a_recipe_for_certain_labels_refuses_others(tmp_path: Path) -> None:
     (tmp_path / "certain.toml").write_text('fits = ["events"]\n[encoder]\nname = "fa1"\n[neurons.contact]\ntau = 2.0\n')
-    with pytest.raises(ProblemError, match=r"it is for contact, not for 'ball': .* there are gait_channel, "):
+    with pytest.raises(
+        ProblemError, match=r"it is for contact, not for 'ball': .* there are event_counts, gait_channel, "
+    ):
         Recipe.load(tmp_path / "certain.toml", labels=["contact", "ball"])
 
 
@@ -116,7 +126,11 @@ def test_what_is_said_for_all_neurons_comes_before_what_one_has_and_what_is_said
 @pytest.mark.parametrize(
     ("recipe", "error", "text"),
     [
-        ("gaitpdb", ProblemError, r"recipe 'gaitpdb': there are gait_channel, .*; the path of a file holds a dot"),
+        (
+            "gaitpdb",
+            ProblemError,
+            r"recipe 'gaitpdb': there are event_counts, gait_channel, .*; the path of a file holds a dot",
+        ),
         ("./gaitpdb", FileNotFoundError, "No such file"),
         (3, ProblemError, "recipe is 3: must be a path"),
         (KEPT / "nothing.toml", FileNotFoundError, "No such file"),

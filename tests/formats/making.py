@@ -10,6 +10,8 @@ import h5py
 import numpy as np
 import pytest
 
+from . import event_files
+
 SHARED = Path(os.environ.get("TAXEL_DATA", Path(__file__).parents[3] / "shared" / "data"))
 
 
@@ -208,3 +210,7 @@ def write_emed(folder: Path, change=lambda rows: rows) -> Path:
     file = folder / "step.lst"
     file.write_bytes("\n".join(change(lines)).encode("latin-1"))
     return file
+
+
+def write_event_camera(folder: Path) -> Path:
+    return event_files.write(folder / "skin.raw", event_files.some_rows())

@@ -203,6 +203,20 @@ def plate(folder: Path, size: int) -> Path:
     return write_plate(folder, count=max(1, size // (4 * 26 * 12 * 41)))
 
 
+def event_camera(folder: Path, size: int) -> Path:
+    from formats.event_files import some_rows, write
+
+    return write(folder / "a.dat", some_rows(size // 13), "dat")
+
+
+def counted_events(folder: Path, size: int) -> Path:
+    (folder / "layout.toml").write_text("[event_camera]\nwindow_ms = 10\n")
+    from formats.event_files import some_rows, write
+
+    # An event each 100 us.
+    return write(folder / "a.dat", some_rows(size // (48 * 64 * 4) * 100), "dat")
+
+
 def bag(ending: str) -> Callable[[Path, int], Path]:
     def one(folder: Path, size: int) -> Path:
         from formats import bags
@@ -246,9 +260,22 @@ KINDS: dict[str, Callable[[Path, int], Path]] = {
     "tekscan": tekscan,
     "emed": emed,
     "plate": plate,
+    "event_camera": event_camera,
+    "event_camera, counted": counted_events,
 }
 #: Those whose arrays are written and read in moments.
-QUICK = ("mcap of events", "mcap of frames", "lsa", "npz of events", "npz of frames", "npy", "gaitndd", "popu")
+QUICK = (
+    "mcap of events",
+    "mcap of frames",
+    "lsa",
+    "npz of events",
+    "npz of frames",
+    "npy",
+    "gaitndd",
+    "popu",
+    "event_camera",
+    "event_camera, counted",
+)
 
 
 def arrays_of(every: Any) -> int:

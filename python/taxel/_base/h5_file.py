@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import math
 import os
-import selectors
-import subprocess
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from taxel._base.arguments import refuse_changed, shown
-from taxel._base.child_process import ChildProcess, search_path
-from taxel._base.files import open_file
 from taxel._base.limits import DESCRIPTION, unpacked
 from taxel._base.messages import first_line
+from taxel._base.reading_child import ReadingChild
 from taxel._core import FormatError, ProblemError
 
 _CHILD = Path(__file__).with_name("h5_child.py")
-#: The longest time between two lines of the child, s; and the longest time for its start, which loads libraries.
-PATIENCE_S, BEGIN_S = 10.0, 120.0
+#: The longest time between two lines of the child, s.
+PATIENCE_S = 10.0
 #: Bytes that a text takes in memory beside its characters.
 _TEXT_BYTES = 64
 
@@ -50,7 +45,7 @@ class Entry:
         return self.dtype[:1] in tuple("<>|=")
 
 
-class H5File:
+class H5File(ReadingChild):
     """Open a .h5 as a context manager; a child process reads it and ends with the context.
 
     Parameters
@@ -73,29 +68,12 @@ class H5File:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = Path(path)
+        super().__init__(_CHILD, path, "a whole HDF5 file", PATIENCE_S)
         self._claimed = 0
-        # Opening the file here raises Python's own errors.
-        with open_file(self.path) as file:
-            self._child = ChildProcess(
-                _CHILD,
-                [file.fileno()],
-                at_once=True,
-                pass_fds=[file.fileno()],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-            )
-        self._answers, self._rest = selectors.DefaultSelector(), bytearray()
-        assert self._child.stdin is not None and self._child.stdout is not None  # noqa: PT018  pipes
-        self._stdin, self._stdout = self._child.stdin, self._child.stdout
-        self._answers.register(self._stdout, selectors.EVENT_READ)
         self.entries: dict[str, Entry] = {}
         self.left_out: dict[str, str] = {}
         try:
-            self._order(search_path())
-            self._answer(BEGIN_S)
-            while "listed" not in (answer := self._answer(PATIENCE_S)):
+            while "listed" not in (answer := self._answer()):
                 if "entry" in answer:
                     self.entries[answer["entry"]] = Entry(answer["dtype"], tuple(answer["shape"]))
                 elif "left_out" in answer:
@@ -113,7 +91,7 @@ class H5File:
         FormatError : the attribute is damaged
         """
         self._order({"attribute": name})
-        value: int | str | None = self._answer(PATIENCE_S)["done"]
+        value: int | str | None = self._answer()["done"]
         return value
 
     def text(self, name: str, most: int = DESCRIPTION) -> str:
@@ -141,7 +119,7 @@ class H5File:
         unpacked(self._location(name), size, most)
         read: list[str] = []
         self._order({"name": name, "text": True})
-        while "done" not in (answer := self._answer(PATIENCE_S)):
+        while "done" not in (answer := self._answer()):
             size += sum(answer["lengths"])
             unpacked(self._location(name), size, most)
             read += [bytes(self._bytes(length)).decode() for length in answer["lengths"]]
@@ -195,7 +173,7 @@ class H5File:
         except ValueError as error:
             raise FormatError(f"{self._location(name)}: shape {entry.shape}: {first_line(error)}") from None
         self._order({"name": name, "text": False})
-        while "done" not in (answer := self._answer(PATIENCE_S)):
+        while "done" not in (answer := self._answer()):
             block = tuple(slice(*edges) for edges in answer["block"])
             piece = self._bytes(answer["size"]).view(stored).reshape(array[block].shape)
             with np.errstate(over="ignore", invalid="ignore"):
@@ -210,63 +188,3 @@ class H5File:
 
     def _location(self, name: str) -> str:
         return f"{self.path}, data set {name}"
-
-    def _order(self, order: Any) -> None:
-        try:
-            self._stdin.write(json.dumps(order).encode() + b"\n")
-            self._stdin.flush()
-        except BrokenPipeError:
-            # The last answer of the child has the reason.
-            return
-
-    def _answer(self, patience_s: float) -> dict[str, Any]:
-        """Return the next line that the child writes."""
-        while (end := self._rest.find(b"\n")) < 0:
-            self._rest += self._more(1 << 16, patience_s)
-        line = bytes(self._rest[:end])
-        del self._rest[: end + 1]
-        answer: dict[str, Any] = json.loads(line)
-        if "refused" in answer:
-            location = f"{self.path}, {shown(answer['entry'])}" if answer["entry"] else str(self.path)
-            raise FormatError(f"{location}: {answer['refused']}")
-        if "error" in answer:
-            raise FormatError(f"{self.path}: not a whole HDF5 file ({answer['error']})")
-        return answer
-
-    def _bytes(self, size: int) -> NDArray[np.uint8]:
-        """Return the bytes that follow a line."""
-        data = np.empty(size, np.uint8)
-        ready = min(size, len(self._rest))
-        data[:ready] = np.frombuffer(self._rest, np.uint8, ready)
-        del self._rest[:ready]
-        while ready < size:
-            more = self._more(size - ready, PATIENCE_S)
-            data[ready : ready + len(more)] = np.frombuffer(more, np.uint8)
-            ready += len(more)
-        return data
-
-    def _more(self, most: int, patience_s: float) -> bytes:
-        """Return what the child has written since, as soon as there is something."""
-        if not self._answers.select(patience_s):
-            raise FormatError(f"{self.path}: not a whole HDF5 file (the library has read nothing for {patience_s:g} s)")
-        more = os.read(self._stdout.fileno(), most)
-        if not more:
-            raise FormatError(
-                f"{self.path}: not a whole HDF5 file (reading it ended the library, status {self._child.wait()})"
-            )
-        return more
-
-    def close(self) -> None:
-        """End the child."""
-        self._child.kill()
-        for pipe in (self._stdin, self._stdout):
-            with contextlib.suppress(BrokenPipeError):
-                pipe.close()
-        self._child.wait()
-        self._answers.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

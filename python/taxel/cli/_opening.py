@@ -54,6 +54,30 @@ class FileOptions:
         str | None,
         typer.Option(metavar="NAME", help="The release of ROS, as humble, whose messages a bag holds undefined."),
     ] = None
+    region: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A:B,C:D",
+            help="Read columns A to B - 1 and rows C to D - 1 of an event camera's file, as 100:420,60:300.",
+        ),
+    ] = None
+    bin: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="PIXELS", help="So many pixels of an event camera along a side become one taxel."),
+    ] = None
+    count_ms: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001,
+            max=3.6e6,
+            metavar="MS",
+            help="Read an event camera's file as frames of counts, one each so many ms (window_ms of taxel.open).",
+        ),
+    ] = None
+    polarity: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Which events of an event camera are read: both (default), on or off."),
+    ] = None
     rate_hz: Annotated[
         float | None,
         typer.Option(metavar="HZ", help="Frames a second, for recordings without times, whose frames are numbered."),
@@ -70,6 +94,7 @@ class FileOptions:
     @property
     def opener(self) -> TextOptions:
         """What opens files by these options."""
-        from taxel.recording.text_options import TextOptions  # noqa: PLC0415  the command line starts quickly
+        from taxel.recording.text_options import TYPED, TextOptions  # noqa: PLC0415  the command line starts quickly
 
-        return TextOptions(**vars(self))
+        names = {typed: name for name, typed in TYPED.items()}
+        return TextOptions(**{names.get(typed, typed): value for typed, value in vars(self).items()})

@@ -53,9 +53,10 @@ def train(
         str | None,
         typer.Option(
             help="The recipe to start from: touch (events of a board; all labels but those of steps on any grid), "
-            "gait_plate (counts), gait_insole (N), gait_channel (others); or a TOML or JSON file (a path with a dot or "
-            "a slash): [encoder] or [encoders.NAME], [learner], [neurons.LABEL], run_threshold, align. Default, "
-            "without --encoder: that which fits the recording and its labels."
+            "event_counts (counts of an event camera), gait_plate (counts), gait_insole (N), gait_channel (others); or "
+            "a TOML or JSON file (a path with a dot or a slash): [encoder] or [encoders.NAME], [learner], "
+            "[neurons.LABEL], run_threshold, align. Default, without --encoder: that which fits the recording and its "
+            "labels."
         ),
     ] = None,
     encoder: Annotated[

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from taxel._base.arguments import checked_path
 from taxel._base.arguments import text as checked_text
@@ -33,12 +34,12 @@ class Format:
     files : function
         Returns the files of this format in a folder, or the file itself, in order; empty if there are none.
     trials : function
-        Yields the trials of a folder or a file.
+        Yields the trials of a folder or a file; those of an event camera by a `Reduction`.
     """
 
     about: str
     files: Callable[[Path], list[Path]]
-    trials: Callable[[str | Path], Iterator[Trial]]
+    trials: Callable[..., Iterator[Trial]]
 
 
 def _of(name: str) -> Format:
@@ -60,11 +61,12 @@ FORMATS = {
         "tekscan",
         "icub",
         "popu",
+        "event_camera",
     )
 }
 
 
-def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # noqa: A002  the usual name
+def trials(path: str | Path, format: str | None = None, **how: Any) -> Iterator[Trial]:  # noqa: A002  the usual name
     """Yield the trials of a file or a folder.
 
     Parameters
@@ -73,6 +75,8 @@ def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # n
         A file, or a folder of files of one format.
     format : str, optional
         One of `FORMATS`; default: recognised by the files' names and first bytes.
+    **how
+        Further arguments of its own: the `reduction` of an event camera's files.
 
     Yields
     ------
@@ -101,6 +105,6 @@ def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # n
         problem = "no known format" if not names else "several formats (" + ", ".join(names) + ")"
         raise FormatError(f"{source}: holds {problem}; say format= one of {', '.join(FORMATS)}")
     try:
-        yield from FORMATS[names[0]].trials(source)
+        yield from FORMATS[names[0]].trials(source, **how)
     except MemoryError as error:
         raise FormatError(f"{source}: needs more memory than there is ({error})") from None

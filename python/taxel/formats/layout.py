@@ -22,6 +22,7 @@ from taxel._base.limits import VALUE
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places
+from taxel.formats.event_camera.reduction import Reduction
 
 __all__ = ["Data", "Layout", "PrintedFrames", "Table", "advice", "load_packaged"]
 
@@ -231,6 +232,8 @@ class Layout:
         Where its frames are read live.
     ros : mapping, optional
         The topic and what else opens it, by the names of the arguments of `taxel.open`.
+    event_camera : Reduction, optional
+        What is read of an event camera's file.
 
     Raises
     ------
@@ -251,6 +254,7 @@ class Layout:
     data: Data | None = None
     source: PrintedFrames | None = None
     ros: Mapping[str, Any] = field(default_factory=dict)
+    event_camera: Reduction | None = None
 
     def __post_init__(self) -> None:
         if (self.rows is None) != (self.columns is None):
@@ -406,7 +410,14 @@ def _values(document: dict[str, Any]) -> dict[str, Any]:
 
 
 #: The tables of a layout file by their names.
-_TABLES: dict[str, type[Any]] = {"places": Places, "table": Table, "data": Data, "source": PrintedFrames, "ros": dict}
+_TABLES: dict[str, type[Any]] = {
+    "places": Places,
+    "table": Table,
+    "data": Data,
+    "source": PrintedFrames,
+    "ros": dict,
+    "event_camera": Reduction,
+}
 
 
 def _keys(table: type[Any]) -> list[str]:

@@ -22,6 +22,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import Trial
+from taxel.formats.event_camera import Reduction
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
@@ -54,6 +55,10 @@ class SharedOptions:
     field: str | Sequence[str] | None = None
     types: str | os.PathLike[str] | None = None
     ros: str | None = None
+    region: str | None = None
+    bin: int | None = None
+    window_ms: float | None = None
+    polarity: str | None = None
     limit: int | None = None
 
 
@@ -73,6 +78,20 @@ class OpenOptions(SharedOptions):
     def topics(self) -> Topics:
         """What of a ROS bag is opened."""
         return Topics(self.topic, self.field, self.types, self.ros)
+
+    def how(self, path: Path, name: str, layout: Layout | None) -> dict[str, Reduction]:
+        """Return the arguments of a format's own with which a path is read; `name` is "" of what is of no format.
+
+        Raises
+        ------
+        ProblemError : what is read of an event camera's file is given for another one
+        """
+        reduction = Reduction(self.region, self.bin, self.window_ms, self.polarity)
+        if name == "event_camera":
+            return {"reduction": reduction.but(None if layout is None else layout.event_camera)}
+        if reduction.is_given:
+            raise ProblemError(f"{path}: no event camera's file; region, bin, window_ms and polarity are of one")
+        return {}
 
 
 @with_fields_of(OpenOptions)
@@ -99,6 +118,10 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
         list too.
     types, ros : path and str, optional
         For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, as "humble".
+    region, bin, window_ms, polarity : str, int, float (ms) and str, optional
+        What is read of an event camera's file: columns and rows as "100:420,60:300", of which the last are not
+        included; the side of the square of pixels that becomes a taxel; frames of counts, one each `window_ms`, at
+        the window's begin; and "on" or "off" events alone, not "both".
     limit : int, bytes, 1 or more, optional
         How much may be read into memory; default: three quarters of what is available, and at most the sizes of
         docs/files.md.
@@ -157,6 +180,8 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
         A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as of `taxel.open`.
     array, layout, topic, field, types, ros
         As of `taxel.open`.
+    region, bin, window_ms, polarity : str, int, float (ms) and str, optional
+        As of `taxel.open`.
     limit : int, bytes, 1 or more, optional
         As of `taxel.open`, for all recordings together.
     pairing, differences
@@ -207,9 +232,11 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
     flag("differences", options.differences)
     layout = recognition.layout_of(path, options.layout)
     try:
-        match recognition.recognise_recording(path, layout):
+        found = recognition.recognise_recording(path, layout)
+        how = options.how(path, found.format if isinstance(found, recognition.FormatFile) else "", layout)
+        match found:
             case recognition.FormatFile(name):
-                trials = _counting_memory(formats.trials(path, name))
+                trials = _counting_memory(formats.trials(path, name, **how))
                 return [_recording_of(trial, path, name, options.layout) for trial in trials]
             case recognition.RosBag():
                 topics = options.topics.but({} if layout is None else layout.ros)
@@ -277,8 +304,10 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
         recorded = [file for file in files if file in recorded or file in bags]
     names = [] if recorded else [*recognition.formats_of(folder)]
     if len(names) == 1:
+        how = options.how(folder, names[0], recognition.layout_of(folder, options.layout))
         trials = sorted(
-            _counting_memory(formats.trials(folder, names[0])), key=lambda t: recognition.natural_order(Path(t.name))
+            _counting_memory(formats.trials(folder, names[0], **how)),
+            key=lambda t: recognition.natural_order(Path(t.name)),
         )
         pairs = [(Path(trial.name), _recording_of(trial, folder, names[0], options.layout)) for trial in trials]
         return _add_labels(folder / LABELS, pairs)

@@ -27,6 +27,7 @@ from taxel.detect.loads import clock_of
 from taxel.detect.plain_score import floor_of, plain_score
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import score_together
+from taxel.events import Events
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.analysis.rest import BY_UNIT
@@ -106,6 +107,12 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
         if labels == "notes":
             raise helped(ProblemError(f"notes: names no event in {titles}"), "labels", "give")
         raise refused("labels", f" is {_named(labels)}: names no event in {titles}")
+    for table in map(recorded, opened):
+        if isinstance(table, Events) and table.intensity is None:
+            raise ProblemError(
+                "events without intensities, which the recipe touch and its encoders need: frames of an event camera's "
+                "counts (window_ms=5, --count-ms 5) are trained by event_counts"
+            )
     unlabelled = sources_without(labels, opened, labelled)
     labelled = [_moved(events, each, options.shift_ms) for events, each in zip(labelled, opened, strict=True)]
     names = sorted({label for events in labelled for label in events})

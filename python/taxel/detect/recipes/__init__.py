@@ -2,7 +2,8 @@
 
 A recipe's file says `about` what it is, its `source`, which recordings it `fits` ("events", units of frames, or "many
 UNIT": units of frames of a grid or of more than 32 channels, or "grids": frames of taxels with known neighbours, before
-what fits the unit, but for labels of steps, as "foot_off"), the encoder, or several as `encoders` by name, whether
+what fits the unit, but for labels of steps, as "foot_off", or "UNIT/": units of grids that begin so, before all else),
+the encoder, or several as `encoders` by name, whether
 labels are moved to what the sensor felt (`align`), what all neurons share (`learner`), what is a neuron's own
 (`neurons`), which labels are `also` called otherwise, and the parameters of any `other` label, or whose they are;
 without `other` it is for its neurons' labels alone. A new recipe is a new file in this folder.
@@ -78,8 +79,10 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
     """
     recipes = {name: read(name) for name in names()}
     recipe_for = {kind: name for name, values in recipes.items() for kind in values.get("fits", ())}
-    if not isinstance(source, Frames):
-        return (recipe_for["events"], "events of a board") if "events" in recipe_for else (_ANY, "no other fits events")
+    kind = f"{source.unit.partition('/')[0]}/" if isinstance(source, Frames) else "events"
+    if not isinstance(source, Frames) or (kind in recipe_for and source.array._has_neighbours):
+        what = f"frames in {source.unit}" if isinstance(source, Frames) else "events of a board"
+        return recipe_for.get(kind, _ANY), what
     array, grids = source.array, recipe_for.get("grids")
     known = False
     if array.taxels < 2 or not array._has_neighbours:

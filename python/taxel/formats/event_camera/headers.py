@@ -1,0 +1,143 @@
+"""The headers of event cameras' files, and whether the bytes below them are whole words: faery does not say it.
+
+Sources: Prophesee's descriptions of EVT 2.0, EVT 3.0 and DAT; iniVation's of AEDAT 4.0, whose header is a flatbuffer.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from pathlib import Path
+from typing import BinaryIO
+
+from taxel._base.files import open_file
+from taxel._core import FormatError
+from taxel.formats import text
+
+__all__ = ["ENDINGS", "check", "is_dat"]
+
+#: The endings of these files, and how faery names what is in them.
+ENDINGS = {".raw": "evt", ".dat": "dat", ".aedat4": "aedat"}
+#: Bytes of a word of an encoding, by the version that a header states.
+_WORDS = {"evt": {"2": 4, "3": 2}, "dat": {"1": 8, "2": 8}}
+_VERSION = {
+    "evt": re.compile(rb"^% *(?:evt +|format +evt)(\d[\d.]*)", re.IGNORECASE | re.MULTILINE),
+    "dat": re.compile(rb"^% *Version +(\d[\d.]*)", re.MULTILINE),
+}
+_HEADER = 1 << 16
+_AEDAT = b"#!AER-DAT4.0\r\n"
+#: What begins a text in UTF-8 or UTF-16, which no event does.
+_TEXTS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
+
+
+def is_dat(path: Path) -> bool:
+    """Return whether a .dat is of an event camera, and no table of text: words follow its header, or begin it."""
+    head = text.first_bytes(path, _HEADER)
+    below = head[_end_of_lines(head) :][:64]
+    # Of each event's word the upper bytes of its time are 0.
+    return not head.startswith(_TEXTS) and (below[1:2] == b"\x08" or below.count(0) >= 8)
+
+
+def check(path: Path) -> str:
+    """Return how faery names what is in a file, which must have its header, and whole words below it.
+
+    Raises
+    ------
+    FormatError : no header, one of another version, or an end within a word
+    """
+    kind = ENDINGS[path.suffix.lower()]
+    with open_file(path) as file:
+        size = file.seek(0, 2)
+        file.seek(0)
+        if kind == "aedat":
+            _check_packets(path, file, size)
+        else:
+            _check_words(path, file, size, kind)
+    return kind
+
+
+def _check_words(path: Path, file: BinaryIO, size: int, kind: str) -> None:
+    """Refuse a file of lines that begin with a percent sign and of words below them, unless it is whole."""
+    head = file.read(_HEADER)
+    end = _end_of_lines(head)
+    if not end:
+        begins = " ".join(f"{byte:02X}" for byte in head[:4]) or "nothing"
+        raise FormatError(f"{path}, byte 0: starts with {begins}, not with a header (lines of %): damaged")
+    found = _VERSION[kind].search(head[:end])
+    version, known = ("" if found is None else found[1].decode()), _WORDS[kind]
+    word = known.get(version.removesuffix(".0"))
+    if word is None:
+        names = " and ".join(f"{kind.upper()}{number}" for number in known)
+        states = f"states {kind.upper()}{version}" if version else "states no version"
+        raise FormatError(f"{path}: its header {states}; {names} are read")
+    # Two bytes say the type of a .dat's events and their size.
+    begin = end + 2 * (kind == "dat")
+    if begin >= size:
+        raise FormatError(f"{path}: ends after its header, byte {size}: damaged, as it holds no event")
+    if (size - begin) % word:
+        over = (size - begin) % word
+        raise FormatError(f"{path}: ends within a word, {over} of {word} bytes from byte {size - over} on: damaged")
+
+
+def _end_of_lines(head: bytes) -> int:
+    """Return where the lines of a header end; 0 without any."""
+    end = 0
+    while head[end : end + 1] == b"%" and (after := head.find(b"\n", end)) >= 0:
+        end = after + 1
+        if head[:after].rstrip().endswith(b"\n% end"):
+            break
+    return end
+
+
+def _check_packets(path: Path, file: BinaryIO, size: int) -> None:
+    """Refuse an AEDAT 4.0 whose packets do not end where its header, or the file, does."""
+    magic = file.read(len(_AEDAT))
+    if magic != _AEDAT:
+        raise FormatError(f"{path}, byte 0: starts with {magic[:14]!r}, not with {_AEDAT!r}: damaged, or another AEDAT")
+    try:
+        (length,) = struct.unpack("<I", file.read(4))
+        if length > min(size, _HEADER):
+            raise struct.error
+        table = _table_at(file.read(length))
+    except struct.error:
+        raise FormatError(f"{path}: its header is damaged") from None
+    at, end = len(_AEDAT) + 4 + length, size if table < 0 else table
+    if end > size:
+        raise FormatError(f"{path}: ends at byte {size}, before its table of packets at byte {table}: damaged")
+    if at == end:
+        raise FormatError(f"{path}: ends after its header, byte {size}: damaged, as it holds no event")
+    while at < end:
+        file.seek(at)
+        packet = file.read(8)
+        after = at + 8 + (struct.unpack("<I", packet[4:])[0] if len(packet) == 8 else 0)
+        if len(packet) < 8 or after > end:
+            raise FormatError(f"{path}: ends within the packet that begins at byte {at}: damaged")
+        at = after
+
+
+def _table_at(header: bytes) -> int:
+    """Return where a flatbuffer of an AEDAT's header says that the table of packets is; below 0 without one.
+
+    Raises
+    ------
+    struct.error : the header points out of itself
+    """
+
+    def field(slot: int, form: str) -> tuple[int, int]:
+        """Return a field's place and its value."""
+        (table,) = struct.unpack_from("<I", header)
+        (back,) = struct.unpack_from("<i", header, table)
+        if not 0 <= table - back < len(header):
+            raise struct.error
+        (fields,) = struct.unpack_from("<H", header, table - back)
+        offset = struct.unpack_from("<H", header, table - back + 4 + 2 * slot)[0] if 4 + 2 * slot < fields else 0
+        return table + offset, struct.unpack_from(form, header, table + offset)[0] if offset else -1
+
+    # faery reads this text without a check: a damaged place would be one outside of the file.
+    place, offset = field(2, "<I")
+    if offset < 0:
+        raise struct.error
+    (length,) = struct.unpack_from("<I", header, place + offset)
+    if place + offset + 4 + length > len(header):
+        raise struct.error
+    return field(1, "<q")[1]

@@ -1,0 +1,105 @@
+"""What is read of an event camera's file: a region, taxels of several pixels, a polarity, counts in windows."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, fields, replace
+
+from taxel._base.arguments import finite, integer, shown, text
+from taxel._base.errors import refused
+from taxel._core import ProblemError
+from taxel.spikes import to_us
+
+__all__ = ["POLARITIES", "Reduction"]
+
+POLARITIES = ("both", "on", "off")
+#: The longest window, ms: an hour.
+_LONGEST_MS = 3.6e6
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Say what is read of an event camera's file; the arguments are those of `taxel.open`.
+
+    Parameters
+    ----------
+    region : str, optional
+        Columns and rows as "A:B,C:D", of which B and D are not included; default: the whole sensor.
+    bin : int, pixels, 1 or more, optional
+        The side of the square of pixels that becomes a taxel; default: 1.
+    window_ms : float, ms, whole us, optional
+        Frames of counts, one a window; default: events.
+    polarity : {"both", "on", "off"}, optional
+        Which events are read; default: both.
+
+    Raises
+    ------
+    ProblemError : a value of another kind
+
+    Examples
+    --------
+    >>> Reduction("100:420,60:300", bin=4).bounds(640, 480), Reduction(window_ms=2.5).window_us
+    ((100, 420, 60, 300), 2500)
+    """
+
+    region: str | None = None
+    bin: int | None = None
+    window_ms: float | None = None
+    polarity: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.region is not None:
+            _ends(self.region)
+        if self.bin is not None:
+            integer("bin", self.bin, 1, 65_535)
+        if self.window_ms is not None:
+            window_us = to_us(finite("window_ms", self.window_ms, "ms", least=0.001, most=_LONGEST_MS))
+            if round(window_us, 6) % 1:
+                raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be whole us")
+        if self.polarity is not None:
+            text("polarity", self.polarity, POLARITIES)
+
+    @property
+    def is_given(self) -> bool:
+        """Whether any of it is."""
+        return any(getattr(self, field.name) is not None for field in fields(self))
+
+    def but(self, stated: Reduction | None) -> Reduction:
+        """Return what is given, and what a layout states of the rest."""
+        given = {field.name: value for field in fields(self) if (value := getattr(self, field.name)) is not None}
+        return replace(stated or Reduction(), **given)
+
+    @property
+    def side(self) -> int:
+        """Pixels along a taxel."""
+        return self.bin or 1
+
+    @property
+    def window_us(self) -> int | None:
+        """The window, us; None for events."""
+        return None if self.window_ms is None else round(to_us(self.window_ms))
+
+    def bounds(self, columns: int, rows: int) -> tuple[int, int, int, int]:
+        """Return first and last (exclusive) column and row of the region on a sensor.
+
+        Raises
+        ------
+        ProblemError : a region beyond the sensor
+        """
+        left, right, top, bottom = _ends(self.region or ":,:")
+        right, bottom = columns if right is None else right, rows if bottom is None else bottom
+        if not (left < right <= columns and top < bottom <= rows):
+            size = f"{columns} columns and {rows} rows"
+            raise ProblemError(
+                f"region {shown(self.region)}: must lie within the sensor's {size}, as 0:{columns},0:{rows}"
+            )
+        return left, right, top, bottom
+
+
+def _ends(region: str) -> tuple[int, int | None, int, int | None]:
+    """Return the ends of a region's columns and rows; None for the sensor's own."""
+    found = re.fullmatch(r"(\d{0,5}):(\d{0,5}),(\d{0,5}):(\d{0,5})", text("region", region), re.ASCII)
+    if found is None:
+        raise refused("region", f" is {shown(region)}: must be columns and rows A:B,C:D, as 100:420,60:300")
+    left, right, top, bottom = (int(end) if end else None for end in found.groups())
+    return left or 0, right, top or 0, bottom

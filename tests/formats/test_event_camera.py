@@ -1,0 +1,275 @@
+"""Files of event cameras: what faery reads is what decoders by hand read, and damage is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from refusal import refused
+from tests.draws import mixed
+
+import taxel
+from taxel import Events, FormatError, Frames, ProblemError
+from taxel.cli import main
+from taxel.formats import event_camera
+from taxel.formats.event_camera import Reduction, reading
+
+from .event_files import ENCODED, READ, some_rows, write
+
+faery = pytest.importorskip("faery")
+
+ENDINGS = {"evt2": "a.raw", "evt3": "a.raw", "dat": "a.dat"}
+
+
+def rows_of(events: Events) -> np.ndarray:
+    return np.stack([events.t, events.x.astype(int), events.y.astype(int), events.p.astype(int)], 1)
+
+
+def by_faery(path: Path, rows: np.ndarray, size: tuple[int, int] = (64, 48), **how: object) -> Path:
+    events = np.zeros(len(rows), faery.EVENTS_DTYPE)
+    events["t"], events["x"], events["y"], events["on"] = rows.T
+    faery.events_stream_from_array(events, size).to_file(path, **how)
+    return path
+
+
+def counted(rows: np.ndarray, reduction: Reduction, size: tuple[int, int] = (64, 48)) -> np.ndarray:
+    """Count events one after the other."""
+    left, right, top, bottom = reduction.bounds(*size)
+    side, window = reduction.side, reduction.window_us
+    first = rows[0, 0] // window
+    counts = np.zeros((rows[-1, 0] // window - first + 1, -(-(bottom - top) // side), -(-(right - left) // side)))
+    for t, x, y, p in rows.tolist():
+        if left <= x < right and top <= y < bottom and reduction.polarity in (None, "both", ("off", "on")[p]):
+            counts[t // window - first, (y - top) // side, (x - left) // side] += 1
+    return counts
+
+
+@pytest.mark.parametrize("kind", ENCODED)
+def test_events_are_those_that_a_decoder_by_hand_reads(kind: str, tmp_path: Path) -> None:
+    rows = some_rows(seed=len(kind))
+    path = write(tmp_path / ENDINGS[kind], rows, kind)
+    recording = taxel.open(path)
+    assert (READ[kind](path) == rows).all()
+    assert (rows_of(recording.events) == rows).all()
+    assert (recording.array.shape, recording.kind) == ((48, 64), "event_camera")
+    assert recording.events.intensity is None
+
+
+@pytest.mark.parametrize("kind", ["evt2", "evt3", "dat2", "none", "lz4", "zstd"])
+def test_what_faery_writes_is_read_back(kind: str, tmp_path: Path) -> None:
+    rows = some_rows(9000, seed=3)
+    ending = {"e": "raw", "d": "dat"}.get(kind[0], "aedat4")
+    how = {"compression": None if kind == "none" else (kind, 1)} if ending == "aedat4" else {"version": kind}
+    path = by_faery(tmp_path / f"a.{ending}", rows, **how)
+    assert (rows_of(taxel.open(path).events) == rows).all()
+
+
+@pytest.mark.parametrize(
+    ("region", "side", "window_ms", "polarity"),
+    [
+        *mixed((None, "3:50,7:41", "10:,:20"), (None, 1, 4, 7), (0.5, 5, 1000), (None, "both", "on", "off")),
+    ],
+)
+def test_counts_are_those_of_events_one_after_the_other(
+    region: str | None, side: int | None, window_ms: float, polarity: str | None, tmp_path: Path
+) -> None:
+    rows, reduction = some_rows(), Reduction(region, side, window_ms, polarity)
+    path = write(tmp_path / "a.raw", rows)
+    frames = taxel.open(path, region=region, bin=side, window_ms=window_ms, polarity=polarity).frames()
+    assert (frames.values == counted(rows, reduction)).all()
+    first = rows[0, 0] // reduction.window_us
+    # The time of a frame is its begin: what is detected in it is known at its end.
+    assert (frames.t == (first + np.arange(len(frames))) * reduction.window_us).all()
+    assert frames.unit == f"events/{window_ms:g} ms"
+    assert frames.values.sum() == len(rows) or (region, polarity or "both") != (None, "both")
+
+
+def test_both_polarities_are_the_sum_of_each(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.raw", some_rows())
+    both, on, off = (taxel.open(path, window_ms=2, polarity=name).frames() for name in ("both", "on", "off"))
+    assert (both.values == on.values + off.values).all()
+    assert on.values.any()
+    assert off.values.any()
+
+
+def test_a_region_and_larger_taxels_make_events_too(tmp_path: Path) -> None:
+    rows = some_rows()
+    path = write(tmp_path / "a.raw", rows)
+    events = taxel.open(path, region="3:50,7:41", bin=4, polarity="on").events
+    kept = rows[(rows[:, 1] >= 3) & (rows[:, 1] < 50) & (rows[:, 2] >= 7) & (rows[:, 2] < 41) & (rows[:, 3] == 1)]
+    assert (
+        rows_of(events) == np.stack([kept[:, 0], (kept[:, 1] - 3) // 4, (kept[:, 2] - 7) // 4, kept[:, 3]], 1)
+    ).all()
+    assert events.array.shape == (9, 12)
+
+
+def test_the_layout_and_the_command_line_say_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(tmp_path / "a.raw", some_rows())
+    given = taxel.open(path, region="0:32,0:32", bin=4, window_ms=5, polarity="on").frames()
+    options = ["--region", "0:32,0:32", "--bin", "4", "--count-ms", "5", "--polarity", "on"]
+    with pytest.raises(SystemExit, match="0"):
+        main(["convert", str(path), str(tmp_path / "b.npz"), *options])
+    (tmp_path / "a.layout.toml").write_text(
+        '[event_camera]\nregion = "0:32,0:32"\nbin = 4\nwindow_ms = 5\npolarity = "on"\n'
+    )
+    assert given == taxel.open(path).frames() == taxel.open(tmp_path / "b.npz").frames()
+    # What is given comes before what the layout says.
+    assert taxel.open(path, bin=8).array.shape == (4, 4)
+    capsys.readouterr()
+
+
+def test_a_folder_of_files_is_a_list_of_recordings(tmp_path: Path) -> None:
+    for k in (10, 2):
+        write(tmp_path / f"take{k}.raw", some_rows(seed=k))
+    (tmp_path / "layout.toml").write_text("[event_camera]\nwindow_ms = 5\n")
+    (tmp_path / "labels.csv").write_text("recording,label,t_us\ntake2,contact,2000\ntake10,contact,3000\n")
+    opened = taxel.open_all(tmp_path, bin=16)
+    assert [recording.name for recording in opened] == ["take2.raw", "take10.raw"]
+    assert [recording.array.shape for recording in opened] == [(3, 4)] * 2
+    assert [[note.t for note in recording.notes] for recording in opened] == [[2000], [3000]]
+
+
+def test_a_table_named_dat_is_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "a.dat"
+    path.write_text("% a comment of a table\n" + "".join(f"{k / 100:g} {k % 7} 0 0 0 0\n" for k in range(50)))
+    assert event_camera.files(path) == []
+    assert event_camera.files(write(tmp_path / "b.dat", some_rows(), "dat")) == [tmp_path / "b.dat"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "said"),
+    [
+        ("evt3", lambda data: data[:-1], "ends within a word, 1 of 2 bytes from byte"),
+        ("evt2", lambda data: data[:-3], "ends within a word, 1 of 4 bytes from byte"),
+        ("dat", lambda data: data[:-5], "ends within a word, 3 of 8 bytes from byte"),
+        ("evt3", lambda data: data[data.index(b"% end\n") + 6 :], r"byte 0: starts with .*, not with a header"),
+        ("dat", lambda data: data[data.index(b"\x0c\x08") + 2 :], r"byte 0: starts with .*, not with a header"),
+        ("evt3", lambda data: b"", "byte 0: starts with nothing, not with a header"),
+        ("evt3", lambda data: data[: data.index(b"% end\n") + 6], "ends after its header, byte .*: damaged"),
+        ("evt3", lambda data: data[: data.index(b"% end\n") + 6] + b"\x00\x80\x01\x60", "holds no event: damaged, or"),
+        (
+            "evt3",
+            lambda data: data.replace(b"evt 3.0", b"evt 4").replace(b"EVT3", b"EVT4"),
+            "states EVT4; EVT2 and EVT3",
+        ),
+        ("evt3", lambda data: data.replace(b"% evt 3.0\n% format EVT3;", b"% form "), "states no version"),
+        ("evt2", lambda data: data.replace(b"64x48", b"").replace(b"EVT2;height=48", b"EVT2"), "says no size; give it"),
+        ("evt2", lambda data: data.replace(b"64", b"16"), "not a whole file of an event camera .*x="),
+    ],
+)
+def test_damage_is_named(kind: str, change, said: str, tmp_path: Path) -> None:
+    path = write(tmp_path / ENDINGS[kind], some_rows(), kind)
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(FormatError, match=said) as raised:
+        taxel.open(path)
+    assert str(path) in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_an_aedat_that_ends_anywhere_is_named(tmp_path: Path) -> None:
+    path = by_faery(tmp_path / "a.aedat4", some_rows(9000))
+    data = path.read_bytes()
+    for end in (0, 10, 16, 200, 700, 1000, len(data) // 2):
+        path.write_bytes(data[:end])
+        with pytest.raises(FormatError, match="damaged"):
+            taxel.open(path)
+    path.write_bytes(b"#!AER-DAT2.0\r\n" + data[14:])
+    with pytest.raises(FormatError, match=r"starts with b'#!AER-DAT2\.0"):
+        taxel.open(path)
+
+
+def test_a_crash_of_the_library_is_an_error(tmp_path: Path) -> None:
+    """In this process the first of these ended the interpreter, and others were exceptions of no known class."""
+    path = by_faery(tmp_path / "a.aedat4", some_rows(9000))
+    data, rng, said = path.read_bytes(), np.random.default_rng(3), []
+    for _ in range(12):
+        spoilt = bytearray(data)
+        for at in rng.integers(14, 700, 3):
+            spoilt[at] = rng.integers(256)
+        path.write_bytes(spoilt)
+        try:
+            assert len(taxel.open(path).events)
+        except (FormatError, ProblemError) as error:
+            said.append(str(error))
+    assert said
+    assert all(str(path) in line and "\n" not in line for line in said)
+
+
+def test_a_library_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    child = tmp_path / "child.py"
+    child.write_text("print('{\"running\": true}', flush=True)\n__import__('time').sleep(600)\n")
+    monkeypatch.setattr(reading, "_CHILD", child)
+    monkeypatch.setattr(reading, "PATIENCE_S", 0.5)
+    with pytest.raises(FormatError, match=r"not a whole file of an event camera \(the library has read nothing"):
+        taxel.open(write(tmp_path / "a.raw", some_rows()))
+
+
+def test_without_the_extra_one_line_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write(tmp_path / "a.raw", some_rows())
+    monkeypatch.setattr(reading, "find_spec", lambda name: None)
+    with pytest.raises(ImportError, match=r"faery is not installed: pip install 'taxel\[events\]'"):
+        taxel.open(path)
+
+
+def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(tmp_path: Path) -> None:
+    rng, begins = np.random.default_rng(4), 1_000_000 + 400_000 * np.arange(12)
+    noise = np.stack([rng.integers(0, 6_000_000, 600), *rng.integers(0, 48, (2, 600)), rng.integers(0, 2, 600)], 1)
+    bursts = [
+        np.stack([t + rng.integers(0, 15_000, 300), *rng.integers(10, 30, (2, 300)), rng.random(300) < 0.9], 1)
+        for t in begins
+    ]
+    rows = np.concatenate([noise, *bursts]).astype(np.int64)
+    path = write(tmp_path / "a.raw", rows[np.argsort(rows[:, 0], kind="stable")])
+    labels = [{"contact": begins.tolist()}]
+    with refused("events without intensities, which the recipe touch and its encoders need: frames of an event camera"):
+        taxel.train(taxel.open(path), labels)
+    training = taxel.train(taxel.open(path, bin=4, window_ms=5), labels)
+    assert training.score["contact"].found == 12
+    assert any("recipe event_counts" in line for line in training.lines())
+    frames = taxel.open(path, bin=4, window_ms=5).frames()
+    assert len(taxel.detect.run(training.readout, frames, tare=taxel.Tare.take(frames, stop_us=500_000))) == 12
+    with refused("in events/2 ms, and the readout was trained on events/5 ms"):
+        taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=2).frames())
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"region": "0:65,0:48"}, "region '0:65,0:48': must lie within the sensor's 64 columns and 48 rows"),
+        ({"region": "9:9,0:48"}, "must lie within"),
+        ({"region": "1,2"}, "region is '1,2': must be columns and rows A:B,C:D"),
+        ({"region": 3}, "region is 3"),
+        ({"bin": 0}, "bin is 0"),
+        ({"bin": 1.5}, "bin is 1.5"),
+        ({"window_ms": 0.0015}, "window_ms is 0.0015: must be whole us"),
+        ({"window_ms": 0}, "window_ms is 0"),
+        ({"window_ms": float("nan")}, "window_ms is nan"),
+        ({"polarity": "red"}, "polarity is 'red': must be one of 'both', 'on', 'off'"),
+    ],
+)
+def test_an_option_that_does_not_fit_is_one_clear_error(options: dict[str, object], said: str, tmp_path: Path) -> None:
+    with refused(said):
+        taxel.open(write(tmp_path / "a.raw", some_rows()), **options)
+
+
+def test_the_options_are_of_an_event_camera_alone(tmp_path: Path) -> None:
+    taxel.convert(Frames(np.zeros((3, 2, 2)), [0, 10, 20]), tmp_path / "a.npz")
+    for place in (tmp_path / "a.npz", tmp_path):
+        with refused("no event camera's file; region, bin, window_ms and polarity are of one"):
+            taxel.open_all(place, bin=2)
+
+
+def test_windows_that_make_more_frames_than_may_be_read_are_refused(tmp_path: Path) -> None:
+    rows = some_rows(20)
+    rows[-1, 0] = 3_000_000_000
+    path = write(tmp_path / "a.dat", rows, "dat")
+    with pytest.raises(FormatError, match=r"frames of 48 x 64 taxels \(fewer by region, bin or window_ms\): claims"):
+        taxel.open(path, window_ms=1)
+
+
+def test_a_sensor_of_1280_x_720_is_read_and_larger_taxels_make_it_small(tmp_path: Path) -> None:
+    rows = some_rows(300, (1280, 720))
+    path = write(tmp_path / "a.raw", rows, size=(1280, 720))
+    assert (rows_of(taxel.open(path).events) == rows).all()
+    assert taxel.open(path, bin=4, window_ms=5).array.shape == (180, 320)
