@@ -291,6 +291,9 @@ void bench_reset(Bench* b) {
     b->step_began = false;
 }
 
+// Whether the pattern is on after the next reset.
+void bench_pattern(Bench* b, int on) { b->top.pattern = on; }
+
 // What is set for steps that begin from now on, or began in the clock before.
 void bench_ticks(Bench* b, const uint16_t* ticks) {
     b->set.ticks = std::make_shared<std::vector<uint16_t>>(ticks, ticks + b->columns * b->rows);
