@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from test_board import COLUMNS, ROWS, Pins
+from test_frames import pressures
 
 from ethernet import payload_of
 from pair import Pair, drawing
 from taxel import Array
 from taxel.simulate import Board, pattern
 from taxel.wire import Command, Decoder, Registers
-from test_board import COLUMNS, ROWS, Pins
-from test_frames import pressures
 
 
 @pytest.mark.parametrize(("columns", "rows", "channels", "version"), [(8, 8, 16, 1), (5, 7, 64, 2)])
@@ -21,8 +21,14 @@ def test_quick_the_pattern_is_the_emulated_boards(columns, rows, channels, versi
     ticks = np.zeros(pair.array.shape, np.uint16)
     # On; with another ramp, that is lower than the ball; as afferents; off, and on again.
     flags = 1 << 3 | (version - 1) << 4
-    writes = [(0, flags | 1 << 6), (4, 33 << 16 | 90), (0, flags | 1 << 6 | 2 | 983 << 16), (0, flags), (0, flags | 1 << 6)]
-    faults, rolled = 0, 0
+    writes = [
+        (0, flags | 1 << 6),
+        (4, 33 << 16 | 90),
+        (0, flags | 1 << 6 | 2 | 983 << 16),
+        (0, flags),
+        (0, flags | 1 << 6),
+    ]
+    rolled = 0
     for number, value in writes:
         pair.frame(ticks, Command(number, value).to_bytes())
         for frame in range(90):
