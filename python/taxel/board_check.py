@@ -34,10 +34,14 @@ HOST = "192.168.52.1"
 _MAGIC = 0x54
 #: What the kernel is asked to hold, bytes; the largest datagram.
 _WAITING, _LARGEST = 1 << 25, 65_535
+#: How long it may take to read what the kernel holds, s.
+_DRAINED_S = 5.0
 #: How long a board may take to answer on its serial line, s: a simulated one is slow.
 _ANSWER_S = 30.0
 #: After which the numbers of the pattern's frames begin anew.
 _FRAMES = 65_536
+#: Frames that may be of the comparators still as the pattern is switched on.
+_AHEAD = 64
 #: Of the values, the share that an assumption about the frames' number must explain.
 _EXPLAINED = 0.5
 #: Resolution of a stamp of version 1, us.
@@ -249,12 +253,15 @@ class _Receiver:
         return capture
 
     def drain(self, seconds: float) -> None:
-        """Let pass what arrives within so long."""
-        until = time.monotonic() + seconds
-        while (left := until - time.monotonic()) > 0:
-            self.socket.settimeout(left)
-            with contextlib.suppress(TimeoutError):
+        """Let pass what has arrived, and what arrives within so long; then what waits."""
+        begun = time.monotonic()
+        while (passed := time.monotonic() - begun) < seconds + _DRAINED_S:
+            self.socket.settimeout(max(seconds - passed, 0.0))
+            try:
                 self.socket.recv(_LARGEST)
+            except (TimeoutError, BlockingIOError):
+                if passed >= seconds:
+                    return
 
 
 @dataclass(frozen=True)
@@ -299,8 +306,8 @@ def _decoded(capture: _Capture, array: Array) -> _Values:
 class _Frames:
     """Which frames of the pattern events may be of, by their times.
 
-    A stamp is the start of a frame, rounded down to the resolution of the version of the wire. So of an event at `t` the
-    number is one of `several`, which are more than one where several frames have the same stamp.
+    A stamp is the start of a frame, rounded down to the resolution of the version of the wire. So an event is of one of
+    `several` frames, which are more than one where several have the same stamp.
     """
 
     def __init__(self, registers: Registers, anchor_us: int, resolution_us: float) -> None:
@@ -312,6 +319,11 @@ class _Frames:
         """Return the first frame that each time may be of."""
         since = (t - self.anchor_us - self.after_us) / self.frame_us
         return self.number + np.ceil(np.round(since, 6)).astype(np.int64)
+
+
+def _period(array: Array) -> int:
+    """Return the number of frames after which the pattern repeats itself."""
+    return max(256 << (array.columns - 1).bit_length(), 32 << (array.rows - 1).bit_length())
 
 
 def _expected(array: Array, registers: Registers, x: Any, y: Any, frames: NDArray[np.int64]) -> NDArray[np.uint16]:
@@ -359,20 +371,20 @@ def _numbered(values: _Values, array: Array, registers: Registers) -> tuple[_Fra
 def _meaning(values: _Values, at: int, frame: int, expected: int, array: Array, registers: Registers) -> str:
     """Return what may have made a value differ."""
     x, y, value = int(values.x[at]), int(values.y[at]), int(values.value[at])
-    if x != y and x < array.rows and y < array.columns:
-        if int(_expected(array, registers, y, x, np.array([frame]))[0]) == value:
-            return "it is the value of the taxel with row and column exchanged: lines and steps are mixed up"
+    exchanged = x != y and x < array.rows and y < array.columns
+    if exchanged and int(_expected(array, registers, y, x, np.array([frame]))[0]) == value:
+        return "it is the value of the taxel with row and column exchanged: lines and steps are mixed up"
     near = np.arange(frame - 512, frame + 512)
     off = near[_expected(array, registers, x, y, near) == value] - frame
     if len(off) and value not in (0, expected):
         k = int(off[np.abs(off).argmin()])
+        when = f"{counted(abs(k), 'frame')} {'later' if k > 0 else 'before'}"
         return (
-            f"it is this taxel's value {abs(k)} frames {'later' if k > 0 else 'before'}: the event was late, or its frame"
-            " took longer than the registers say"
+            f"it is this taxel's value {when}: frames do not take the time that the registers say, or one was left out"
         )
     if (value ^ expected).bit_count() == 1:
         return "one bit differs: a disturbed link, or its clock does not suit the PHY"
-    return "it is no value of the pattern here: the comparators' values, if the register pattern is off; else a damaged one"
+    return "no value of the pattern is near: a comparator's, where the register pattern is off; else it was damaged"
 
 
 def _compared(
@@ -381,8 +393,14 @@ def _compared(
     """Compare each value, and what every taxel holds, with the pattern."""
     everything = np.arange(len(values.t))
     right, number = _right(values, everything, array, registers, frames), frames.of(values.t)
-    # Where the pattern was switched on meanwhile, events before it were the comparators'.
-    of_pattern = right | ~(begun & (number < 0))
+    # Where the pattern was switched on just before, the first events may be the comparators'.
+    of_pattern = np.ones(right.shape, bool)
+    if begun:
+        period = _period(array)
+        turns = (int(number.min()) + _AHEAD) // period * period
+        frames.number -= turns
+        number = number - turns
+        of_pattern = number >= 0
     wrong = np.flatnonzero(~right & of_pattern)
     order = np.argsort(values.t, kind="stable")
     order = order[of_pattern[order]]
@@ -436,12 +454,12 @@ def _compared(
 def _interfaces() -> list[tuple[str, str, bool, int]]:
     """Return name, IPv4 address, whether it is up and speed (Mbit/s) of this machine's interfaces."""
     states = psutil.net_if_stats()
-    found = []
-    for name, addresses in psutil.net_if_addrs().items():
-        for address in addresses:
-            if address.family == socket.AF_INET and name in states:
-                found.append((name, address.address, states[name].isup, states[name].speed))
-    return found
+    return [
+        (name, address.address, states[name].isup, states[name].speed)
+        for name, addresses in psutil.net_if_addrs().items()
+        for address in addresses
+        if address.family == socket.AF_INET and name in states
+    ]
 
 
 def _nothing(port: int, seconds: float) -> str:
@@ -541,16 +559,16 @@ class _Check:
 
     def values(self, found: PatternCheck) -> None:
         """Tell whether all values are the pattern's."""
-        first = found.first
+        first, lagged = found.first, counted(found.behind, "taxel")
         if first is None:
             self.tell("values", True, f"all {found.events} values are the pattern's")
             return
         self.tell(
             "values",
             False,
-            f"{found.wrong} of {found.events} values are not the pattern's, and {counted(found.behind, 'taxel')} lagged; the first:"
-            f" taxel ({first.x}, {first.y}) at {first.t} us, frame {first.frame}: {first.value}, must be {first.expected}:"
-            f" {first.meaning}",
+            f"{found.wrong} of {found.events} values are not the pattern's, and {lagged} lagged;"
+            f" the first: taxel ({first.x}, {first.y}) at {first.t} us, frame {first.frame}, has {first.value} and must"
+            f" have {first.expected}: {first.meaning}",
         )
 
     def covered(self, found: PatternCheck, array: Array, guessed: bool) -> str:
@@ -559,7 +577,7 @@ class _Check:
         pace = ""
         if speed < 0.5:
             pace = f"; the board's clock takes {1 / speed:.0f} s a second, as a simulated board's does"
-        period = 16 * 16 * (1 << (array.columns - 1).bit_length()) * registers.frame_us / 1e6
+        period = _period(array) * registers.frame_us / 1e6
         rest = (
             ""
             if found.taxels == array.rows * array.columns
@@ -574,7 +592,7 @@ class _Check:
     def rest(self, receiver: _Receiver, seconds: float, array: Array, device: Device, speed: float) -> RestCheck:
         """Look at the comparators' own values."""
         registers = device.registers
-        # With a ramp of a tick all taxels hold 0 or 1; then each that reads more gives its value, the same for all versions.
+        # With a ramp of a tick all taxels hold 0 or 1; then each that reads more gives its value.
         device.set(pattern=False, mechanoreceptor=False, noise_floor=0, ramp=1)
         receiver.drain(self.frames_s(registers, speed))
         faults = dict(device.faults)
@@ -619,12 +637,13 @@ class _Check:
             row, column = np.unravel_index(np.nanargmax(found.noise), found.noise.shape)
             largest, floor = found.noise[row, column], found.registers.noise_floor
             # Of normal noise one value in 370 is further than three standard deviations.
-            above = int((found.noise > floor / 3).sum())
+            above = counted(int((found.noise > floor / 3).sum()), "taxel")
+            median, place = np.nanmedian(found.noise), f"taxel ({column}, {row})"
             self.tell(
                 "noise",
                 None,
-                f"standard deviation {np.nanmedian(found.noise):.2f} ticks (median of the taxels), at most {largest:.2f}, taxel"
-                f" ({column}, {row}); for {counted(above, 'taxel')} the noise floor {floor} is below three of them",
+                f"standard deviation {median:.2f} ticks (the median), at most {largest:.2f} ({place}); three of"
+                f" them are above the noise floor, {floor}, for {above}",
             )
 
 
@@ -650,7 +669,7 @@ def _at_rest(capture: _Capture, array: Array, registers: Registers, faults: int)
         last = np.append(taxel[1:] != taxel[:-1], True) if len(taxel) else np.empty(0, bool)
         end = (t.max() if len(t) else 0) + registers.frame_us
         weight = np.where(last, end, np.append(t[1:], end)[: len(t)]) - t
-        total, size = np.zeros(mean.size), mean.size
+        size = mean.size
         total = np.bincount(taxel, weight, size)
         seen = total > 0
         first = np.divide(np.bincount(taxel, weight * value, size), total, where=seen, out=np.full(size, np.nan))
@@ -717,7 +736,7 @@ def check_board(
 
     Notes
     -----
-    The pattern's formula is in *Registers*, *The pattern*. The boards that send differences, or no intensities, cannot be
+    The pattern's formula is in *Registers*, *The pattern*. Boards that send differences, or no intensities, cannot be
     checked.
 
     Examples
@@ -744,6 +763,7 @@ def check_board(
         with Device(place, array=array, timeout=_ANSWER_S) as device:
             rest = None
             with _with_pattern(device) as registers:
+                receiver.drain(0.05)
                 found = check.pattern(receiver, where, seconds, device.array, [registers], device)
                 if found is not None:
                     rest = check.rest(receiver, seconds, device.array, device, found.speed)

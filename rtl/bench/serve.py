@@ -1,7 +1,7 @@
 """Run the simulated logic as a board: a pseudo-terminal is its serial line, and datagrams go out by UDP.
 
-It runs far slower than a board, and its clock shows it: a second of the board takes half a minute and more. What the host
-reads of the board's own time is as on a board. At rest its comparators trip near a value, with noise.
+It runs far slower than a board: a second of the board takes half a minute and more. Stamps are of the board's time,
+as on a board. At rest its comparators trip near a value, with noise.
 
     .venv/bin/python rtl/bench/serve.py --button       starts with the pattern, as a board whose button was held
 """

@@ -173,9 +173,9 @@ def check(
     """Check a board: its link by a pattern that it makes itself, then its comparators at rest.
 
     With its serial line the command switches the pattern on, compares every value that arrives, and looks at the
-    comparators, for which nothing may touch the sensor; then the registers are as before. Without it the board must make
-    the pattern already: hold the button of the Colorlight i9 for two seconds. Exit code 3: something is not as it must
-    be.
+    comparators, for which nothing may touch the sensor; then the registers are as before. Without it the board must
+    make the pattern already: hold the button of the Colorlight i9 for two seconds. Exit code 3: something is not as it
+    must be.
 
     Example: taxel device check /dev/ttyACM0
     """

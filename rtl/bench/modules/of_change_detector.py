@@ -45,7 +45,8 @@ def drawn(frames, build):
                     "initial_frame": frame == 0, "frame_first": line == lines[0] and step == 0,
                     "frame_last": line == lines[-1] and step == build["STEPS"] - 1, "line": line, "step": step,
                     "stamp": at // 100 & 0xFFFF, "micros": at, "format": now["format"], "ended": said,
-                    "pattern": now["pattern"], "ramp": now["ramp"], "noise_floor": now["noise_floor"], "threshold": now["threshold"],
+                    "pattern": now["pattern"], "ramp": now["ramp"],
+                    "noise_floor": now["noise_floor"], "threshold": now["threshold"],
                     "markers": markers, "starts": starts,
                 }  # fmt: skip
                 counts = []
@@ -149,13 +150,12 @@ class Model:
             self.afferents.clear()
         if read["frame_first"]:
             self.ball.frame(read["pattern"])
-        for channel, count in enumerate(counts):
+        for channel, counted in enumerate(counts):
             row = channel * build["STEPS"] + read["step"]
             taxel = read["line"], row
             if row >= build["ROWS"]:
                 continue
-            if read["pattern"]:
-                count = self.ball.value(*taxel, read["ramp"])
+            count = self.ball.value(*taxel, read["ramp"]) if read["pattern"] else counted
             value = min(count, read["ramp"])
             if read["initial_frame"]:
                 self.first.append(NOT_RETURNED if count == NOT_RETURNED else value)

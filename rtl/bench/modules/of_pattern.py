@@ -31,10 +31,11 @@ async def values_are_those_of_the_page(dut):
             dut.n.value = ball.n
             await FallingEdge(dut.clk)
         ball.frame(rolls)
-        for k, line in enumerate(random.sample(range(columns), min(columns, 3))):
-            # A line where the ball is, too.
-            if rolls and k == 1:
-                line = ball.n // 256 % ball.columns % columns
+        lines = random.sample(range(columns), min(columns, 3))
+        # Of a line where the ball is, too.
+        if rolls:
+            lines[-1] = ball.n // 256 % ball.columns % columns
+        for k, line in enumerate(lines):
             dut.read.value = pack("read_t", frame_first=int(k == 0), pattern=int(rolls), line=line, ramp=ramp)
             dut.step_end.value = 1
             await FallingEdge(dut.clk)

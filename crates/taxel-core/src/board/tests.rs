@@ -307,7 +307,7 @@ fn the_pattern_reads_as_its_page_has_it_and_begins_anew() {
         for n in 0..40 {
             for word in words(&play(&mut board, &[NOT_RETURNED; 4096])) {
                 if let Word::Intensity { ticks, x, y, .. } = word {
-                    held[thesis.index(x, y)] = ticks;
+                    held[thesis.index(x.into(), y.into())] = ticks;
                 }
             }
             let expected = |k: usize| pattern(&thesis, ((k % 64) as u16, (k / 64) as u16), n, 150);
