@@ -576,7 +576,7 @@ class _Check:
         registers, speed = found.registers, found.speed
         pace = ""
         if speed < 0.5:
-            pace = f"; the board's clock takes {1 / speed:.0f} s a second, as a simulated board's does"
+            pace = f"; the board's clock takes {1 / speed:.0f} s for a second, as a simulated board's does"
         period = _period(array) * registers.frame_us / 1e6
         rest = (
             ""
@@ -585,7 +585,7 @@ class _Check:
         )
         whose = " (guessed: no serial line)" if guessed else ""
         return (
-            f"{found.frames} with events, {1e6 / registers.frame_us:.0f} frames/s{whose}; {found.taxels} of"
+            f"{found.frames} stamps with events, {1e6 / registers.frame_us:.0f} frames/s{whose}; {found.taxels} of"
             f" {array.rows * array.columns} taxels had one{rest}{pace}"
         )
 

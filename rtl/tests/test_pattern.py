@@ -91,4 +91,4 @@ def test_a_button_that_is_held_for_long_starts_the_pattern():
         assert payloads[: len(expected)] == expected
         rolled.append(len(expected))
     assert rolled[0] == rolled[1] == rolled[3] == 0
-    assert rolled[2] == rolled[4] > 10
+    assert rolled[2] == rolled[4] > 5
