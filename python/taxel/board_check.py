@@ -19,7 +19,7 @@ from taxel import _core
 from taxel._base.arguments import callback, integer, number, text
 from taxel._base.errors import refused
 from taxel._base.messages import counted
-from taxel._core import ProblemError
+from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.device import Device
 from taxel.live.sending import PORT
@@ -34,6 +34,8 @@ HOST = "192.168.52.1"
 _MAGIC = 0x54
 #: What the kernel is asked to hold, bytes; the largest datagram.
 _WAITING, _LARGEST = 1 << 25, 65_535
+#: How long the first datagram may take, s.
+_PATIENCE_S = 10.0
 #: How long it may take to read what the kernel holds, s.
 _DRAINED_S = 5.0
 #: How long a board may take to answer on its serial line, s: a simulated one is slow.
@@ -374,7 +376,7 @@ def _meaning(values: _Values, at: int, frame: int, expected: int, array: Array, 
     exchanged = x != y and x < array.rows and y < array.columns
     if exchanged and int(_expected(array, registers, y, x, np.array([frame]))[0]) == value:
         return "it is the value of the taxel with row and column exchanged: lines and steps are mixed up"
-    near = np.arange(frame - 512, frame + 512)
+    near = np.arange(frame - 32, frame + 33)
     off = near[_expected(array, registers, x, y, near) == value] - frame
     if len(off) and value not in (0, expected):
         k = int(off[np.abs(off).argmin()])
@@ -436,8 +438,11 @@ def _compared(
     first = first_behind
     if len(wrong):
         at = wrong[values.t[wrong].argmin()]
-        n = int(number[at])
-        expected_value = int(_expected(array, registers, values.x[at], values.y[at], np.array([n]))[0])
+        several = number[at] + np.arange(frames.several)
+        expected_values = _expected(array, registers, values.x[at], values.y[at], several)
+        # Of several frames that it may be of, that from which it differs in the fewest bits.
+        nearest = int(np.bitwise_count(expected_values ^ values.value[at]).argmin())
+        n, expected_value = int(several[nearest]), int(expected_values[nearest])
         if first is None or values.t[at] <= first.t:
             first = Difference(
                 *(int(values.t[at]), int(values.x[at]), int(values.y[at]), n % _FRAMES),
@@ -502,7 +507,7 @@ class _Check:
         device: Device | None,
     ) -> PatternCheck | None:
         """Compare what arrives with the pattern."""
-        patience = max(seconds, 10.0)
+        patience = max(seconds, _PATIENCE_S)
         before = {} if device is None else dict(device.faults)
         capture = receiver.take(seconds, patience)
         if not capture.datagrams:
@@ -771,7 +776,11 @@ def check_board(
 
 
 def _presets(array: Array, preset: str | None) -> list[Registers]:
-    """Return what a board without a serial line may hold."""
-    names = PRESETS if preset is None else (preset,)
-    found = [Registers._of(_core.registers_preset(name, array._parts()), array) for name in names]
+    """Return what a board without a serial line may hold: the preset that is named, or each that fits the array."""
+    if preset is not None:
+        return [Registers._of(_core.registers_preset(preset, array._parts()), array)]
+    found = []
+    for name in PRESETS:
+        with contextlib.suppress(DeviceError, ProblemError):
+            found.append(Registers._of(_core.registers_preset(name, array._parts()), array))
     return [registers for registers in found if not registers.mechanoreceptor]
