@@ -1,6 +1,7 @@
 """The pattern, frame by frame against the emulated board; and the button that starts it."""
 
 import numpy as np
+import pins
 import pytest
 from test_board import COLUMNS, ROWS, Pins
 from test_frames import pressures
@@ -67,24 +68,29 @@ def test_the_host_computes_each_value_of_a_pattern():
     assert frames > 10
 
 
+def test_the_table_of_pins_is_that_of_the_lpf():
+    text = pins.PAGE.read_text()
+    assert pins.page(text) == text
+
+
 def test_a_button_that_is_held_for_long_starts_the_pattern():
-    pins = Pins(3, PATTERN_CLOCKS=300)
+    board_pins = Pins(3, PATTERN_CLOCKS=300)
     array = Array(ROWS, COLUMNS)
-    pins.steady(True)
+    board_pins.steady(True)
     rolled = []
     # How long the button is held, ns; a button bounces as it is pressed and as it is released.
     for held in (500, 2500, 3500, 500, 3500):
         for pressed, ns in ((True, 40), (False, 30), (True, held), (False, 50), (True, 60), (False, 0)):
-            pins.button(pressed)
-            pins.run(ns)
-            assert pins.in_reset() or not pressed or ns < 50
-        pins.frames()
+            board_pins.button(pressed)
+            board_pins.run(ns)
+            assert board_pins.in_reset() or not pressed or ns < 50
+        board_pins.frames()
         for _ in range(2):
-            assert pins.run(1_000_000)
+            assert board_pins.run(1_000_000)
         received = []
         for _ in range(30):
-            assert pins.run(1_000_000)
-            received += pins.frames()
+            assert board_pins.run(1_000_000)
+            received += board_pins.frames()
         board = Board(Registers(array=array, channels=64, pattern=held == 3500), array, queue=1 << 30)
         expected = [datagram for _ in range(28) for datagram in board.frame(np.zeros((ROWS, COLUMNS), np.uint16))]
         payloads = [payload_of(frame) for frame in received]

@@ -5,6 +5,7 @@ Usage: .venv/bin/python rtl/tools/waveforms.py
 
 from __future__ import annotations
 
+import itertools
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,6 @@ from matplotlib.figure import Figure
 
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "rtl" / "bench"))
-
-import itertools
 
 from logic import Logic  # noqa: E402
 

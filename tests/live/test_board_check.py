@@ -139,9 +139,8 @@ def test_datagrams_that_are_lost_are_seen_in_either_version(wire_version, name):
         check = check_board(board.place, port=board.port, host="127.0.0.1", seconds=1.0)
     assert not found(check, name).good
     assert not check.good
-    assert check.pattern.behind > 0
-    if wire_version == 2:
-        assert check.pattern.counts.missing > 0
+    # Most datagrams of version 2 are heartbeats, whose loss moves no value.
+    assert check.pattern.behind > 0 if wire_version == 1 else check.pattern.counts.missing > 0
 
 
 def test_without_a_serial_line_a_board_that_makes_the_pattern_is_recognised(capsys):
