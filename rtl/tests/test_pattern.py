@@ -1,16 +1,22 @@
 """The pattern, frame by frame against the emulated board; and the button that starts it."""
 
+import sys
+
 import numpy as np
-import pins
 import pytest
 from test_board import COLUMNS, ROWS, Pins
 from test_frames import pressures
 
 from ethernet import payload_of
+from logic import RTL
 from pair import Pair, drawing
 from taxel import Array
 from taxel.simulate import Board, pattern
 from taxel.wire import Command, Decoder, Registers
+
+sys.path.append(str(RTL / "tools"))
+
+import pins
 
 
 @pytest.mark.parametrize(("columns", "rows", "channels", "version"), [(8, 8, 16, 1), (5, 7, 64, 2)])
