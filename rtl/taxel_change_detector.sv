@@ -1,7 +1,8 @@
 // Which taxels of a read changed: counts become values, each is compared with the value that its taxel holds, or each taxel
 // is an afferent that may fire.
 //
-// The counts of a read are loaded at once and taken one a clock, channel after channel. What `PREVIOUS_SAMPLE` and `INTENSITY`
+// The counts of a read are loaded at once and taken one a clock, channel after channel; with the pattern its values take their
+// place. What `PREVIOUS_SAMPLE` and `INTENSITY`
 // choose is as `previous` and `intensity` of the emulated board. The initial frame sets every taxel's value to 0.
 //
 // Before the first events of a frame of version 2 come, its predecessor's end is queued; where a line's values are due to be
@@ -128,7 +129,7 @@ module taxel_change_detector #(
   } sample_t;
 
   sample_t counted, valued, fetched, compared, weighed, judged;
-  logic [15:0] tick;
+  logic [15:0] tick, of_pattern;
   logic [15:0] held, previous;
   logic [15:0] moved, moved_of, moved_by;
   logic more, more_of, polarity, beyond, changed;
@@ -143,6 +144,10 @@ module taxel_change_detector #(
     assign row = {channel, now.step[STEP_BITS-1:0]};
   end
 
+  taxel_pattern #(.COLUMNS(COLUMNS), .ROWS(ROWS), .ROW_BITS(ROW_BITS)) ball (
+      .clk, .reset, .step_end, .read, .read_done, .row, .value(of_pattern)
+  );
+
   logic [15:0] values[2**ADDRESS_BITS];
   logic store, storing;
   logic [ADDRESS_BITS-1:0] storing_at;
@@ -155,14 +160,14 @@ module taxel_change_detector #(
     counted.start        <= starts[0];
     counted.last         <= busy && now.frame_last && channel == CHANNEL_BITS'(CHANNELS - 1);
     counted.exists       <= busy && 32'(row) < ROWS;
-    counted.not_returned <= counts[0].tripped && counts[0].first && counts[0].at == 0;
+    counted.not_returned <= !now.pattern && counts[0].tripped && counts[0].first && counts[0].at == 0;
     counted.address      <= {now.line[LINE_BITS-1:0], row};
     counted.value        <= '0;
     tick                 <= counts[0].tripped ? {counts[0].at, 1'b0} - 16'(counts[0].first) : 16'hFFFF;
     of_counted           <= now;
     // What it reads: at most the ramp's length.
     valued               <= counted;
-    valued.value         <= tick < of_counted.ramp ? tick : of_counted.ramp;
+    valued.value         <= of_counted.pattern ? of_pattern : tick < of_counted.ramp ? tick : of_counted.ramp;
     of_valued            <= of_counted;
     held                 <= values[counted.address];
     // The value that its taxel holds.

@@ -11,12 +11,14 @@ module taxel_ethernet_board #(
     parameter int ROWS = 64,
     parameter int BAUD_CLOCKS = 868,
     parameter int CSEL_CLOCKS = 8,
-    parameter int RESET_CLOCKS = 1_000_000  // 10 ms, for the PHY
+    parameter int RESET_CLOCKS = 1_000_000,    // 10 ms, for the PHY
+    parameter int PATTERN_CLOCKS = 200_000_000  // 2 s, for which the button is held for the pattern
 ) (
     input  logic        clk,       // 100 MHz
     input  logic        clk_fast,  // 150 MHz
     input  logic        clk_link,  // 125 MHz
-    input  logic        steady,    // all three clocks are, and no button is pressed; of no clock
+    input  logic        steady,    // all three clocks are; of no clock
+    input  logic        button_n,  // low while the button is pressed, which resets; of no clock
     input  logic [63:0] comparators,
     output logic        ramp,
     output logic        csel_reg_clk_out,
@@ -34,20 +36,30 @@ module taxel_ethernet_board #(
     output logic [3:0]  eth_tx_data
 );
 
-  // Reset lasts until the clocks have been steady for as long as the PHY needs.
+  // Reset lasts until the clocks have been steady, and the button up, for as long as the PHY needs. A button bounces for
+  // less than that.
   localparam int RESET_BITS = $clog2(RESET_CLOCKS + 1);
 
-  logic runs;
-  logic reset;
-  initial reset = 1'b1;
+  localparam int PATTERN_BITS = $clog2(PATTERN_CLOCKS + 1);
+
+  logic runs, up;
+  logic reset, pattern;
+  initial {reset, pattern} = 2'b10;
   logic [RESET_BITS-1:0] waited;
+  logic [PATTERN_BITS-1:0] held;
 
   taxel_synchroniser to_runs (.clk, .from(steady), .to(runs));
+  taxel_synchroniser to_up (.clk, .from(button_n), .to(up));
 
   always_ff @(posedge clk) begin
     reset <= waited != RESET_BITS'(RESET_CLOCKS);
-    if (!runs) waited <= '0;
+    if (!runs || !up) waited <= '0;
     else if (waited != RESET_BITS'(RESET_CLOCKS)) waited <= waited + RESET_BITS'(1);
+    // The button, held for long enough, starts the pattern; as it bounces, what it started stays. The next reset ends it.
+    if (!runs || up) held <= '0;
+    else if (held != PATTERN_BITS'(PATTERN_CLOCKS)) held <= held + PATTERN_BITS'(1);
+    if (held == PATTERN_BITS'(PATTERN_CLOCKS)) pattern <= 1'b1;
+    else if (!runs || (!reset && !up)) pattern <= 1'b0;
   end
 
   assign eth_reset_n = !reset;
@@ -77,7 +89,7 @@ module taxel_ethernet_board #(
       .CSEL_CLOCKS(CSEL_CLOCKS),
       .DELAY(2 + 3)
   ) core (
-      .clk, .clk_fast, .reset, .ramp(ramp_pair), .comparators(samples), .rsel, .csel_reg_clk_out, .csel_reg_din_out,
+      .clk, .clk_fast, .reset, .pattern, .ramp(ramp_pair), .comparators(samples), .rsel, .csel_reg_clk_out, .csel_reg_din_out,
       .rx, .tx, .tdata, .tkeep, .tvalid, .tready, .tlast, .record_sync, .frame_sync_out, .col_change_sync, .col_read_sync,
       .row_read_sync
   );

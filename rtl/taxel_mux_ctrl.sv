@@ -183,6 +183,7 @@ module taxel_mux_ctrl #(
           line_due: line_due,
           totals_due: totals_due
       };
+      read.pattern       <= active.pattern && !initial_frame;
       read.ramp          <= active.ramp;
       read.noise_floor   <= active.noise_floor;
       read.threshold     <= '{rest: active.threshold_rest, jump: active.threshold_jump, decay: active.threshold_decay};

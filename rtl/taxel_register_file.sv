@@ -16,6 +16,7 @@ module taxel_register_file #(
 ) (
     input  logic                            clk,
     input  logic                            reset,
+    input  logic                            pattern,        // whether it is on after a reset
     input  logic                            command,
     input  logic [2:0]                      number,
     input  logic [31:0]                     value,
@@ -84,6 +85,7 @@ module taxel_register_file #(
     if (reset) begin
       {begun, judged, checked, answer, refused_full} <= '0;
       written <= AT_RESET;
+      written.pattern <= pattern;
     end
   end
 

@@ -13,6 +13,8 @@ package taxel_registers;
     logic frame_sync;
     // Version of the wire protocol that the board uses (read: the manual has only one). The bits hold 1 less.
     logic [1:0] wire_version;
+    // The values of a ball that rolls take the place of the comparators' (read: the manual has no such bit).
+    logic pattern;
     // FA-1: increase of the threshold by a spike, T A of Table 5.3.
     logic [15:0] threshold_jump;
     // Time from one driven line to the next.
@@ -40,7 +42,7 @@ package taxel_registers;
   // What register n holds; 0 where there is no such field.
   function automatic logic [31:0] word(registers_t r, logic [2:0] n);
     case (n)
-      3'd0: return 32'(r.random_lines) | (32'(r.mechanoreceptor) << 1) | (32'(r.invert_comparator) << 2) | (32'(r.frame_sync) << 3) | (32'(r.wire_version) << 4) | (32'(r.threshold_jump) << 16);
+      3'd0: return 32'(r.random_lines) | (32'(r.mechanoreceptor) << 1) | (32'(r.invert_comparator) << 2) | (32'(r.frame_sync) << 3) | (32'(r.wire_version) << 4) | (32'(r.pattern) << 6) | (32'(r.threshold_jump) << 16);
       3'd1: return 32'(r.line_period);
       3'd2: return 32'(r.line_read);
       3'd3: return 32'(r.step_period) | (32'(r.step_read) << 16);
@@ -54,7 +56,7 @@ package taxel_registers;
   // Which bits register n has; the others are reserved and must be 0.
   function automatic logic [31:0] mask(logic [2:0] n);
     case (n)
-      3'd0: return 32'hFFFF003F;
+      3'd0: return 32'hFFFF007F;
       3'd1: return 32'hFFFFFFFF;
       3'd2: return 32'hFFFFFFFF;
       3'd3: return 32'hFFFFFFFF;
@@ -76,6 +78,7 @@ package taxel_registers;
         changed.invert_comparator = value[2];
         changed.frame_sync = value[3];
         changed.wire_version = value[5:4];
+        changed.pattern = value[6];
         changed.threshold_jump = value[31:16];
       end
       3'd1: begin
@@ -163,6 +166,7 @@ package taxel_registers;
           invert_comparator: 1'd0,
           frame_sync: 1'd1,
           wire_version: 2'd1,
+          pattern: 1'd0,
           threshold_jump: 16'd0,
           line_period: 32'd600,
           line_read: 32'd600,
@@ -181,6 +185,7 @@ package taxel_registers;
           invert_comparator: 1'd0,
           frame_sync: 1'd1,
           wire_version: 2'd1,
+          pattern: 1'd0,
           threshold_jump: 16'd0,
           line_period: 32'd781,
           line_read: 32'd780,
@@ -199,6 +204,7 @@ package taxel_registers;
           invert_comparator: 1'd0,
           frame_sync: 1'd1,
           wire_version: 2'd0,
+          pattern: 1'd0,
           threshold_jump: 16'd0,
           line_period: 32'd300,
           line_read: 32'd300,
@@ -217,6 +223,7 @@ package taxel_registers;
           invert_comparator: 1'd0,
           frame_sync: 1'd1,
           wire_version: 2'd0,
+          pattern: 1'd0,
           threshold_jump: 16'd0,
           line_period: 32'd75,
           line_read: 32'd75,

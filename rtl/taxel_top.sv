@@ -29,6 +29,7 @@ module taxel_top #(
     input  logic                     clk,
     input  logic                     clk_fast,
     input  logic                     reset,
+    input  logic                     pattern,   // in reset: whether values are those of the pattern from time 0 on
     // The analogue side.
     output logic [1:0]               ramp,
     input  logic [CHANNELS-1:0][1:0] comparators,
@@ -105,7 +106,7 @@ module taxel_top #(
       .STEPS(STEPS),
       .AT_RESET(AT_RESET)
   ) registers (
-      .clk, .reset, .command, .number, .value, .answer, .answered, .room, .refused_full,
+      .clk, .reset, .pattern, .command, .number, .value, .answer, .answered, .room, .refused_full,
       .written, .markers, .starts, .markers_taken, .marker_lost
   );
 

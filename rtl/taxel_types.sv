@@ -45,6 +45,7 @@ package taxel_types;
     micros_t     micros;
     format_t     format;
     ended_t      ended;          // the frame before
+    logic        pattern;        // values are those of the pattern, not of the comparators
     logic [15:0] ramp;           // ticks
     logic [7:0]  noise_floor;    // ticks
     threshold_t  threshold;      // of afferents

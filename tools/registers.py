@@ -166,7 +166,8 @@ def rust_table(source: Table) -> str:
             else f'    #[serde(alias = "{field["manual"]}")]\n'
         )
         unit = "" if field["unit"] in ("flag", "lines", "channels", "version") else f" In units of {field['unit']}."
-        struct.append(f"    /// {field['text']}{unit}\n{rename}    pub {field['name']}: {rust_type(field)},")
+        lacking = "    #[serde(default)]\n" if field.get("later") else ""
+        struct.append(f"    /// {field['text']}{unit}\n{rename}{lacking}    pub {field['name']}: {rust_type(field)},")
     words, masks, stores = [], [], []
     for register in range(8):
         here = [f for f in fields if f.get("register") == register]
@@ -483,6 +484,31 @@ A board of up to 64 lines resets to the first preset of as many channels (*5.2 k
 one resets to wire version 2 and *128 x 128, 1 kHz*, or with 16 channels to *128 x 128, 1.3 kHz*, with the lines of its array, and line
 times no shorter than its steps. *wire* is the version of a board that starts with the preset. Applying a preset to a running board by
 its name (`taxel device apply`, the panel) changes neither its version nor its channels, which are fixed in hardware.
+
+## The pattern
+
+With `pattern` set, values that anyone can compute take the place of the comparators': those of a ball that rolls over the array, so that
+everything behind the converter can be checked without a sensor. No comparator counts as a fault meanwhile. All else is as always: a value
+makes an event where it differs by more than `noise_floor` from the one sent last, and with `mechanoreceptor` it drives the afferent.
+
+The frames of the pattern are counted: `n` is 0 in the first frame that has it, and the number before plus 1, modulo 65536, in each further
+frame. A frame without it ends the count, a reset too; the frame before time 0 never has it. Taxel (`x`, `y`), of driven line `x` and sense
+line `y`, reads `v` ticks in frame `n`, in whole numbers, with `//` rounding down and `mod` never negative:
+
+```
+C, R = the array's columns and rows, each rounded up to a power of two
+p    = (n // 16 - 16 * x) mod (16 * C)        a = min(p, 16 * C - p)
+q    = (n // 2  - 16 * y) mod (16 * R)        b = min(q, 16 * R - q)
+v    = max(0, min(128, ramp) - max(a, b) - min(a, b) // 2)
+```
+
+So positions are in sixteenths of a taxel, the ball's middle is at `n // 16` across the lines and `n // 2` along them, and a ball that
+leaves the array on one side comes back on the other. Of 64 x 64 taxels each one has read 64 or more after 16384 frames. Examples for
+64 x 64 taxels and a ramp of 150: with `n` = 0 taxel (0, 0) reads 128, (1, 0) 112, (1, 1) 104, (63, 63) 104 and (5, 2) 32; with `n` = 100
+(0, 3) reads 121 and (0, 4) 111.
+
+A board may begin with the pattern after a reset: the Colorlight i9 does where its button is held for two seconds or more
+([](hardware.md)).
 
 ## FA-1 on the board
 

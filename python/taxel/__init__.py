@@ -18,7 +18,21 @@ from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
 if TYPE_CHECKING:
-    from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, tasks, wire
+    from taxel import (
+        board_check,
+        detect,
+        device,
+        encode,
+        formats,
+        information,
+        learn,
+        live,
+        metrics,
+        plot,
+        simulate,
+        tasks,
+        wire,
+    )
     from taxel.detect import Readout
     from taxel.recording import BoardChange, Datagrams, Recording, Verdict, Zeroing, open_all
     from taxel.recording import open_one as open  # noqa: A004  taxel.open is a recording's
@@ -58,6 +72,7 @@ __all__ = [
     "Tare",
     "Verdict",
     "Zeroing",
+    "board_check",
     "convert",
     "cut",
     "detect",
@@ -82,8 +97,8 @@ __all__ = [
 
 #: The module of each name that is imported at its first access, so that ``import taxel`` is quick.
 _ROOMS = (
-    "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "plot", "recording", "report",
-    "simulate", "tasks", "wire",
+    "board_check", "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "plot",
+    "recording", "report", "simulate", "tasks", "wire",
 )  # fmt: skip
 _RECORDING = (
     "BoardChange", "Datagrams", "Health", "Recording", "Verdict", "Zeroing", "convert", "cut", "health", "merge",

@@ -479,6 +479,9 @@ def play(
     options: str,
     watch: Callable[[float], object],
 ) -> Played: ...
+def pattern_values(
+    parts: _Array, x: NDArray[np.uint16], y: NDArray[np.uint16], frame: NDArray[np.uint16], ramp: int
+) -> NDArray[np.uint16]: ...
 def emulate(
     to: str,
     parts: _Array,

@@ -291,6 +291,9 @@ void bench_reset(Bench* b) {
     b->step_began = false;
 }
 
+// Whether the pattern is on after the next reset.
+void bench_pattern(Bench* b, int on) { b->top.pattern = on; }
+
 // What is set for steps that begin from now on, or began in the clock before.
 void bench_ticks(Bench* b, const uint16_t* ticks) {
     b->set.ticks = std::make_shared<std::vector<uint16_t>>(ticks, ticks + b->columns * b->rows);
@@ -298,6 +301,19 @@ void bench_ticks(Bench* b, const uint16_t* ticks) {
 void bench_invert(Bench* b, int inverted) { b->set.inverted = inverted; }
 void bench_lines(Bench* b, int lines) { b->set.lines = lines; }
 
+
+// One instant, of 20 ns after 0, 6.67, 10 or 13.33 ns, in which a clock rises; returns the pins behind it, for pictures.
+uint64_t bench_instant(Bench* b) {
+    const uint64_t phase = b->phase;
+    b->step();
+    const auto& top = b->top;
+    const uint64_t pins[] = {top.frame_sync_out, top.row_read_sync, top.col_change_sync, top.col_read_sync,
+                             top.csel_reg_clk_out, top.csel_reg_din_out, top.ramp & 1u, top.ramp >> 1u & 1u,
+                             b->driven[0] & 1u, b->driven[1] & 1u};
+    uint64_t bits = phase;
+    for (int k = 0; k < 10; k++) bits |= pins[k] << (2 + k);
+    return bits | uint64_t{top.rsel} << 12;
+}
 
 // Runs to the next frame's edge, or for so many clocks; returns whether the edge came.
 int bench_run(Bench* b, uint64_t clocks) {

@@ -35,6 +35,7 @@ struct Bench {
         of_ramp = ticks;
         chain.assign(columns, 1);
         top.rx = 1;
+        top.button_n = 1;
     }
 
     static VerilatedContext* prepared(VerilatedContext& context, int seed) {
@@ -114,6 +115,7 @@ extern "C" {
 
 Bench* board_new(int columns, int rows, int seed) { return new Bench(columns, rows, seed); }
 void board_delete(Bench* b) { delete b; }
+void board_button(Bench* b, int pressed) { b->top.button_n = !pressed; }
 void board_steady(Bench* b, int steady) { b->top.steady = steady; }
 void board_ticks(Bench* b, const uint16_t* ticks) { std::memcpy(b->ticks.data(), ticks, 2 * b->ticks.size()); }
 int board_in_reset(Bench* b) { return !b->top.eth_reset_n; }

@@ -181,9 +181,10 @@ class Logic:
         """Give its memory back."""
         self._library.bench_delete(self._bench)
 
-    def reset(self) -> None:
-        """Hold the logic in reset for some clocks; what it sent before is forgotten."""
+    def reset(self, *, pattern: bool = False) -> None:
+        """Hold the logic in reset for some clocks, for the pattern or without it; what it sent before is forgotten."""
         self._bytes = b""
+        self.call("pattern", int(pattern))
         self.call("reset")
 
     def ticks(self, ticks: Any) -> None:

@@ -50,7 +50,7 @@ module colorlight_i9 (
   );
 
   taxel_ethernet_board board (
-      .clk(clk), .clk_fast(clk_fast), .clk_link(clk_link), .steady(locked_scan && locked_link && button_n),
+      .clk(clk), .clk_fast(clk_fast), .clk_link(clk_link), .steady(locked_scan && locked_link), .button_n(button_n),
       .comparators(comparators), .ramp(ramp), .csel_reg_clk_out(csel_reg_clk_out),
       .csel_reg_din_out(csel_reg_din_out), .rx(rx), .tx(tx), .record_sync(record_sync),
       .frame_sync_out(frame_sync_out), .col_change_sync(col_change_sync), .col_read_sync(col_read_sync),

@@ -3,8 +3,8 @@
 // what the event is to hold; no other time gives one. The end of a frame and its markers go before it, one each.
 //
 // Two lines, two steps and two channels here, of which one row does not exist. Reads are twelve clocks apart or more:
-// channels and ten, as rule 9 demands; and of the two steps by turns. Whether an afferent fires is any value at any
-// time.
+// channels and ten, as rule 9 demands; and of the two steps by turns. Whether an afferent fires, and what the pattern
+// has, is any value at any time.
 module detector_proof
   import taxel_types::*;
 #(
@@ -24,7 +24,8 @@ module detector_proof
     input logic             totals_sent,
     input logic             fires,      // what an afferent tells
     input logic             fires_more,
-    input logic [15:0]      integral
+    input logic [15:0]      integral,
+    input logic [15:0]      rolled      // what the pattern tells
 );
 
   localparam int COLUMNS = 2, ROWS = 3, CHANNELS = 2, STEPS = 2;
@@ -69,13 +70,13 @@ module detector_proof
   assign extra   = 3'(follows) + (begins ? ended.markers : 3'd0);
 
   // What it holds, and what is to come of its count.
-  logic [15:0] held, tick, value, moved;
+  logic [15:0] held, tick, value, moved, of_pattern;
   logic judged, returned, changes, spikes, other;
   logic [4:0] slot;
   assign judged   = comes && left == 5'd0;
-  assign returned = !(trip && trip_first && trip_at == 15'd0);
+  assign returned = of_taxel.pattern || !(trip && trip_first && trip_at == 15'd0);
   assign tick     = {trip_at, 1'b0} - 16'(trip_first);
-  assign value    = trip && tick < of_taxel.ramp ? tick : of_taxel.ramp;
+  assign value    = of_taxel.pattern ? of_pattern : trip && tick < of_taxel.ramp ? tick : of_taxel.ramp;
   assign moved    = value > held ? value - held : held - value;
   assign spikes   = of_taxel.format.spikes;
   assign changes  = judged && exists && returned && !of_taxel.initial_frame
@@ -90,6 +91,7 @@ module detector_proof
     if (apart != 4'd15) apart <= apart + 4'd1;
     if (since != 5'd31) since <= since + 5'd1;
     if (comes) left <= left - 5'd1;
+    if (left == 5'd5) of_pattern <= rolled;
     if (judged) comes <= 1'b0;
     if (step_end) ended <= read;
     unreported <= step_end || (unreported && !read_done);
@@ -123,6 +125,7 @@ module detector_proof
       if (!LEMMAS) begin
         assume (read.ramp < 16'd8 && read.noise_floor < 8'd4 && held < 16'd8 && wants_end && wants_done);
         for (int c = 0; c < CHANNELS; c++) assume (at[c] < 15'd4);
+        assume (rolled < 16'd8);
         assume (read.micros < 48'd8 && read.stamp < 16'd8 && read.threshold == '0 && integral < 16'd8);
         assume (read.ended.micros < 31'd8 && read.ended.lines == '0);
         assume (!read_done || !comes || ended.step[0] != of_step);
@@ -155,6 +158,7 @@ module detector_proof
       cover (judged && lost && of_channel);
       cover (judged && push && spikes);
       cover (judged && !returned && of_channel && exists);
+      cover (judged && push && of_taxel.pattern && value > of_taxel.ramp);
     end
   end
 
@@ -199,4 +203,23 @@ module taxel_afferents
   assign fires     = detector_proof.fires;
   assign more      = detector_proof.fires_more;
   assign intensity = detector_proof.integral;
+endmodule
+
+// In place of the pattern: a value that is any.
+module taxel_pattern
+  import taxel_types::*;
+#(
+    parameter int COLUMNS = 64,
+    parameter int ROWS = 64,
+    parameter int ROW_BITS = 6
+) (
+    input  logic                clk,
+    input  logic                reset,
+    input  logic                step_end,
+    input  read_t               read,
+    input  logic                read_done,
+    input  logic [ROW_BITS-1:0] row,
+    output logic [15:0]         value
+);
+  assign value = detector_proof.rolled;
 endmodule

@@ -9,7 +9,8 @@ module registers_proof
     input logic [2:0]  number,
     input logic [31:0] value,
     input logic        room,
-    input logic        markers_taken
+    input logic        markers_taken,
+    input logic        pattern
 );
 
   localparam int COLUMNS = 8, CHANNELS = 16, STEPS = 4;
@@ -31,7 +32,7 @@ module registers_proof
       .STEPS(STEPS),
       .AT_RESET(at_reset(STEPS, COLUMNS, 64, CHANNELS))
   ) registers (
-      .clk, .reset(!begun), .command, .number, .value, .answer, .answered, .room, .refused_full,
+      .clk, .reset(!begun), .pattern, .command, .number, .value, .answer, .answered, .room, .refused_full,
       .written, .markers, .starts, .markers_taken, .marker_lost
   );
 

@@ -18,14 +18,17 @@ ROOM, MOST = 1 << 20, 4096
 class Pins:
     """The board between its pins."""
 
-    def __init__(self, seed: int) -> None:
-        parameters = {"COLUMNS": COLUMNS, "ROWS": ROWS, "RESET_CLOCKS": 60, "BAUD_CLOCKS": 8}
+    def __init__(self, seed: int, **others: int) -> None:
+        parameters = {"COLUMNS": COLUMNS, "ROWS": ROWS, "RESET_CLOCKS": 60, "BAUD_CLOCKS": 8} | others
         self.library = ctypes.CDLL(str(built(parameters=parameters, top="taxel_ethernet_board", bench="board")))
         self.library.board_new.restype = ctypes.c_void_p
         self.board = ctypes.c_void_p(self.library.board_new(COLUMNS, ROWS, seed))
 
     def steady(self, steady: bool) -> None:
         self.library.board_steady(self.board, int(steady))
+
+    def button(self, pressed: bool) -> None:
+        self.library.board_button(self.board, int(pressed))
 
     def in_reset(self) -> bool:
         return bool(self.library.board_in_reset(self.board))

@@ -8,6 +8,7 @@ module timed_core #(
     input  logic                     clk,
     input  logic                     clk_fast,
     input  logic                     reset,
+    input  logic                     pattern,
     output logic [1:0]               ramp,
     input  logic [CHANNELS-1:0][1:0] comparators,
     input  logic                     rx,
@@ -16,7 +17,7 @@ module timed_core #(
     output logic [10:0]              lines   // all other outputs
 );
 
-  logic reset_in, reset_held, rx_in, tready_in;
+  logic reset_in, reset_held, pattern_in, rx_in, tready_in;
   logic [1:0] ramp_out;
   logic [CHANNELS-1:0][1:0] comparators_in;
   logic [9*LINK_BYTES+1:0] link_out;
@@ -25,6 +26,7 @@ module timed_core #(
   always_ff @(posedge clk) begin
     reset_in   <= reset;
     reset_held <= reset_in;
+    pattern_in <= pattern;
     rx_in      <= rx;
     tready_in  <= tready;
     link       <= link_out;
@@ -37,7 +39,7 @@ module timed_core #(
   end
 
   taxel_top #(.COLUMNS(COLUMNS), .ROWS(ROWS), .CHANNELS(CHANNELS), .LINK_BYTES(LINK_BYTES)) core (
-      .clk, .clk_fast, .reset(reset_held), .ramp(ramp_out), .comparators(comparators_in),
+      .clk, .clk_fast, .reset(reset_held), .pattern(pattern_in), .ramp(ramp_out), .comparators(comparators_in),
       .rsel(lines_out[2:0]), .csel_reg_clk_out(lines_out[3]), .csel_reg_din_out(lines_out[4]),
       .rx(rx_in), .tx(lines_out[5]),
       .tdata(link_out[8*LINK_BYTES-1:0]), .tkeep(link_out[9*LINK_BYTES-1:8*LINK_BYTES]),

@@ -6,7 +6,7 @@
 //!
 //! This file defines the board's parts, and how it is created and reset; `frame` runs the parts once per frame, and
 //! `commands` answers the host. `scan` defines the order of taxels, `comparator`, `afferents` and `asynchronous` find
-//! events, `link` encodes them as datagrams and queues these, `refresh` repeats values and totals.
+//! events, `pattern` makes values for a test of what follows, `link` encodes them as datagrams and queues these, `refresh` repeats values and totals.
 
 mod afferents;
 mod asynchronous;
@@ -19,6 +19,7 @@ mod frame;
 mod link;
 mod network;
 mod options;
+mod pattern;
 mod play;
 mod refresh;
 mod scan;
@@ -30,6 +31,7 @@ use afferents::BoardAfferents;
 use asynchronous::Asynchronous;
 use comparator::Comparators;
 use link::Link;
+use pattern::Ball;
 use refresh::Refresh;
 use scan::ScanOrder;
 
@@ -40,6 +42,7 @@ pub use flaws::{Flaw, Flawed, Flaws};
 pub use link::{DATAGRAM_WORDS, PORT, QUEUE_WORDS};
 pub use network::{Network, NetworkCounts, NetworkFaults};
 pub use options::{IntensityWord, Previous, Version2};
+pub use pattern::pattern;
 pub use play::{Armed, Play, Played};
 pub use session::{opening, session};
 
@@ -82,6 +85,8 @@ pub struct Board {
     comparators: Comparators,
     /// The afferent model, used instead of the comparators with `mechanoreceptor`.
     afferents: BoardAfferents,
+    /// The ball whose values take the place of the comparators' with `pattern`.
+    ball: Ball,
     /// The taxels' own comparators, if the board does not scan.
     asynchronous: Option<Asynchronous>,
     link: Link,
@@ -119,6 +124,7 @@ impl Board {
             time: 0,
             comparators: Comparators::new(array.len(), array.columns),
             afferents: BoardAfferents::new(array.len()),
+            ball: Ball::default(),
             asynchronous: None,
             link: Link::new(settings, array)?,
             refresh: Refresh::default(),
@@ -157,6 +163,7 @@ impl Board {
         (self.time, self.refresh) = (0, Refresh::default());
         self.comparators.values.fill(0);
         self.afferents.forget();
+        self.ball = Ball::default();
         self.asynchronous = self.asynchronous.take().map(|_| Asynchronous::default());
         self.link.reset(self.settings(), &self.array)
     }

@@ -102,7 +102,7 @@ impl BoardClock {
     pub fn note(&mut self, board_us: i64, arrived_ns: i64) -> bool {
         let point = (board_us, arrived_ns - board_us * 1000);
         if let Some(offset) = self.offset {
-            self.arrivals.note(arrived_ns - offset.host_ns(board_us));
+            self.arrivals.note(board_us, arrived_ns, arrived_ns - offset.host_ns(board_us));
         }
         let mut ended = false;
         if self.running.points > 0 {
@@ -466,6 +466,18 @@ mod tests {
         }
         let why = clock.pace().and_then(|pace| pace.doubt).expect("a doubt");
         assert!(why.contains("a delay of 1.5 s"), "{why}");
+    }
+
+    #[test]
+    fn a_simulated_board_is_as_slow_as_its_simulation_and_not_doubted() {
+        let mut clock = BoardClock::default();
+        for k in 0..40_000_i64 {
+            clock.note(k * 10_000, k * 400_000_000);
+            if k == 3 || k == 1000 || k == 39_999 {
+                let pace = clock.pace().expect("something came");
+                assert!((pace.drift_ppm / 39e6 - 1.0).abs() < 0.01 && pace.doubt.is_none(), "{k}: {pace:?}");
+            }
+        }
     }
 
     #[test]

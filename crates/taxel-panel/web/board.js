@@ -30,6 +30,7 @@ const SPOKEN = {
   invert_comparator: "Invert comparator",
   frame_sync: "One stamp a frame",
   wire_version: "Wire version",
+  pattern: "Test pattern",
   threshold_jump: "FA-1 jump",
   threshold_rest: "FA-1 threshold",
   threshold_decay: "FA-1 decay",

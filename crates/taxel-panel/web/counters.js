@@ -55,11 +55,18 @@ export function writeCounters(counters, drawn) {
   put("wire", counters.wire_version ? `wire version ${counters.wire_version}` : "");
 }
 
+/** A drift beyond which the source is a simulated board, ppm: as the server has it. */
+const SIMULATED_PPM = 1e6;
+
 /**
  * Writes how the source's clock runs beside this machine's, and how late its datagrams are.
  * @param {Pace | null} pace of what is shown; null where arrivals say nothing
  */
 export function writePace(pace) {
+  if (pace && pace.drift_ppm > SIMULATED_PPM) {
+    write(part("pace", HTMLElement), `Clock: a simulated board, at 1/${(1 + pace.drift_ppm / 1e6).toFixed(0)} of real time`);
+    return;
+  }
   const delays = pace && pace.delay.p50_us !== null && pace.delay.p99_us !== null ? `; delays beyond the shortest: ${short(pace.delay.p50_us)} (median), ${short(pace.delay.p99_us)} (99 %)` : "";
   write(part("pace", HTMLElement), pace ? `Clock: drift ${pace.drift_ppm < 0 ? "−" : "+"}${Math.abs(pace.drift_ppm).toFixed(1)} ppm${delays}` : "");
 }

@@ -25,6 +25,7 @@ export const FIELDS = [
   { name: "invert_comparator", manual: "invert_comparator", register: 0, low: 2, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "A falling edge ends a sample." },
   { name: "frame_sync", manual: "use_frame_sync", register: 0, low: 3, bits: 1, offset: 0, unit: "flag", default: true, least: 0, greatest: 1, text: "All events of a frame carry the time of its start." },
   { name: "wire_version", manual: "wire_version", register: 0, low: 4, bits: 2, offset: 1, unit: "version", default: 1, least: 1, greatest: 2, text: "Version of the wire protocol that the board uses (read: the manual has only one)." },
+  { name: "pattern", manual: "pattern", register: 0, low: 6, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "The values of a ball that rolls take the place of the comparators' (read: the manual has no such bit)." },
   { name: "threshold_jump", manual: "threshold_jump", register: 0, low: 16, bits: 16, offset: 0, unit: "1/256 theta_0", default: 0, least: 0, greatest: 65535, text: "FA-1: increase of the threshold by a spike, T A of Table 5.3." },
   { name: "line_period", manual: "row_change_period", register: 1, low: 0, bits: 32, offset: 0, unit: "10 ns", default: 300, least: 1, greatest: 4294967295, text: "Time from one driven line to the next." },
   { name: "line_read", manual: "row_read_duration", register: 2, low: 0, bits: 32, offset: 0, unit: "10 ns", default: 300, least: 1, greatest: 4294967295, text: "Part of line_period in which the line is read." },

@@ -87,7 +87,9 @@ mod _core {
         numbered_path, open_regular, read_lsa, recording_damage, recording_verdict, whole_frames, write_lsa,
     };
     #[pymodule_export]
-    use crate::simulate::{Layer, Played, SendingBoard, check_scene, draw_scene, emulate, motion, play, truth};
+    use crate::simulate::{
+        Layer, Played, SendingBoard, check_scene, draw_scene, emulate, motion, pattern_values, play, truth,
+    };
     #[cfg(feature = "test-hooks")]
     #[pymodule_export]
     use crate::test_hooks::{message_schemas, test_hook};

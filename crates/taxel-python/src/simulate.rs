@@ -394,6 +394,22 @@ impl Layer {
     }
 }
 
+/// The pattern's values (ticks) of taxels in frames since it began: each taxel's place and frame.
+#[pyfunction]
+pub fn pattern_values<'py>(
+    py: Python<'py>,
+    parts: ArrayParts,
+    x: PyReadonlyArray1<'py, u16>,
+    y: PyReadonlyArray1<'py, u16>,
+    frame: PyReadonlyArray1<'py, u16>,
+    ramp: u16,
+) -> PyResult<Bound<'py, PyArray1<u16>>> {
+    let of = to_array(parts)?;
+    let (x, y, frame) = (slice("x", &x)?, slice("y", &y)?, slice("frame", &frame)?);
+    let values = x.iter().zip(y).zip(frame).map(|((&x, &y), &n)| board::pattern(&of, (x, y), n, ramp));
+    Ok(array(py, values.collect()))
+}
+
 /// A board that scans frames as they are pushed, and sends what it makes of them.
 #[pyclass(frozen, module = "taxel._core")]
 pub struct SendingBoard(Exclusive<(Board, Sender)>);

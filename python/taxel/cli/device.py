@@ -1,4 +1,4 @@
-"""``taxel device``: a board on its serial line."""
+"""``taxel device``: a board on its serial line, and whether it works."""
 
 from __future__ import annotations
 
@@ -14,10 +14,13 @@ from rich.table import Table
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._core import ProblemError
-from taxel.cli._app import App, JsonOption, SecondsOption
+from taxel.array import of_size
+from taxel.board_check import check_board
+from taxel.cli._app import OUTSIDE, App, JsonOption, SecondsOption
 from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.device import Device, ports
+from taxel.live.sending import PORT
 from taxel.wire import PRESETS, Registers, described
 from taxel.wire.registers import QUOTED_PRESETS
 
@@ -146,6 +149,49 @@ def watch(
                 say(json.dumps(now) if as_json else faults + reconnect_text)
                 before = now
             time.sleep(_POLL_S)
+
+
+@app.command(short_help="Check a board: its link by a pattern, then its comparators at rest.")
+def check(
+    place: Annotated[
+        str | None,
+        typer.Argument(help="The serial port, or host:port. Without it only the pattern that the board makes already."),
+    ] = None,
+    port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port that the board sends to.")] = PORT,
+    host: Annotated[str, typer.Option(help="The address of this machine to listen on; 0.0.0.0: all.")] = "0.0.0.0",
+    array: Annotated[
+        str | None,
+        typer.Option(metavar="ROWSxCOLUMNS", help="Without a serial line: the size of the sensor. Default: 64x64."),
+    ] = None,
+    preset: Annotated[
+        str | None,
+        typer.Option(help="Without a serial line: the board's preset. Default: that which explains the values best."),
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, help="For how long each part is received, s.")] = 4.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Check a board: its link by a pattern that it makes itself, then its comparators at rest.
+
+    With its serial line the command switches the pattern on, compares every value that arrives, and looks at the
+    comparators, for which nothing may touch the sensor; then the registers are as before. Without it the board must
+    make the pattern already: hold the button of the Colorlight i9 for two seconds. Exit code 3: something is not as it
+    must be.
+
+    Example: taxel device check /dev/ttyACM0
+    """
+    result = check_board(
+        place,
+        port=port,
+        host=host,
+        array=None if array is None else of_size(array, of_wire=True),
+        preset=preset,
+        seconds=seconds,
+        say=None if as_json else say,
+    )
+    if as_json:
+        say(json.dumps({"good": result.good, "findings": [asdict(finding) for finding in result.findings]}))
+    if not result.good:
+        raise typer.Exit(OUTSIDE)
 
 
 #: Interval at which `watch` reads the faults, s.

@@ -7,7 +7,7 @@ UDP: acts, a recording again, or the frames of any other sensor. `Board` is the 
 
 from taxel.simulate import circuit
 from taxel.simulate.acts import Act, Contact, FrameSequence, Motion, Scene, Silence, Track
-from taxel.simulate.board import NOT_RETURNED, Board, Version2
+from taxel.simulate.board import NOT_RETURNED, Board, Version2, pattern
 from taxel.simulate.emulator import Played, emulate, play, truth
 from taxel.simulate.emulator_report import EmulatorReport
 from taxel.simulate.layer import Layer, Pressed
@@ -38,6 +38,7 @@ __all__ = [
     "Version2",
     "circuit",
     "emulate",
+    "pattern",
     "play",
     "truth",
 ]

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import buffer_bytes, flag, instance, integer, numbers, text
@@ -19,7 +19,7 @@ from taxel.array import Array
 from taxel.simulate.circuit import Circuit
 from taxel.wire import Registers
 
-__all__ = ["NOT_RETURNED", "Board", "Version2", "fitting", "reading"]
+__all__ = ["NOT_RETURNED", "Board", "Version2", "fitting", "pattern", "reading"]
 
 #: The trip time of a comparator that had not returned when the ramp began: a fault, not a value.
 NOT_RETURNED = 65_535
@@ -100,6 +100,44 @@ def fitting(preset: str | None, array: Array) -> Registers:
     except DeviceError as error:
         size = f"{array.rows} x {array.columns} taxels"
         raise DeviceError(f'preset "{preset}" does not read {size}: {error}') from None
+
+
+def pattern(frame: int, *, array: Array | None = None, ramp: int = 150) -> NDArray[np.uint16]:
+    """Return what a board whose register `pattern` is set reads, in the place of its comparators' values.
+
+    Parameters
+    ----------
+    frame : int, 0 or more
+        Frames since the pattern began; it repeats after 65536.
+    array : Array, optional
+        The sensor; default: the thesis' 64 x 64.
+    ramp : int, ticks, 1 to 65534
+        As the registers have it.
+
+    Returns
+    -------
+    uint16, shape (rows, columns), ticks
+
+    Raises
+    ------
+    ProblemError : a number out of these ranges
+
+    Notes
+    -----
+    The formula is in *Registers*, *The pattern*.
+
+    Examples
+    --------
+    >>> pattern(0)[:3, :3]
+    array([[128, 112,  96],
+           [112, 104,  88],
+           [ 96,  88,  80]], dtype=uint16)
+    """
+    sensor = Array._of(array)
+    y, x = (place.ravel().astype(np.uint16) for place in np.indices(sensor.shape))
+    n = np.full(x.size, integer("frame", frame, 0) % 65_536, np.uint16)
+    values = _core.pattern_values(sensor._parts(), x, y, n, integer("ramp", ramp, 1, 65_534))
+    return values.reshape(sensor.shape)
 
 
 class Board:

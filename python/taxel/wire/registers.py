@@ -54,9 +54,10 @@ class Registers:
         A difference above it causes an event.
     lines : int, 1 to 256
         Driven lines.
-    random_lines, mechanoreceptor, invert_comparator, frame_sync, record : bool
+    random_lines, mechanoreceptor, invert_comparator, frame_sync, pattern, record : bool
         Whether the lines are driven in random order, each taxel is an FA-1 afferent, a falling edge ends a sample, all
-        events of a frame have the time of its start, and the board is recording.
+        events of a frame have the time of its start, the values of a rolling ball replace the comparators', and the
+        board is recording.
     wire_version : {1, 2}
         Version 1 can address 64 x 64 taxels at most.
     threshold_rest, threshold_jump, threshold_decay : int, in 1/1024, 1/256 theta_0, 1/1024 theta_0

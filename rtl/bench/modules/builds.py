@@ -8,7 +8,7 @@ from structs import pack
 def held(**fields: int) -> str:
     """Return the parameter that sets what registers hold at reset: what obeys the rules, but for the fields given."""
     times = {"line_period": 300, "line_read": 300, "step_period": 75, "step_read": 55, "ramp": 150, "noise_floor": 3}
-    return f"AT_RESET=175'h{pack('registers_t', frame_sync=1, **times, **fields):x}"
+    return f"AT_RESET=176'h{pack('registers_t', frame_sync=1, **times, **fields):x}"
 
 
 #: Modules, each with the parameters of its builds.
@@ -26,7 +26,7 @@ MODULES = {
     "comparator_array": ["CHANNELS=8", "CHANNELS=16 DELAY=5"],
     "comparator_column": [""],
     "datagram_sender": ["ROWS=5 BOARD=4711", "ROWS=128", "ROWS=1"],
-    "ethernet_board": ["COLUMNS=3 ROWS=5 BAUD_CLOCKS=8 RESET_CLOCKS=60"],
+    "ethernet_board": ["COLUMNS=3 ROWS=5 BAUD_CLOCKS=8 RESET_CLOCKS=60 PATTERN_CLOCKS=500"],
     "ethernet_frame": [""],
     "event_fifo": ["DEPTH=4 BITS=8", "DEPTH=5 BITS=12"],
     "link": ["BYTES=1", "BYTES=4"],
@@ -39,6 +39,7 @@ MODULES = {
         "ROWS=128 MOST=688 HOLD_US=1000 DIFFERENCE=1",
         "ROWS=64 MOST=128 VALUED=0 HEARTBEAT_US=30000",
     ],
+    "pattern": ["", "COLUMNS=5 ROWS=7", "COLUMNS=128 ROWS=128 ROW_BITS=7", "COLUMNS=1 ROWS=1"],
     "power_law": [""],
     "ramp_counter": ["", "DELAY=6", "DELAY=9"],
     "random_lines": [""],

@@ -266,6 +266,25 @@ class Comparators:
         return self.late.popleft()
 
 
+class Ball:
+    """The pattern, as docs/registers.md has it: frames since it began, and what a taxel reads."""
+
+    def __init__(self, columns: int, rows: int) -> None:
+        self.columns, self.rows = (1 << (size - 1).bit_length() for size in (columns, rows))
+        self.n: int | None = None
+
+    def frame(self, rolls: bool) -> None:
+        """Begin a frame of which the pattern is on, or off."""
+        self.n = None if not rolls else 0 if self.n is None else (self.n + 1) % 65536
+
+    def value(self, x: int, y: int, ramp: int) -> int:
+        """Return what a taxel reads in this frame."""
+        assert self.n is not None
+        ahead = (self.n // 16 - 16 * x) % (16 * self.columns), (self.n // 2 - 16 * y) % (16 * self.rows)
+        a, b = (min(d, 16 * size - d) for d, size in zip(ahead, (self.columns, self.rows), strict=True))
+        return max(0, min(128, ramp) - max(a, b) - min(a, b) // 2)
+
+
 class Scan:
     """The changes and spikes of frames of one array, in the order of the scan (docs/wire.md)."""
 

@@ -6,7 +6,7 @@ from collections import defaultdict, deque
 import cocotb
 from cocotb.triggers import FallingEdge
 from drivers import begin, settled, within
-from models import NOT_RETURNED, Afferent
+from models import NOT_RETURNED, Afferent, Ball
 from structs import NUMBERS, pack, unpack
 
 EVENT, MARKER, FRAME, FLUSH = (NUMBERS[f"ENTRY_{name}"] for name in ("EVENT", "MARKER", "FRAME", "FLUSH"))
@@ -24,7 +24,7 @@ def drawn(frames, build):
             ramp = random.choice([5, 150, 300])
             now = {
                 "ramp": ramp, "noise_floor": random.choice([0, 3, 255]) if ramp > 5 else 0,
-                "lines": random.randrange(build["COLUMNS"]),
+                "lines": random.randrange(build["COLUMNS"]), "pattern": int(frame > 0 and random.random() < 0.3),
                 "threshold": {"rest": random.choice([33, 400]), "jump": random.randrange(2000),
                               "decay": random.randrange(256)},
                 "format": {"version_2": random.getrandbits(1), "wide_values": ramp > 255,
@@ -45,7 +45,8 @@ def drawn(frames, build):
                     "initial_frame": frame == 0, "frame_first": line == lines[0] and step == 0,
                     "frame_last": line == lines[-1] and step == build["STEPS"] - 1, "line": line, "step": step,
                     "stamp": at // 100 & 0xFFFF, "micros": at, "format": now["format"], "ended": said,
-                    "ramp": now["ramp"], "noise_floor": now["noise_floor"], "threshold": now["threshold"],
+                    "pattern": now["pattern"], "ramp": now["ramp"],
+                    "noise_floor": now["noise_floor"], "threshold": now["threshold"],
                     "markers": markers, "starts": starts,
                 }  # fmt: skip
                 counts = []
@@ -71,6 +72,7 @@ class Model:
     def __init__(self, build):
         self.build = build
         self.held, self.afferents = defaultdict(int), defaultdict(Afferent)
+        self.ball = Ball(build["COLUMNS"], build["ROWS"])
         self.seen = deque()  # entries, and what found no room: by clock
         self.first, self.faults, self.sent, self.frames = [], 0, 0, 0
         self.lost = self.frame = self.pushed = 0
@@ -146,12 +148,15 @@ class Model:
                 assert self.entry(kind=FLUSH, **self.times(ended["format"], read))
         if not form["spikes"]:
             self.afferents.clear()
-        for channel, count in enumerate(counts):
+        if read["frame_first"]:
+            self.ball.frame(read["pattern"])
+        for channel, counted in enumerate(counts):
             row = channel * build["STEPS"] + read["step"]
             taxel = read["line"], row
-            value = min(count, read["ramp"])
             if row >= build["ROWS"]:
                 continue
+            count = self.ball.value(*taxel, read["ramp"]) if read["pattern"] else counted
+            value = min(count, read["ramp"])
             if read["initial_frame"]:
                 self.first.append(NOT_RETURNED if count == NOT_RETURNED else value)
                 continue

@@ -66,7 +66,7 @@ async def frames_are_those_of_the_page(dut):
         while not int(dut.frame_sync_out.value):
             await FallingEdge(dut.clk)
 
-    dut.steady.value, dut.rx.value, dut.comparators.value = 0, 1, 0
+    dut.steady.value, dut.button_n.value, dut.rx.value, dut.comparators.value = 0, 1, 1, 0
     Clock(dut.clk, 10, "ns").start()
     Clock(dut.clk_fast, 2 * TICK, "ps").start()
     Clock(dut.clk_link, 8, "ns").start()

@@ -23,7 +23,7 @@ def drawn(columns, steps):
         "invert_comparator": random.getrandbits(1), "frame_sync": random.getrandbits(1),
         "wire_version": random.getrandbits(1), "threshold_jump": random.getrandbits(16),
         "threshold_rest": random.getrandbits(16), "threshold_decay": random.getrandbits(8),
-        "noise_floor": random.getrandbits(8),
+        "noise_floor": random.getrandbits(8), "pattern": random.getrandbits(1),
         "line_period": line_read + random.choice([0, random.randrange(40)]), "line_read": line_read,
         "step_period": step, "step_read": read, "ramp": random.choice([150, 255, 256, 60]),
         "lines": random.randrange(columns), "record": random.getrandbits(1),
@@ -122,6 +122,7 @@ async def every_clock_of_the_scan(dut):
                     "frame_last": k == r["lines"] and step == steps - 1, "line": order[k], "step": step,
                     "stamp": values["stamp"], "micros": values["micros"],
                     "format": unpack("format_t", pack("format_t", **form(r))), "ramp": r["ramp"],
+                    "pattern": r["pattern"] and frame > 0,
                     "noise_floor": r["noise_floor"], "markers": waiting[0], "starts": waiting[1],
                     "threshold": SimpleNamespace(
                         rest=r["threshold_rest"], jump=r["threshold_jump"], decay=r["threshold_decay"]

@@ -77,8 +77,10 @@ async def every_command_is_answered_and_rules_are_kept(dut):
     build = {"channels": channels, "driven_lines": columns, "sense_lines": rows, "steps": steps}
     first = vars(unpack("registers_t", dut.AT_RESET.value))
     assert not broken(first, build)
-    kinds, held, waiting, refusals = dict.fromkeys((GREETING, OK, BAD, STATUS), 0), dict(first), [], 0
-    await begin(dut, command=0, room=1, markers_taken=0)
+    kinds, waiting, refusals = dict.fromkeys((GREETING, OK, BAD, STATUS), 0), [], 0
+    first["pattern"] = random.getrandbits(1)
+    held = dict(first)
+    await begin(dut, command=0, room=1, markers_taken=0, pattern=first["pattern"])
 
     async def clock():
         """One clock; the scan may take markers in it."""
@@ -90,7 +92,8 @@ async def every_command_is_answered_and_rules_are_kept(dut):
 
     for k in range(1500):
         if k % 500 == 499:
-            await reset(dut, command=0, markers_taken=0)
+            first["pattern"] = random.getrandbits(1)
+            await reset(dut, command=0, markers_taken=0, pattern=first["pattern"])
             held = dict(first)
             waiting.clear()
         number, value = attempt(held, build)

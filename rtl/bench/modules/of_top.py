@@ -96,7 +96,7 @@ async def datagrams_and_lines_are_those_of_the_page(dut):
             serial.append(sum(level << k for k, level in enumerate(levels[:8])))
 
     Clock(dut.clk_fast, 6666, "ps").start()
-    await begin(dut, rx=1, tready=0, comparators=0)
+    await begin(dut, pattern=0, rx=1, tready=0, comparators=0)
 
     def payload():
         return beat(dut.tdata, int(dut.tkeep.value)), int(dut.tlast.value)

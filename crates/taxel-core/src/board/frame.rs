@@ -20,7 +20,7 @@ impl Board {
     /// `ticks` are the comparators' trip times by taxel index, in 1/300 us from the ramp's start; one at or above the
     /// ramp's length reads as that length, and [`NOT_RETURNED`] is a fault. `sink` receives each datagram's payload and
     /// returns whether it accepted it. Datagrams that it does not accept wait in the queue; if the queue is full, a
-    /// taxel's words are dropped.
+    /// taxel's words are dropped. With `pattern` set, [`pattern`](super::pattern()) takes the place of the trip times.
     ///
     /// # Errors
     ///
@@ -48,10 +48,12 @@ impl Board {
         {
             return Err(problem!("accepted of {} taxels: the array has {}", accepted.len(), self.array.len()));
         }
-        let read = FrameReading { ticks, accepted };
         self.link.offer(&mut self.counts, &mut sink);
         self.take_over(&mut sink);
         let registers = self.active;
+        let of_ball = self.ball.frame(&self.array, registers.pattern, registers.ramp);
+        let ticks = of_ball.as_deref().unwrap_or(ticks);
+        let read = FrameReading { ticks, accepted };
         let lines = self.scan.lines(&registers);
         let any = self.compare(ticks);
         if self.is_asynchronous() {

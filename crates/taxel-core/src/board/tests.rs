@@ -292,6 +292,32 @@ fn presets_play_on_boards_that_fit_them() {
 }
 
 #[test]
+fn the_pattern_reads_as_its_page_has_it_and_begins_anew() {
+    let thesis = Array::thesis();
+    let of_page = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (63, 63, 0), (5, 2, 0), (0, 3, 100), (0, 4, 100)];
+    let values = of_page.map(|(x, y, n)| pattern(&thesis, (x, y), n, 150));
+    assert_eq!(values, [128, 112, 104, 104, 32, 121, 111]);
+    assert_eq!(pattern(&thesis, (0, 0), 0, 90), 90);
+    // What the comparators do has no effect; each frame without the pattern ends it.
+    let mut board = Board::new(Registers { pattern: true, noise_floor: 0, ..Registers::default() }, &thesis).unwrap();
+    let mut held = vec![0; 4096];
+    for on in [true, false, true] {
+        let word = board.registers().word(0) & !(1 << 6) | u32::from(on) << 6;
+        board.command(&Command { register: 0, value: word }.to_bytes());
+        for n in 0..40 {
+            for word in words(&play(&mut board, &[NOT_RETURNED; 4096])) {
+                if let Word::Intensity { ticks, x, y, .. } = word {
+                    held[thesis.index(x.into(), y.into())] = ticks;
+                }
+            }
+            let expected = |k: usize| pattern(&thesis, ((k % 64) as u16, (k / 64) as u16), n, 150);
+            assert!(!on || (0..4096).all(|k| held[k] == expected(k)), "frame {n}");
+        }
+    }
+    assert_eq!(board.counts().not_returned, 40 * 4096);
+}
+
+#[test]
 fn nonsense_is_refused() {
     let mut board = board();
     assert!(board.frame(&[0; 4095], |_| true).unwrap_err().to_string().contains("4095 trip times"));

@@ -12,13 +12,21 @@ use crate::latency::{Latencies, Quantiles};
 const MOST_DRIFT_PPM: f64 = 10_000.0;
 /// Reading: no datagram on a local network is later than this, us.
 const MOST_DELAY_US: f64 = 1e6;
+/// Reading: a board whose clock takes more than twice the host's time is a simulated one, ppm.
+const SIMULATED_PPM: f64 = 1e6;
+/// Host's time after which a simulated board is known by its pace, ns.
+const KNOWN_NS: i64 = 500_000_000;
 /// Only by a drift beyond what is fitted does one in two arrive so much sooner than the soonest can, us.
 const SOON_US: f64 = 1e5;
 
 /// Why a drift between two clocks, or the delays of datagrams, cannot be; `None` if they can. `delay_us` is that of 99
-/// in 100 datagrams at most, `median_us` that of one in two.
+/// in 100 datagrams at most, `median_us` that of one in two. A simulated board's clock is as slow as its simulation, and
+/// all its datagrams seem late: that is no reason for a doubt.
 #[must_use]
 pub fn doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<String> {
+    if drift_ppm > SIMULATED_PPM {
+        return None;
+    }
     let mut wrong = vec![];
     if drift_ppm.abs() > MOST_DRIFT_PPM {
         wrong.push(format!("a drift of {drift_ppm:+.0} ppm (clocks differ by less than {MOST_DRIFT_PPM:.0})"));
@@ -55,12 +63,25 @@ pub struct Pace {
 pub(super) struct ArrivalDelays {
     delays: Latencies,
     fastest: VecDeque<ArrivalPoint>,
+    /// The first arrival and the latest: the board's time, us, and the host's, ns.
+    ends: Option<[(i64, i64); 2]>,
 }
 
 impl ArrivalDelays {
-    /// Notes how much later than the line a datagram arrived.
-    pub(super) fn note(&mut self, late_ns: i64) {
+    /// Notes when a datagram arrived, and how much later than the line.
+    pub(super) fn note(&mut self, board_us: i64, arrived_ns: i64, late_ns: i64) {
+        let now = (board_us, arrived_ns);
+        self.ends = Some([self.ends.map_or(now, |[first, _]| first), now]);
         self.delays.note(late_ns);
+    }
+
+    /// The drift of a simulated board, ppm; `None` if it is none.
+    #[allow(clippy::cast_precision_loss)]
+    fn simulated_ppm(&self) -> Option<f64> {
+        let [(first_us, first_ns), (last_us, last_ns)] = self.ends?;
+        let (board_ns, host_ns) = ((last_us - first_us) * 1000, last_ns - first_ns);
+        let drift = (host_ns as f64 / board_ns.max(1) as f64 - 1.0) * 1e6;
+        (host_ns >= KNOWN_NS && drift > SIMULATED_PPM).then_some(drift)
     }
 
     /// Notes the fastest arrival of a stretch.
@@ -88,7 +109,8 @@ impl ArrivalDelays {
     /// What they show beside the line.
     pub(super) fn pace(&self, line: Offset) -> Pace {
         let beyond = self.drift_ppm().filter(|drift| drift.abs() > MOST_DRIFT_PPM);
-        let (drift_ppm, delay) = (beyond.unwrap_or(line.drift_ppm), self.delays.quantiles());
+        let drift_ppm = self.simulated_ppm().or(beyond).unwrap_or(line.drift_ppm);
+        let delay = self.delays.quantiles();
         let doubt = doubt(drift_ppm, delay.p99_us.unwrap_or(0.0), delay.p50_us.unwrap_or(0.0));
         Pace { drift_ppm, delay, doubt }
     }

@@ -2,7 +2,7 @@
 
 use super::field::Field;
 
-pub(super) const FIELDS: [Field; 16] = [
+pub(super) const FIELDS: [Field; 17] = [
     Field {
         name: "random_lines",
         manual: "use_rand_row",
@@ -62,6 +62,18 @@ pub(super) const FIELDS: [Field; 16] = [
         offset: 1,
         least: 1,
         greatest: 2,
+    },
+    Field {
+        name: "pattern",
+        manual: "pattern",
+        unit: "flag",
+        text: "The values of a ball that rolls take the place of the comparators' (read: the manual has no such bit).",
+        register: 0,
+        shift: 6,
+        mask: 0x1,
+        offset: 0,
+        least: 0,
+        greatest: 1,
     },
     Field {
         name: "threshold_jump",

@@ -19,6 +19,7 @@ const DEFAULTS: Registers = Registers {
     invert_comparator: false,
     frame_sync: true,
     wire_version: 1,
+    pattern: false,
     threshold_jump: 0,
     line_period: 300,
     line_read: 300,

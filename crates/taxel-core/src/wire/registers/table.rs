@@ -19,6 +19,9 @@ pub struct Registers {
     pub frame_sync: bool,
     /// Version of the wire protocol that the board uses (read: the manual has only one).
     pub wire_version: u8,
+    /// The values of a ball that rolls take the place of the comparators' (read: the manual has no such bit).
+    #[serde(default)]
+    pub pattern: bool,
     /// FA-1: increase of the threshold by a spike, T A of Table 5.3. In units of 1/256 theta_0.
     pub threshold_jump: u16,
     /// Time from one driven line to the next. In units of 10 ns.
@@ -61,6 +64,7 @@ impl Registers {
                     | u32::from(self.invert_comparator) << 2
                     | u32::from(self.frame_sync) << 3
                     | (u32::from(self.wire_version).wrapping_sub(1) & 0x3) << 4
+                    | u32::from(self.pattern) << 6
                     | u32::from(self.threshold_jump) << 16
             }
             1 => self.line_period,
@@ -81,7 +85,7 @@ impl Registers {
     #[must_use]
     pub fn mask(n: u8) -> u32 {
         match n {
-            0 => 0xffff003f,
+            0 => 0xffff007f,
             1 => 0xffffffff,
             2 => 0xffffffff,
             3 => 0xffffffff,
@@ -101,6 +105,7 @@ impl Registers {
                 self.invert_comparator = (value >> 2) & 0x1 == 1;
                 self.frame_sync = (value >> 3) & 0x1 == 1;
                 self.wire_version = ((value >> 4) & 0x3) as u8 + 1;
+                self.pattern = (value >> 6) & 0x1 == 1;
                 self.threshold_jump = ((value >> 16) & 0xffff) as u16;
             }
             1 => {
