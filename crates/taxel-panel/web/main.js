@@ -11,6 +11,7 @@ import { Labels } from "./labels.js";
 import { Lanes } from "./lanes.js";
 import { Layout } from "./layout.js";
 import { Maps } from "./maps.js";
+import { Mistakes } from "./mistakes.js";
 import { Notes } from "./notes.js";
 import { failed, notify, silence } from "./notice.js";
 import { Player } from "./player.js";
@@ -51,14 +52,18 @@ const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.c
 const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), timeWindow, mark);
 const maps = new Maps(settings, watch);
 const lanes = new Lanes(settings, shown);
-const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
+const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), (from, to) => timeWindow.closer(from, to), listRecordings);
 const notes = new Notes(player, labels);
-const training = new Training(server, player);
+const mistakes = new Mistakes(player, () => {
+  marksDue = true;
+  layout.arrange();
+});
+const training = new Training(server, player, mistakes);
 const layout = new Layout(arrangement, () => (lanesDue = true));
 const board = new Board(server, settings, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
 const recorder = new Recorder(server, failed, () => showTab("record"));
-const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, notes: notes.withTime, cut: view.cut }));
+const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, mistakes: mistakes.shown, notes: notes.withTime, cut: view.cut }));
 
 /** @type {Timeline | null} */
 let timeline = null;
@@ -256,6 +261,8 @@ function receive(message) {
       return board.connection.log(message.text);
     case "source_preview":
       return board.connection.preview(message);
+    case "layout_saved":
+      return board.connection.saved(message);
     case "places":
       return board.connection.offer(message);
     case "cut":
@@ -375,11 +382,11 @@ function open(message) {
   if (!again) turnTo(message);
   if (timeline && !again) {
     timeline.following = false;
-    timeWindow.showAll();
+    timeWindow.showBeginning(message.touch_us);
     // It opens on something: the first touch.
     if (message.touch_us !== null) player.seek(message.touch_us);
   }
-  training.choose(message.name, message.train);
+  training.choose(message.name, message.train, message.frames?.trial ?? null);
   board.array = message.array;
   const noisy = message.frames?.flickering ?? [];
   maps.flickering = noisy.length;
@@ -437,6 +444,7 @@ function showDetections(shown, labels) {
 function mark() {
   cursor.draw();
   detections.mark(timeline);
+  mistakes.mark(timeline);
 }
 
 const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
@@ -526,7 +534,7 @@ matchMedia("(prefers-color-scheme: light)").addEventListener("change", applyThem
 
 // ------------------------------------------------------------------------------------------------ start
 
-bindActions({ server, player, settings, recorder, labels, view, maps, lanes, window: timeWindow }, () => timeline);
+bindActions({ server, player, settings, recorder, labels, mistakes, view, maps, lanes, window: timeWindow }, () => timeline);
 part("files", HTMLSelectElement).onchange = ({ target }) => {
   const { value } = /** @type {HTMLSelectElement} */ (target);
   if (value) ask(value);

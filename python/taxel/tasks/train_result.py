@@ -167,6 +167,16 @@ class Training:
                 for recording, score in zip(self.recordings, self.scored.scores, strict=True)
             ],
             "score": self.scored.together.to_dict(),
+            "mistakes": [
+                {
+                    "recording": self.recordings[k].name,
+                    "source": self.recordings[k].label,
+                    "label": label,
+                    "t_us": t,
+                    "missed": is_missed,
+                }
+                for k, label, t, is_missed in self.scored.mistakes
+            ],
             "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
             "helps": {label: advice.helps for label, advice in self.advice.items()},
             "options": sorted({advice.option for advice in self.advice.values() if advice.option is not None}),
