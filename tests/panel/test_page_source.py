@@ -98,3 +98,35 @@ def test_what_arrives_is_shown_and_another_source_takes_the_place_of_the_first(t
         assert panel.live is not None
         assert panel.live.array.shape == (4, 4)
         until(lambda: panel.live is not None and panel.live.counters["frames"] > 5, "the source before is back")
+
+
+def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chromium: Any, tmp_path: Path) -> None:
+    plug = tmp_path / "mat"
+    with (
+        running("live", "--panel", "--port", "0", "--host", "127.0.0.1", folder=tmp_path) as server,
+        opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
+    ):
+        connect = page.locator("#numbers-form").get_by_role("button", name="Connect", exact=True)
+        with mat(4, 4) as (line, _):
+            plug.symlink_to(line)
+            page.locator("#numbers").fill(f"serial:{plug},array=4x4,frame_end=blank")
+            connect.click()
+            shows(page, "state-word", "^Live$")
+            page.locator("#record").click()
+            shows(page, "state-word", "^Recording trial1.mcap$")
+            page.wait_for_timeout(1000)
+        shows(page, "silence-text", rf"^The line is silent: nothing from serial:{plug}.* since \d+\.\d+ s of the source, for")
+        shows(page, "state-word", "^Silent, Recording")
+        plug.unlink()
+        with mat(4, 4) as (line, _):
+            plug.symlink_to(line)
+            until(lambda: page.locator("#silence").is_hidden(), "lines arrive again")
+            shows(page, "state-word", "^Recording trial1.mcap$")
+            page.wait_for_timeout(500)
+            page.locator("#record").click()
+            shows(page, "record-last-verdict", "silent|gap|without|lost")
+            connect.click()
+            shows(page, "state-word", "^Live$")
+    verdict = taxel.open(tmp_path / "trial1.mcap").verdict
+    print(verdict)
+    assert "pause" in str(verdict)

@@ -133,9 +133,9 @@ class Grid extends Sensor {
     return this.mm ? `x ${rounded(column * this.mm[1])}, y ${rounded(y * this.mm[0])}` : `column ${column.toFixed(1)}, row ${y.toFixed(1)}`;
   }
 
-  /** @returns {string} the unit of a centre within a source */
+  /** @returns {string} the unit of a centre within a source, behind it */
   get unit() {
-    return this.mm ? "mm" : "";
+    return this.mm ? " mm" : "";
   }
 
   /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */
@@ -213,7 +213,7 @@ class Placed extends Sensor {
 
   /** @param {number} x @param {number} y @returns {string} a centre, in the unit of the places */
   centre(x, y) {
-    return `${this.within(0, [x, y])}, ${this.unit}`;
+    return `${this.within(0, [x, y])}${this.unit}`;
   }
 
   /** @param {number} _ @param {number} x @returns {number} x as it is: the places of all sources are in one system */
@@ -230,7 +230,7 @@ class Placed extends Sensor {
 
   /** @returns {string} */
   get unit() {
-    return this.places.unit ?? "units of the file";
+    return this.places.unit ? ` ${this.places.unit}` : ", units of the file";
   }
 
   /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */

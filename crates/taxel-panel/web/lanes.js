@@ -91,7 +91,7 @@ function centreAt({ sensor }, timeline, column) {
   if (sensor.kind === "channels" || Number.isNaN(timeline.sum[column])) return "";
   if (!others.length) return Number.isNaN(first[0]) ? "nothing pressed" : sensor.centre(...first);
   const pressed = [first, ...others].flatMap((at, k) => (Number.isNaN(at[0]) ? [] : [`${sensor.sources[k].name} ${sensor.within(k, at)}`]));
-  return pressed.length ? [...pressed, sensor.unit].filter(Boolean).join(", ") : "nothing pressed";
+  return pressed.length ? pressed.join(", ") + sensor.unit : "nothing pressed";
 }
 
 /** The lanes, from top to bottom. @type {readonly Lane[]} */

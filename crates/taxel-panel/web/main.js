@@ -4,6 +4,7 @@ import { bindActions } from "./actions.js";
 import { Board } from "./board.js";
 import { writeCounters, writePace } from "./counters.js";
 import { Cursor } from "./cursor.js";
+import { Description } from "./description.js";
 import { Detections, recorded } from "./detections.js";
 import { make, part, write } from "./dom.js";
 import { showKeys } from "./keys.js";
@@ -62,6 +63,7 @@ const training = new Training(server, player, mistakes);
 const layout = new Layout(arrangement, () => (lanesDue = true));
 const board = new Board(server, settings, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
+const description = new Description(server, (name) => ask(name), (name) => labels.count(name), () => showTab("view"));
 const recorder = new Recorder(server, failed, () => showTab("record"));
 const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, mistakes: mistakes.shown, notes: notes.withTime, cut: view.cut }));
 
@@ -261,6 +263,8 @@ function receive(message) {
       return board.connection.log(message.text);
     case "source_preview":
       return board.connection.preview(message);
+    case "topics":
+      return description.offer(message, opened?.name ?? null);
     case "layout_saved":
       return board.connection.saved(message);
     case "places":
@@ -346,6 +350,7 @@ async function ask(name, trial) {
     refused = why.includes(name) ? why : `${name}: ${why}`;
     // What is open stays open, so that the same file can be chosen again once it is mended.
     if (opening === name) part("files", HTMLSelectElement).value = opened?.name ?? "";
+    description.refused(name);
     // Where nothing is shown it stands above the maps.
     if (player.transport.source !== null || hello?.live) notify(refused, true);
   }
@@ -398,6 +403,7 @@ function open(message) {
   view.offer([]);
   showDetections(recorded(message.detections), [...new Set(message.detections.map(({ label }) => label))].sort());
   notes.choose(message.notes);
+  description.choose(message);
   server.send({ type: "overview" });
   showRegisters();
   player.show();
@@ -420,6 +426,7 @@ function move(transport) {
     showZeroed();
     part("files", HTMLSelectElement).value = "";
     notes.choose([]);
+    description.choose(null);
     player.reach = counters?.reach_us ?? null;
     labels.choose(recorder.status?.state === "recording" ? recorder.status.file : null);
     view.choose(null);

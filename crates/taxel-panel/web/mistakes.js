@@ -1,7 +1,7 @@
 // What a training missed or detected falsely among the labels that it was scored on: counted in a table, marked over the lanes, walked through.
 
 import { collapsed } from "./clusters.js";
-import { entitle, make, part, write } from "./dom.js";
+import { make, part, write } from "./dom.js";
 import { notify } from "./notice.js";
 import { counted, integer, seconds, short } from "./words.js";
 
@@ -88,10 +88,13 @@ export class Mistakes {
       return share === null ? [] : [{ ...mistake, x: share * clientWidth }];
     });
     const { single, counts } = collapsed(inside, MARK, 1);
-    const place = (/** @type {number} */ x) => `left: ${((100 * x) / clientWidth).toFixed(3)}%`;
+    const placed = (/** @type {HTMLElement} */ mark, /** @type {number} */ x) => {
+      mark.style.left = `${((100 * x) / clientWidth).toFixed(3)}%`;
+      return mark;
+    };
     marks.replaceChildren(
-      ...single.map((mistake) => make("span", { class: mistake.is_missed ? "missed" : "false", style: place(mistake.x), title: described(mistake) })),
-      ...counts.map(({ from, to, marks: { length } }) => make("span", { class: "count bad", style: place((from + to) / 2), title: counted(length, "mistake") }, integer(length))),
+      ...single.map((mistake) => placed(make("span", { class: mistake.is_missed ? "missed" : "false", title: described(mistake) }), mistake.x)),
+      ...counts.map(({ from, to, marks: { length } }) => placed(make("span", { class: "count bad", title: counted(length, "mistake") }, integer(length)), (from + to) / 2)),
     );
   }
 }

@@ -169,6 +169,7 @@ class FileRequests:
             written = layout_text.with_keys(target, text, keys)
             with whole_file(target, overwrite=True) as part:
                 part.write_text(written, "utf-8")
+        self._files.forget()
 
     def save_layout(self, source: str, out: Path) -> str:
         """Write the layout file of a source of lines, which must not exist; return the command that reads it live."""
