@@ -77,13 +77,14 @@ export class Detections {
   /** Puts the marks over the lanes. @param {Timeline | null} timeline */
   mark(timeline) {
     const marks = part("detection-marks", HTMLElement);
+    // What is hidden has no width.
+    marks.hidden = !this.shown.length;
     const { clientWidth } = marks;
     const inside = this.shown.flatMap(({ label, t_us }) => {
       const share = timeline?.share(t_us) ?? null;
       return share === null ? [] : [{ label, t_us, x: share * clientWidth }];
     });
     const { single, counts } = collapsed(inside.sort((a, b) => a.x - b.x), MARK, 1);
-    marks.hidden = !this.shown.length;
     const all = [
       ...single.map(({ label, t_us, x }) => ({ x, kind: this.shape(label), text: "", title: `${label} at ${seconds(t_us)}` })),
       ...counts.map(({ from, to, marks: { length } }) => ({ x: (from + to) / 2, kind: "count", text: integer(length), title: counted(length, "detection") })),

@@ -47,6 +47,8 @@ import { rounded, integer } from "./words.js";
 const SIDE = 44;
 /** CSS pixels between two lines of the grid. */
 const GRID_PX = 96;
+/** Steps between the numbers of an axis of counts. */
+const WHOLE = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000];
 /** Up to this many channels have a curve each. */
 const MOST_CHANNELS = 64;
 /** Colours of the sums of several sources, by their names in style.css. */
@@ -164,7 +166,7 @@ export const LANES = [
     heading: () => ["Area ", swatch("less"), " ", output({ id: "area-now" })],
     says: (shown, timeline, column) => [areaAt(shown, timeline, column)],
     title: () => "Area",
-    plan: () => ({ scales: { area: { range: fromZero(() => 8) } }, series: [line(themed("less"), "area")], axes: [axis("area", 3, themed("less"))] }),
+    plan: () => ({ scales: { area: { range: fromZero(() => 8) } }, series: [line(themed("less"), "area")], axes: [{ ...axis("area", 3, themed("less")), incrs: WHOLE }] }),
     at: (_, timeline, column) => [timeline.area[column] >= 0 ? timeline.area[column] : null],
   },
   {

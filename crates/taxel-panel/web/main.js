@@ -63,7 +63,10 @@ const training = new Training(server, player, mistakes);
 const layout = new Layout(arrangement, () => (lanesDue = true));
 const board = new Board(server, settings, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
-const description = new Description(server, (name) => ask(name), (name) => labels.count(name), () => showTab("view"));
+const description = new Description(server, (name) => {
+  reread = name;
+  ask(name);
+}, (name) => labels.count(name), () => showTab("view"));
 const recorder = new Recorder(server, failed, () => showTab("record"));
 const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, mistakes: mistakes.shown, notes: notes.withTime, cut: view.cut }));
 
@@ -81,6 +84,8 @@ let registers = null;
 let zeroed = [];
 /** The recording that is being opened. @type {string | null} */
 let opening = null;
+/** The recording that is read anew, in another way. */
+let reread = "";
 /** Encoder and latency of the spikes in the raster. */
 let spikes = "";
 /** Why the last one was not opened. */
@@ -375,8 +380,9 @@ function showRegisters() {
 
 /** @param {Opened} message */
 function open(message) {
-  const again = opened?.name === message.name && opened.frames?.trial === message.frames?.trial;
+  const again = reread !== message.name && opened?.name === message.name && opened.frames?.trial === message.frames?.trial;
   opened = message;
+  reread = "";
   player.transport = { ...player.transport, source: message.name, state: "paused" };
   player.reach = message.start_us === null || message.stop_us === null ? null : [message.start_us, message.stop_us];
   player.t_us = message.start_us;

@@ -110,8 +110,9 @@ def minus(rows: Iterable[Note], others: Iterable[Note]) -> tuple[Note, ...]:
 
 def _inverse(gone: Sequence[Note], added: Sequence[Note]) -> tuple[Edit, ...]:
     """Return the edits that take a change back, of which these rows are gone and those were added."""
-    deletions = (Edit(row, None) for row in minus(added, gone))
-    return (*deletions, *(Edit(None, row) for row in minus(gone, added)))
+    # Rows that differ in nothing but columns that taxel does not know are different ones here.
+    deleted, marked = Counter(added) - Counter(gone), Counter(gone) - Counter(added)
+    return (*(Edit(row, None) for row in deleted.elements()), *(Edit(None, row) for row in marked.elements()))
 
 
 def _common(rows: Sequence[Note], others: Iterable[Note]) -> tuple[Note, ...]:

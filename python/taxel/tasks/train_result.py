@@ -156,6 +156,7 @@ class Training:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain values for JSON."""
+        several = len({recording.label for recording in self.recordings}) > 1
         result: dict[str, Any] = {
             "labels": list(self.readout.labels),
             "recipe": self.options.recipe,
@@ -170,7 +171,7 @@ class Training:
             "mistakes": [
                 {
                     "recording": self.recordings[k].name,
-                    "source": self.recordings[k].label,
+                    "source": self.recordings[k].label if several else "",
                     "label": label,
                     "t_us": t,
                     "missed": is_missed,
