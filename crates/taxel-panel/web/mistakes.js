@@ -40,10 +40,13 @@ export class Mistakes {
     this.found = mistakes;
     write(part("train-judged", HTMLElement), judged_on);
     part("train-rows", HTMLElement).replaceChildren(...scores.map(row));
-    const result = part("train-result", HTMLElement);
-    result.hidden = false;
+    part("train-result", HTMLElement).hidden = false;
     this.show();
-    result.scrollIntoView({ block: "nearest" });
+  }
+
+  /** Brings the table into sight. */
+  look() {
+    part("train-result", HTMLElement).scrollIntoView({ block: "nearest" });
   }
 
   /** Another recording, or another trial of it, is shown. @param {string | null} trial @param {boolean} again whether it is the same recording */

@@ -73,7 +73,7 @@ export class Training {
     this.text(text, next, options);
     if (name !== this.source) return;
     this.mistakes.take(trained);
-    this.read(readout);
+    this.read(readout).then(() => this.mistakes.look());
   }
 
   /** Lets a readout read what is shown. @param {string} readout */
