@@ -1,4 +1,4 @@
-"""What a recording does not say itself is chosen on the page, and written beside it; the stretch with which the page opens."""
+"""What a recording does not say itself is chosen on the page and written beside it; what the page opens with."""
 
 from __future__ import annotations
 
