@@ -159,3 +159,36 @@ def test_a_row_that_is_deleted_once_and_acknowledged_once_does_not_return_to_go_
     conflict = conflict_of(known, [heel, heel])
     assert conflict.returned == (heel,)
     assert settled(known, [heel, heel], conflict, restore=True).rows == (heel,)
+
+
+#: Without rows that differ in nothing but columns that taxel does not know.
+SETS = st.lists(NOTES, max_size=8, unique_by=lambda note: (note.text, note.t, note.source))
+
+
+@given(SETS, st.randoms(use_true_random=False), st.integers(1, 6))
+def test_what_takes_a_change_back_restores_the_table(table, choose: random.Random, count: int) -> None:
+    """Columns that taxel does not know come back too, and rows that a moved label became one with stay."""
+    rows = tuple(Note(n.text, n.t, source=n.source, others=(("comment", str(k)),)) for k, n in enumerate(table))
+    request = [edits_of(rows, choose) for _ in range(count)]
+    joined = join(Acknowledged(), rows, [request])
+    (inverse,) = joined.inverses
+    if isinstance(joined.outcomes[0], str):
+        assert (inverse, joined.rows) == ((), rows)
+        return
+    back = join(joined.acknowledged, joined.rows, [inverse])
+    assert sorted(back.rows, key=repr) == sorted(rows, key=repr)
+    # It can be taken back in turn.
+    again = join(back.acknowledged, back.rows, list(back.inverses))
+    assert keys(again.rows) == keys(joined.rows)
+
+
+@given(SETS, SETS, st.booleans())
+def test_what_takes_a_settled_conflict_back_restores_the_table(labels, table, restore: bool) -> None:
+    base = Acknowledged(labels=tuple(labels), table=tuple(labels))
+    conflict = conflict_of(base, table)
+    if not conflict:
+        return
+    joined = settled(base, table, conflict, restore=restore)
+    (inverse,) = joined.inverses
+    back = join(joined.acknowledged, joined.rows, [inverse])
+    assert keys(back.rows) == keys(table)

@@ -55,7 +55,7 @@ def test_a_sensor_is_drawn_as_its_geometry_is_known(name: str, chromium: Any, tm
         channels = name == "channels"
         shows(page, "pressure-title", "^Channels$" if channels else "^Pressure$")
         assert page.locator("#centre-block").is_visible() is not channels
-        assert page.locator("#area-legend").is_visible() is not channels
+        assert page.locator("#area-block").is_visible() is not channels
         assert page.locator("#channels-block").is_visible() is channels
         # The crosshair is where somebody placed it, and nobody did.
         assert page.locator("#pressure-cross").is_hidden()
@@ -69,14 +69,14 @@ def test_a_sensor_is_drawn_as_its_geometry_is_known(name: str, chromium: Any, tm
         centre = {
             "plate": r"^3\.3, 0\.0 \(16\.5, 0 mm\)$",
             "grid": r"^3\.3, 0\.0$",
-            "insole": r"^200, 675 in the places' own unit$",
-            "cells": r"^200, 675 mm$",
-            "uneven": r"^200, 675 mm$",
+            "insole": r"^x 200, y 675, units of the file$",
+            "cells": r"^x 200, y 675 mm$",
+            "uneven": r"^x 200, y 675 mm$",
         }
         area = {"plate": r"^2 taxels \(77\.4 mm²\)$", "cells": r"^2 taxels \(18,000 mm²\)$"}.get(name, "^2 taxels$")
         if not channels:
             shows(page, "centre-now", centre[name])
-            shows(page, "force-area", area)
+            shows(page, "area-now", area)
         box = frame.bounding_box()
         if name in ("plate", "grid"):
             ratio = 5 * 5.08 / (4 * 7.62) if name == "plate" else 5 / 4

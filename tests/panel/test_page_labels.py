@@ -281,3 +281,71 @@ def test_notes_are_used_as_labels_by_one_request(chromium: Any, tmp_path: Path) 
         shows(page, "label-count", "^34 labels$")
         assert len(page.evaluate("window.sent")) == 1
         assert page.locator("#notes-as-labels").is_hidden()
+        # All of them are there after a reload, and one step takes all of them back.
+        page.reload()
+        shows(page, "label-count", "^34 labels$")
+
+
+def test_ctrl_z_takes_back_every_change_of_labels(replay: Any, table: Path) -> None:
+    text = "label,t_us,comment\nheel,2000000,first\ntoe,3000000,second\n"
+    labelled(replay, table, text)
+    texts = [table.read_text()]
+
+    def changed(what: str) -> None:
+        until(lambda: table.read_text() != texts[-1], what)
+        texts.append(table.read_text())
+
+    row = replay.locator("#label-list li").first.locator("input")
+    row.nth(1).fill("2.5")
+    row.nth(1).press("Enter")
+    changed("it is moved")
+    row.nth(0).fill("ball")
+    row.nth(0).press("Enter")
+    changed("it is renamed")
+    replay.locator("#label-list li").nth(1).get_by_role("button", name="delete toe").click()
+    changed("it is deleted")
+    press(replay, "Home", "m")
+    changed("another is marked")
+    # A label that is moved onto an equal one is one with it.
+    replay.locator("#label-name").fill("ball")
+    press(replay, "m")
+    changed("an equal one is marked")
+    first = replay.locator("#label-list li").first.locator("input").nth(1)
+    first.fill("2.5")
+    first.press("Enter")
+    changed("two are one")
+    while len(texts) > 1:
+        texts.pop()
+        press(replay, "Control+z")
+        wanted = sorted(texts[-1].splitlines())
+        until(lambda wanted=wanted: sorted(table.read_text().splitlines()) == wanted, "the last change is taken back")
+    press(replay, "Control+z")
+    shows(replay, "notice-text", "^nothing to undo")
+    # In a field it is the field's own.
+    name = replay.locator("#label-name")
+    name.fill("new")
+    name.press("Control+z")
+    assert sorted(table.read_text().splitlines()) == sorted(text.splitlines())
+
+
+def test_a_thousand_notes_become_labels_all_or_none(chromium: Any, tmp_path: Path) -> None:
+    frames = taxel.Frames(np.zeros((1100, 2, 2)), np.arange(1100) * 10_000, unit="N", array=taxel.Array(2, 2))
+    (tmp_path / "own").mkdir()
+    taxel.convert(frames, tmp_path / "own" / "mat.npz")
+    noted = [f"{('heel', 'toe')[k % 2]},{10_000 * k}" for k in range(1000)]
+    (tmp_path / "own" / "mat.notes.csv").write_text("\n".join(["label,t_us", *noted]) + "\n")
+    taxel.convert(taxel.open(tmp_path / "own" / "mat.npz"), tmp_path / "mat.mcap")
+    with shown(chromium, tmp_path / "mat.mcap") as page:
+        shows(page, "notes-as-labels", r"^Use as labels \(1000\)$")
+        # The page goes the moment after the press.
+        page.evaluate("() => { document.getElementById('notes-as-labels').click(); location.reload(); }")
+        shows(page, "state-word", "^Replay$")
+        shows(page, "label-count", "^(0|1,000) labels$")
+        if page.locator("#label-count").inner_text() == "0 labels":
+            page.locator("#notes-as-labels").click()
+        shows(page, "label-count", "^1,000 labels$")
+        assert len(rows(tmp_path / "mat.notes.csv")) == 1000
+        # A second's worth of flags would cover each other: their number stands there.
+        counts = page.locator("#label-lane .count").all_inner_texts()
+        assert sum(int(count.replace(",", "")) for count in counts) > 900
+        assert page.locator(".flag").count() < 20

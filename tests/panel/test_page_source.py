@@ -19,6 +19,7 @@ from tests.panel.browser import running
 from tests.panel.pages import opened, shows, until
 
 import taxel
+from taxel.formats.layout import Layout
 from taxel.live import Live, Panel
 
 pytestmark = pytest.mark.timeout(600)
@@ -74,7 +75,20 @@ def test_a_mat_on_a_serial_line_is_chosen_seen_and_recorded(chromium: Any, tmp_p
         shows(page, "pressure-top", "counts")
         shows(page, "where-info", f"serial:{line}")
         shows(page, "registers-why", "A source of numbers has no registers")
-        shows(page, "numbers-command", r"taxel live --panel --source 'serial:.*,array=16x12,frame_end=blank'")
+        shows(page, "numbers-command", r"taxel live --panel --source serial:.*,array=16x12,frame_end=blank$")
+        # A source that was begun elsewhere is in the field as a whole.
+        page.evaluate("localStorage.clear()")
+        page.reload()
+        until(lambda: source.input_value() == f"serial:{line},array=16x12,frame_end=blank", "all of it is in the field")
+        name = page.locator("#layout-name")
+        name.fill("my mat")
+        page.locator("#layout-save").click()
+        shows(page, "layout-saved", r"^Saved in my mat\.layout\.toml, which the command reads\.$")
+        shows(page, "numbers-shell", r"^taxel live --panel --source 'my mat\.layout\.toml'$")
+        layout = Layout.read(tmp_path / "my mat.layout.toml")
+        assert layout.source_text() == source.input_value()
+        page.locator("#layout-save").click()
+        shows(page, "numbers-why", r"my mat\.layout\.toml: exists already$")
         page.locator("#numbers-falls").check()
         assert source.input_value().endswith(",falls=true")
         silent.set()
@@ -98,3 +112,42 @@ def test_what_arrives_is_shown_and_another_source_takes_the_place_of_the_first(t
         assert panel.live is not None
         assert panel.live.array.shape == (4, 4)
         until(lambda: panel.live is not None and panel.live.counters["frames"] > 5, "the source before is back")
+
+
+def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chromium: Any, tmp_path: Path) -> None:
+    plug = tmp_path / "mat"
+    with (
+        running("live", "--panel", "--port", "0", "--host", "127.0.0.1", folder=tmp_path) as server,
+        opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
+    ):
+        connect = page.locator("#numbers-form").get_by_role("button", name="Connect", exact=True)
+        with mat(4, 4) as (line, _):
+            plug.symlink_to(line)
+            page.locator("#numbers").fill(f"serial:{plug},array=4x4,frame_end=blank")
+            connect.click()
+            shows(page, "pressure-top", "counts")
+            shows(page, "state-word", "^Live$")
+            page.locator("#record").click()
+            shows(page, "state-word", r"^Recording trial1\.mcap$")
+            page.wait_for_timeout(1000)
+        shows(
+            page,
+            "silence-text",
+            rf"^The line is silent: nothing from serial:{plug}.* since \d+\.\d+ s of the source, for",
+        )
+        shows(page, "state-word", "^Silent, Recording")
+        plug.unlink()
+        with mat(4, 4) as (line, _):
+            plug.symlink_to(line)
+            until(lambda: page.locator("#silence").is_hidden(), "lines arrive again")
+            shows(page, "state-word", r"^Recording trial1\.mcap$")
+            page.wait_for_timeout(500)
+            page.locator("#record").click()
+            shows(page, "record-last-verdict", r"no frame came for a second or more 1 time, \d+\.\d s in all")
+            shows(page, "state-word", "^Live$")
+            connect.click()
+            until(lambda: page.locator("#numbers-why").is_hidden(), "it is connected again")
+            shows(page, "state-word", "^Live$")
+    verdict = taxel.open(tmp_path / "trial1.mcap").verdict
+    assert verdict.noted["silences"] == 1
+    assert verdict.noted["silent_ms"] >= 1000

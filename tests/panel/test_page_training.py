@@ -30,6 +30,7 @@ from tests.tasks.recordings import rested
 
 import taxel
 import taxel.device
+from taxel.live import Panel
 
 __all__ = ["live", "page", "recording"]
 
@@ -147,3 +148,36 @@ def test_play_label_train_and_watch_the_new_readout(
         [sys.executable, "-m", "taxel", *words, *options], cwd=tmp_path, check=True, capture_output=True, text=True
     )
     assert again.stdout.startswith(f"Detections({len(heard)}: ")
+
+
+def test_what_a_training_missed_is_in_a_table_and_in_the_lanes(chromium: Any, tmp_path: Path) -> None:
+    frames, truth = frames_of_mat()
+    # A label at which nothing happens is missed, and a touch without one is detected falsely.
+    truth["contact"][4] += 200_000
+    taxel.convert(frames, tmp_path / "mat.npz")
+    rows = [f"{label},{t}" for label, times in truth.items() for t in times]
+    (tmp_path / "mat.notes.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
+    with Panel(tmp_path / "mat.npz") as panel, opened(chromium, panel.url) as page:
+        shows(page, "label-count", "^16 labels$")
+        press(page, "k")
+        shows(page, "notice-text", "^no mistakes are known")
+        page.locator("#train").click()
+        shows(page, "train-judged", "^held out: ")
+        table = [row.split("\t") for row in page.locator("#train-rows tr").all_inner_texts()]
+        by = {(label or "contact", kind): counts for label, kind, *counts in (tuple(row[:5]) for row in table)}
+        assert by["contact", "neuron"] == ["7", "1", "1"], table
+        assert by["lift", "neuron"][1:] == ["0", "0"], table
+        shows(page, "mistake-count", "^1 missed, 1 false$")
+        until(lambda: page.locator("#mistake-marks span").count() == 2, "both are marked")
+        press(page, "Home")
+        still(page)
+        wrong, missed = truth["contact"][4] / 1e6 - 0.2, truth["contact"][4] / 1e6
+        for key, text, at in (("k", "false", wrong), ("k", "missed", missed), ("j", "false", wrong)):
+            press(page, key)
+            shows(page, "notice-text", rf"^{text} contact at {at:.1f}\d+ s: [12] of 2$")
+            assert still(page) == pytest.approx(at, abs=0.05)
+        # Another training begins without them.
+        page.locator("#train").click()
+        until(lambda: page.locator("#train-result").is_hidden(), "they go")
+        page.locator("#train").click()
+        shows(page, "train-text", "stopped")

@@ -63,7 +63,7 @@ def test_times_since_1970_count_from_the_begin_of_the_recording_which_the_page_s
         shows(page, "begun", r"^0 s: 2026-11-18 11:06:40\.000 UTC$")
         # Nothing is pressed between the presses: the rest of some 200 counts is subtracted.
         shows(page, "rest-from", "^above the rest of a quiet stretch$")
-        area = page.locator("#force-area")
+        area = page.locator("#area-now")
         until(lambda: int(area.inner_text().split()[0]) > 1, "the first touch")
         assert 25 <= int(area.inner_text().split()[0]) <= 40
         shows(page, "force-title", "^Sum$")
@@ -348,7 +348,7 @@ def test_each_foot_has_a_sum_and_a_colour_of_its_own(size: dict[str, int], chrom
     with shown(chromium, file, **size) as page:
         for t_s, left, right in ((0.05, 320, 320), (0.3, 320, 0), (0.8, 0, 320), (5.05, 320, 320)):
             pointed(page, t_s, "force-sums", rf"^\s*left\s+{left} N\s+right\s+{right} N\s*$")
-        shows(page, "force-area", "^16 taxels$")
+        shows(page, "area-now", "^16 taxels$")
         for name in ("force", "centre"):
             head = page.locator(f"#{name}-block h2")
             assert head.evaluate("e => e.scrollWidth <= e.clientWidth"), f"all is in sight of {head.inner_text()}"

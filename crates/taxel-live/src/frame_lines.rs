@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use serde::Serialize;
 use taxel_core::{Array, problem};
 
-use crate::recording::{DamageCounts, FrameProperties, StreamFaults, is_held};
+use crate::recording::{DamageCounts, FrameProperties, SILENCES, SILENT_MS, StreamFaults, is_held};
 use crate::text_lines::{LeftOut, TextLine};
 
 /// How lines of numbers make frames.
@@ -131,7 +131,21 @@ pub struct FrameAssembler {
     rows: u64,
     /// Time of the last frame, us.
     last: Option<i64>,
+    /// When the last frame arrived, ns since 1970.
+    arrived_ns: Option<i64>,
+    silences: Silences,
 }
+
+/// Silences between frames that arrive.
+#[derive(Debug, Clone, Copy, Default)]
+struct Silences {
+    count: u64,
+    ns: u64,
+}
+
+/// Without any frame for so long a source is silent, ns; one of slow frames after so many of them.
+const SILENT_NS: i64 = 1_000_000_000;
+const SILENT_FRAMES: f64 = 3.0;
 
 impl FrameAssembler {
     /// Begins without any line.
@@ -142,7 +156,18 @@ impl FrameAssembler {
             _ => 1.0,
         });
         let values = Vec::with_capacity(layout.array.len());
-        Self { layout, faults, unread: UnreadLines::default(), lines: 0, values, begun: None, rows: 0, last: None }
+        Self {
+            layout,
+            faults,
+            unread: UnreadLines::default(),
+            lines: 0,
+            values,
+            begun: None,
+            rows: 0,
+            last: None,
+            arrived_ns: None,
+            silences: Silences::default(),
+        }
     }
 
     /// How lines make frames.
@@ -268,6 +293,8 @@ impl FrameAssembler {
         // Lines that came in one packet have one arrival time.
         let t = self.last.map_or(t, |last| t.max(last + 1));
         self.last = Some(t);
+        self.silences = self.silences_until(arrived_ns);
+        self.arrived_ns = Some(arrived_ns);
         Some((t, &self.values))
     }
 
@@ -312,10 +339,24 @@ impl FrameAssembler {
         self.lines
     }
 
-    /// What is wrong with the lines so far, as a verdict states it.
+    /// The silences so far, with that which lasts until `now_ns` since 1970.
+    fn silences_until(&self, now_ns: i64) -> Silences {
+        let Silences { count, ns } = self.silences;
+        #[allow(clippy::cast_possible_truncation)]
+        let least = SILENT_NS.max((SILENT_FRAMES * 1000.0 * self.layout.frame_us) as i64);
+        match self.arrived_ns.map(|arrived_ns| now_ns - arrived_ns) {
+            Some(silent) if silent > least => Silences { count: count + 1, ns: ns + silent.unsigned_abs() },
+            _ => self.silences,
+        }
+    }
+
+    /// What is wrong with the lines until `now_ns` since 1970, as a verdict states it.
     #[must_use]
-    pub fn found(&self) -> DamageCounts {
-        self.faults.found()
+    pub fn found(&self, now_ns: i64) -> DamageCounts {
+        let Silences { count, ns } = self.silences_until(now_ns);
+        let mut found = self.faults.found();
+        found.damage.extend([(SILENCES, count), (SILENT_MS, ns / 1_000_000)].map(|(cause, n)| (cause.to_owned(), n)));
+        found
     }
 }
 

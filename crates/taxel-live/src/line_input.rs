@@ -71,6 +71,8 @@ impl LineReader {
         let n = match &mut self.input {
             None => {
                 std::thread::sleep(LOOK_EVERY);
+                // A plug that was pulled may be put back at any time.
+                self.input = OpenInput::open(&self.place).ok();
                 0
             }
             Some(OpenInput::Serial(line)) => line.read(&mut self.piece, LOOK_EVERY)?,
@@ -119,10 +121,6 @@ impl LineReader {
         // A port that is open is not opened again.
         self.input = None;
         self.input = OpenInput::open(&self.place).ok();
-        if self.input.is_none() {
-            std::thread::sleep(LOOK_EVERY);
-            self.input = OpenInput::open(&self.place).ok();
-        }
         self.is_cut = matches!(self.place, LinePlace::Serial(_));
     }
 }

@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
-pub(crate) use damage::ADDRESS;
+pub(crate) use damage::{ADDRESS, SILENCES, SILENT_MS};
 pub use damage::{DamageCounts, damage, damage_of_version_1};
 pub use event_previews::EventPreviews;
 pub use frames::{FrameEncoding, FrameProperties, Frames};

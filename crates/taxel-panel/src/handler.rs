@@ -42,15 +42,85 @@ pub enum PresetValue {
 /// A preset of the user: value by register name.
 pub type UserPreset = BTreeMap<String, PresetValue>;
 
+/// How a neuron, or the plain rule beside it, detects a label.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
+pub struct LabelScore {
+    /// The label.
+    pub label: String,
+    /// Whether it is the plain rule's.
+    pub is_plain_rule: bool,
+    /// Number of labels with a detection.
+    pub found: u64,
+    /// Number of labels without one.
+    pub missed: u64,
+    /// Number of detections without a label.
+    #[serde(rename = "false")]
+    pub wrong: u64,
+    /// From the label until the detection is known, median, ms; null where none was found.
+    pub delay_ms: Option<f64>,
+}
+
+/// A label without a detection of the neuron, or a detection without a label.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
+pub struct Mistake {
+    /// The label.
+    pub label: String,
+    /// Board time, us.
+    pub t_us: i64,
+    /// Whether a label was missed; else a detection is false.
+    pub is_missed: bool,
+    /// The sensor that it is of, where the recording has several; else empty.
+    pub source: String,
+    /// The trial that it is of, where the file holds several; else empty.
+    pub trial: String,
+}
+
 /// What a training has made.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct TrainingResult {
     /// How well the readout detects, in words.
     pub text: String,
+    /// On which labels it was scored, in words.
+    pub judged_on: String,
+    /// The scores of each label, of the neuron and of the plain rule.
+    pub scores: Vec<LabelScore>,
+    /// What the neurons missed or detected falsely, with times as in the file.
+    pub mistakes: Vec<Mistake>,
     /// The command that detects by it in a shell.
     pub next: String,
     /// Options of the command that trains that may help.
     pub options: Vec<String>,
+}
+
+/// A field of a topic of a ROS bag that holds numbers.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
+pub struct BagTopic {
+    /// The topic.
+    pub topic: String,
+    /// The field; empty for a topic of images.
+    pub field: String,
+    /// Numbers in a message: rows and columns where the message states them.
+    pub shape: Vec<u64>,
+    /// Number of messages.
+    pub messages: u64,
+    /// Why it cannot be read; empty where it can.
+    pub trouble: String,
+}
+
+/// What a layout file says of a recording; `None` is not changed.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Description {
+    /// Whether values fall with pressure.
+    pub falls: Option<bool>,
+    /// Frames a second.
+    pub rate_hz: Option<f64>,
+    /// Rows and columns.
+    pub size: Option<(u16, u16)>,
+    /// The topic of a ROS bag, and its field (empty for none).
+    pub topic: Option<(String, String)>,
 }
 
 /// The presets of the user.
@@ -117,6 +187,8 @@ pub struct LabelTable {
     pub rows: Vec<LabelRow>,
     /// Where it lacks what was acknowledged.
     pub conflict: LabelConflict,
+    /// Of a table as it was written: the number of each request, by which it is taken back; `None` where it changed nothing.
+    pub changes: Vec<Option<u64>>,
 }
 
 /// What became of a request of label edits: the rows as they were written, one an edit, or why none of them was carried out.
@@ -232,6 +304,15 @@ pub trait FileRequests: Send + Sync {
 
     /// Writes a stretch of a recording to a new file; returns what that file cannot hold.
     fn cut(&self, cut: &Cut<'_>) -> Reply<Vec<String>>;
+
+    /// Returns the topics of a ROS bag that hold numbers, by their fields; none of any other file.
+    fn topics(&self, path: &Path) -> Reply<Vec<BagTopic>>;
+
+    /// Writes what is stated into the layout file beside a recording.
+    fn describe(&self, path: &Path, description: &Description) -> Reply<()>;
+
+    /// Writes a new layout file of a source of lines; returns the command that reads it live.
+    fn save_layout(&self, source: &str, out: &Path) -> Reply<String>;
 }
 
 /// Requests about the tables of labels beside recordings. Times are those of the view, in which one us of the file is `us`.
@@ -252,6 +333,9 @@ pub trait LabelRequests: Send + Sync {
         us: i64,
         requests: &[Vec<LabelEdit>],
     ) -> Reply<(Vec<EditOutcome>, LabelTable)>;
+
+    /// Takes back a change by its number in [`LabelTable::changes`].
+    fn undo(&self, table: &Path, recording: &str, us: i64, change: u64) -> Reply<LabelTable>;
 
     /// Ends a conflict: restores what was acknowledged, or accepts the table as it is.
     fn settle(

@@ -250,6 +250,10 @@ impl Hub {
                 Origin::Frames(place) => Some(place.clone()),
                 Origin::Udp(_) | Origin::Bridge(_) => None,
             }),
+            source: live.and_then(|live| match live.handle.origin() {
+                Origin::Frames(_) => live.handle.options().sources.first().cloned(),
+                Origin::Udp(_) | Origin::Bridge(_) => None,
+            }),
             frames: live.and_then(|live| live.frames()),
             delta_intensity: live.map(|live| live.handle.options().differences),
             control: self.board().control.clone(),

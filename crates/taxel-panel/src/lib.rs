@@ -35,9 +35,10 @@ pub fn message_schemas() -> String {
 
 pub use array_state::RestSource;
 pub use handler::{
-    BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, FramesRead, LabelConflict, LabelEdit,
-    LabelRequests, LabelRow, LabelTable, Opening, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
-    TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
+    BagTopic, BoardLines, BoardRequests, Cut, Description, Detected, EditOutcome, FileRequests, FramesRead,
+    LabelConflict, LabelEdit, LabelRequests, LabelRow, LabelScore, LabelTable, Mistake, Opening, PresetRequests,
+    PresetValue, ReadFile, Reply, RequestHandlers, TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset,
+    UserPresets,
 };
 pub use keyframe_index::Activity;
 pub use keyframe_index::frames::{FrameArea, FrameFile, FrameIndex, FrameRest, FrameSource};

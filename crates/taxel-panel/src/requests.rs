@@ -15,32 +15,33 @@ use taxel_live::locked::lock;
 use taxel_live::pipeline::{SourcePreview, SourceText};
 use taxel_live::ports::ports;
 
-use super::handler::{Cut, Detected, LabelRow, TrainingResult};
+use super::handler::{Cut, Description, Detected, LabelRow, Mistake, TrainingResult};
 use super::hub::Hub;
 use super::hub::clients::Broadcast;
 use super::hub::indexed::{Indexed, OpenRecording};
-use super::hub::labels::LabelChange;
+use super::hub::labels::{LabelChange, LabelHistory};
 use super::hub::live_source::LiveSource;
 use super::hub::recorder::RecordingPlan;
 use super::protocol::messages::{FoundDetection, InterfaceAddress, Message};
 use super::protocol::refusal::{Answer, Refusal};
-use super::protocol::request::{Id, RecordRequest, Request, RestHow, Taxel};
+use super::protocol::request::{DescribeRequest, Id, RecordRequest, Request, RestHow, Taxel};
 use super::readout_encoders::ReadoutEncoders;
 
 /// How long lines of a source are read to show them.
 const PREVIEW: Duration = Duration::from_secs(2);
 
-/// Carries out a request; `shown` is the recording that the client shows. Returns the message for that client alone.
+/// Carries out a request of a client with this history of changes; `shown` is the recording that it shows. Returns the message for that client alone.
 ///
 /// # Errors
 ///
 /// The refusal, after which nothing has changed.
 pub(super) async fn carry_out(
     hub: Arc<Hub>,
+    history: &LabelHistory,
     shown: Option<&OpenRecording>,
     request: Request,
 ) -> Answer<Option<Message>> {
-    let change = |change| labels::change(&hub, shown, vec![change]);
+    let change = |change| labels::change(&hub, history, shown, vec![change]);
     match request {
         Request::Set { values } => registers::set(&hub, &values).await?,
         Request::Read {} => registers::read(&hub).await?,
@@ -56,7 +57,7 @@ pub(super) async fn carry_out(
             change(LabelChange::Mark(LabelRow { replaces_us: replaces_us.map(|t| t.0), ..row })).await?;
         }
         Request::Marks { labels } => {
-            labels::change(&hub, shown, labels::marks(shown, labels.0)?).await?;
+            labels::change(&hub, history, shown, labels::marks(shown, labels.0)?).await?;
         }
         Request::Rename { label_id, label } => {
             change(LabelChange::Rename { id: number(label_id), label: label.0 }).await?
@@ -64,8 +65,9 @@ pub(super) async fn carry_out(
         Request::Move { label_id, t_us } => change(LabelChange::Move { id: number(label_id), t_us: t_us.0 }).await?,
         Request::Delete { label_id } => change(LabelChange::Delete { id: number(label_id) }).await?,
         Request::Settle { conflict_id, keep } => {
-            labels::settle(&hub, shown, number(conflict_id), keep).await?;
+            labels::settle(&hub, history, shown, number(conflict_id), keep).await?;
         }
+        Request::Undo {} => labels::undo(&hub, history, shown).await?,
         Request::Health {} => return health(&hub, shown).await.map(Some),
         Request::Cut { start_us, stop_us, name } => {
             return cut(&hub, shown, (start_us.0, stop_us.0), &name.0).await.map(Some);
@@ -86,6 +88,13 @@ pub(super) async fn carry_out(
             hub.ask(move |handlers| handlers.board.read_source(&source.0)).await?;
         }
         Request::PreviewSource { source } => return preview(source.0).await.map(Some),
+        Request::SaveLayout { source, name } => return save_layout(&hub, source.0, &name.0).await.map(Some),
+        Request::Topics { name } => {
+            let path = hub.folder.file(&name.0)?;
+            let topics = hub.ask(move |handlers| handlers.files.topics(&path)).await?;
+            return Ok(Some(Message::Topics { name: name.0, topics }));
+        }
+        Request::Describe(request) => describe(&hub, request).await?,
         Request::DeltaIntensity { on } => {
             check_restart(&hub)?;
             hub.ask(move |handlers| handlers.board.set_differences(on)).await?;
@@ -162,6 +171,25 @@ async fn preview(source: String) -> Answer<Message> {
     Ok(Message::SourcePreview { lines, source, about })
 }
 
+async fn save_layout(hub: &Hub, source: String, name: &str) -> Answer<Message> {
+    let name = format!("{}.layout.toml", name.trim().trim_end_matches(".layout.toml"));
+    let out = hub.folder.file(&name).map_err(|error| Refusal::of_field("name", error))?;
+    let command = hub.ask(move |handlers| handlers.files.save_layout(&source, &out)).await?;
+    Ok(Message::LayoutSaved { name, command })
+}
+
+/// Writes what a client states of a recording beside it, so that it is read again.
+async fn describe(hub: &Hub, request: DescribeRequest) -> Answer {
+    let DescribeRequest { name, falls, rate_hz, size, topic, field } = request;
+    let path = hub.folder.file(&name.0)?;
+    let topic = topic.map(|topic| (topic.0, field.map(|field| field.0).unwrap_or_default()));
+    let description = Description { falls, rate_hz: rate_hz.map(|rate| rate.0), size, topic };
+    let file = path.clone();
+    hub.ask(move |handlers| handlers.files.describe(&file, &description)).await?;
+    hub.folder.forget_file(&path);
+    Ok(())
+}
+
 fn rest(hub: &Hub, how: RestHow) -> Answer {
     let live = board(hub)?;
     let mut state = lock(&live.state);
@@ -211,13 +239,16 @@ fn record(hub: &Arc<Hub>, request: RecordRequest) -> Answer {
 
 /// Trains a readout on the labels of the recording that is shown.
 async fn train(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<Message> {
-    let name = shown.ok_or("train: open a recording with labels first")?.name.clone();
+    let shown = shown.ok_or("train: open a recording with labels first")?;
+    let (name, us) = (shown.name.clone(), shown.indexed.us());
     let readout = readout_of(&name);
     let (recording, out) = (hub.folder.file(&name)?, hub.folder.file(&readout)?);
-    let TrainingResult { text, next, options } =
+    let TrainingResult { text, judged_on, scores, mistakes, next, options } =
         hub.ask(move |handlers| handlers.training.train(&recording, &out)).await?;
     hub.clients.send_message(&hub.recordings_message().await);
-    Ok(Message::Trained { name, readout, text, next, options })
+    let in_view = |mistake: Mistake| Mistake { t_us: mistake.t_us * us, ..mistake };
+    let mistakes = mistakes.into_iter().map(in_view).collect();
+    Ok(Message::Trained { name, readout, text, judged_on, scores, mistakes, next, options })
 }
 
 /// The name of the readout that is trained on a recording.

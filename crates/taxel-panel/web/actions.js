@@ -15,6 +15,7 @@ import { seconds } from "./words.js";
  * @property {import("./settings.js").Settings} settings
  * @property {import("./recorder.js").Recorder} recorder
  * @property {import("./labels.js").Labels} labels
+ * @property {import("./mistakes.js").Mistakes} mistakes
  * @property {import("./view.js").View} view
  * @property {import("./maps.js").Maps} maps
  * @property {import("./lanes.js").Lanes} lanes
@@ -28,7 +29,7 @@ import { seconds } from "./words.js";
  * @param {Parts} parts
  * @param {() => Timeline | null} timeline
  */
-export function bindActions({ server, player, settings, recorder, labels, view, maps, lanes, window }, timeline) {
+export function bindActions({ server, player, settings, recorder, labels, mistakes, view, maps, lanes, window }, timeline) {
   const help = part("help", HTMLDialogElement);
   const cutHere = (/** @type {0 | 1} */ end) => player.timeToMark(timeline()?.cursor_us).then((t_us) => view.setCut(end, t_us));
   const step = (/** @type {KeyboardEvent} */ event) => (event.shiftKey ? 1e6 : 1e5);
@@ -72,7 +73,10 @@ export function bindActions({ server, player, settings, recorder, labels, view, 
       mark: () => labels.markHere(),
       nextLabel: () => labels.go(1),
       labelBefore: () => labels.go(-1),
+      nextMistake: () => mistakes.go(1),
+      mistakeBefore: () => mistakes.go(-1),
       deleteLabel: () => labels.removeChosen(),
+      undo: () => labels.undo(),
       cutFrom: () => cutHere(0),
       cutTo: () => cutHere(1),
       open: () => part("files", HTMLSelectElement).focus(),

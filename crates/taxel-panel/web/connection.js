@@ -120,6 +120,11 @@ export class Connection {
       this.showSource();
     };
     this.source.input.oninput = () => this.showSource();
+    const name = part("layout-name", HTMLInputElement);
+    part("layout-save", HTMLButtonElement).onclick = () => {
+      if (!name.value.trim()) return name.focus();
+      server.request({ type: "save_layout", source: this.source.input.value.trim(), name: name.value.trim() }).then(() => this.source.refuse(null), (error) => this.source.refuse(error.message));
+    };
     const drop = part("control-drop", HTMLButtonElement);
     drop.onclick = () => server.request({ type: "control", place: null }).then(() => this.line.refuse(null), failed);
     part("places-again", HTMLButtonElement).onclick = () => this.look();
@@ -139,7 +144,8 @@ export class Connection {
     part("numbers-falls", HTMLInputElement).checked = /,falls=(?!false)/.test(source);
     const command = part("numbers-command", HTMLElement);
     command.hidden = !source;
-    write(command, source && `In a shell: taxel live --panel --source '${source}'`);
+    write(part("numbers-shell", HTMLElement), `taxel live --panel --source ${quoted(source)}`);
+    write(part("layout-saved", HTMLElement), "");
   }
 
   /** Shows what arrives from a source, and what it seems to be. @param {SourcePreview} preview */
@@ -152,13 +158,20 @@ export class Connection {
     this.showSource();
   }
 
+  /** A layout file was written. @param {import("./messages.js").LayoutSaved} saved */
+  saved({ name, command }) {
+    part("numbers-command", HTMLElement).hidden = false;
+    write(part("numbers-shell", HTMLElement), command);
+    write(part("layout-saved", HTMLElement), `Saved in ${name}, which the command reads.`);
+  }
+
   /** Asks which ports and addresses there are. */
   look() {
     this.server.send({ type: "places" });
   }
 
   /** @param {Hello} hello */
-  greet({ live, options, udp, lines, control, delta_intensity }) {
+  greet({ live, options, udp, lines, source, control, delta_intensity }) {
     const where = part("where", HTMLDetailsElement);
     where.hidden = !live;
     // Without a line there is something to choose.
@@ -167,7 +180,9 @@ export class Connection {
     this.udp = udp ?? "";
     this.line.at(control);
     this.events.at(udp);
-    if (lines !== null && !this.source.input.value) this.source.at(lines);
+    // Without a source of lines, the one that was used last can be chosen again.
+    if (!this.source.input.value) this.source.at(source ?? this.source.before[0] ?? null);
+    this.showSource();
     part("control-drop", HTMLButtonElement).disabled = control === null;
     part("delta-intensity", HTMLInputElement).checked = delta_intensity ?? false;
     const stated = Object.entries(options ?? {}).filter(([, value]) => value !== null && String(value) !== "");
@@ -201,6 +216,9 @@ export class Connection {
 function described({ kind, product, maker, serial }) {
   return [product, maker, serial].filter(Boolean).join(", ") || (kind === "other" ? "" : kind);
 }
+
+/** @param {string} word @returns {string} as it is typed in a shell */
+const quoted = (word) => (/^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", `'"'"'`)}'`);
 
 /** @param {string} text @returns {[string, number]} host and port; an address in brackets may hold colons */
 function hostAndPort(text) {

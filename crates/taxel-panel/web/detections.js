@@ -1,7 +1,8 @@
 // Detections: the list beside the views, and the marks over the lanes.
 
+import { collapsed } from "./clusters.js";
 import { entitle, make, part, write } from "./dom.js";
-import { seconds, short, integer } from "./words.js";
+import { counted, seconds, short, integer } from "./words.js";
 
 /** @typedef {{ label: string, t_us: number, latency_us: number | null }} Detection */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
@@ -9,10 +10,11 @@ import { seconds, short, integer } from "./words.js";
 /** Detections of a recording, in their order. @param {{ label: string, t_us: number }[]} found @returns {Detection[]} */
 export const recorded = (found) => found.map(({ label, t_us }) => ({ label, t_us, latency_us: null }));
 
-/** Detections of the live source that are stored, and the number of those that are listed and marked. */
+/** Detections of the live source that are stored, and the number of those that are listed. */
 const MOST_STORED = 300;
 const LISTED = 100;
-const MARKED = 200;
+/** Width of a mark, CSS pixels. */
+const MARK = 11;
 
 /** Shapes of the marks, one for each label. */
 const SHAPES = 4;
@@ -75,15 +77,26 @@ export class Detections {
   /** Puts the marks over the lanes. @param {Timeline | null} timeline */
   mark(timeline) {
     const marks = part("detection-marks", HTMLElement);
-    const inside = timeline ? this.shown.filter(({ t_us }) => timeline.share(t_us) !== null).slice(0, MARKED) : [];
+    // What is hidden has no width.
     marks.hidden = !this.shown.length;
-    while (marks.children.length > inside.length) marks.lastElementChild?.remove();
-    while (marks.children.length < inside.length) marks.append(make("span"));
-    inside.forEach(({ label, t_us }, i) => {
+    const { clientWidth } = marks;
+    const inside = this.shown.flatMap(({ label, t_us }) => {
+      const share = timeline?.share(t_us) ?? null;
+      return share === null ? [] : [{ label, t_us, x: share * clientWidth }];
+    });
+    const { single, counts } = collapsed(inside.sort((a, b) => a.x - b.x), MARK, 1);
+    const all = [
+      ...single.map(({ label, t_us, x }) => ({ x, kind: this.shape(label), text: "", title: `${label} at ${seconds(t_us)}` })),
+      ...counts.map(({ from, to, marks: { length } }) => ({ x: (from + to) / 2, kind: "count", text: integer(length), title: counted(length, "detection") })),
+    ];
+    while (marks.children.length > all.length) marks.lastElementChild?.remove();
+    while (marks.children.length < all.length) marks.append(make("span"));
+    all.forEach(({ x, kind, text, title }, i) => {
       const mark = /** @type {HTMLElement} */ (marks.children[i]);
-      mark.className = this.shape(label);
-      entitle(mark, "title", label);
-      mark.style.left = `${(100 * (timeline?.share(t_us) ?? 0)).toFixed(3)}%`;
+      mark.className = kind;
+      write(mark, text);
+      entitle(mark, "title", title);
+      mark.style.left = `${((100 * x) / clientWidth).toFixed(3)}%`;
     });
   }
 }

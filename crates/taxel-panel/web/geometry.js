@@ -130,12 +130,12 @@ class Grid extends Sensor {
   /** @param {number} k @param {[number, number]} at @returns {string} a centre within source k, in `unit` */
   within(k, [x, y]) {
     const column = this.across(k, x);
-    return this.mm ? `${rounded(column * this.mm[1])}, ${rounded(y * this.mm[0])}` : `${column.toFixed(1)}, ${y.toFixed(1)}`;
+    return this.mm ? `x ${rounded(column * this.mm[1])}, y ${rounded(y * this.mm[0])}` : `column ${column.toFixed(1)}, row ${y.toFixed(1)}`;
   }
 
-  /** @returns {string} the unit of a centre within a source */
+  /** @returns {string} the unit of a centre within a source, behind it */
   get unit() {
-    return this.mm ? "mm" : "";
+    return this.mm ? " mm" : "";
   }
 
   /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */
@@ -213,7 +213,7 @@ class Placed extends Sensor {
 
   /** @param {number} x @param {number} y @returns {string} a centre, in the unit of the places */
   centre(x, y) {
-    return `${this.within(0, [x, y])} ${this.places.unit ?? "in the places' own unit"}`;
+    return `${this.within(0, [x, y])}${this.unit}`;
   }
 
   /** @param {number} _ @param {number} x @returns {number} x as it is: the places of all sources are in one system */
@@ -224,12 +224,13 @@ class Placed extends Sensor {
   /** @param {number} _ @param {[number, number]} at @returns {string} a centre, in `unit` */
   within(_, at) {
     // Coordinates are in steps of the extent.
-    return at.map((coordinate) => rounded(Math.abs(coordinate) < this.near / 100 ? 0 : coordinate)).join(", ");
+    const [x, y] = at.map((coordinate) => rounded(Math.abs(coordinate) < this.near / 100 ? 0 : coordinate));
+    return `x ${x}, y ${y}`;
   }
 
   /** @returns {string} */
   get unit() {
-    return this.places.unit ?? "own unit";
+    return this.places.unit ? ` ${this.places.unit}` : ", units of the file";
   }
 
   /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */

@@ -23,7 +23,10 @@ export const KEYS = [
   { keys: ["m"], shown: "M", text: "mark a label at the cursor, else at the time shown", action: "mark" },
   { keys: ["n"], shown: "N", text: "to the next label", action: "nextLabel" },
   { keys: ["p"], shown: "P", text: "to the label before", action: "labelBefore" },
+  { keys: ["k"], shown: "K", text: "to the next label that the training missed, or false detection", action: "nextMistake" },
+  { keys: ["j"], shown: "J", text: "to the one before", action: "mistakeBefore" },
   { keys: ["Delete"], shown: "Delete", text: "delete the chosen label", action: "deleteLabel" },
+  { keys: ["Ctrl z"], shown: "Ctrl Z", text: "take back the last change of labels", action: "undo" },
   { keys: ["["], shown: "[", text: "the stretch to cut begins here", action: "cutFrom" },
   { keys: ["]"], shown: "]", text: "the stretch to cut ends here", action: "cutTo" },
   { keys: ["o"], shown: "O", text: "choose a recording to open", action: "open" },
@@ -49,12 +52,14 @@ export function bindKeys(actions, letters) {
   const byKey = new Map(KEYS.flatMap(({ keys, action }) => keys.map((key) => [key, action])));
   for (const action of byKey.values()) if (!actions[action]) throw new Error(`no action for key ${action}`);
   document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey || event.defaultPrevented) return;
+    if (event.altKey || event.defaultPrevented) return;
     const { target } = event;
     if (!(target instanceof Element)) return;
     const types = target instanceof HTMLInputElement && !["checkbox", "range"].includes(target.type);
     if (types || target instanceof HTMLTextAreaElement || document.querySelector("dialog[open]")) return;
-    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    const letter = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    // On a Mac it is the command key.
+    const key = event.ctrlKey || event.metaKey ? `Ctrl ${event.shiftKey ? "Shift " : ""}${letter}` : letter;
     const action = byKey.get(key);
     if (!action || (event.repeat && ["record", "play", "mark", "theme", "picture"].includes(action))) return;
     if (key.length === 1 && key !== " " && !letters()) return;

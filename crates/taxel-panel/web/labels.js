@@ -1,9 +1,10 @@
 // Labels by click: mark, name, move and delete events on the time line.
 
+import { collapsed } from "./clusters.js";
 import { LabelConflict } from "./conflict.js";
 import { entitle, make, part, write } from "./dom.js";
 import { notify, silence } from "./notice.js";
-import { counted, listedTime, readTime, seconds, timeUnit } from "./words.js";
+import { counted, integer, listedTime, readTime, seconds, timeUnit } from "./words.js";
 
 /** @typedef {import("./messages.js").Label} Label */
 /** @typedef {import("./messages.js").Labels} LabelsMessage */
@@ -16,7 +17,7 @@ import { counted, listedTime, readTime, seconds, timeUnit } from "./words.js";
 const STEP_US = 1000;
 /** From here on a press is a drag, CSS pixels. */
 const DRAG = 4;
-/** Levels on which handles are stacked where they would cover each other; more labels than fit are lines alone. */
+/** Levels on which handles are stacked where they would cover each other; more labels than fit are a count. */
 const LEVELS = 3;
 /** Width of a handle, CSS pixels. */
 const HANDLE = { mouse: 11, touch: 16 };
@@ -32,15 +33,17 @@ export class Labels {
    * @param {() => Timeline | null} timeline
    * @param {(error: unknown) => void} failed
    * @param {() => void} shown called to bring the tab to the front
+   * @param {(from_us: number, to_us: number) => void} closer called to show a stretch of time
    * @param {(file: string) => void} counted called when the number of a recording's labels may have changed
    */
-  constructor(server, settings, player, timeline, failed, shown, counted) {
+  constructor(server, settings, player, timeline, failed, shown, closer, counted) {
     this.server = server;
     this.settings = settings;
     this.player = player;
     this.timeline = timeline;
     this.failed = failed;
     this.shown = shown;
+    this.closer = closer;
     this.counted = counted;
     this.conflict = new LabelConflict(server, failed, shown);
     /** @type {Map<string, LabelsMessage>} by recording */
@@ -51,6 +54,14 @@ export class Labels {
     this.trial = null;
     /** @type {Map<number, HTMLButtonElement>} */
     this.flags = new Map();
+    /** The counts of flags that would cover each other. @type {HTMLButtonElement[]} */
+    this.counts = [];
+    /** The rows of the list, with what each was made for. @type {Map<number, { made: string, row: HTMLElement }>} */
+    this.rows = new Map();
+    /** The notice that offers to take a deletion back. */
+    this.offered = "";
+    /** The answer to the last change: the next one that is taken back is that of after it. @type {Promise<unknown>} */
+    this.saved = Promise.resolve();
     /** @type {number | null} */
     this.chosen = null;
     /** The name that was marked by the last click. */
@@ -159,9 +170,17 @@ export class Labels {
 
   /** Asks for a change of labels; the tab says so until there is an answer. @param {import("./messages.js").Request} message */
   save(message) {
+    silence(this.offered);
     const answer = this.server.request(message).finally(() => this.showPlace());
+    this.saved = answer.catch(() => {});
     this.showPlace();
     return answer;
+  }
+
+  /** Takes back the last change of labels that was made in this window. */
+  undo() {
+    // The server takes back what it has carried out.
+    this.saved = this.saved.then(() => this.save({ type: "undo" })).then(() => notify("took back the last change of labels"), this.failed);
   }
 
   /** Makes a label and chooses it. @param {{ label: string, t_us: number, source?: string, replaces_us?: number | null }} label */
@@ -185,9 +204,13 @@ export class Labels {
   remove(label_id) {
     const gone = this.labels.find((label) => label.label_id === label_id);
     if (!gone) return;
-    const { label, t_us, source, replaces_us } = gone;
-    const undo = () => this.add({ label, t_us, ...(source ? { source } : {}), replaces_us });
-    this.save({ type: "delete", label_id }).then(() => notify(`deleted ${label} at ${seconds(t_us)}`, false, { text: "Undo", action: undo }), this.failed);
+    this.save({ type: "delete", label_id }).then(() => this.offerUndo(`deleted ${gone.label} at ${seconds(gone.t_us)}`), this.failed);
+  }
+
+  /** Says what was changed, and offers to take it back. @param {string} text */
+  offerUndo(text) {
+    this.offered = text;
+    notify(text, false, { text: "Undo", action: () => this.undo() });
   }
 
   /** @param {number} by 1: the next label after the time shown, -1: the one before */
@@ -221,7 +244,9 @@ export class Labels {
     // A row in which a person types stays what it is.
     const typing = list.contains(document.activeElement) ? document.activeElement?.closest("li")?.dataset.id : undefined;
     const edited = typing === undefined ? null : list.querySelector(`li[data-id="${CSS.escape(typing)}"]`);
-    const rows = labels.map((label) => (edited instanceof HTMLElement && edited.dataset.id === String(label.label_id) ? edited : this.row(label)));
+    const rows = labels.map((label) => (edited instanceof HTMLElement && edited.dataset.id === String(label.label_id) ? edited : this.rowOf(label)));
+    const ids = new Set(labels.map(({ label_id }) => label_id));
+    for (const id of this.rows.keys()) if (!ids.has(id)) this.rows.delete(id);
     if (rows.length !== list.children.length || rows.some((row, i) => row !== list.children[i])) {
       const focused = document.activeElement;
       list.replaceChildren(...rows);
@@ -236,6 +261,14 @@ export class Labels {
     const table = this.file ? this.files.get(this.file) : undefined;
     const how = this.server.saves ? "Saving" : table?.labels.length ? "Saved" : "To be saved";
     write(part("label-place", HTMLElement), table ? `${how} in ${table.path}` : "Open a recording, or start one, and mark what happens in it.");
+  }
+
+  /** The row of a label, made again only where it is another. @param {Label} label @returns {HTMLElement} */
+  rowOf(label) {
+    const made = JSON.stringify([label, timeUnit()]);
+    let known = this.rows.get(label.label_id);
+    if (known?.made !== made) this.rows.set(label.label_id, (known = { made, row: this.row(label) }));
+    return known.row;
   }
 
   /** @param {Label} label @returns {HTMLElement} */
@@ -293,20 +326,44 @@ export class Labels {
     };
   }
 
-  /** Puts each flag in the window where its time is; its handle on the first level where it covers no other. */
+  /** Puts each flag in the window where its time is; its handle on the first level where it covers no other. More than have levels are a count. */
   arrange() {
     const timeline = this.timeline();
     const { clientWidth } = this.lane;
-    const seen = new Set();
     const handle = HANDLE[matchMedia("(max-width: 860px)").matches ? "touch" : "mouse"];
     const inside = this.labels.flatMap((label) => {
       const t_us = this.dragged?.label_id === label.label_id ? this.dragged.t_us : label.t_us;
       const share = timeline?.share(t_us) ?? null;
-      return share === null ? [] : [{ ...label, t_us, share }];
+      return share === null ? [] : [{ ...label, t_us, x: share * clientWidth }];
     });
+    const { single, counts } = collapsed(inside.filter(({ label_id }) => label_id !== this.chosen), handle, LEVELS);
+    const flagged = [...single, ...inside.filter(({ label_id }) => label_id === this.chosen)].sort((a, b) => a.x - b.x);
+    this.arrangeFlags(flagged, handle, clientWidth);
+    while (this.counts.length > counts.length) this.counts.pop()?.remove();
+    while (this.counts.length < counts.length) {
+      const count = make("button", { type: "button", class: "count" });
+      this.counts.push(count);
+      this.lane.append(count);
+    }
+    counts.forEach(({ from, to, marks }, i) => {
+      const count = this.counts[i];
+      const [first, last] = [marks[0].t_us, marks[marks.length - 1].t_us];
+      write(count, integer(marks.length));
+      const name = `${counted(marks.length, "label")} from ${seconds(first)} to ${seconds(last)}: show them closer`;
+      entitle(count, "aria-label", name);
+      entitle(count, "title", name);
+      count.style.left = `${from.toFixed(1)}px`;
+      count.style.width = `${(to - from + handle).toFixed(1)}px`;
+      count.onclick = () => this.closer(first, last);
+    });
+  }
+
+  /** @param {(Label & { x: number })[]} flagged by time @param {number} handle width of a handle @param {number} wide of the lane, CSS pixels */
+  arrangeFlags(flagged, handle, wide) {
+    const seen = new Set();
     /** @type {number[]} where the last handle of each level ends */
     const ends = new Array(LEVELS).fill(-Infinity);
-    inside.forEach(({ label_id, label, t_us, share }, i) => {
+    flagged.forEach(({ label_id, label, t_us, x }, i) => {
       seen.add(label_id);
       let flag = this.flags.get(label_id);
       if (!flag) {
@@ -314,14 +371,13 @@ export class Labels {
         this.flags.set(label_id, flag);
         this.lane.append(flag);
       }
-      const x = share * clientWidth;
       const level = ends.findIndex((end) => end <= x);
       if (level >= 0) ends[level] = x + handle;
       // The name stands where no other handle of its level follows.
-      const next = inside.slice(i + 1, i + 1 + LEVELS).reduce((least, later) => Math.min(least, later.share * clientWidth), clientWidth + handle);
+      const next = flagged.slice(i + 1, i + 1 + LEVELS).reduce((least, later) => Math.min(least, later.x), wide + handle);
       const named = level === 0 && next - x > handle + LETTER * Math.min(label.length, 14);
       if (named) ends.fill(x + handle + LETTER * Math.min(label.length, 14));
-      flag.style.left = `${(100 * share).toFixed(3)}%`;
+      flag.style.left = `${((100 * x) / wide).toFixed(3)}%`;
       flag.dataset.level = String(level);
       flag.classList.toggle("line", level < 0 && label_id !== this.chosen);
       write(/** @type {HTMLElement} */ (flag.lastElementChild), named ? label : "");

@@ -47,6 +47,8 @@ import { rounded, integer } from "./words.js";
 const SIDE = 44;
 /** CSS pixels between two lines of the grid. */
 const GRID_PX = 96;
+/** Steps between the numbers of an axis of counts. */
+const WHOLE = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000];
 /** Up to this many channels have a curve each. */
 const MOST_CHANNELS = 64;
 /** Colours of the sums of several sources, by their names in style.css. */
@@ -91,7 +93,7 @@ function centreAt({ sensor }, timeline, column) {
   if (sensor.kind === "channels" || Number.isNaN(timeline.sum[column])) return "";
   if (!others.length) return Number.isNaN(first[0]) ? "nothing pressed" : sensor.centre(...first);
   const pressed = [first, ...others].flatMap((at, k) => (Number.isNaN(at[0]) ? [] : [`${sensor.sources[k].name} ${sensor.within(k, at)}`]));
-  return pressed.length ? `${pressed.join("  ")} ${sensor.unit}`.trim() : "nothing pressed";
+  return pressed.length ? pressed.join(", ") + sensor.unit : "nothing pressed";
 }
 
 /** The lanes, from top to bottom. @type {readonly Lane[]} */
@@ -141,28 +143,31 @@ export const LANES = [
       history[3 * column + 2] === UNKNOWN_VALUE ? [] : Array.from(history.subarray(3 * column, 3 * column + 3), (ticks) => (ticks - zero) * step),
   },
   {
-    name: "force", label: "Sum of the values, or force, and number of taxels pressed", least: 72,
-    setting: "showForce", box: "Sum or force, area",
-    heading: ({ sensor, sums }, sources) => [
+    name: "force", label: "Sum of the values, or force", least: 72,
+    setting: "showForce", box: "Sum or force",
+    heading: ({ sums }, sources) => [
       make("b", { id: "force-title" }, sums.unit === "N" ? "Force" : "Sum"),
       " ",
       make("span", { id: "force-sums" }, ...(sources.length ? sources.flatMap((source, k) => [swatch(COLOURS[k]), ` ${source} `, output(), " "]) : [swatch("more"), " ", output({ id: "force-sum" })])),
-      " ",
-      make("span", { id: "area-legend", class: sources.length ? "apart" : "", hidden: sensor.kind === "channels" }, make("span", { class: "gap" }, "Area"), " ", swatch("less dashed"), " ", output({ id: "force-area" })),
     ],
-    says: (shown, timeline, column) => [...sumsAt(shown, timeline, column), areaAt(shown, timeline, column)],
-    title: ({ sums }) => `${sums.unit === "N" ? "Force" : "Sum"} and area`,
-    plan: (shown, sources) => {
-      const areas = shown().sensor.kind !== "channels";
-      // Beside the colours of several sources the area has none.
-      const [force, area] = sources.length ? [themed("dim"), themed("dim")] : ["more", "less"].map(themed);
-      return {
-        scales: { force: { range: fromZero(() => 8 * shown().sums.step) }, area: { range: fromZero(() => 8) } },
-        series: [...coloured(sources).map((colour) => line(colour, "force")), { ...line(area, "area", [5, 3]), show: areas }],
-        axes: [axis("force", 3, force), { ...axis("area", 1, area), ...(areas ? {} : { values: () => [] }) }],
-      };
-    },
-    at: ({ sums: { step } }, timeline, column) => [...timeline.sums(column).map((sum) => (sum >= 0 ? sum * step : null)), timeline.area[column] >= 0 ? timeline.area[column] : null],
+    says: sumsAt,
+    title: ({ sums }) => (sums.unit === "N" ? "Force" : "Sum"),
+    plan: (shown, sources) => ({
+      scales: { force: { range: fromZero(() => 8 * shown().sums.step) } },
+      series: coloured(sources).map((colour) => line(colour, "force")),
+      axes: [axis("force", 3, sources.length ? themed("dim") : themed("more"))],
+    }),
+    at: ({ sums: { step } }, timeline, column) => timeline.sums(column).map((sum) => (sum >= 0 ? sum * step : null)),
+  },
+  {
+    name: "area", label: "Number of taxels pressed", kind: "low", least: 54,
+    setting: "showArea", box: "Area",
+    fits: ({ sensor }) => sensor.kind !== "channels",
+    heading: () => ["Area ", swatch("less"), " ", output({ id: "area-now" })],
+    says: (shown, timeline, column) => [areaAt(shown, timeline, column)],
+    title: () => "Area",
+    plan: () => ({ scales: { area: { range: fromZero(() => 8) } }, series: [line(themed("less"), "area")], axes: [{ ...axis("area", 3, themed("less")), incrs: WHOLE }] }),
+    at: (_, timeline, column) => [timeline.area[column] >= 0 ? timeline.area[column] : null],
   },
   {
     name: "centre", label: "Centre of pressure", kind: "low", least: 62,

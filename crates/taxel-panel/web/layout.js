@@ -11,6 +11,8 @@ const GAP = 20;
 const BELOW_BANNER = 8;
 /** The least that is needed beside the lanes: the flags, the detections, the axis. */
 const FLAGS_AND_AXIS = 79;
+/** A row of marks that is shown at times. */
+const MARKS = 15;
 /** The least width of lanes that stand beside maps. */
 const LANES_WIDE = 460;
 /** Part of the width that maps beside the lanes may take. */
@@ -33,6 +35,7 @@ export class Layout {
     this.views = part("views", HTMLElement);
     /** The message above the maps, shown at times. */
     this.banner = part("silence", HTMLElement);
+    this.mistakes = part("mistake-marks", HTMLElement);
     this.done = "";
     const resized = new ResizeObserver(() => this.arrange());
     resized.observe(this.views);
@@ -45,7 +48,7 @@ export class Layout {
     const { clientWidth: wide } = this.views;
     const banner = this.banner.offsetHeight;
     const high = this.views.clientHeight - (banner && banner + BELOW_BANNER);
-    const low = FLAGS_AND_AXIS + lanes.reduce((sum, { least }) => sum + least, 0);
+    const low = FLAGS_AND_AXIS + (this.mistakes.hidden ? 0 : MARKS) + lanes.reduce((sum, { least }) => sum + least, 0);
     const beside = Math.min(BESIDE * wide, wide - LANES_WIDE - GAP);
     /** @type {[Side, number][]} */
     const widths = [

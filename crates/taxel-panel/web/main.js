@@ -4,6 +4,7 @@ import { bindActions } from "./actions.js";
 import { Board } from "./board.js";
 import { writeCounters, writePace } from "./counters.js";
 import { Cursor } from "./cursor.js";
+import { Description } from "./description.js";
 import { Detections, recorded } from "./detections.js";
 import { make, part, write } from "./dom.js";
 import { showKeys } from "./keys.js";
@@ -11,6 +12,7 @@ import { Labels } from "./labels.js";
 import { Lanes } from "./lanes.js";
 import { Layout } from "./layout.js";
 import { Maps } from "./maps.js";
+import { Mistakes } from "./mistakes.js";
 import { Notes } from "./notes.js";
 import { failed, notify, silence } from "./notice.js";
 import { Player } from "./player.js";
@@ -51,14 +53,22 @@ const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.c
 const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), timeWindow, mark);
 const maps = new Maps(settings, watch);
 const lanes = new Lanes(settings, shown);
-const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
+const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), (from, to) => timeWindow.closer(from, to), listRecordings);
 const notes = new Notes(player, labels);
-const training = new Training(server, player);
+const mistakes = new Mistakes(player, () => {
+  marksDue = true;
+  layout.arrange();
+});
+const training = new Training(server, player, mistakes);
 const layout = new Layout(arrangement, () => (lanesDue = true));
 const board = new Board(server, settings, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
+const description = new Description(server, (name) => {
+  reread = name;
+  ask(name);
+}, (name) => labels.count(name), () => showTab("view"));
 const recorder = new Recorder(server, failed, () => showTab("record"));
-const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, notes: notes.withTime, cut: view.cut }));
+const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, mistakes: mistakes.shown, notes: notes.withTime, cut: view.cut }));
 
 /** @type {Timeline | null} */
 let timeline = null;
@@ -74,6 +84,8 @@ let registers = null;
 let zeroed = [];
 /** The recording that is being opened. @type {string | null} */
 let opening = null;
+/** The recording that is read anew, in another way. */
+let reread = "";
 /** Encoder and latency of the spikes in the raster. */
 let spikes = "";
 /** Why the last one was not opened. */
@@ -256,6 +268,10 @@ function receive(message) {
       return board.connection.log(message.text);
     case "source_preview":
       return board.connection.preview(message);
+    case "topics":
+      return description.offer(message, opened?.name ?? null);
+    case "layout_saved":
+      return board.connection.saved(message);
     case "places":
       return board.connection.offer(message);
     case "cut":
@@ -339,6 +355,7 @@ async function ask(name, trial) {
     refused = why.includes(name) ? why : `${name}: ${why}`;
     // What is open stays open, so that the same file can be chosen again once it is mended.
     if (opening === name) part("files", HTMLSelectElement).value = opened?.name ?? "";
+    description.refused(name);
     // Where nothing is shown it stands above the maps.
     if (player.transport.source !== null || hello?.live) notify(refused, true);
   }
@@ -363,8 +380,9 @@ function showRegisters() {
 
 /** @param {Opened} message */
 function open(message) {
-  const again = opened?.name === message.name && opened.frames?.trial === message.frames?.trial;
+  const again = reread !== message.name && opened?.name === message.name && opened.frames?.trial === message.frames?.trial;
   opened = message;
+  reread = "";
   player.transport = { ...player.transport, source: message.name, state: "paused" };
   player.reach = message.start_us === null || message.stop_us === null ? null : [message.start_us, message.stop_us];
   player.t_us = message.start_us;
@@ -375,11 +393,11 @@ function open(message) {
   if (!again) turnTo(message);
   if (timeline && !again) {
     timeline.following = false;
-    timeWindow.showAll();
+    timeWindow.showBeginning(message.touch_us);
     // It opens on something: the first touch.
     if (message.touch_us !== null) player.seek(message.touch_us);
   }
-  training.choose(message.name, message.train);
+  training.choose(message.name, message.train, message.frames?.trial ?? null);
   board.array = message.array;
   const noisy = message.frames?.flickering ?? [];
   maps.flickering = noisy.length;
@@ -391,6 +409,7 @@ function open(message) {
   view.offer([]);
   showDetections(recorded(message.detections), [...new Set(message.detections.map(({ label }) => label))].sort());
   notes.choose(message.notes);
+  description.choose(message);
   server.send({ type: "overview" });
   showRegisters();
   player.show();
@@ -413,6 +432,7 @@ function move(transport) {
     showZeroed();
     part("files", HTMLSelectElement).value = "";
     notes.choose([]);
+    description.choose(null);
     player.reach = counters?.reach_us ?? null;
     labels.choose(recorder.status?.state === "recording" ? recorder.status.file : null);
     view.choose(null);
@@ -437,6 +457,7 @@ function showDetections(shown, labels) {
 function mark() {
   cursor.draw();
   detections.mark(timeline);
+  mistakes.mark(timeline);
 }
 
 const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
@@ -526,7 +547,7 @@ matchMedia("(prefers-color-scheme: light)").addEventListener("change", applyThem
 
 // ------------------------------------------------------------------------------------------------ start
 
-bindActions({ server, player, settings, recorder, labels, view, maps, lanes, window: timeWindow }, () => timeline);
+bindActions({ server, player, settings, recorder, labels, mistakes, view, maps, lanes, window: timeWindow }, () => timeline);
 part("files", HTMLSelectElement).onchange = ({ target }) => {
   const { value } = /** @type {HTMLSelectElement} */ (target);
   if (value) ask(value);

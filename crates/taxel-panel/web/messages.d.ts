@@ -35,6 +35,20 @@ export interface Arrival {
   heartbeat_us: number | null;
 }
 
+/** A field of a topic of a ROS bag that holds numbers. */
+export interface BagTopic {
+  /** The topic. */
+  topic: string;
+  /** The field; empty for a topic of images. */
+  field: string;
+  /** Numbers in a message: rows and columns where the message states them. */
+  shape: number[];
+  /** Number of messages. */
+  messages: number;
+  /** Why it cannot be read; empty where it can. */
+  trouble: string;
+}
+
 /** What another program's text of a table lacks. A row without a `label` says that the note at `replaces_us` counts no more. */
 export interface Conflict {
   conflict_id: number;
@@ -136,6 +150,22 @@ export interface LabelRow {
   replaces_us: number | null;
 }
 
+/** How a neuron, or the plain rule beside it, detects a label. */
+export interface LabelScore {
+  /** The label. */
+  label: string;
+  /** Whether it is the plain rule's. */
+  is_plain_rule: boolean;
+  /** Number of labels with a detection. */
+  found: number;
+  /** Number of labels without one. */
+  missed: number;
+  /** Number of detections without a label. */
+  false: number;
+  /** From the label until the detection is known, median, ms; null where none was found. */
+  delay_ms: number | null;
+}
+
 /** The last recording. */
 export interface LastRecording {
   file: string;
@@ -180,6 +210,20 @@ export interface Lost {
 export interface Marker {
   t_us: number;
   start: boolean;
+}
+
+/** A label without a detection of the neuron, or a detection without a label. */
+export interface Mistake {
+  /** The label. */
+  label: string;
+  /** Board time, us. */
+  t_us: number;
+  /** Whether a label was missed; else a detection is false. */
+  is_missed: boolean;
+  /** The sensor that it is of, where the recording has several; else empty. */
+  source: string;
+  /** The trial that it is of, where the file holds several; else empty. */
+  trial: string;
 }
 
 /** The drift and the delays that arrivals show. */
@@ -265,6 +309,8 @@ export interface Hello {
   udp: string | null;
   /** Where frames of numbers are read; null of a board. */
   lines: string | null;
+  /** That source as a text states it, with all of its keys; null of a board. */
+  source: string | null;
   /** The values of those frames, after the first one; null of a board, whose values are ticks. */
   frames: LiveFrames | null;
   /** Whether intensities are differences; null without a board. */
@@ -416,6 +462,21 @@ export interface SourcePreview {
   about: string;
 }
 
+/** A layout file was written. */
+export interface LayoutSaved {
+  type: "layout_saved";
+  name: string;
+  /** The command that reads the source in a shell. */
+  command: string;
+}
+
+/** When asked: the fields with numbers of the topics of a ROS bag; empty of any other file. */
+export interface Topics {
+  type: "topics";
+  name: string;
+  topics: BagTopic[];
+}
+
 /** The recorder, on each change and once a second while it counts or records. */
 export interface Recorder {
   type: "recorder";
@@ -453,6 +514,12 @@ export interface Trained {
   readout: string;
   /** How well the readout detects, in words. */
   text: string;
+  /** On which labels it was scored: held-out ones, or those that it was trained on. */
+  judged_on: string;
+  /** The neuron of each label, and the plain rule beside it where there is one. */
+  scores: LabelScore[];
+  /** The labels that neurons missed, and their false detections, among the labels that `scores` count. */
+  mistakes: Mistake[];
   /** The command that detects by it in a shell. */
   next: string;
   /** Options of `taxel train` that may help. */
@@ -811,6 +878,12 @@ export interface SettleRequest {
   keep: "acknowledged" | "file";
 }
 
+/** Take back the last change of labels that this client made in the recording that it shows or that is recorded, whole or not at all; refused where there is none, or where another window or program has changed such a label since. */
+export interface UndoRequest {
+  type: "undo";
+  id?: number;
+}
+
 /** Requests `health` of what this view shows. */
 export interface HealthRequest {
   type: "health";
@@ -873,6 +946,34 @@ export interface PreviewSourceRequest {
   source: string;
 }
 
+/** Write a source of lines, with all that its text states, to the new layout file NAME.layout.toml of the folder; `layout_saved` follows. An existing file is never overwritten. */
+export interface SaveLayoutRequest {
+  type: "save_layout";
+  id?: number;
+  source: string;
+  name: string;
+}
+
+/** Requests `topics`: those of a ROS bag of the folder. */
+export interface TopicsRequest {
+  type: "topics";
+  id?: number;
+  name: string;
+}
+
+/** Write what is stated here into the layout file beside a recording of the folder, NAME.layout.toml, as its keys `falls`, `rate_hz`, `rows` and `columns`, and in `[ros]` `topic` and `field`; what it holds already stays. The next `open` reads the recording by it. Refused where options of the command say the same, and for a file that no layout file describes. */
+export interface DescribeRequest {
+  type: "describe";
+  id?: number;
+  name: string;
+  falls?: boolean | null;
+  field?: string | null;
+  rate_hz?: number | null;
+  /** Rows and columns. */
+  size?: [number, number] | null;
+  topic?: string | null;
+}
+
 /** Whether the board sends differences from the value before, not values. Earlier events were decoded with the other meaning, so the source begins anew: time, values, the past that can be viewed, a readout with its tare. Refused while a recording runs. */
 export interface DeltaIntensityRequest {
   type: "delta_intensity";
@@ -904,6 +1005,8 @@ export type Message =
   | BoardLine
   | Places
   | SourcePreview
+  | LayoutSaved
+  | Topics
   | Recorder
   | Recordings
   | Trained
@@ -950,6 +1053,7 @@ export type Request =
   | MoveRequest
   | DeleteRequest
   | SettleRequest
+  | UndoRequest
   | HealthRequest
   | TrainRequest
   | TrainingRequest
@@ -959,6 +1063,9 @@ export type Request =
   | ListenRequest
   | ReadSourceRequest
   | PreviewSourceRequest
+  | SaveLayoutRequest
+  | TopicsRequest
+  | DescribeRequest
   | DeltaIntensityRequest
   | PlacesRequest
   | ControlRequest;

@@ -2,7 +2,7 @@
 
 import { make, part, write } from "./dom.js";
 import { failed, notify } from "./notice.js";
-import { seconds } from "./words.js";
+import { counted, seconds } from "./words.js";
 
 /** @typedef {import("./labels.js").Labels} Labels */
 /** @typedef {import("./player.js").Player} Player */
@@ -76,7 +76,7 @@ export class Notes {
       group.t_us.push(t_us);
       group.replaces_us.push(t_us);
     }
-    await this.labels.save({ type: "marks", labels: [...groups.values()] }).catch(failed);
+    await this.labels.save({ type: "marks", labels: [...groups.values()] }).then(() => this.labels.offerUndo(`${counted(unused.length, "note")} used as labels`), failed);
     this.button.disabled = false;
     this.show();
   }

@@ -41,7 +41,8 @@ function fall(opened) {
   const falling = sources.filter(({ falls }) => falls).map(({ name }) => name);
   if (!opened || !falling.length) return "";
   const names = falling.length < sources.length ? ` of ${falling.join(", ")}` : "";
-  return `The values${names} fall from their rest, so that no pressure is shown. If less means more pressure, write the line “falls = true” into ${opened.name.replace(/\.[^.]+$/, "")}.layout.toml beside the recording, and start taxel view again.`;
+  const file = `${opened.name.replace(/\.[^.]+$/, "")}.layout.toml`;
+  return `The values${names} fall from their rest, so that no pressure is shown. If less means more pressure, turn them: “falls = true” is written into ${file} beside the recording, which every command reads too.`;
 }
 
 /** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */
@@ -89,11 +90,16 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const doubt = (connected && (opened ? opened.pace : counters?.pace)?.doubt) || "";
   const nothing = connected && source === null && !hello?.live;
   const banner = part("silence", HTMLElement);
-  write(banner, [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`, nothing && refused, connected && fall(opened), connected && preload(opened)].filter(Boolean).join(" "));
-  banner.hidden = !banner.textContent;
+  const falling = connected && fall(opened);
+  const text = [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`, nothing && refused, connected && preload(opened), falling].filter(Boolean).join(" ");
+  write(part("silence-text", HTMLElement), text);
+  const turn = part("turn-values", HTMLButtonElement);
+  turn.hidden = !falling;
+  write(turn, falling ? "Turn values" : "");
+  banner.hidden = !text;
   const subject = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? source : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
-  const text = [subject, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");
-  write(part("source", HTMLElement), text);
-  entitle(part("source", HTMLElement), "title", text);
+  const about = [subject, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");
+  write(part("source", HTMLElement), about);
+  entitle(part("source", HTMLElement), "title", about);
   document.documentElement.classList.toggle("recording", recording !== null);
 }

@@ -6,7 +6,7 @@ import { seconds, writtenTime } from "./words.js";
 /** @typedef {import("./messages.js").Overview} Overview */
 /** @typedef {import("./player.js").Player} Player */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
-/** @typedef {{ labels: { t_us: number }[], detections: { t_us: number }[], notes: { t_us: number }[], cut: [number | null, number | null] }} Marks */
+/** @typedef {{ labels: { t_us: number }[], detections: { t_us: number }[], mistakes: { t_us: number }[], notes: { t_us: number }[], cut: [number | null, number | null] }} Marks */
 
 /** The strip at the foot of the page. */
 export class Strip {
@@ -78,7 +78,7 @@ export class Strip {
       const [left, right] = timeline.window.map((t) => Math.max(0, Math.min(width, x(t))));
       context.fillRect(left, 0, right - left, height);
     }
-    const { labels, detections, notes, cut } = this.marks();
+    const { labels, detections, mistakes, notes, cut } = this.marks();
     const [begin, end] = cut;
     if (begin !== null || end !== null) {
       context.fillStyle = themed("cut");
@@ -106,6 +106,7 @@ export class Strip {
     ticks(notes, "dim", 0, 5, 1.5);
     ticks(detections, "less", 0, 5, 2);
     ticks(labels, "label", 0, height, 2);
+    ticks(mistakes, "bad", 5, 12, 3);
     if (this.hover !== undefined) {
       context.fillStyle = themed("dim");
       context.fillRect(this.hover, 0, 1, height);

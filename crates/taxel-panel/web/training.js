@@ -12,10 +12,11 @@ const ASKED_MS = 3000;
 
 /** The button that trains, what the training prints, and the choice of the readout. */
 export class Training {
-  /** @param {Server} server @param {import("./player.js").Player} player */
-  constructor(server, player) {
+  /** @param {Server} server @param {import("./player.js").Player} player @param {import("./mistakes.js").Mistakes} mistakes */
+  constructor(server, player, mistakes) {
     this.server = server;
     this.player = player;
+    this.mistakes = mistakes;
     /** When the training began, ms; null while none runs. @type {number | null} */
     this.since = null;
     /** The recording that is shown; null: the live source. @type {string | null} */
@@ -31,6 +32,7 @@ export class Training {
   async begin() {
     this.since = performance.now();
     this.text("");
+    this.mistakes.clear();
     const asking = setInterval(() => this.server.send({ type: "training" }), ASKED_MS);
     this.write();
     try {
@@ -66,9 +68,12 @@ export class Training {
   }
 
   /** @param {Trained} trained */
-  take({ name, readout, text, next, options }) {
+  take(trained) {
+    const { name, readout, text, next, options } = trained;
     this.text(text, next, options);
-    if (name === this.source) this.read(readout);
+    if (name !== this.source) return;
+    this.mistakes.take(trained);
+    this.read(readout).then(() => this.mistakes.look());
   }
 
   /** Lets a readout read what is shown. @param {string} readout */
@@ -99,8 +104,9 @@ export class Training {
     this.show();
   }
 
-  /** @param {string | null} source a recording, or null: the live source @param {string} [command] what trains on it in a shell */
-  choose(source, command = "") {
+  /** @param {string | null} source a recording, or null: the live source @param {string} [command] what trains on it in a shell @param {string | null} [trial] where the file holds several */
+  choose(source, command = "", trial = null) {
+    this.mistakes.choose(trial, source === this.source);
     part("train-shell", HTMLElement).hidden = !command;
     write(part("train-command", HTMLElement), command);
     if (source === this.source) return;

@@ -14,6 +14,8 @@ import { short } from "./words.js";
 const SHORTEST_US = 5000;
 /** Room beside the beginning and the end of a recording, part of the window. */
 const ROOM = 0.01;
+/** The longest stretch of a recording with which the page opens: so much can be read, us. */
+const READABLE_US = 10e6;
 /** Where in a window that jumps to a time this lies. */
 const AHEAD = 0.2;
 /** CSS pixels between two numbers of the axis. */
@@ -92,6 +94,20 @@ export class TimeWindow {
     if (!reach) return;
     const room = Math.max(SHORTEST_US / 2, ROOM * (reach[1] - reach[0]));
     this.set(reach[0] - room, reach[1] + room);
+  }
+
+  /** Shows the first touches of a recording, or all of a short one. @param {number | null} touch_us the time of the first touch */
+  showBeginning(touch_us) {
+    const { reach } = this.player;
+    if (!reach || reach[1] - reach[0] <= READABLE_US) return this.showAll();
+    const from = (touch_us ?? reach[0]) - AHEAD * READABLE_US;
+    this.set(from, from + READABLE_US);
+  }
+
+  /** Shows what happens from one time to another, with room beside it. @param {number} from_us @param {number} to_us */
+  closer(from_us, to_us) {
+    const room = Math.max(SHORTEST_US, 0.2 * (to_us - from_us));
+    this.set(from_us - room, to_us + room);
   }
 
   /**

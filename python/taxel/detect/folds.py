@@ -37,7 +37,7 @@ from taxel.detect.loads import Clock, clock_of
 from taxel.detect.plain_score import PlainScore, floor_of, plain_score
 from taxel.detect.readout import Readout, run
 from taxel.detect.recipe import Recipe
-from taxel.detect.scoring import Score, score, score_together
+from taxel.detect.scoring import Mistake, Score, mistakes_of, score, score_together
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms
 
@@ -114,6 +114,8 @@ class Judged:
         One a fold.
     plain : PlainScore, optional
         How plain rules did that were tuned on the training part of each fold.
+    mistakes : tuple of Mistake
+        What the scores of each example call missed and false.
     """
 
     scores: tuple[Score, ...]
@@ -121,6 +123,7 @@ class Judged:
     how: str
     trained: tuple[Trained, ...] = ()
     plain: PlainScore | None = None
+    mistakes: tuple[Mistake, ...] = ()
 
 
 def judge(
@@ -201,7 +204,8 @@ def judge(
     scores = tuple(score(*compared, window) for compared in zip(joined, truths, strict=True))
     parts = [(fold.train, fold.test) for fold in ways]
     plain = plain_score(examples, labels, clocks, floor_of(recipe.encoder), parts, truths, window, report)
-    return Judged(scores, score_together(joined, truths, window), how, tuple(trained), plain)
+    together, mistakes = score_together(joined, truths, window), mistakes_of(joined, truths, scores)
+    return Judged(scores, together, how, tuple(trained), plain, mistakes)
 
 
 def _check_arguments(

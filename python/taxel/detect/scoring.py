@@ -179,6 +179,25 @@ class Score:
         return "\n".join(lines)
 
 
+class Mistake(NamedTuple):
+    """A reference event without a detection, or a detection without an event.
+
+    Attributes
+    ----------
+    recording : int
+        The place of the recording among those that were scored.
+    label : str
+    t : int, us
+    is_missed : bool
+        Whether the event was missed; otherwise the detection is false.
+    """
+
+    recording: int
+    label: str
+    t: int
+    is_missed: bool
+
+
 def score(
     found: Detections,
     truth: Mapping[str, ArrayLike] | ArrayLike,
@@ -233,6 +252,19 @@ def score(
     together: dict[str, Any] = {name: np.concatenate([getattr(score, name) for score in parts]) for name in names}
     near = sum(score.false_near for score in parts)
     return Score(parts[-1].label if len(scores) == 1 else "all", false_near=near, by_label=scores, **together)
+
+
+def mistakes_of(
+    detections: Sequence[Detections], truths: Sequence[Mapping[str, NDArray[np.int64]]], scores: Sequence[Score]
+) -> tuple[Mistake, ...]:
+    """Return what the scores of several recordings call missed and false, by recording and time."""
+    found: list[Mistake] = []
+    for k, (detected, truth, scored) in enumerate(zip(detections, truths, scores, strict=True)):
+        _, times = _truth(detected, truth)
+        for label, part in (scored.by_label or {scored.label: scored}).items():
+            found += [Mistake(k, label, int(t), is_missed=True) for t in times[part.missed_events]]
+            found += [Mistake(k, label, int(t), is_missed=False) for t in detected.t[part.false_detections]]
+    return tuple(sorted(found, key=lambda mistake: (mistake.recording, mistake.t)))
 
 
 def score_together(

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from taxel._base.arguments import finite, flag, integer, mapping, several, shown, text
-from taxel._base.documents import read_toml
+from taxel._base.documents import of_toml, read_toml
 from taxel._base.errors import refused
 from taxel._base.files import beside, named
 from taxel._base.limits import VALUE
@@ -286,7 +286,20 @@ class Layout:
         FormatError : not TOML, longer than 1 MiB, a key that is not known, or a value of another kind (names the key)
         OSError : the file cannot be read
         """
-        document = read_toml(path)
+        return cls._of_document(path, read_toml(path))
+
+    @classmethod
+    def of_text(cls, path: Path, text: str) -> Layout:
+        """Return the layout of a text that is to be written to a file.
+
+        Raises
+        ------
+        FormatError : as of `read`
+        """
+        return cls._of_document(path, of_toml(str(path), text))
+
+    @classmethod
+    def _of_document(cls, path: Path, document: dict[str, Any]) -> Layout:
         try:
             return cls(path=path, **_values(document))
         except (ProblemError, TypeError) as error:
@@ -307,7 +320,7 @@ class Layout:
         True
         """
         folder = [path / "layout.toml"] if path.is_dir() else []
-        for candidate in (beside(path, _name(named(path))), *folder, beside(path, "layout.toml")):
+        for candidate in (beside(path, layout_name(named(path))), *folder, beside(path, "layout.toml")):
             if candidate.is_file():
                 return candidate
         return None
@@ -382,10 +395,10 @@ def advice(path: Path, says: str) -> str:
 
 def or_given(path: Path) -> str:
     """Return which layout file is read with a recording, as part of a sentence."""
-    return f"beside it, {_name(path)}, or one given as layout"
+    return f"beside it, {layout_name(path)}, or one given as layout"
 
 
-def _name(path: Path) -> str:
+def layout_name(path: Path) -> str:
     """Return the name of the layout file of one recording."""
     return f"{path.name.removesuffix('.gz').rpartition('.')[0] or path.name}.layout.toml"
 

@@ -81,11 +81,14 @@ class Joined:
     acknowledged : Acknowledged
     outcomes : tuple of (tuple of Note or None) or str
         For each request its rows as they are in the table, one an edit, or why nothing of it was carried out.
+    inverses : tuple of tuple of Edit
+        For each request what takes it back; nothing where it changed nothing.
     """
 
     rows: tuple[Note, ...]
     acknowledged: Acknowledged
     outcomes: tuple[tuple[Note | None, ...] | str, ...] = ()
+    inverses: tuple[tuple[Edit, ...], ...] = ()
 
 
 def _key(note: Note) -> _Key:
@@ -103,6 +106,13 @@ def minus(rows: Iterable[Note], others: Iterable[Note]) -> tuple[Note, ...]:
         else:
             left.append(row)
     return tuple(left)
+
+
+def _inverse(gone: Sequence[Note], added: Sequence[Note]) -> tuple[Edit, ...]:
+    """Return the edits that take a change back, of which these rows are gone and those were added."""
+    # Rows that differ in nothing but columns that taxel does not know are different ones here.
+    deleted, marked = Counter(added) - Counter(gone), Counter(gone) - Counter(added)
+    return (*(Edit(row, None) for row in deleted.elements()), *(Edit(None, row) for row in marked.elements()))
 
 
 def _common(rows: Sequence[Note], others: Iterable[Note]) -> tuple[Note, ...]:
@@ -165,6 +175,9 @@ class _State:
     def __init__(self, rows: Iterable[Note], labels: Iterable[Note], deleted: Iterable[Note], table: Iterable[Note]):
         self.rows, self.labels, self.table = _Rows(rows), _Rows(labels), _Rows(table)
         self.deleted = {_key(row): row for row in deleted}
+        #: The rows of the table that a request deleted and added.
+        self.gone: list[Note] = []
+        self.added: list[Note] = []
 
     def copy(self) -> _State:
         return _State(self.rows, self.labels, self.deleted.values(), self.table)
@@ -208,6 +221,7 @@ class _State:
         while self.labels.count(row) > self.rows.count(row) + missing:
             self.labels.take(row)
         self.table.take(row)
+        self.gone.append(taken)
         self.deleted.pop(_key(row), None)
         self.deleted[_key(row)] = row
         return taken
@@ -215,6 +229,7 @@ class _State:
     def _add(self, row: Note) -> None:
         self.rows.add(row)
         self.table.add(row)
+        self.added.append(row)
         self.deleted.pop(_key(row), None)
 
 
@@ -237,7 +252,9 @@ def join(base: Acknowledged, file_rows: Sequence[Note], change: Sequence[Sequenc
     """
     state = _State(file_rows, base.labels, base.deleted, file_rows if base.table is None else base.table)
     outcomes: list[tuple[Note | None, ...] | str] = []
+    inverses: list[tuple[Edit, ...]] = []
     for request in change:
+        state.gone, state.added = [], []
         # Only an edit of a row that must be there can fail.
         before = state.copy() if len(request) > 1 and any(edit.old for edit in request) else None
         try:
@@ -245,10 +262,11 @@ def join(base: Acknowledged, file_rows: Sequence[Note], change: Sequence[Sequenc
         except LookupError as error:
             outcomes.append(str(error))
             state = state if before is None else before
+        inverses.append(_inverse(state.gone, state.added))
     rows = tuple(state.rows)
     deleted = tuple(state.deleted.values())[-_MOST_DELETED:]
     known = Acknowledged(tuple(state.labels), deleted, tuple(state.table))
-    return Joined(rows, _known_after(known, rows), tuple(outcomes))
+    return Joined(rows, _known_after(known, rows), tuple(outcomes), tuple(inverses))
 
 
 def _known_after(known: Acknowledged, rows: tuple[Note, ...]) -> Acknowledged:
@@ -291,4 +309,5 @@ def settled(base: Acknowledged, file_rows: Sequence[Note], conflict: Conflict, *
         kept = set(map(_key, returned))
         deleted = tuple(row for row in base.deleted if _key(row) not in kept)
         known = replace(base, labels=minus(base.labels, missing), deleted=deleted)
-    return Joined(rows, _known_after(known, rows))
+    inverse = _inverse(minus(file_rows, rows), minus(rows, file_rows))
+    return Joined(rows, _known_after(known, rows), inverses=(inverse,))

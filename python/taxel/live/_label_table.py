@@ -16,6 +16,7 @@ import ctypes
 import errno
 import functools
 import hashlib
+import itertools
 import json
 import os
 import re
@@ -56,6 +57,9 @@ _WRITTEN_S = 2.0
 #: How long a table that is being written is waited for, s.
 _WHOLE_WITHIN_S = 6.0
 
+#: How many changes of tables can be taken back.
+_MOST_CHANGES = 1000
+
 #: How many replaced tables are watched for programs that still write to them, and how many bytes of text.
 _MOST_WATCHED, _MOST_WATCHED_BYTES = 16, 1 << 20
 
@@ -90,10 +94,14 @@ class TableRead:
     rows : tuple of Note
         Those of the recording itself have no name of a recording.
     conflict : Conflict
+    changes : tuple of int or None
+        Of a table as it was written: the number of each request, by which `LabelTables.undo` takes it back; None where
+        it changed nothing.
     """
 
     rows: tuple[Note, ...]
     conflict: Conflict
+    changes: tuple[int | None, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,6 +358,9 @@ class LabelTables:
     def __init__(self) -> None:
         self._watched: list[_Watched] = []
         self._watched_lock = threading.Lock()
+        #: What takes the newest changes back, by their numbers.
+        self._inverses: dict[int, tuple[Edit, ...]] = {}
+        self._numbers = itertools.count(1)
 
     def close(self) -> None:
         """Take in what other programs wrote to replaced tables, and close them."""
@@ -420,7 +431,31 @@ class LabelTables:
         ProblemError : the table is no table of labels or cannot be written, or another program holds the lock
         """
         joined = self._write(table, names, lambda known, file_rows: join(known, file_rows, requests))
-        return joined.outcomes, TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
+        return joined.outcomes, self._written(joined)
+
+    def undo(self, table: Path, names: frozenset[str], change: int) -> TableRead:
+        """Take back a change, whole or not at all.
+
+        Raises
+        ------
+        ProblemError : as of `change`, or a label that it made was changed since; nothing is taken back then
+        """
+        inverse = self._inverses.pop(change, None)
+        if inverse is None:
+            raise ProblemError("undo: this change is too long ago")
+        joined = self._write(table, names, lambda known, file_rows: join(known, file_rows, [inverse]))
+        (outcome,) = joined.outcomes
+        if isinstance(outcome, str):
+            raise ProblemError(f"undo: {outcome}")
+        return self._written(joined)
+
+    def _written(self, joined: Joined) -> TableRead:
+        """Return a table as it was written, and remember what takes its changes back."""
+        changes = tuple(next(self._numbers) if inverse else None for inverse in joined.inverses)
+        self._inverses |= {k: inverse for k, inverse in zip(changes, joined.inverses, strict=True) if k is not None}
+        for oldest in sorted(self._inverses)[:-_MOST_CHANGES]:
+            self._inverses.pop(oldest, None)
+        return TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows), changes)
 
     def settle(self, table: Path, names: frozenset[str], conflict: Conflict, *, restore: bool) -> TableRead:
         """End a conflict: restore what was acknowledged, or accept the table as it is.
@@ -429,10 +464,9 @@ class LabelTables:
         ------
         ProblemError : as of `change`, or nothing is left of the conflict
         """
-        joined = self._write(
-            table, names, lambda known, file_rows: settled(known, file_rows, conflict, restore=restore)
+        return self._written(
+            self._write(table, names, lambda known, file_rows: settled(known, file_rows, conflict, restore=restore))
         )
-        return TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
 
     def _write(self, table: Path, names: frozenset[str], action: _Action) -> Joined:
         while True:

@@ -166,6 +166,11 @@ class ShownFiles:
                 self._folder.cleanup()
                 self._folder = None
 
+    def forget(self) -> None:
+        """Read the next recording anew, whose layout file was written."""
+        with self._lock:
+            self._trials = None
+
     def opened(self, path: Path, trial: str | None) -> tuple[Recording, list[str]]:
         """Return a recording of a file, and the names of its trials if it has several.
 

@@ -26,7 +26,7 @@ from taxel.detect.folds import INNER, count_of_folds
 from taxel.detect.loads import clock_of
 from taxel.detect.plain_score import floor_of, plain_score
 from taxel.detect.readout import run_counting
-from taxel.detect.scoring import score_together
+from taxel.detect.scoring import mistakes_of, score_together
 from taxel.events import Events
 from taxel.recorded import recorded
 from taxel.recording import Recording
@@ -301,6 +301,5 @@ def _own(outcomes: Sequence[Outcome], window_ms: float) -> Judged:
     truths = [outcome.example.labels for outcome in outcomes]
     found = [outcome.example._known(outcome.found) for outcome in outcomes]
     together = score_together(found, truths, window_ms)
-    return Judged(
-        tuple(outcome.score for outcome in outcomes if outcome.score is not None), together, "its own training data"
-    )
+    scores = tuple(outcome.score for outcome in outcomes if outcome.score is not None)
+    return Judged(scores, together, "its own training data", mistakes=mistakes_of(found, truths, scores))

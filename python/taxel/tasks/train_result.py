@@ -164,6 +164,7 @@ class Training:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain values for JSON."""
+        several = len({recording.label for recording in self.recordings}) > 1
         result: dict[str, Any] = {
             "labels": list(self.readout.labels),
             "recipe": self.options.recipe,
@@ -175,6 +176,16 @@ class Training:
                 for recording, score in zip(self.recordings, self.scored.scores, strict=True)
             ],
             "score": self.scored.together.to_dict(),
+            "mistakes": [
+                {
+                    "recording": self.recordings[k].name,
+                    "source": self.recordings[k].label if several else "",
+                    "label": label,
+                    "t_us": t,
+                    "missed": is_missed,
+                }
+                for k, label, t, is_missed in self.scored.mistakes
+            ],
             "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
             "causes": [cause.to_dict() for cause in self.causes],
             "options": list(dict.fromkeys(cause.option for cause in self._first_causes() if cause.option)),

@@ -117,7 +117,7 @@ impl FrameInput {
 
     pub(super) fn counts(&self) -> LineCounts {
         let state = lock(&self.state);
-        let counts = LineCounts::new(state.frames.lines(), state.frames.found(), state.trouble.clone());
+        let counts = LineCounts::new(state.frames.lines(), state.frames.found(now_ns()), state.trouble.clone());
         LineCounts { unread: Some(state.frames.unread().clone()), ..counts }
     }
 

@@ -128,6 +128,9 @@ pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
 pub(super) const IN_NO_LINE: &str = "bytes_in_no_line";
 pub(super) const UNFINISHED_LINES: &str = "bytes_of_unfinished_lines";
 pub(super) const ANEW: &str = "clock_began_anew";
+/// How often no frame of numbers arrived for a second or more, and how long in all, ms.
+pub(crate) const SILENCES: &str = "silences";
+pub(crate) const SILENT_MS: &str = "silent_ms";
 /// Values of a stream of numbers that a line says are missing (`nan`).
 pub(super) const MISSING: &str = "missing_values";
 pub(super) const BACK: &str = "stamps_out_of_order";

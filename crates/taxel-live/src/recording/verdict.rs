@@ -12,7 +12,7 @@ use taxel_core::wire::StepBack;
 
 use super::damage::{
     ADDRESS, ANEW, BOARD_DROPPED, BOARD_RESET, DamageCounts, EVENTS_DROPPED, IN_NO_LINE, MISSING, OTHER_BOARD,
-    OVERTAKEN, REPAIRED, REPEATED, UNFINISHED_LINES,
+    OVERTAKEN, REPAIRED, REPEATED, SILENCES, SILENT_MS, UNFINISHED_LINES,
 };
 use super::topic::Topic;
 use crate::bridged::Bridged;
@@ -329,6 +329,16 @@ impl Verdict {
                 pieces.push(numbered(n, text));
             }
         }
+        let (silences, silent_ms) = (of_board(SILENCES), of_board(SILENT_MS));
+        if silences > 0 {
+            verdict
+                .noted
+                .extend([(SILENCES, silences), (SILENT_MS, silent_ms)].map(|(cause, n)| (cause.to_owned(), n)));
+            let tenths = silent_ms.div_ceil(100);
+            let times = counted(silences, "time");
+            let all = format!("{}.{} s in all", tenths / 10, tenths % 10);
+            pieces.push(format!("no frame came for a second or more {times}, {all}"));
+        }
         if bridged.silences > 0 || bridged.restarts > 0 {
             verdict.noted.insert("silences_of_other_computer".to_owned(), bridged.silences);
             verdict.noted.insert("restarts_of_other_computer".to_owned(), bridged.restarts);
@@ -363,6 +373,8 @@ impl Verdict {
             OVERTAKEN,
             IN_NO_LINE,
             UNFINISHED_LINES,
+            SILENCES,
+            SILENT_MS,
         ];
         let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
         for (cause, n) in found() {

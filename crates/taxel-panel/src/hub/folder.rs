@@ -128,6 +128,11 @@ impl Folder {
     pub(crate) fn forget(&self, key: &Key) {
         lock(&self.indices).remove(key);
     }
+
+    /// Forgets the indices of a file, of all of its trials.
+    pub(crate) fn forget_file(&self, path: &Path) {
+        lock(&self.indices).retain(|(file, _), _| file != path);
+    }
 }
 
 /// Size of a recording, bytes: of a bag that is a folder that of its files.

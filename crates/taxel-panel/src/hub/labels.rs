@@ -10,6 +10,9 @@ use crate::handler::{LabelConflict, LabelEdit, LabelRow, LabelTable};
 use crate::protocol::messages::{Conflict, Label, Message};
 use crate::protocol::refusal::Answer;
 
+/// Maximum number of changes that a client can take back.
+const MOST_CHANGES: usize = 1000;
+
 /// A change of the labels of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum LabelChange {
@@ -84,7 +87,29 @@ fn set(labels: &mut Vec<Label>, id: u64, row: Option<LabelRow>) {
 /// A request that waits to be written with others.
 pub(crate) struct WaitingChanges {
     pub(crate) changes: Vec<LabelChange>,
-    pub(crate) answer: oneshot::Sender<Answer>,
+    /// Gets the number of the change; `None` where it changed nothing.
+    pub(crate) answer: oneshot::Sender<Answer<Option<u64>>>,
+}
+
+/// The newest changes of labels that a client made, by the recordings' names and their numbers in
+/// [`LabelTable::changes`](crate::handler::LabelTable::changes).
+#[derive(Default)]
+pub(crate) struct LabelHistory(Mutex<Vec<(String, u64)>>);
+
+impl LabelHistory {
+    pub(crate) fn add(&self, recording: &str, change: u64) {
+        let mut changes = lock(&self.0);
+        changes.push((recording.to_owned(), change));
+        let excess = changes.len().saturating_sub(MOST_CHANGES);
+        changes.drain(..excess);
+    }
+
+    /// Takes the last change of a recording out.
+    pub(crate) fn take_last(&self, recording: &str) -> Option<u64> {
+        let mut changes = lock(&self.0);
+        let index = changes.iter().rposition(|(name, _)| name == recording)?;
+        Some(changes.remove(index).1)
+    }
 }
 
 /// The labels of the recordings that clients have opened, by the recordings' names.

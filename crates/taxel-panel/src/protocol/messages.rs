@@ -14,7 +14,7 @@ use taxel_live::pipeline::{Arrival, LiveOptions, OutputDetection};
 use taxel_live::ports::Port;
 
 use super::refusal::Refusal;
-use crate::handler::{LabelRow, UnhealthyTaxels, UserPreset};
+use crate::handler::{BagTopic, LabelRow, LabelScore, Mistake, UnhealthyTaxels, UserPreset};
 use crate::readout_encoders::ReadoutEncoders;
 
 /// A message of the server.
@@ -40,6 +40,8 @@ pub(crate) enum Message {
         udp: Option<String>,
         /// Where frames of numbers are read; null of a board.
         lines: Option<String>,
+        /// That source as a text states it, with all of its keys; null of a board.
+        source: Option<String>,
         /// The values of those frames, after the first one; null of a board, whose values are ticks.
         frames: Option<LiveFrames>,
         /// Whether intensities are differences; null without a board.
@@ -173,6 +175,14 @@ pub(crate) enum Message {
         /// What the lines seem to be, in words.
         about: String,
     },
+    /// A layout file was written.
+    LayoutSaved {
+        name: String,
+        /// The command that reads the source in a shell.
+        command: String,
+    },
+    /// When asked: the fields with numbers of the topics of a ROS bag; empty of any other file.
+    Topics { name: String, topics: Vec<BagTopic> },
     /// The recorder, on each change and once a second while it counts or records.
     Recorder {
         state: RecorderPhase,
@@ -204,6 +214,12 @@ pub(crate) enum Message {
         readout: String,
         /// How well the readout detects, in words.
         text: String,
+        /// On which labels it was scored: held-out ones, or those that it was trained on.
+        judged_on: String,
+        /// The neuron of each label, and the plain rule beside it where there is one.
+        scores: Vec<LabelScore>,
+        /// The labels that neurons missed, and their false detections, among the labels that `scores` count.
+        mistakes: Vec<Mistake>,
         /// The command that detects by it in a shell.
         next: String,
         /// Options of `taxel train` that may help.

@@ -102,6 +102,9 @@ pub(crate) enum Request {
     /// End the conflict of `labels`: with `acknowledged` the table gets the labels that it lacks, and loses those that returned;
     /// with `file` it stays as it is. Refused where the conflict is another by now, or is over.
     Settle { conflict_id: Id, keep: Keep },
+    /// Take back the last change of labels that this client made in the recording that it shows or that is recorded, whole or not
+    /// at all; refused where there is none, or where another window or program has changed such a label since.
+    Undo {},
     /// Requests `health` of what this view shows.
     Health {},
     /// Train a readout on the labels of the recording shown, of a file with several trials on those that have labels, as `taxel
@@ -125,6 +128,15 @@ pub(crate) enum Request {
     ReadSource { source: Text<1024> },
     /// Requests `source_preview`: what arrives from a source of lines, for two seconds at most.
     PreviewSource { source: Text<1024> },
+    /// Write a source of lines, with all that its text states, to the new layout file NAME.layout.toml of the folder; `layout_saved`
+    /// follows. An existing file is never overwritten.
+    SaveLayout { source: Text<1024>, name: Text<90> },
+    /// Requests `topics`: those of a ROS bag of the folder.
+    Topics { name: Text<110> },
+    /// Write what is stated here into the layout file beside a recording of the folder, NAME.layout.toml, as its keys `falls`,
+    /// `rate_hz`, `rows` and `columns`, and in `[ros]` `topic` and `field`; what it holds already stays. The next `open` reads the
+    /// recording by it. Refused where options of the command say the same, and for a file that no layout file describes.
+    Describe(DescribeRequest),
     /// Whether the board sends differences from the value before, not values. Earlier events were decoded with the other
     /// meaning, so the source begins anew: time, values, the past that can be viewed, a readout with its tare. Refused while a
     /// recording runs.
@@ -167,6 +179,20 @@ pub(crate) struct RecordRequest {
     pub(crate) format: Option<RecordingFormat>,
 }
 
+/// What a layout file is to say of a recording.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(inline))]
+pub(crate) struct DescribeRequest {
+    pub(crate) name: Text<110>,
+    pub(crate) falls: Option<bool>,
+    pub(crate) rate_hz: Option<Number<1, 1_000_000_000>>,
+    /// Rows and columns.
+    pub(crate) size: Option<(u16, u16)>,
+    pub(crate) topic: Option<Text<255>>,
+    pub(crate) field: Option<Text<255>>,
+}
+
 /// The kind of file that is recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -200,6 +226,7 @@ impl Request {
                 | Self::Move { .. }
                 | Self::Delete { .. }
                 | Self::Settle { .. }
+                | Self::Undo { .. }
         )
     }
 

@@ -10,7 +10,7 @@ use crate::handler::{EditOutcome, LabelRow, LabelTable};
 use crate::hub::Hub;
 use crate::hub::clients::Broadcast;
 use crate::hub::indexed::OpenRecording;
-use crate::hub::labels::{LabelChange, NumberedEdit, WaitingChanges, file_of};
+use crate::hub::labels::{LabelChange, LabelHistory, NumberedEdit, WaitingChanges, file_of};
 use crate::protocol::limited::{OneOrMore, Text};
 use crate::protocol::limits::MOST_MARKS;
 use crate::protocol::messages::Message;
@@ -109,7 +109,12 @@ fn recording_of(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<(String, i64
 }
 
 /// Changes labels of the recording that is shown or being recorded; returns when the table with all of the changes is on the disk.
-pub(crate) async fn change(hub: &Hub, shown: Option<&OpenRecording>, changes: Vec<LabelChange>) -> Answer {
+pub(crate) async fn change(
+    hub: &Hub,
+    history: &LabelHistory,
+    shown: Option<&OpenRecording>,
+    changes: Vec<LabelChange>,
+) -> Answer {
     let (name, us) = recording_of(hub, shown)?;
     let changes: Vec<_> = changes.into_iter().map(|change| change.at_whole(us)).collect();
     for (shown, t_us) in changes.iter().filter_map(|change| shown.zip(change.t_us())) {
@@ -122,7 +127,9 @@ pub(crate) async fn change(hub: &Hub, shown: Option<&OpenRecording>, changes: Ve
         let _turn = hub.labels.turn(&name).await;
         write_waiting(hub, &name, us).await;
     }
-    written.await.unwrap_or_else(|_| Err(Refusal::bug("labels:")))
+    let change = written.await.unwrap_or_else(|_| Err(Refusal::bug("labels:")))?;
+    change.into_iter().for_each(|change| history.add(&name, change));
+    Ok(())
 }
 
 /// Writes all changes that wait for a table, and answers them.
@@ -143,34 +150,63 @@ async fn write_waiting(hub: &Hub, name: &str, us: i64) {
     }
 }
 
-async fn write(hub: &Hub, name: &str, us: i64, edits: Vec<Result<Vec<NumberedEdit>, String>>) -> Answer<Vec<Answer>> {
+async fn write(
+    hub: &Hub,
+    name: &str,
+    us: i64,
+    edits: Vec<Result<Vec<NumberedEdit>, String>>,
+) -> Answer<Vec<Answer<Option<u64>>>> {
     let table = hub.folder.file(&file_of(name))?;
     let of_request = |edits: &Vec<NumberedEdit>| edits.iter().map(|(_, edit)| edit.clone()).collect();
     let requests: Vec<Vec<_>> = edits.iter().flatten().map(of_request).collect();
     let recording = name.to_owned();
     let (outcomes, read): (Vec<EditOutcome>, LabelTable) =
         hub.ask(move |handlers| handlers.labels.change(&table, &recording, us, &requests)).await?;
-    let mut outcomes = outcomes.into_iter();
+    let mut outcomes = outcomes.into_iter().zip(read.changes.clone());
     let mut answers = vec![];
     for request in edits {
-        let outcome = request.map(|numbered| (numbered, outcomes.next().unwrap_or_else(|| Err("failed".to_owned()))));
+        let failed = || (Err("failed".to_owned()), None);
+        let outcome = request.map(|numbered| (numbered, outcomes.next().unwrap_or_else(failed)));
         answers.push(match outcome {
-            Ok((numbered, Ok(rows))) => {
+            Ok((numbered, (Ok(rows), change))) => {
                 let numbers = numbered.into_iter().map(|(id, _)| id);
                 hub.labels.renumber(name, numbers.zip(rows).filter_map(|(id, row)| Some((id?, row))));
-                Ok(())
+                Ok(change)
             }
-            Ok((_, Err(reason))) | Err(reason) => Err(reason.into()),
+            Ok((_, (Err(reason), _))) | Err(reason) => Err(reason.into()),
         });
     }
-    hub.labels.replace(name, Some(read));
-    hub.labels.follows(name, us);
-    hub.clients.send(Broadcast::Labels(name.to_owned()));
+    take(hub, name, us, read);
     Ok(answers)
 }
 
+/// Shows a table as it was written.
+fn take(hub: &Hub, name: &str, us: i64, read: LabelTable) {
+    hub.labels.replace(name, Some(read));
+    hub.labels.follows(name, us);
+    hub.clients.send(Broadcast::Labels(name.to_owned()));
+}
+
+/// Takes back the last change of labels that a client made in the recording that is shown or being recorded.
+pub(crate) async fn undo(hub: &Hub, history: &LabelHistory, shown: Option<&OpenRecording>) -> Answer {
+    let (name, us) = recording_of(hub, shown)?;
+    let change = history.take_last(&name).ok_or("nothing to undo: no label was changed here in this window")?;
+    let table = hub.folder.file(&file_of(&name))?;
+    let _turn = hub.labels.turn(&name).await;
+    let recording = name.clone();
+    let read = hub.ask(move |handlers| handlers.labels.undo(&table, &recording, us, change)).await?;
+    take(hub, &name, us, read);
+    Ok(())
+}
+
 /// Ends the conflict of this number as the client chose.
-pub(crate) async fn settle(hub: &Hub, shown: Option<&OpenRecording>, id: u64, keep: Keep) -> Answer {
+pub(crate) async fn settle(
+    hub: &Hub,
+    history: &LabelHistory,
+    shown: Option<&OpenRecording>,
+    id: u64,
+    keep: Keep,
+) -> Answer {
     let (name, us) = recording_of(hub, shown)?;
     let restore = keep == Keep::Acknowledged;
     let table = hub.folder.file(&file_of(&name))?;
@@ -180,7 +216,7 @@ pub(crate) async fn settle(hub: &Hub, shown: Option<&OpenRecording>, id: u64, ke
     })?;
     let recording = name.clone();
     let read = hub.ask(move |handlers| handlers.labels.settle(&table, &recording, us, &conflict, restore)).await?;
-    hub.labels.replace(&name, Some(read));
-    hub.clients.send(Broadcast::Labels(name));
+    read.changes.iter().flatten().for_each(|&change| history.add(&name, change));
+    take(hub, &name, us, read);
     Ok(())
 }

@@ -8,6 +8,7 @@ use tokio::sync::{Semaphore, mpsc};
 
 use crate::hub::Hub;
 use crate::hub::indexed::OpenRecording;
+use crate::hub::labels::LabelHistory;
 use crate::protocol::limits::MOST_BYTES;
 use crate::protocol::messages::Message;
 use crate::protocol::refusal::Refusal;
@@ -32,6 +33,7 @@ pub(super) struct PendingRequests {
     answers: mpsc::Sender<Message>,
     permits: Arc<Semaphore>,
     label_permits: Arc<Semaphore>,
+    history: Arc<LabelHistory>,
     /// Whether there were too many requests that change labels, and more than half of them still wait.
     is_full: AtomicBool,
 }
@@ -42,7 +44,8 @@ impl PendingRequests {
         let (answers, receiver) = mpsc::channel(MOST_ANSWERS);
         let permits = |most| Arc::new(Semaphore::new(most));
         let (permits, label_permits) = (permits(MOST_PENDING), permits(MOST_LABEL_REQUESTS));
-        (Self { answers, permits, label_permits, is_full: AtomicBool::new(false) }, receiver)
+        let history = Arc::default();
+        (Self { answers, permits, label_permits, history, is_full: AtomicBool::new(false) }, receiver)
     }
 
     /// Whether the client's next message may be read.
@@ -72,9 +75,9 @@ impl PendingRequests {
             let refusal = Refusal::from("too many requests at a time: wait for their answers");
             return Some(Message::refused(id, kind, refusal));
         };
-        let (hub, answers) = (Arc::clone(hub), self.answers.clone());
+        let (hub, history, answers) = (Arc::clone(hub), Arc::clone(&self.history), self.answers.clone());
         tokio::spawn(async move {
-            let last = match carry_out(hub, shown.as_ref(), request).await {
+            let last = match carry_out(hub, &history, shown.as_ref(), request).await {
                 Ok(answer) => {
                     if let Some(answer) = answer {
                         // The client may have left in the meantime, here and below.

@@ -13,10 +13,10 @@ use taxel_core::rest::Value;
 use taxel_core::wire::Command;
 use taxel_live::recording::{self, Remarks};
 use taxel_panel::{
-    Activity, BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, FrameArea, FrameFile, FrameIndex,
-    FrameRest, FrameSource, FramesRead, LabelConflict, LabelEdit, LabelRequests, LabelRow, LabelTable, Opening,
-    PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers, RestSource, TrainingRequests, TrainingResult,
-    UnhealthyTaxels, UserPreset, UserPresets,
+    Activity, BagTopic, BoardLines, BoardRequests, Cut, Description, Detected, EditOutcome, FileRequests, FrameArea,
+    FrameFile, FrameIndex, FrameRest, FrameSource, FramesRead, LabelConflict, LabelEdit, LabelRequests, LabelRow,
+    LabelScore, LabelTable, Mistake, Opening, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
+    RestSource, TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 
 use crate::held::from_touches;
@@ -130,6 +130,22 @@ impl FileRequests for PythonHandler {
         let Cut { path, trial, out, start_us, stop_us } = *cut;
         self.call(|handler| handler.call_method1("cut", (path, trial, out, start_us, stop_us))?.extract())
     }
+
+    fn topics(&self, path: &Path) -> Reply<Vec<BagTopic>> {
+        let topics: Vec<(String, String, Vec<u64>, u64, String)> =
+            self.call(|handler| handler.call_method1("topics", (path,))?.extract())?;
+        let topic = |(topic, field, shape, messages, trouble)| BagTopic { topic, field, shape, messages, trouble };
+        Ok(topics.into_iter().map(topic).collect())
+    }
+
+    fn describe(&self, path: &Path, description: &Description) -> Reply<()> {
+        let Description { falls, rate_hz, size, topic } = description.clone();
+        self.call(|handler| handler.call_method1("describe", (path, falls, rate_hz, size, topic)).map(drop))
+    }
+
+    fn save_layout(&self, source: &str, out: &Path) -> Reply<String> {
+        self.call(|handler| handler.call_method1("save_layout", (source, out))?.extract())
+    }
 }
 
 impl LabelRequests for PythonHandler {
@@ -160,6 +176,12 @@ impl LabelRequests for PythonHandler {
         Ok((outcomes.into_iter().map(outcome).collect(), read.into()))
     }
 
+    fn undo(&self, table: &Path, recording: &str, us: i64, change: u64) -> Reply<LabelTable> {
+        let arguments = (table, recording, us, change);
+        let read: TableRead = self.call(|handler| handler.call_method1("undo", arguments)?.extract())?;
+        Ok(read.into())
+    }
+
     fn settle(
         &self,
         table: &Path,
@@ -177,8 +199,25 @@ impl LabelRequests for PythonHandler {
 
 impl TrainingRequests for PythonHandler {
     fn train(&self, recording: &Path, out: &Path) -> Reply<TrainingResult> {
-        let (text, next, options) = self.call(|handler| handler.call_method1("train", (recording, out))?.extract())?;
-        Ok(TrainingResult { text, next, options })
+        let trained: Trained = self.call(|handler| handler.call_method1("train", (recording, out))?.extract())?;
+        let Trained { text, judged_on, scores, mistakes, next, options } = trained;
+        let scores = scores.into_iter().map(|(label, is_plain_rule, found, missed, wrong, delay_ms)| LabelScore {
+            label,
+            is_plain_rule,
+            found,
+            missed,
+            wrong,
+            delay_ms,
+        });
+        let mistakes = mistakes.into_iter().map(|(label, t_us, is_missed, source, trial)| Mistake {
+            label,
+            t_us,
+            is_missed,
+            source,
+            trial,
+        });
+        let (scores, mistakes) = (scores.collect(), mistakes.collect());
+        Ok(TrainingResult { text, judged_on, scores, mistakes, next, options })
     }
 
     fn command(&self, recording: &Path, out: &Path) -> Reply<String> {
@@ -278,13 +317,26 @@ impl From<LabelConflict> for Conflict {
 struct TableRead {
     rows: Vec<Note>,
     conflict: Conflict,
+    changes: Vec<Option<u64>>,
 }
 
 impl From<TableRead> for LabelTable {
-    fn from(TableRead { rows, conflict: Conflict { missing, returned, new } }: TableRead) -> Self {
+    fn from(TableRead { rows, conflict: Conflict { missing, returned, new }, changes }: TableRead) -> Self {
         let conflict = LabelConflict { missing: all(missing), returned: all(returned), new: all(new) };
-        Self { rows: all(rows), conflict }
+        Self { rows: all(rows), conflict, changes }
     }
+}
+
+/// `TrainedReadout` of Python: scores as label, whether of the plain rule, found, missed, false and median delay (ms), mistakes
+/// as label, time (us), whether missed, source and trial.
+#[derive(FromPyObject)]
+struct Trained {
+    text: String,
+    judged_on: String,
+    scores: Vec<(String, bool, u64, u64, u64, Option<f64>)>,
+    mistakes: Vec<(String, i64, bool, String, String)>,
+    next: String,
+    options: Vec<String>,
 }
 
 fn all<T, U: From<T>>(rows: Vec<T>) -> Vec<U> {

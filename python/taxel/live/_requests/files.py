@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.documents import read_text
+from taxel._base.errors import refused
+from taxel._base.files import beside, named, whole_file
 from taxel.array import Array
+from taxel.formats import layout_text
+from taxel.formats.layout import Layout, layout_name
+from taxel.formats.ros import is_bag, topics
 from taxel.live._requests.reasons import reasons
+from taxel.live._requests.typed import typed
 from taxel.live._shown_files import Opening, ReadFrames, ShownFiles
 from taxel.recording.analysis.health import TaxelStatistics, Touches, judge
 from taxel.recording.convert import convert
@@ -98,3 +106,74 @@ class FileRequests:
             recording, _ = self._files.opened(path, trial)
             (part,) = cut(recording, start_us=start_us, stop_us=stop_us)
             return list(convert(part, out))
+
+    def topics(self, path: Path) -> list[tuple[str, str, tuple[int, ...], int, str]]:
+        """Return the fields with numbers of the topics of a ROS bag; none of any other file.
+
+        Returns
+        -------
+        list of (str, str, tuple of int, int, str)
+            Topic, field, shape, number of messages, and why it cannot be read ("" if it can).
+        """
+        with reasons():
+            if not is_bag(path):
+                return []
+            options = self._opening.options_of(path)
+            types = None if options.types is None else Path(options.types)
+            return [
+                (each.topic, each.field, each.shape, each.messages, each.trouble)
+                for each in topics(path, types, options.ros)
+            ]
+
+    def describe(
+        self,
+        path: Path,
+        falls: bool | None,
+        rate_hz: float | None,
+        size: tuple[int, int] | None,
+        topic: tuple[str, str] | None,
+    ) -> None:
+        """Write what is stated of a recording into the layout file beside it, which is made where there is none.
+
+        Parameters
+        ----------
+        path : Path
+        falls : bool, optional
+            Whether values fall with pressure.
+        rate_hz : float, Hz, optional
+        size : (int, int), optional
+            Rows and columns.
+        topic : (str, str), optional
+            Of a ROS bag, and its field ("" for none).
+        """
+        options = self._opening.options_of(path)
+        stated = options.given()
+        keys: dict[str, object] = {}
+        if falls is not None:
+            keys["falls"] = falls
+        if rate_hz is not None:
+            keys["rate_hz"] = rate_hz
+        if size is not None:
+            keys["rows"], keys["columns"] = size
+        if topic is not None:
+            keys["ros.topic"] = topic[0]
+            keys |= {"ros.field": topic[1]} if topic[1] else {}
+        for option, key in (("layout", ""), ("rate_hz", "rate_hz"), ("array", "rows"), ("topic", "ros.topic")):
+            if option in stated and (key in keys or not key):
+                raise refused(option, f" is {stated[option]} by the command: start taxel view without it, or change it")
+        with reasons():
+            # A layout of the whole folder stays as it is; this recording gets a copy with these keys.
+            there = Layout.beside(path)
+            target = beside(path, layout_name(named(path)))
+            text = "" if there is None else read_text(there)
+            written = layout_text.with_keys(target, text, keys)
+            with whole_file(target, overwrite=True) as part:
+                part.write_text(written, "utf-8")
+        self._files.forget()
+
+    def save_layout(self, source: str, out: Path) -> str:
+        """Write the layout file of a source of lines, which must not exist; return the command that reads it live."""
+        written = layout_text.of_source(source)
+        with reasons(), whole_file(out) as part:
+            part.write_text(written, "utf-8")
+        return shlex.join(["taxel", "live", "--panel", "--source", typed(out)])

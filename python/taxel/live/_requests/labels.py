@@ -108,6 +108,11 @@ class LabelRequests:
         with reasons():
             return self._to_view(table, us, self._labels.settle(table, _own_names(recording), seen, restore=restore))
 
+    def undo(self, table: Path, recording: str, us: int, change: int) -> TableRead:
+        """Take back a change by its number, in `changes` of the table that it was written in."""
+        with reasons():
+            return self._to_view(table, us, self._labels.undo(table, _own_names(recording), change))
+
     def _unit_us(self, table: Path, us: int) -> float:
         """Return how long one us of a table is in the view."""
         return us * self._opening.unit_us(table)
@@ -119,4 +124,4 @@ class LabelRequests:
             return tuple(_in_view(note, unit_us) for note in notes)
 
         conflict = Conflict(*map(in_view, (read.conflict.missing, read.conflict.returned, read.conflict.new)))
-        return TableRead(tuple(sorted(in_view(read.rows), key=lambda note: note.t or 0)), conflict)
+        return TableRead(tuple(sorted(in_view(read.rows), key=lambda note: note.t or 0)), conflict, read.changes)

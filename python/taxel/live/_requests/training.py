@@ -6,6 +6,8 @@ import contextlib
 import json
 import shlex
 import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
 from subprocess import PIPE
@@ -16,6 +18,7 @@ from taxel._base.progress import Steps
 from taxel._core import ProblemError
 from taxel.detect import Readout, load
 from taxel.live._requests.reasons import reasons
+from taxel.live._requests.typed import typed
 from taxel.live._shown_files import Opening, ShownFiles
 
 #: Code with which a task ends that was stopped.
@@ -25,12 +28,46 @@ _INTERRUPTED = 130
 _STOPPED = "the training was stopped: nothing was written"
 
 
-def _typed(path: Path) -> str:
-    """Return a path as it is typed in the folder where taxel was started."""
-    here = Path.cwd()
-    name = str(path.relative_to(here) if path.is_relative_to(here) else path)
-    # A name that begins with a dash is no option.
-    return f"./{name}" if name.startswith("-") else name
+@dataclass(frozen=True)
+class TrainedReadout:
+    """Hold what a training has made, for the panel's server.
+
+    Parameters
+    ----------
+    text : str
+        The result and its warnings as lines for people.
+    judged_on : str
+        On which labels it was scored.
+    scores : list of (str, bool, int, int, int, float or None)
+        Label, whether of the plain rule, labels found, labels missed, false detections, median of when they are known
+        after the label (ms).
+    mistakes : list of (str, int, bool, str, str)
+        Label, time (us), whether a label was missed, the sensor where there are several, and the trial.
+    next : str
+        The command that detects by the readout.
+    options : list of str
+        Which options of ``taxel train`` may help.
+    """
+
+    text: str
+    judged_on: str
+    scores: list[tuple[str, bool, int, int, int, float | None]]
+    mistakes: list[tuple[str, int, bool, str, str]]
+    next: str
+    options: list[str]
+
+
+def _scores(result: dict[str, Any]) -> Iterator[tuple[str, bool, int, int, int, float | None]]:
+    """Yield the scores of each label, of the neuron and of the plain rule, of a training as plain values."""
+    plain = result["plain_rule"]
+    for label in result["labels"]:
+        rows = [(False, result["score"])]
+        if plain is not None and plain["score"] is not None and plain["rules"].get(label) is not None:
+            rows.append((True, plain["score"]))
+        for is_plain_rule, score in rows:
+            counts = score["by_label"][label]
+            delay_ms = counts["known_delay_ms"]["median"]
+            yield label, is_plain_rule, counts["found"], counts["missed"], counts["false"], delay_ms
 
 
 class TrainingRequests:
@@ -56,15 +93,8 @@ class TrainingRequests:
             self._closed = True
         self.end()
 
-    def train(self, recording: Path, out: Path) -> tuple[str, str, list[str]]:
-        """Train on the labels of a recording.
-
-        Returns
-        -------
-        tuple of str, str and list of str
-            The result and its warnings as lines for people; the command that detects by the readout; which options of
-            ``taxel train`` may help.
-        """
+    def train(self, recording: Path, out: Path) -> TrainedReadout:
+        """Train on the labels of a recording."""
         request = {"recordings": [str(recording)], "open": self._opening.options_of(recording).given()}
         with self._lock:
             if self._closed:
@@ -84,9 +114,17 @@ class TrainingRequests:
         if answer["type"] != "result":
             stopped = code < 0 or code == _INTERRUPTED
             raise ProblemError(_STOPPED if stopped else f"the training ended with code {code}")
-        following = shlex.join(["taxel", "detect", "RECORDING", "--readout", _typed(out)])
+        following = shlex.join(["taxel", "detect", "RECORDING", "--readout", typed(out)])
         lines = [*answer["lines"], *(f"warning: {text}" for text in answer["result"]["warnings"])]
-        return "\n".join(lines), following, answer["result"]["options"]
+        result = answer["result"]
+        return TrainedReadout(
+            "\n".join(lines),
+            answer["lines"][0],
+            list(_scores(result)),
+            [(m["label"], m["t_us"], m["missed"], m["source"], m["recording"]) for m in result["mistakes"]],
+            following,
+            result["options"],
+        )
 
     def _answer(self, training: ChildProcess, request: dict[str, Any]) -> dict[str, Any]:
         """Ask for a training, wait until it has ended, and return the last line that it wrote."""
@@ -112,7 +150,7 @@ class TrainingRequests:
     def command(self, recording: Path, out: Path) -> str:
         """Return the command that trains the same in a shell, in the folder where taxel was started."""
         words = self._opening.options_of(recording).words()
-        return shlex.join(["taxel", "train", _typed(recording), "--labels", "notes", "-o", _typed(out), *words])
+        return shlex.join(["taxel", "train", typed(recording), "--labels", "notes", "-o", typed(out), *words])
 
     def end(self) -> None:
         """End the training that runs, if one does."""

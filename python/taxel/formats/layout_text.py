@@ -1,0 +1,135 @@
+"""Writes layout files: that of a live source, and keys into one that a person may have written."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from taxel._base.arguments import shown
+from taxel._base.errors import refused
+from taxel._core import FormatError, ProblemError
+from taxel.array import of_size
+from taxel.formats.layout import Layout
+
+__all__ = ["of_source", "with_keys"]
+
+#: Keys of a source that are whole numbers, and those that are lists.
+_WHOLE, _LISTS = ("baud", "frame_lines"), ("columns", "leave_out")
+
+#: The line that begins a table of TOML.
+_TABLE = re.compile(r"^[ \t]*\[", re.MULTILINE)
+
+
+def of_source(text: str) -> str:
+    """Return the text of a layout file for a live source.
+
+    Parameters
+    ----------
+    text : str
+        "serial:/dev/ttyACM0,baud=9600,array=16x16" ...
+
+    Raises
+    ------
+    ProblemError : it states no array, or what a layout file cannot hold
+
+    Examples
+    --------
+    >>> print(of_source("serial:COM3,baud=9600,array=4x3,falls=true"), end="")
+    rows = 4
+    columns = 3
+    falls = true
+    <BLANKLINE>
+    [source]
+    place = "serial:COM3"
+    baud = 9600
+    """
+    place, *pairs = text.split(",")
+    keys = {name: value for name, _, value in (pair.partition("=") for pair in pairs)}
+    if not keys.get("array"):
+        raise refused("source", f" is {shown(text)}: needs array=ROWSxCOLUMNS; Show what arrives finds it")
+    array = of_size(keys.pop("array"), of_wire=False)
+    lines = [f"rows = {array.rows}", f"columns = {array.columns}"]
+    if array.pitch_mm is not None:
+        lines.append(f"pitch_mm = {_written(array.pitch_mm)}")
+    if "unit" in keys:
+        lines.append(f"unit = {_written(keys.pop('unit'))}")
+    if "falls" in keys:
+        lines.append(f"falls = {keys.pop('falls')}")
+    if "rate" in keys:
+        lines.append(f"rate_hz = {keys.pop('rate')}")
+    lines += ["", "[source]", f"place = {_written(place)}"]
+    for name, value in keys.items():
+        written = value if name in _WHOLE else _written(_columns(value) if name in _LISTS else value)
+        lines.append(f"{name} = {written}")
+    made = "\n".join(lines) + "\n"
+    try:
+        Layout.of_text(Path("layout.toml"), made)
+    except FormatError as error:
+        raise refused("source", f" is {shown(text)}: {error}") from None
+    return made
+
+
+def with_keys(path: Path, text: str, keys: Mapping[str, Any]) -> str:
+    """Return the text of a layout file with other values of some keys; all else stays, comments too.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for errors.
+    text : str
+    keys : mapping of str to value
+        By their names, of a key in a table as "ros.topic".
+
+    Raises
+    ------
+    FormatError : the text is no layout, before or with these keys
+    ProblemError : it is written so that only a person can change it
+
+    Examples
+    --------
+    >>> print(with_keys(Path("a.toml"), "unit = 'N'  # newton", {"falls": True, "ros.topic": "/palm"}), end="")
+    falls = true
+    unit = 'N'  # newton
+    <BLANKLINE>
+    [ros]
+    topic = "/palm"
+    """
+    Layout.of_text(path, text)
+    wanted, made = tomllib.loads(text), text
+    for name, value in keys.items():
+        table, _, key = name.rpartition(".")
+        (wanted.setdefault(table, {}) if table else wanted)[key] = value
+        made = _set(made, table, f"{key} = {_written(value)}", key)
+    Layout.of_text(path, made)
+    if tomllib.loads(made) != wanted:
+        raise ProblemError(f"{path}: cannot be changed here as it is written; set {', '.join(keys)} in it by hand")
+    return made
+
+
+def _set(text: str, table: str, line: str, key: str) -> str:
+    """Return a text of TOML with a line in place of that of the same key in a table, or before the table's others."""
+    begin = 0
+    if table:
+        head = re.search(rf"^[ \t]*\[[ \t]*{re.escape(table)}[ \t]*\].*(\n|\Z)", text, re.MULTILINE)
+        if head is None:
+            return f"{text.rstrip()}\n\n[{table}]\n{line}\n".lstrip("\n")
+        begin = head.end()
+    following = _TABLE.search(text, begin)
+    end = len(text) if following is None else following.start()
+    inside, count = re.subn(rf"^[ \t]*{re.escape(key)}[ \t]*=.*$", lambda _: line, text[begin:end], flags=re.MULTILINE)
+    before = text[:begin] if begin == 0 or text[:begin].endswith("\n") else f"{text[:begin]}\n"
+    return before + (inside if count else f"{line}\n{inside}") + text[end:]
+
+
+def _columns(value: str) -> list[str | int]:
+    """Return the columns of a key of a source: those that are numbers as such."""
+    return [int(column) if column.isdecimal() else column for column in value.split(":")]
+
+
+def _written(value: object) -> str:
+    """Return a value as TOML has it: JSON has the same escapes, numbers and lists."""
+    return json.dumps(value, ensure_ascii=False)
