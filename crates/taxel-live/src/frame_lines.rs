@@ -124,6 +124,9 @@ pub struct FrameAssembler {
     faults: StreamFaults,
     unread: UnreadLines,
     lines: u64,
+    /// The numbers of the last line, NaN in the columns that are left out, and which columns are not.
+    numbers: Vec<f64>,
+    is_read: Vec<bool>,
     /// The values of the frame so far, its first stamp and the arrival of its first line, ns since 1970.
     values: Vec<f32>,
     begun: Option<(Option<f64>, i64)>,
@@ -155,13 +158,17 @@ impl FrameAssembler {
             [(_, unit_us)] => unit_us,
             _ => 1.0,
         });
-        let values = Vec::with_capacity(layout.array.len());
+        let mut is_read = vec![false; layout.fields];
+        let clocks = layout.time.iter().map(|(field, _)| field);
+        layout.values.iter().chain(clocks).for_each(|&field| is_read[field] = true);
         Self {
-            layout,
             faults,
             unread: UnreadLines::default(),
             lines: 0,
-            values,
+            numbers: Vec::with_capacity(layout.fields),
+            is_read,
+            values: Vec::with_capacity(layout.array.len()),
+            layout,
             begun: None,
             rows: 0,
             last: None,
@@ -187,14 +194,15 @@ impl FrameAssembler {
             return None;
         }
         self.lines += 1;
-        match self.numbers(text).filter(|_| !line.cut) {
-            Some(numbers) => self.push_numbers(&numbers, arrived_ns),
-            None => {
-                self.count_unread(text);
-                self.discard();
-                None
-            }
+        let mut numbers = std::mem::take(&mut self.numbers);
+        let is_whole = self.read(text, &mut numbers) && !line.cut;
+        let ends = is_whole && self.push_numbers(&numbers, arrived_ns);
+        self.numbers = numbers;
+        if !is_whole {
+            self.count_unread(text);
+            self.discard();
         }
+        if ends { self.end_frame() } else { None }
     }
 
     /// Adds the numbers of a line, as [`FrameAssembler::push`].
@@ -208,35 +216,35 @@ impl FrameAssembler {
             return Err(problem!("{n} values: must be {expected}"));
         }
         self.lines += 1;
-        Ok(self.push_numbers(numbers, arrived_ns))
+        Ok(if self.push_numbers(numbers, arrived_ns) { self.end_frame() } else { None })
     }
 
     /// Whether a line has the numbers of the layout.
     #[must_use]
     pub fn fits(&self, line: &TextLine) -> bool {
-        self.numbers(&line.text).is_some()
+        self.read(&line.text, &mut vec![])
     }
 
-    /// The numbers of a line, NaN in the columns that are left out; `None` if it is no line of the layout.
-    fn numbers(&self, text: &str) -> Option<Vec<f64>> {
-        let cells = cells(text);
-        let mut numbers = vec![f64::NAN; cells.len()];
-        if numbers.len() != self.layout.fields {
-            return None;
+    /// Reads the numbers of a line, NaN in the columns that are left out; returns whether it is a line of the layout.
+    fn read(&self, text: &str, numbers: &mut Vec<f64>) -> bool {
+        numbers.clear();
+        for cell in cells(text) {
+            let value = match self.is_read.get(numbers.len()) {
+                Some(true) => number(&cell),
+                Some(false) => Some(f64::NAN),
+                None => None,
+            };
+            let Some(value) = value else { return false };
+            numbers.push(value);
         }
-        let clocks = self.layout.time.iter().map(|(field, _)| field);
-        for &field in self.layout.values.iter().chain(clocks) {
-            numbers[field] = number(&cells[field])?;
-        }
-        Some(numbers)
+        numbers.len() == self.layout.fields
     }
 
     /// Counts a line that is no part of a frame.
     fn count_unread(&mut self, text: &str) {
         self.faults.strange();
         let is_text = !text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t'));
-        let cells = cells(text);
-        let kind = match cells.iter().all(|cell| number(cell).is_some()) {
+        let kind = match cells(text).all(|cell| number(&cell).is_some()) {
             _ if !is_text => &mut self.unread.no_text,
             true => &mut self.unread.other_length,
             false => &mut self.unread.text,
@@ -244,7 +252,8 @@ impl FrameAssembler {
         kind.count(1, text);
     }
 
-    fn push_numbers(&mut self, numbers: &[f64], arrived_ns: i64) -> Option<(i64, &[f32])> {
+    /// Adds the numbers of a line; returns whether it ends a frame.
+    fn push_numbers(&mut self, numbers: &[f64], arrived_ns: i64) -> bool {
         if self.begun.is_none() {
             let stamp = match self.layout.time[..] {
                 [] => None,
@@ -264,12 +273,13 @@ impl FrameAssembler {
         self.values.extend(self.layout.values.iter().map(value));
         self.rows += 1;
         match self.layout.end {
-            FrameEnd::Lines(lines) if self.rows == lines as u64 => self.end_frame(),
-            FrameEnd::EmptyLine if self.values.len() > self.layout.array.len() => {
-                self.discard();
-                None
+            FrameEnd::Lines(lines) => self.rows == lines as u64,
+            FrameEnd::EmptyLine => {
+                if self.values.len() > self.layout.array.len() {
+                    self.discard();
+                }
+                false
             }
-            _ => None,
         }
     }
 
@@ -319,8 +329,9 @@ impl FrameAssembler {
 
     /// Whether a line names the columns.
     fn names_columns(&self, text: &str) -> bool {
-        let cells = cells(text);
-        cells.len() == self.layout.fields && cells.iter().all(|cell| number(cell).is_none())
+        let mut fields = 0;
+        let are_names = cells(text).inspect(|_| fields += 1).all(|cell| number(&cell).is_none());
+        are_names && fields == self.layout.fields
     }
 
     /// Handles an interruption: the next line begins a frame.
@@ -362,18 +373,17 @@ impl FrameAssembler {
 
 /// The cells of a line, which semicolons (then a comma may be a decimal one), commas, tabs or blanks separate; a separator may
 /// end the line.
-pub(crate) fn cells(text: &str) -> Vec<Cow<'_, str>> {
+pub(crate) fn cells(text: &str) -> impl Iterator<Item = Cow<'_, str>> {
     let text = text.trim();
-    let Some(separator) = [';', ',', '\t'].into_iter().find(|&separator| text.contains(separator)) else {
-        return text.split_whitespace().map(Cow::Borrowed).collect();
-    };
-    let mut cells: Vec<&str> = text.split(separator).map(str::trim).collect();
-    if cells.last().is_some_and(|cell| cell.is_empty()) {
-        cells.pop();
-    }
-    let decimal =
-        |cell: &'_ str| if separator == ';' && cell.contains(',') { Some(cell.replace(',', ".")) } else { None };
-    cells.into_iter().map(|cell| decimal(cell).map_or(Cow::Borrowed(cell), Cow::Owned)).collect()
+    let separator = [';', ',', '\t'].into_iter().find(|&separator| text.contains(separator));
+    let text = separator.and_then(|separator| text.strip_suffix(separator)).unwrap_or(text);
+    let split =
+        text.split(move |c: char| if let Some(separator) = separator { c == separator } else { c.is_whitespace() });
+    let cells = split.map(str::trim).filter(move |cell| separator.is_some() || !cell.is_empty());
+    cells.map(move |cell| {
+        let is_decimal = separator == Some(';') && cell.contains(',');
+        if is_decimal { Cow::Owned(cell.replace(',', ".")) } else { Cow::Borrowed(cell) }
+    })
 }
 
 /// The number in a cell, if it is one that frames hold.

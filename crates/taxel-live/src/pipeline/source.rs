@@ -522,7 +522,7 @@ impl OpenedLines {
         let until = Instant::now() + FIRST_LINE;
         let mut names: Option<Vec<String>> = None;
         while let Some((line, at_ns)) = self.next(until)? {
-            let found = cells(&line.text);
+            let found: Vec<_> = cells(&line.text).collect();
             if found.is_empty() || line.text.starts_with('#') {
                 continue;
             }

@@ -58,7 +58,7 @@ impl SourcePreview {
                 if std::mem::take(&mut reader.is_cut) {
                     continue;
                 }
-                let cells = cells(&line.text);
+                let cells: Vec<_> = cells(&line.text).collect();
                 let numbers: Option<Vec<f64>> = cells.iter().map(|cell| number(cell)).collect();
                 let is_empty = cells.is_empty();
                 found.push(PreviewLine { numbers: numbers.filter(|_| !is_empty), is_empty, at_ns });
@@ -143,11 +143,7 @@ mod tests {
     /// Lines that arrive every 10 ms.
     fn lines(text: &str) -> Vec<PreviewLine> {
         let line = |(k, text): (usize, &str)| PreviewLine {
-            numbers: cells(text)
-                .iter()
-                .map(|cell| number(cell))
-                .collect::<Option<Vec<f64>>>()
-                .filter(|n| !n.is_empty()),
+            numbers: cells(text).map(|cell| number(&cell)).collect::<Option<Vec<f64>>>().filter(|n| !n.is_empty()),
             is_empty: text.is_empty(),
             at_ns: 10_000_000 * i64::try_from(k).unwrap(),
         };
