@@ -359,7 +359,8 @@ class Mistakes:
         if not any(cause.kind in ("falling_values", "shifted_labels") for cause in found):
             for label, mistakes in wrong.items():
                 found += [*self._unlabelled_time(evidence.sound, label), *self._name(label, mistakes)]
-                if not any(cause.kind == "foreign_labels" and label in cause.labels for cause in found):
+                # A tare that does not fit lets labels lie far from what is felt, too.
+                if not any(cause.kind in ("foreign_labels", "tare") and label in cause.labels for cause in found):
                     found += self._unpaired(label)
                 # More labels and other parameters are for what nothing else explains.
                 if all(2 * cause.mistakes < mistakes for cause in found if label in cause.labels):
