@@ -273,3 +273,7 @@ def test_a_sensor_of_1280_x_720_is_read_and_larger_taxels_make_it_small(tmp_path
     path = write(tmp_path / "a.raw", rows, size=(1280, 720))
     assert (rows_of(taxel.open(path).events) == rows).all()
     assert taxel.open(path, bin=4, window_ms=5).array.shape == (180, 320)
+    with refused(r"more than 65536 positions .*; .npz, .h5 and .csv hold such events; region and bin"):
+        taxel.convert(path, tmp_path / "a.mcap")
+    taxel.convert(taxel.open(path, bin=8), tmp_path / "a.mcap")
+    assert taxel.open(tmp_path / "a.mcap").events == taxel.open(path, bin=8).events

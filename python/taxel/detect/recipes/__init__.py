@@ -81,8 +81,8 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
     recipe_for = {kind: name for name, values in recipes.items() for kind in values.get("fits", ())}
     kind = f"{source.unit.partition('/')[0]}/" if isinstance(source, Frames) else "events"
     if not isinstance(source, Frames) or (kind in recipe_for and source.array._has_neighbours):
-        what = f"frames in {source.unit}" if isinstance(source, Frames) else "events of a board"
-        return recipe_for.get(kind, _ANY), what
+        subject = f"frames in {source.unit}" if isinstance(source, Frames) else "events of a board"
+        return recipe_for.get(kind, _ANY), subject
     array, grids = source.array, recipe_for.get("grids")
     known = False
     if array.taxels < 2 or not array._has_neighbours:

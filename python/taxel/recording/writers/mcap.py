@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._core import RecordingWriter
+from taxel._base.messages import first_line
+from taxel._core import ProblemError, RecordingWriter
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
@@ -225,7 +226,11 @@ def encode_events(
     ProblemError : an array of more than 65 536 positions, or times more than 8.9 years apart
     """
     begins = None if held is None else np.ascontiguousarray(held).reshape(-1)
-    encoded = _core.encode_datagrams(events._parts(), begins, clock is not None)
+    try:
+        encoded = _core.encode_datagrams(events._parts(), begins, clock is not None)
+    except ProblemError as error:
+        smaller = "region and bin of an event camera's file make fewer taxels"
+        raise ProblemError(f"{first_line(error)}; .npz, .h5 and .csv hold such events; {smaller}") from None
     at = (
         encoded.times * 1000
         if clock is None or not len(encoded.times)
