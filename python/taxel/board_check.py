@@ -85,9 +85,9 @@ class Difference:
     ----------
     t : int, us
         The board's time.
-    x, y : int
+    x, y : int, 0 or more
         Column and row of the taxel.
-    frame : int
+    frame : int, 0 or more
         The number of the pattern's frame.
     expected, value : int, ticks
     meaning : str
@@ -116,17 +116,17 @@ class PatternCheck:
     ----------
     registers : Registers
         Those of the board, or, without its serial line, the preset that explains the values best.
-    version : {1, 2}
+    version : int, 1 or more
         Of the wire.
     datagrams, events, frames : int, 0 or more
         How many arrived, and how many stamps have an event.
     counts : Counts
         What the decoder found missing or damaged.
-    taxels : int
+    taxels : int, 0 or more
         How many taxels had an event.
-    wrong : int
+    wrong : int, 0 or more
         Events whose value is not the pattern's.
-    behind : int
+    behind : int, 0 or more
         Taxels that, at the end of some frame, hold a value further from the pattern's than the noise floor.
     first : Difference or None
         The first of either.
