@@ -85,9 +85,9 @@ class Difference:
     ----------
     t : int, us
         The board's time.
-    x, y : int
+    x, y : int, 0 or more
         Column and row of the taxel.
-    frame : int
+    frame : int, 0 or more
         The number of the pattern's frame.
     expected, value : int, ticks
     meaning : str
@@ -116,16 +116,17 @@ class PatternCheck:
     ----------
     registers : Registers
         Those of the board, or, without its serial line, the preset that explains the values best.
-    version : int, 1 or 2
-    datagrams, events, frames : int
-        How many arrived, and how many frames have an event.
+    version : int, 1 or more
+        Of the wire.
+    datagrams, events, frames : int, 0 or more
+        How many arrived, and how many stamps have an event.
     counts : Counts
         What the decoder found missing or damaged.
-    taxels : int
+    taxels : int, 0 or more
         How many taxels had an event.
-    wrong : int
+    wrong : int, 0 or more
         Events whose value is not the pattern's.
-    behind : int
+    behind : int, 0 or more
         Taxels that, at the end of some frame, hold a value further from the pattern's than the noise floor.
     first : Difference or None
         The first of either.
@@ -157,7 +158,7 @@ class RestCheck:
     Parameters
     ----------
     registers : Registers
-    faults : int
+    faults : int, 0 or more
         How often a comparator had not returned when its ramp began.
     values : float, shape (rows, columns), ticks
         The mean of each taxel; nan where it gave no value, which one that stays at 0 or 1 does.
@@ -213,7 +214,7 @@ class _Capture:
     """What arrived, and where."""
 
     datagrams: list[bytes] = field(default_factory=list)
-    arrived_ns: list[int] = field(default_factory=list)
+    arrived_us: list[int] = field(default_factory=list)
     sender: str = ""
     interface: str = ""
     destination: str = ""
@@ -251,7 +252,7 @@ class _Receiver:
                             capture.interface = socket.if_indextoname(int.from_bytes(info[:4], "little"))
                         capture.destination = str(ipaddress.IPv4Address(info[8:12]))
             capture.datagrams.append(data)
-            capture.arrived_ns.append(time.monotonic_ns())
+            capture.arrived_us.append(round(time.monotonic() * 1e6))
         return capture
 
     def drain(self, seconds: float) -> None:
@@ -287,8 +288,8 @@ def _decoded(capture: _Capture, array: Array) -> _Values:
     """Decode all datagrams."""
     version = 2 if capture.datagrams[0][:1] == bytes([_MAGIC]) else 1
     decoder, parts, times = Decoder(2 if version == 2 else 1, array=array), [], []
-    for datagram, arrived in zip(capture.datagrams, capture.arrived_ns, strict=True):
-        for events in (decoder.push(datagram, arrived // 1000), decoder.end_of_datagram()):
+    for datagram, arrived in zip(capture.datagrams, capture.arrived_us, strict=True):
+        for events in (decoder.push(datagram, arrived), decoder.end_of_datagram()):
             if not len(events):
                 continue
             times.append((int(events.t[-1]), arrived))
@@ -300,7 +301,7 @@ def _decoded(capture: _Capture, array: Array) -> _Values:
             parts.append((events.t[here], events.x[here], events.y[here], events.intensity[here]))
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)] if parts else [np.empty(0, np.int64)] * 4
     t, x, y, value = columns[0], *(column.astype(np.uint16) for column in columns[1:])
-    passed = (times[-1][1] - times[0][1]) / 1e3 if times else 0.0
+    passed = times[-1][1] - times[0][1] if times else 0
     speed = (times[-1][0] - times[0][0]) / passed if passed > 0 else math.nan
     return _Values(version, decoder.counts, t, x, y, value, speed)
 
@@ -317,7 +318,7 @@ class _Frames:
         self.several = max(math.ceil(resolution_us / self.frame_us), 1)
         self.number, self.after_us = 0, resolution_us / 2
 
-    def of(self, t: NDArray[np.int64]) -> NDArray[np.int64]:
+    def first(self, t: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the first frame that each time may be of."""
         since = (t - self.anchor_us - self.after_us) / self.frame_us
         return self.number + np.ceil(np.round(since, 6)).astype(np.int64)
@@ -337,7 +338,7 @@ def _expected(array: Array, registers: Registers, x: Any, y: Any, frames: NDArra
 
 def _right(values: _Values, chosen: Any, array: Array, registers: Registers, frames: _Frames) -> NDArray[np.bool_]:
     """Return which of these values are those of a frame that they may be of."""
-    first = frames.of(values.t[chosen])
+    first = frames.first(values.t[chosen])
     right = np.zeros(first.shape, bool)
     for k in range(frames.several):
         right |= _expected(array, registers, values.x[chosen], values.y[chosen], first + k) == values.value[chosen]
@@ -351,7 +352,7 @@ def _numbered(values: _Values, array: Array, registers: Registers) -> tuple[_Fra
     some = later[np.unique(np.linspace(0, len(later) - 1, 64).astype(int))]
     frames = _Frames(registers, int(values.t[some[0]]), values.resolution_us)
     # A frame more or less moves the ball by a sixteenth of a taxel, a tick.
-    k, best, number = frames.of(values.t[some]), -1, 0
+    k, best, number = frames.first(values.t[some]), -1, 0
     for start in range(0, _FRAMES, 4096):
         numbers = np.arange(start, start + 4096)
         expected = _expected(array, registers, values.x[some], values.y[some], numbers[:, None] + k)
@@ -394,7 +395,7 @@ def _compared(
 ) -> PatternCheck:
     """Compare each value, and what every taxel holds, with the pattern."""
     everything = np.arange(len(values.t))
-    right, number = _right(values, everything, array, registers, frames), frames.of(values.t)
+    right, number = _right(values, everything, array, registers, frames), frames.first(values.t)
     # Where the pattern was switched on just before, the first events may be the comparators'.
     of_pattern = np.ones(right.shape, bool)
     if begun:
@@ -418,7 +419,7 @@ def _compared(
         held[values.y[now], values.x[now]] = values.value[now]
         if k % each:
             continue
-        n = int(frames.of(stamps[k : k + 1])[0]) + frames.several - 1
+        n = int(frames.first(stamps[k : k + 1])[0]) + frames.several - 1
         expected = _expected(array, registers, x, y, np.full(array.shape, n)).astype(np.int64)
         off = (held >= 0) & (np.abs(expected - held) > floor)
         if off.any() and first_behind is None:
@@ -748,7 +749,7 @@ def check_board(
     --------
     >>> check_board(port=0)
     Traceback (most recent call last):
-    taxel.ProblemError: port is 0: must be from 1 to 65535
+    taxel.ProblemError: port ...
     """
     where = integer("port", port, 1, 65_535)
     if not 0.1 <= number("seconds", seconds) <= 3600:

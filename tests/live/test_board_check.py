@@ -21,6 +21,8 @@ from taxel.simulate import NOT_RETURNED, Board
 from taxel.wire import Registers
 
 ARRAY = Array(16, 16)
+#: For how long a check receives: on a busy machine, too, hundreds of frames come meanwhile.
+SECONDS = 3.0
 
 
 class Emulated:
@@ -53,7 +55,7 @@ class Emulated:
                         link.sendto(spoiled, ("127.0.0.1", self.port))
                 frames += 1
                 # As a board does, not in each frame; a line that nobody reads fills up.
-                if frames % 100 == 0:
+                if frames % 10 == 0:
                     with contextlib.suppress(BlockingIOError):
                         os.write(self.ours, self.board.faults().encode())
 
@@ -89,7 +91,7 @@ def found(check: BoardCheck, name: str) -> Any:
 def test_a_sound_board_passes_and_holds_its_registers_afterwards(wire_version):
     with emulated(wire_version=wire_version, noise_floor=7) as board:
         before = board.board.registers
-        check = check_board(board.place, port=board.port, host="127.0.0.1", seconds=1.0)
+        check = check_board(board.place, port=board.port, host="127.0.0.1", seconds=SECONDS)
         assert check.good, check.findings
         assert board.board.registers == before
     assert check.pattern.version == wire_version
@@ -105,7 +107,7 @@ def test_a_loose_and_a_stuck_sense_line_are_named():
     ticks = np.full(ARRAY.shape, 20, np.int64)
     ticks[5], ticks[7] = 60_000, NOT_RETURNED
     with emulated(ticks) as board:
-        check = check_board(board.place, port=board.port, host="127.0.0.1", seconds=1.0)
+        check = check_board(board.place, port=board.port, host="127.0.0.1", seconds=SECONDS)
     assert not check.good
     assert found(check, "values").good
     assert check.rest.faults > 0
@@ -122,7 +124,7 @@ def flipped(count: int, datagram: bytes) -> bytes:
 
 def test_a_bit_that_differs_is_named_with_its_taxel():
     with emulated(spoil=flipped) as board:
-        check = check_board(board.place, port=board.port, host="127.0.0.1", seconds=1.0)
+        check = check_board(board.place, port=board.port, host="127.0.0.1", seconds=SECONDS)
     assert not found(check, "values").good
     assert check.pattern.wrong > 0
     first = check.pattern.first
@@ -136,7 +138,7 @@ def test_datagrams_that_are_lost_are_seen_in_either_version(wire_version, name):
     with emulated(
         spoil=lambda count, datagram: None if count % 10 == 3 else datagram, wire_version=wire_version
     ) as board:
-        check = check_board(board.place, port=board.port, host="127.0.0.1", seconds=1.0)
+        check = check_board(board.place, port=board.port, host="127.0.0.1", seconds=SECONDS)
     assert not found(check, name).good
     assert not check.good
     # Most datagrams of version 2 are heartbeats, whose loss moves no value.
@@ -145,18 +147,18 @@ def test_datagrams_that_are_lost_are_seen_in_either_version(wire_version, name):
 
 def test_without_a_serial_line_a_board_that_makes_the_pattern_is_recognised(capsys):
     with emulated(pattern=True) as board:
-        check = check_board(port=board.port, host="127.0.0.1", array=ARRAY, seconds=1.0)
+        check = check_board(port=board.port, host="127.0.0.1", array=ARRAY, seconds=SECONDS)
         assert check.good, check.findings
         assert check.rest is None
         with pytest.raises(SystemExit) as ended:
-            main(["device", "check", "--port", str(board.port), "--array", "16x16", "--seconds", "0.5"])
+            main(["device", "check", "--port", str(board.port), "--array", "16x16", "--seconds", str(SECONDS)])
     assert ended.value.code == 0
     assert "ok    values: all" in capsys.readouterr().out
 
 
 def test_a_board_without_the_pattern_fails(capsys):
     with emulated(noise_floor=0) as board, pytest.raises(SystemExit) as ended:
-        main(["device", "check", "--port", str(board.port), "--array", "16x16", "--seconds", "0.5", "--json"])
+        main(["device", "check", "--port", str(board.port), "--array", "16x16", "--seconds", str(SECONDS), "--json"])
     assert ended.value.code == 3
     assert '"good": false' in capsys.readouterr().out
 
