@@ -19,7 +19,7 @@ from tests.panel.pages import clock, opened, press, recording, shown, shows, sti
 import taxel
 from taxel import Array, Frames
 from taxel.live import Panel
-from taxel.live._requests.training import TrainingRequests
+from taxel.live._requests.training import TrainedReadout, TrainingRequests
 from taxel.live._shown_files import Opening, ShownFiles
 from taxel.recording.analysis.pressure import readings
 from taxel.recording.analysis.rest import of_frames
@@ -84,6 +84,7 @@ def test_options_that_the_advice_names_are_given_in_a_shell(chromium: Any, recor
     text = "held out: contact, neuron: 3 of 5\nmore labels help most, else --search (about 60 s) or --recipe gait_plate"
     trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": text}
     trained |= {"next": "taxel detect RECORDING", "options": ["--search", "--recipe"]}
+    trained |= {"judged_on": "held out", "scores": [], "mistakes": []}
     detections = {"train": [trained, {"type": "done"}], "read_out": [{"type": "done"}]}
     with answered(chromium, recording, detections) as page:
         shows(page, "train-shell", r"^The same in a shell: taxel train")
@@ -101,7 +102,9 @@ def test_labels_and_what_a_training_printed_are_in_sight_together(count: int, ch
     table.write_text("label,t_us\n" + "".join(f"contact,{200_000 * k}\n" for k in range(1, count + 1)))
     printed = "\n".join(f"held out: contact, neuron: {k} of 5 found, 0 missed, 0 false" for k in range(30))
     trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": printed}
-    trained |= {"next": "taxel detect RECORDING", "options": []}
+    trained |= {"next": "taxel detect RECORDING", "options": [], "judged_on": "held out", "mistakes": []}
+    score = {"label": "contact", "is_plain_rule": False, "found": 5, "missed": 0, "false": 0, "delay_ms": 4.5}
+    trained |= {"scores": [score, score | {"is_plain_rule": True, "delay_ms": None}]}
     found = [{"label": "contact", "t_us": 10**5 * k, "known_us": 10**5 * k} for k in range(40)]
     detected = {
         "type": "detections",
@@ -121,7 +124,12 @@ def test_labels_and_what_a_training_printed_are_in_sight_together(count: int, ch
         assert page.locator("#panel-labels").evaluate("e => e.scrollTop") == 0
         rows = [row.bounding_box() for row in page.locator("#label-list li").all()[:3]]
         assert max(row["y"] + row["height"] for row in rows) <= min(low, list_["y"] + list_["height"])
-        assert page.locator("#train-text").bounding_box()["y"] + 60 < low
+        scores = page.locator("#train-rows").bounding_box()
+        assert scores["y"] + scores["height"] <= low
+        assert page.locator("#train-rows tr").all_inner_texts() == [
+            "contact\tneuron\t5\t0\t0\t4.5 ms",
+            "rule\t5\t0\t0\t–",
+        ]
     table.unlink()
 
 
@@ -136,7 +144,10 @@ for done in range(2):
     time.sleep(0.6)
 while not pathlib.Path({str(end)!r}).exists():
     time.sleep(0.02)
-result = {{"warnings": ["3 are alone"], "options": ["--search"]}}
+score = {{"found": 3, "missed": 1, "false": 0, "known_delay_ms": {{"median": 5.0}}}}
+mistake = {{"recording": "walk", "source": "", "label": "contact", "t_us": 7, "missed": True}}
+result = {{"labels": ["contact"], "score": {{"by_label": {{"contact": score}}}}, "plain_rule": None}}
+result |= {{"mistakes": [mistake], "warnings": ["3 are alone"], "options": ["--search"]}}
 print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result": result}}))
 """
     )
@@ -144,16 +155,18 @@ print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result":
     monkeypatch.setattr(sys, "executable", str(command))
     handler = TrainingRequests(Opening(), ShownFiles())
     assert handler.progress() == ""
-    printed: list[tuple[str, str, list[str]]] = []
+    printed: list[TrainedReadout] = []
     training = threading.Thread(target=lambda: printed.append(handler.train(tmp_path / "a.npz", tmp_path / "a.json")))
     training.start()
     until(lambda: re.fullmatch(r"fold 2 of 5, after \d+ s; about \d+ s in all", handler.progress()), "its estimate")
     end.touch()
     training.join()
-    [(text, following, options)] = printed
-    assert text.splitlines() == ["held out: all found", "warning: 3 are alone"]
-    assert following.startswith("taxel detect RECORDING --readout ")
-    assert options == ["--search"]
+    [trained] = printed
+    assert trained.text.splitlines() == ["held out: all found", "warning: 3 are alone"]
+    assert trained.next.startswith("taxel detect RECORDING --readout ")
+    assert (trained.judged_on, trained.options) == ("held out: all found", ["--search"])
+    assert trained.scores == [("contact", False, 3, 1, 0, 5.0)]
+    assert trained.mistakes == [("contact", 7, True, "", "walk")]
     assert handler.progress() == ""
 
 

@@ -174,7 +174,7 @@ def test_what_a_training_missed_is_in_a_table_and_in_the_lanes(chromium: Any, tm
         wrong, missed = truth["contact"][4] / 1e6 - 0.2, truth["contact"][4] / 1e6
         for key, text, at in (("k", "false", wrong), ("k", "missed", missed), ("j", "false", wrong)):
             press(page, key)
-            shows(page, "notice-text", rf"^{text} contact at {at:.1f}\d+ s: [12] of 2$")
+            shows(page, "notice-text", rf"^{text} contact at {f'{at:.3f}'[:3]}\d+ s: [12] of 2$")
             assert still(page) == pytest.approx(at, abs=0.05)
         # Another training begins without them.
         page.locator("#train").click()

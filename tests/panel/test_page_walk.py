@@ -248,7 +248,11 @@ def test_values_that_fall_are_said_above_the_maps_with_what_to_do(chromium: Any,
         Frames(np.round(values), np.arange(600) * 10_000, unit="counts", array=Array(8, 8)), tmp_path / "a.npz"
     )
     with shown(chromium, tmp_path / "a.npz") as page:
-        shows(page, "silence", r"^The values fall from their rest.* “falls = true” into a\.layout\.toml beside the rec")
+        shows(
+            page,
+            "silence",
+            r"^The values fall from their rest.* “falls = true” is written into a\.layout\.toml beside the rec",
+        )
     (tmp_path / "a.layout.toml").write_text("falls = true\n")
     with shown(chromium, tmp_path / "a.npz") as page:
         until(lambda: 2 <= clock(page) < 2.6, "the first touch")
@@ -353,9 +357,9 @@ def test_each_foot_has_a_sum_and_a_colour_of_its_own(size: dict[str, int], chrom
             head = page.locator(f"#{name}-block h2")
             assert head.evaluate("e => e.scrollWidth <= e.clientWidth"), f"all is in sight of {head.inner_text()}"
         # Each foot has a centre, where its own heel and toes are.
-        shows(page, "centre-now", r"^left -\d+, 0\s+right \d+, 0 own unit$")
-        pointed(page, 0.3, "centre-now", r"^left -\d+, 0 own unit$")
-        pointed(page, 0.8, "centre-now", r"^right \d+, 0 own unit$")
+        shows(page, "centre-now", r"^left x -\d+, y 0, right x \d+, y 0, units of the file$")
+        pointed(page, 0.3, "centre-now", r"^left x -\d+, y 0, units of the file$")
+        pointed(page, 0.8, "centre-now", r"^right x \d+, y 0, units of the file$")
         named = page.locator("#force-sums .swatch").evaluate_all(
             "all => all.map(e => getComputedStyle(e).backgroundColor.slice(4, -1))"
         )

@@ -1,6 +1,6 @@
 // The connection to the board: its control line and the address of its events, chosen or typed; the lines that it sends.
 
-import { make, part, write } from "./dom.js";
+import { entitle, make, part, write } from "./dom.js";
 
 /** @typedef {import("./messages.js").Hello} Hello */
 /** @typedef {import("./messages.js").Places} Places */
@@ -141,6 +141,7 @@ export class Connection {
   /** Ticks "Turn values" as the source says, and shows the command that reads the same. */
   showSource() {
     const source = this.source.input.value.trim();
+    entitle(this.source.input, "title", source);
     part("numbers-falls", HTMLInputElement).checked = /,falls=(?!false)/.test(source);
     const command = part("numbers-command", HTMLElement);
     command.hidden = !source;

@@ -174,7 +174,8 @@ export const LANES = [
     setting: "showCentre", box: "Centre",
     fits: ({ sensor }) => sensor.kind !== "channels",
     heading: ({ sensor: { axes: [across, down] } }, sources) =>
-      ["Centre ", make("span", { class: sources.length ? "apart" : "" }, swatch("more"), ` ${across} `, swatch("less dashed"), ` ${down}`), " ", output({ id: "centre-now" })],
+      // Of several sources each value has the name of its axis.
+      ["Centre ", make("span", { class: sources.length ? "apart" : "" }, swatch("more"), sources.length ? " " : ` ${across} `, swatch("less dashed"), sources.length ? "" : ` ${down}`), " ", output({ id: "centre-now" })],
     says: (shown, timeline, column) => [centreAt(shown, timeline, column)],
     title: () => "Centre",
     plan: (shown, sources) => {

@@ -93,9 +93,7 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const falling = connected && fall(opened);
   const text = [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`, nothing && refused, connected && preload(opened), falling].filter(Boolean).join(" ");
   write(part("silence-text", HTMLElement), text);
-  const turn = part("turn-values", HTMLButtonElement);
-  turn.hidden = !falling;
-  write(turn, falling ? "Turn values" : "");
+  part("turn-values", HTMLButtonElement).hidden = !falling;
   banner.hidden = !text;
   const subject = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? source : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
   const about = [subject, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");
