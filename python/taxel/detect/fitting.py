@@ -36,7 +36,7 @@ from taxel.detect.levels import fit_levels
 from taxel.detect.loads import clock_of, lacks_neighbours
 from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
-from taxel.detect.scoring import score_together
+from taxel.detect.scoring import Score, score_together
 from taxel.detect.seen import seen
 from taxel.detections import Detections
 from taxel.encode import Composite, Encoder, LocalLoad
@@ -279,17 +279,18 @@ def _best(examples: EncodedExamples, recipe: Recipe, label: str, array: Array | 
         with collected() as caught:
             fitting = Fitting(patterns, plan, label, array, report, rank, known)
             learner = fitting.fit(plan)
-        wrong = 0
-        if len(points) > 1 or fitting.precedes_input(learner):
-            wrong = fitting.wrong(learner, plan.run_threshold)
-        if fitting.precedes_input(learner) and 2 * wrong > fitting.count:
+        if len(points) == 1 and not fitting.precedes_input(learner):
+            return _FittedPoint(0, fitting, learner, point, caught)
+        found = fitting.score(learner, plan.run_threshold)
+        if fitting.precedes_input(learner) and 2 * found.missed > fitting.count:
             with collected() as caught_later:
                 later = Fitting(patterns, plan, label, array, report, rank, known, behind_input=True)
                 by_later = later.fit(plan)
-            if (fewer := later.wrong(by_later, plan.run_threshold)) < wrong:
+            found_later = later.score(by_later, plan.run_threshold)
+            if found_later.rank < found.rank:
                 caught = [_waits(label, fitting, later), *caught_later]
-                wrong, fitting, learner = fewer, later, by_later
-        return _FittedPoint(wrong, fitting, learner, point, caught)
+                found, fitting, learner = found_later, later, by_later
+        return _FittedPoint(found.rank[0], fitting, learner, point, caught)
 
     count = sum(len(pattern.labels.get(label, ())) for pattern in examples.patterns)
     best, refused = None, None
@@ -522,8 +523,8 @@ class Fitting:
             to_ms(alignment.given[alignment.unpaired & (alignment.example == k)]) for k in range(len(self._label_times))
         ]
 
-    def wrong(self, cone: ConeR, run_threshold: float) -> int:
-        """Return how many labels, as given, a fitted learner misses on these examples, and how many it invents."""
+    def score(self, cone: ConeR, run_threshold: float) -> Score:
+        """Return the score of a fitted learner on these examples, against the labels as given."""
         neuron = cone._on_grid()
         neuron.set_params(theta_0=run_threshold * neuron.theta_0)
         found, truths = [], []
@@ -533,7 +534,7 @@ class Fitting:
                 t = EndedTouches.from_trains(source, self._duration).begin_of(t)
             found.append(Detections([self._label] * len(t), t, t))
             truths.append({self._label: times})
-        return score_together(found, truths, FOLLOWED_MS).rank[0]
+        return score_together(found, truths, FOLLOWED_MS)
 
     def seen(self, cone: ConeR) -> dict[str, Any]:
         """Return the range of the inputs of a fitted learner's neuron."""
