@@ -404,9 +404,9 @@ pub fn pattern_values<'py>(
     frame: PyReadonlyArray1<'py, u16>,
     ramp: u16,
 ) -> PyResult<Bound<'py, PyArray1<u16>>> {
-    let of = to_array(parts)?;
+    let layout = to_array(parts)?;
     let (x, y, frame) = (slice("x", &x)?, slice("y", &y)?, slice("frame", &frame)?);
-    let values = x.iter().zip(y).zip(frame).map(|((&x, &y), &n)| board::pattern(&of, (x, y), n, ramp));
+    let values = x.iter().zip(y).zip(frame).map(|((&x, &y), &n)| board::pattern(&layout, (x, y), n, ramp));
     Ok(array(py, values.collect()))
 }
 
