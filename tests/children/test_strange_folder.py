@@ -140,7 +140,7 @@ def test_a_training_of_the_page_runs_no_code_of_a_strange_folder(
 ) -> None:
     monkeypatch.chdir(here)
     handler = TrainingRequests(Opening(), ShownFiles())
-    assert "contact, neuron: " in handler.train(beside / "a.h5", here / "page.json")[0]
+    assert "contact, neuron: " in handler.train(beside / "a.h5", here / "page.json").text
     check_nothing_ran(here, beside)
 
 

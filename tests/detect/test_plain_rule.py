@@ -361,7 +361,7 @@ def test_one_loader_reads_both_and_refuses_others(tmp_path: Path):
         load(tmp_path / "other.json")
     with pytest.raises(taxel.FormatError, match='plain rule: format is "taxel readout"'):
         PlainRule.load(tmp_path / "readout.json")
-    (tmp_path / "bytes.json").write_bytes(b"\xff\xfe")
+    (tmp_path / "bytes.json").write_bytes(b"{\xff\xfe")
     with pytest.raises(taxel.FormatError, match="not text"):
         load(tmp_path / "bytes.json")
 

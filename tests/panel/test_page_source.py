@@ -136,6 +136,7 @@ def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chr
             rf"^The line is silent: nothing from serial:{plug}.* since \d+\.\d+ s of the source, for",
         )
         shows(page, "state-word", "^Silent, Recording")
+        page.wait_for_timeout(1500)  # a silence counts from a second on
         plug.unlink()
         with mat(4, 4) as (line, _):
             plug.symlink_to(line)

@@ -26,6 +26,10 @@ SOUND: dict[str, Sound] = {
         types=None,
         ros=None,
         limit=1 << 30,
+        window_ms=None,
+        bin=None,
+        region=None,
+        polarity=None,
     ),
     "taxel.open_all": plain(
         taxel.open_all,
@@ -39,6 +43,10 @@ SOUND: dict[str, Sound] = {
         types=None,
         ros=None,
         limit=1 << 30,
+        window_ms=None,
+        bin=None,
+        region=None,
+        polarity=None,
     ),
     "taxel.Recording.at_rate": plain(
         lambda **given: taxel.Recording(NUMBERED).at_rate(**given).frames(),

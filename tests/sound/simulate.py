@@ -188,6 +188,7 @@ SOUND: dict[str, Sound] = {
     "taxel.simulate.Pipe": lambda: (taxel.simulate.Pipe, {"source": pipe(), "noise_floor": 3}),
     "taxel.simulate.Pipe.registers": lambda: (taxel.simulate.Pipe(pipe()).registers, {"preset": None}),
     "taxel.simulate.emulate": lambda: (taxel.simulate.emulate, EMULATED),
+    "taxel.simulate.pattern": plain(taxel.simulate.pattern, frame=3, array=taxel.Array(4, 4), ramp=150),
 }
 
 #: For each type that only taxel constructs, a call that returns an instance.

@@ -54,11 +54,11 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_a_process_an
     process = task("train", recordings=[str(place)], out=str(tmp_path / "process.json"))
     texts = {(tmp_path / f"{name}.json").read_text() for name in ("python", "shell", "process")}
     if place.is_file():
-        text, following, options = requests().train(place, tmp_path / "page.json")
+        made = requests().train(place, tmp_path / "page.json")
         texts.add((tmp_path / "page.json").read_text())
-        assert text.splitlines() == [*training.lines(), *(f"warning: {text}" for text in training.warnings)]
-        assert following == f"taxel detect RECORDING --readout {tmp_path / 'page.json'}"
-        assert options == list(training.to_dict()["options"])
+        assert made.text.splitlines() == [*training.lines(), *(f"warning: {text}" for text in training.warnings)]
+        assert made.next == f"taxel detect RECORDING --readout {tmp_path / 'page.json'}"
+        assert made.options == list(training.to_dict()["options"])
     assert len(texts) == 1
     assert json.loads(shell.stdout) == {"readout": str(tmp_path / "shell.json"), **training.to_dict()}
     assert process == json.loads(json.dumps(training.to_dict()))

@@ -190,9 +190,10 @@ class Evidence:
         return Evidence([self.examples[k] for k in left], [self.sound[k] for k in left], self.plan)
 
     @property
-    def falls(self) -> bool:
-        """Whether values fall from their rest."""
-        return bool(self._fall[0])
+    def falls(self) -> str:
+        """That values fall from their rest, and what turns them; empty where none do."""
+        advice, measured = self._fall
+        return f"{measured}: if less means more pressure, {advice} helps" if advice else ""
 
     @cached_property
     def _fall(self) -> tuple[str, str]:

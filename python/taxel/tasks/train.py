@@ -264,6 +264,8 @@ class _Work:
             scored = replace(trained_on, plain=plain_score(*loads, [], truths, window_ms, self.update))
         scores = scored.together, trained_on.together, scored.scores
         causes = Mistakes(trained, *scores, search, scored.plain).causes(evidence)
+        if evidence.falls and not causes:
+            warn(evidence.falls)
         taken = _taken(self.examples) if self.options.tare is None else ()
         return Training(self.options, self.opened, trained, scored, why, causes, outcomes, taken)
 
@@ -275,8 +277,8 @@ class _Work:
             trainings += (folds + 1) * (INNER - 1) * round(sum(points) / len(points))
         if once_s * trainings < _LONG_S:
             return
-        what = "the search and the folds take" if self.options.search else "the folds take"
-        ground = f"one training on all data took {once_s:.1f} s, and {what} about as long as {trainings} of them"
+        parts = "the search and the folds take" if self.options.search else "the folds take"
+        ground = f"one training on all data took {once_s:.1f} s, and {parts} about as long as {trainings} of them"
         self.update(Forecast(f"about {once_s * trainings / 60:.0f} min from here on: {ground}"), 0, 0)
 
     def _outcomes(self, trained: Trained) -> list[Outcome]:
