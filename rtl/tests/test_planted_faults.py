@@ -106,7 +106,7 @@ OF_MODULES = [
     ("comparator_column", " && !closes", ""),
     ("datagram_sender", "{now.line[2:0], STRIDE}", "{3'd0, STRIDE}"),
     ("datagram_sender", "buffer[{bank, place}]", "buffer[{1'b0, place}]"),
-    ("ethernet_board", "if (!runs) waited <= '0;", "if (1'b0) waited <= '0;"),
+    ("ethernet_board", "if (!runs || !up) waited <= '0;", "if (1'b0) waited <= '0;"),
     ("ethernet_board", ".D0(txd[k]), .D1(txd[k+4])", ".D0(txd[k+4]), .D1(txd[k])"),
     ("ethernet_frame", "16'(size) + 16'd28", "16'(size) + 16'd20"),
     ("ethernet_frame", "at >= size", "at > size"),
