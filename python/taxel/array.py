@@ -232,6 +232,11 @@ class Array:
         """Whether it is a grid of taxels that all exist, so that it may be padded at its far edges."""
         return self.exists is None and self.places is None and 1 not in self.shape
 
+    def _holds(self, array: Array) -> bool:
+        """Whether a smaller sensor can be this one's first rows and columns."""
+        are_grids = self._is_whole_grid and array._is_whole_grid
+        return are_grids and array.rows <= self.rows and array.columns <= self.columns
+
     @property
     def taxels(self) -> int:
         """The number of taxels that exist."""

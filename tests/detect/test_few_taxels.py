@@ -11,7 +11,7 @@ import taxel
 from taxel import Array, Frames, Readout, Tare
 from taxel.detect import Example, PlainRule, Recipe, fit, judge, recipes, run, score, tune
 from taxel.encode import LevelCrossing
-from taxel.tasks import train
+from taxel.tasks import DetectOptions, detect, train
 
 
 def single(shape: tuple[int, int], seed: int, count: int = 14, *, times: float = 10.0) -> Example:
@@ -95,6 +95,9 @@ def test_grids_of_several_sizes_are_padded_at_their_far_edges(tmp_path: Path) ->
     labels = [{name: t.tolist() for name, t in example.labels.items()} for example in examples]
     training = train([taxel.open(place) for place in places], labels)
     assert any("3 sizes, from 6 x 8 taxels on, are padded at their far edges to 8 x 8" in w for w in training.warnings)
+    for example, place in zip(examples, places, strict=True):
+        [detected] = detect(training.readout, taxel.open(place), options=DetectOptions(tare=1.9)).each
+        assert score(detected.outcome.found, example.labels, 50.0).rank[0] == 0
 
 
 def test_a_smaller_grid_gives_what_its_padded_frames_give() -> None:

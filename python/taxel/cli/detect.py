@@ -130,6 +130,8 @@ def _table(outcomes: Sequence[Outcome]) -> str:
 
 def _print_score(found: Detecting, labels: Sequence[str], truth: str | None, *, several: bool) -> None:
     """Print the score of all recordings, by label, and that of each."""
+    from taxel.detect.scoring import score_rows  # noqa: PLC0415  a command loads what it needs
+
     say(f"against {truth} (window {found.window_ms:g} ms):", *repr(found.score).split("\n"))
     for label, sources in found.unlabelled.items():
         say(f"not scored, as no row of {truth} names it: {label} of {', '.join(sources)}")
@@ -137,16 +139,7 @@ def _print_score(found: Detecting, labels: Sequence[str], truth: str | None, *, 
         say(f"not scored, as the readout has {', '.join(labels)}: {', '.join(found.not_scored)}")
     if not several:
         return
-    rows: list[tuple[str, ...]] = [("recording", "label", "events", "found", "missed", "false")]
-    for outcome in found.outcomes:
-        scores = {} if outcome.score is None else outcome.score.by_label or {outcome.score.label: outcome.score}
-        rows += [
-            (Path(outcome.name).name, label, *map(str, (score.events, score.found, score.missed, score.false)))
-            for label, score in scores.items()
-        ]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        say("  ".join([*map(str.ljust, row[:2], widths), *map(str.rjust, row[2:], widths[2:])]))
+    say(*score_rows([(Path(outcome.name).name, outcome.score) for outcome in found.outcomes]))
 
 
 def _print(each: Detected, *, given: bool, named: bool, rows: int | None) -> None:

@@ -172,6 +172,10 @@ class PlainRule(_Detector):
         tare = self.tare
         return None if tare is None else tare.array
 
+    def _accepts(self, array: Array) -> bool:
+        """Whether it can detect in the frames of a sensor."""
+        return self.array is None or self.array.fits(array)
+
     def __repr__(self) -> str:
         first, second = self._parts["labels"]
         frames = "1 frame" if self.frames == 1 else f"{self.frames} frames"

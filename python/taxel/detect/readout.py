@@ -245,6 +245,11 @@ class Readout(_Detector):
         """The factor on every threshold after training."""
         return float(self._parts["run_threshold"])
 
+    def _accepts(self, array: Array) -> bool:
+        """Whether it can read out a sensor: its own, or if it was trained on several sizes a smaller one, padded."""
+        sensor = self.array
+        return sensor is None or sensor.fits(array) or (self._parts.get("pads", False) and sensor._holds(array))
+
     @property
     def delays_ms(self) -> NDArray[np.float64]:
         """The delays at each of which every train is an input, ms."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import add
@@ -322,3 +322,14 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
         )
     windows[:] = np.rint(to_us(widths))
     return windows
+
+
+def score_rows(named: Iterable[tuple[str, Score | None]]) -> list[str]:
+    """Return a table for people with a row for each recording and label: the names of recordings, and their scores."""
+    rows: list[tuple[str, ...]] = [("recording", "label", "events", "found", "missed", "false")]
+    for name, together in named:
+        scores = {} if together is None else together.by_label or {together.label: together}
+        for label, score in scores.items():
+            rows.append((name, label, *map(str, (score.events, score.found, score.missed, score.false))))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join([*map(str.ljust, row[:2], widths), *map(str.rjust, row[2:], widths[2:])]) for row in rows]

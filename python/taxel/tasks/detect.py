@@ -254,7 +254,7 @@ def _rest(readout: Readout | PlainRule, recording: Recording, tare: GivenTare | 
 
     None of one of another sensor too, which the readout refuses.
     """
-    if readout.array is not None and not readout.array.fits(recording.array):
+    if not readout._accepts(recording.array):
         return None
     source = recorded(recording, hold=False)
     known = tare is not None or (isinstance(source, Frames) and source.unit in FORCE_UNITS)

@@ -14,6 +14,7 @@ from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained
 from taxel.detect.causes import Cause
 from taxel.detect.levels import LEAST_LEVELS
 from taxel.detect.recipe import change_values, with_floor
+from taxel.detect.scoring import score_rows
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.spikes import to_ms
@@ -224,10 +225,10 @@ class Training:
             point = self.made.recipe.neurons[label]
             chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key not in ("search", "choose"))
             lines.append(f"{label}, chosen: {chosen}")
-        for recording, each in zip(self.recordings, self.scored.scores, strict=True):
-            lines += ["", f"{recording.title}:", *repr(each).split("\n")]
+        lines += ["", *repr(self.scored.together).split("\n")]
         if len(self.scored.scores) > 1:
-            lines += ["", "all recordings:", *repr(self.scored.together).split("\n")]
+            titles = [recording.title for recording in self.recordings]
+            lines += ["", *score_rows(zip(titles, self.scored.scores, strict=True))]
         return lines
 
     def beginning(self) -> str:
