@@ -182,7 +182,7 @@ class Panel:
         >>> with Live(0, host="127.0.0.1") as live, Panel(live) as panel:
         ...     panel.read_source("skin=given,array=2x2,rate=100")
         ...     panel.live.array
-        Array(2x2: 2 rows x 2 columns, 4 taxels, pitch unknown)
+        Array(2x2: 2 rows x 2 columns, 4 taxels, of unknown pitch)
         """
         with self._restarting:
             before = self._restartable("read_source")

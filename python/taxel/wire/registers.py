@@ -317,7 +317,7 @@ def described(registers: Registers) -> list[tuple[str, float, str, str, str]]:
 
     Examples
     --------
-    >>> described(Registers())[9][:4]
+    >>> described(Registers())[10][:4]
     ('step_read', 0.55, 'us', 'REG3[31:16]')
     """
     held, rows = instance("registers", registers, Registers), []
