@@ -117,7 +117,7 @@ def serve(board: Board, line: int, to: tuple[str, int], until: Any) -> None:
             datagrams, serial = board.run(commands)
             for datagram in datagrams:
                 link.sendto(datagram, to)
-            # A line that nobody reads fills up, as on a board: what finds no room is gone.
+            # A line that is not read fills up; as on a board, bytes without room are dropped.
             with contextlib.suppress(BlockingIOError):
                 os.write(line, serial)
             now = time.monotonic()

@@ -54,7 +54,7 @@ class Emulated:
                     if spoiled is not None:
                         link.sendto(spoiled, ("127.0.0.1", self.port))
                 frames += 1
-                # As a board does, not in each frame; a line that nobody reads fills up.
+                # A board sends its faults now and then; a line that is not read fills up.
                 if frames % 10 == 0:
                     with contextlib.suppress(BlockingIOError):
                         os.write(self.ours, self.board.faults().encode())
@@ -164,7 +164,7 @@ def test_a_board_without_the_pattern_fails(capsys):
 
 
 def test_where_nothing_arrives_the_address_that_is_missing_is_named(monkeypatch):
-    monkeypatch.setattr("taxel.board_check._PATIENCE_S", 0.2)
+    monkeypatch.setattr("taxel.board_check.check._PATIENCE_S", 0.2)
     check = check_board(port=free_port(), host="127.0.0.1", seconds=0.1)
     (datagrams, _) = check.findings
     assert not datagrams.good

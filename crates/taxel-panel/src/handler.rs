@@ -187,7 +187,7 @@ pub struct LabelTable {
     pub rows: Vec<LabelRow>,
     /// Where it lacks what was acknowledged.
     pub conflict: LabelConflict,
-    /// Of a table as it was written: the number of each request, by which it is taken back; `None` where it changed nothing.
+    /// The number of each request that was written, by which it can be undone; `None` where it changed nothing.
     pub changes: Vec<Option<u64>>,
 }
 

@@ -155,7 +155,7 @@ def train(
 
 
 def _trained(opened: Sequence[Recording], labels: str, options: TrainOptions, *, as_json: bool) -> Training:
-    """Train; where nearly no label lies near anything felt, ask first, if somebody can answer."""
+    """Train; where nearly no label lies near anything felt, ask first on a terminal."""
     try:
         with progress(as_json) as update:
             return taxel.train(opened, labels, options, progress=update)
@@ -166,7 +166,7 @@ def _trained(opened: Sequence[Recording], labels: str, options: TrainOptions, *,
 
 
 def _confirmed(error: ProblemError) -> bool:
-    """Ask on a terminal whether to train nonetheless; elsewhere nobody can answer."""
+    """Return whether a user on a terminal wants to train nonetheless; elsewhere false."""
     if not _on_terminal():
         return False
     say(f"taxel: {error.args[0]}", err=True)

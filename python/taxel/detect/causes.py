@@ -32,7 +32,7 @@ from taxel.recording.analysis.rest import of_frames
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
-#: The kinds of causes. Of two that concern as many mistakes the earlier counts first, as the later may follow from it.
+#: The kinds of causes. Where two concern equally many mistakes the earlier comes first: the later may follow from it.
 KINDS = (
     "falling_values", "shifted_labels", "few_labels", "unlabelled_source", "levels", "foreign_labels", "tare",
     "durations", "recipe", "unlabelled_time", "label_name", "plain_rule", "no_neighbours", "indistinct_kinds",
@@ -254,7 +254,7 @@ class Evidence:
     def _foreign(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield at how many labels no load begins or ends; all mistakes may be by them if that is most."""
         _, at_edge, total = self._near.get(label, (0, 0, 0))
-        # Of a tare that does not fit nothing is known.
+        # A tare that does not fit tells nothing.
         if at_edge == total or self._loaded >= TOUCH:
             return
         away = total - at_edge
@@ -327,7 +327,7 @@ class Mistakes:
     searched : bool
         Whether its parameters were chosen among those of the recipe.
     plain : PlainScore, optional
-        Of the plain rules, on the labels that `scored` is of.
+        The scores of the plain rules on the labels of `scored`.
     """
 
     trained: Trained

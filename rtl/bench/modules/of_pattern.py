@@ -26,7 +26,7 @@ async def values_are_those_of_the_page(dut):
             ramp = random.choice([1, 127, 128, 129, 150, within(1, 65534)])
         rolls = random.random() < 0.97
         if rolls and ball.n is not None and random.random() < 0.5:
-            # Nobody waits for so many frames.
+            # Waiting for so many frames would take too long.
             ball.n = within(0, 65535, *LIMITS)
             dut.n.value = ball.n
             await FallingEdge(dut.clk)

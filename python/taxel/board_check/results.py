@@ -1,0 +1,169 @@
+"""What a check of a board found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.wire import Counts, Registers
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Hold one thing that was looked at.
+
+    Parameters
+    ----------
+    name : str
+        As "address" or "values".
+    good : bool or None
+        Whether it is as it must be; None where it is only told.
+    text : str
+        A sentence.
+
+    Examples
+    --------
+    >>> print(Finding("version", True, "the datagrams are of version 2"))
+    ok    version: the datagrams are of version 2
+    """
+
+    name: str
+    good: bool | None
+    text: str
+
+    def __str__(self) -> str:
+        return f"{ {True: 'ok', False: 'FAULT', None: 'note'}[self.good]:5} {self.name}: {self.text}"
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Hold a value that is not the pattern's.
+
+    Parameters
+    ----------
+    t : int, us
+        The board's time.
+    x, y : int, 0 or more
+        Column and row of the taxel.
+    frame : int, 0 or more
+        The number of the pattern's frame.
+    expected, value : int, ticks
+    meaning : str
+        What it may mean.
+
+    Examples
+    --------
+    >>> Difference(192, 3, 4, 1, expected=60, value=61, meaning="one bit differs").expected
+    60
+    """
+
+    t: int
+    x: int
+    y: int
+    frame: int
+    expected: int
+    value: int
+    meaning: str
+
+
+@dataclass(frozen=True)
+class PatternCheck:
+    """Hold what arrived while a board made its pattern.
+
+    Parameters
+    ----------
+    registers : Registers
+        Those of the board, or, without its serial line, the preset that explains the values best.
+    version : int, 1 or more
+        The version of the wire.
+    datagrams, events, frames : int, 0 or more
+        How many arrived, and how many stamps have an event.
+    counts : Counts
+        What the decoder found missing or damaged.
+    taxels : int, 0 or more
+        How many taxels had an event.
+    wrong : int, 0 or more
+        Events whose value is not the pattern's.
+    behind : int, 0 or more
+        Taxels that, at the end of some frame, hold a value further from the pattern's than the noise floor.
+    first : Difference or None
+        The first of either.
+    speed : float
+        The board's time that passes in a second of the host's, s; of a simulated board far below 1.
+
+    Examples
+    --------
+    `check_board` makes it.
+    """
+
+    registers: Registers
+    version: int
+    datagrams: int
+    events: int
+    frames: int
+    counts: Counts
+    taxels: int
+    wrong: int
+    behind: int
+    first: Difference | None
+    speed: float
+
+
+@dataclass(frozen=True)
+class RestCheck:
+    """Hold what a board reads at rest, with a noise floor of 0.
+
+    Parameters
+    ----------
+    registers : Registers
+    faults : int, 0 or more
+        How often a comparator had not returned when its ramp began.
+    values : float, shape (rows, columns), ticks
+        The mean of each taxel; nan where it gave no value, which one that stays at 0 or 1 does.
+    noise : float, shape (rows, columns), ticks
+        The standard deviation of each taxel, nan likewise.
+    silent, full : bool, shape (rows, columns)
+        Taxels that gave no value; and those that stay at the ramp's end.
+
+    Examples
+    --------
+    `check_board` makes it.
+    """
+
+    registers: Registers
+    faults: int
+    values: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    silent: NDArray[np.bool_]
+    full: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class BoardCheck:
+    """Hold what a check of a board found.
+
+    Parameters
+    ----------
+    findings : tuple of Finding
+        In the order in which they were looked at.
+    pattern : PatternCheck or None
+        None where nothing arrived that could be compared.
+    rest : RestCheck or None
+        None where it was not looked at: without the serial line, or where no datagram arrived.
+
+    Examples
+    --------
+    >>> BoardCheck((Finding("datagrams", False, "none within 10 s"),), None, None).good
+    False
+    """
+
+    findings: tuple[Finding, ...]
+    pattern: PatternCheck | None
+    rest: RestCheck | None
+
+    @property
+    def good(self) -> bool:
+        """Whether nothing was found that must not be."""
+        return all(finding.good is not False for finding in self.findings)
