@@ -164,6 +164,23 @@ def test_titles_and_days_are_neither_names_nor_times(
     assert np.diff(recording.frames().t).tolist() == [20_000] * 29
 
 
+@pytest.mark.parametrize("code", ["utf-8", "cp1252", "utf-16"])
+@pytest.mark.parametrize("day", ["31.12.2023 23:59:{s},{ms:03d}", "31.12.2023T23:59:{s},{ms:03d}"])
+def test_a_german_table_with_days_and_units_is_read_by_what_is_printed_of_it(
+    tmp_path: Path, code: str, day: str
+) -> None:
+    rows = [f"{day.format(s=59, ms=10 * k)};{k},5;-{k},25\r\n" for k in range(30)]
+    head = "Prüfer: Müller\r\n\r\nZeit;Ferse [N];Mittelfuß [N]\r\n"
+    (tmp_path / "a.csv").write_bytes((head + "".join(rows)).encode(code))
+    (tmp_path / "a.layout.toml").write_text(layout_said_of(tmp_path / "a.csv"), encoding="utf-8")
+    recording = taxel.open(tmp_path / "a.csv")
+    frames = recording.frames()
+    assert (recording.array.names, frames.unit) == (("Ferse [N]", "Mittelfuß [N]"), "N")
+    assert frames.values[:, 0].tolist() == [[k + 0.5, -k - 0.25] for k in range(30)]
+    assert np.diff(frames.t).tolist() == [10_000] * 29
+    assert frames.t[0] == 1_704_067_199_000_000
+
+
 @pytest.mark.parametrize(
     ("text", "layout", "values"),
     [

@@ -49,7 +49,8 @@ class Table:
     time_column : str or int, optional
         The column of times, by its name or its number from 1; default: none.
     time_unit : {"s", "ms", "us", "ns", "iso"}
-        "iso": texts as of ISO 8601, dates with times, of UTC where they state no zone, or times of a day.
+        "iso": texts as of ISO 8601, dates with times, of UTC where they state no zone, or times of a day;
+        days with points (01.05.2024 10:15:02,010) too.
     missing : str, optional
         A cell without a value; default: every cell is a number.
     leave_out : list of str or int

@@ -14,6 +14,9 @@ _UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
 #: Cells that tables hold where a value is missing.
 MISSING = ("", "nan", "NaN", "NA", "-", "null")
 
+#: A day as German and other European tables write it: 01.05.2024, with or without leading zeros.
+_DAY_WITH_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?=[T ]|$)")
+
 #: Units of time as people write them.
 _UNITS_OF_TIME = {
     "s": ("s", "sec", "secs", "second", "seconds", "sek", "sekunden"),
@@ -90,16 +93,24 @@ def ends_in_separator(names: Sequence[str] | None, lines: Sequence[str], separat
 
 
 def seconds_of(cell: str) -> float:
-    """Return the seconds since 1970, or of the day, of a text of ISO 8601; NaN of any other text.
+    """Return the seconds since 1970, or of the day, of a text of ISO 8601 or a day with points; NaN of any other text.
+
+    Days with points are day, month and year (DIN 5008). Days with slashes are none: their order differs by country.
 
     Examples
     --------
     >>> seconds_of("1970-01-02T00:00:00.5"), seconds_of("1970-01-01 01:00:00+01:00"), seconds_of("00:01:00.25")
     (86400.5, 0.0, 60.25)
+    >>> seconds_of("02.01.1970 00:00:00,5"), seconds_of("01/02/1970 00:00")
+    (86400.5, nan)
     """
-    for read in (datetime.fromisoformat, lambda cell: datetime.fromisoformat(f"1970-01-01T{cell}")):
+    with_points = _DAY_WITH_POINTS.match(cell)
+    if with_points:
+        day, month, year = with_points.groups()
+        cell = f"{year}-{month:0>2}-{day:0>2} {cell[with_points.end() :].lstrip(' T')}".strip()
+    for text in (cell, f"1970-01-01T{cell}"):
         try:
-            at = read(cell)
+            at = datetime.fromisoformat(text)
         except ValueError:
             continue
         return (at if at.tzinfo else at.replace(tzinfo=UTC)).timestamp()

@@ -40,6 +40,8 @@ _COUNTS = re.compile(
 )
 #: Names of columns with a number each, as taxels of a grid have, and no words.
 _NUMBERED = re.compile(r"[^\W\d]{0,12}[ _\-\[(.]*\d+[\])]?", re.UNICODE)
+#: A unit of a force, a pressure or a voltage that ends a column's name: Heel [N], toe (kPa).
+_UNIT_IN_NAME = re.compile(r"[\[(](m?N|kgf?|g|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmHg|[mµu]?V)[\])]$")
 _NO_RATE = "# rate_hz = 100  # frames a second: the file does not say it, and without it frames are numbered"
 #: Names of the columns of events in the orders that programs write without names.
 _EVENTS = (("x", "y", "p", "t"), ("t", "x", "y", "p"))
@@ -178,6 +180,13 @@ class _TextTable:
                 return column
         return 0 if self._ascends and not self.counts and len(self.numeric) > 1 else None
 
+    def unit(self, column: int) -> str:
+        """Return the unit of a column, by the line of units or by its name (Heel [N]); "" if none is stated."""
+        if self.units:
+            return self.units[column].strip("[]()")
+        within = _UNIT_IN_NAME.search(self.names[column]) if self.names else None
+        return within[1] if within else ""
+
     def of_time(self, column: int, longer: float) -> list[str]:
         """Return the lines that say which column holds the times; the file is `longer` than what was read of it."""
         lines = [f"time_column = {self.called(column)}"]
@@ -305,7 +314,7 @@ def _of_table(found: _TextTable, longer: float) -> tuple[str, list[str]]:
     table += [f"leave_out = [{', '.join(map(found.called, left))}]"] * bool(left)
     missing = {row[k] for row in found.body for k in taxels if row[k] in MISSING}
     table += [f"missing = {_quote(cell)}" for cell in sorted(missing - {"nan"} or missing)[-1:]]
-    units = {found.units[k].strip("[]()") for k in taxels} if found.units else set()
+    units = {found.unit(k) for k in taxels}
     unit = [f"unit = {_quote(name)}" for name in units if name and len(units) == 1]
     rate = [_NO_RATE] if time is None else []
     holds = f"a table of {counted(len(found.numeric), 'column')}" + f", {lines} lines a frame" * (lines > 1)
