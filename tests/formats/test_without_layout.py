@@ -11,6 +11,7 @@ import pytest
 
 import taxel
 from taxel import FormatError
+from taxel.recording.text_options import TextOptions
 
 from .tables import VALUES, lines, table
 
@@ -268,3 +269,17 @@ def test_a_text_without_numbers_prints_no_layout(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("of a hand\n")
     with pytest.raises(FormatError, match=r"no recording; there are .* \(docs/files\.md\)$"):
         taxel.open(tmp_path / "a.txt")
+
+
+def test_a_folder_of_arrays_without_times_needs_their_rate_alone(tmp_path: Path) -> None:
+    for k in range(12):
+        np.save(tmp_path / f"trial{k}.npy", np.full((5 + k, 3, 2), k))
+    opened = TextOptions(rate_hz=40).open_trials(tmp_path)
+    assert [(each.path.name, each.frames().values[0, 0, 0]) for each in opened] == [
+        (f"trial{k}.npy", k) for k in range(12)
+    ]
+    assert [np.diff(each.frames().t).tolist() for each in opened] == [[25_000] * (4 + k) for k in range(12)]
+    # A table says more than its rate: its layout is asked for.
+    (tmp_path / "a.csv").write_text("a,b\n1,2\n3,4\n")
+    with pytest.raises(FormatError, match="a layout file beside it"):
+        TextOptions(rate_hz=40).open_trials(tmp_path)

@@ -17,7 +17,7 @@ from taxel.recording.contents import Contents
 from taxel.recording.layout import is_row_of, on_array
 from taxel.recording.opening import SharedOptions, join_feet, open_all, sensors
 from taxel.recording.readers.foreign import is_lone_array
-from taxel.recording.recognition import ForeignFile, recognise
+from taxel.recording.recognition import ForeignFile, files_in, is_folder, recognise
 from taxel.recording.recording import Recording
 
 #: How an option is typed of whose name a command may have another one.
@@ -81,12 +81,12 @@ class TextOptions(SharedOptions):
         return bool(self.topic) or (layout is not None and "topic" in Layout.read(Path(layout)).ros)
 
     def layout_of(self, path: Path) -> Any:
-        """Return the layout that is given, or an empty one for an array without one, whose rate `rate_hz` says."""
-        if self.layout is not None or self.rate_hz is None:
+        """Return the layout that is given, or an empty one for arrays without one, whose rate `rate_hz` says."""
+        if self.layout is not None or self.rate_hz is None or not path.exists():
             return self.layout
-        if not path.is_file() or recognise(path) != ForeignFile(has_layout=False):
-            return None
-        return Layout(path) if is_lone_array(path) else None
+        files = files_in(path) if is_folder(path) else [path]
+        undescribed = [file for file in files if file.is_file() and recognise(file) == ForeignFile(has_layout=False)]
+        return Layout(path) if undescribed and all(map(is_lone_array, undescribed)) else None
 
     def _on_array(self, recording: Recording) -> Recording:
         """Return a recording on the sensor of `array`; refuse one that holds a sensor that differs from it."""
