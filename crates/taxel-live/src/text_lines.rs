@@ -9,6 +9,8 @@ pub struct TextLines {
     searched: usize,
     /// Whether they continue a line of which the beginning was returned, as it is too long.
     cut: bool,
+    /// Whether the last line ended in a carriage return: a line feed behind it belongs to the same end.
+    returned: bool,
     /// The bytes that are in no line, since [`TextLines::take_left_out`].
     pub left_out: LeftOut,
 }
@@ -37,7 +39,7 @@ impl TextLines {
     /// Lines of at most `longest` bytes. A longer line is returned up to there, and its rest is left out.
     #[must_use]
     pub fn new(longest: usize) -> Self {
-        Self { longest, bytes: vec![], searched: 0, cut: false, left_out: LeftOut::default() }
+        Self { longest, bytes: vec![], searched: 0, cut: false, returned: false, left_out: LeftOut::default() }
     }
 
     /// Appends bytes that arrived.
@@ -47,21 +49,26 @@ impl TextLines {
 
     /// Makes a line the next one again.
     pub fn put_back(&mut self, line: &TextLine) {
-        self.bytes.splice(0..0, format!("{}\n", line.text).into_bytes());
-        self.searched = 0;
+        let end = if self.returned { '\r' } else { '\n' };
+        self.bytes.splice(0..0, format!("{}{end}", line.text).into_bytes());
+        (self.searched, self.returned) = (0, false);
     }
 
-    /// The next line, which a line feed or a carriage return ends; the last one may lack its end where no more can arrive
-    /// (`ended`).
+    /// The next line, which a line feed, a carriage return or both end, as an Arduino's `println` writes; the last one may lack
+    /// its end where no more can arrive (`ended`).
     pub fn next(&mut self, ended: bool) -> Option<TextLine> {
         loop {
+            if self.returned && !self.bytes.is_empty() {
+                self.remove(usize::from(self.bytes[0] == b'\n'));
+                self.returned = false;
+            }
             let end = self.bytes[self.searched..].iter().position(|byte| matches!(byte, b'\n' | b'\r'));
             let end = end.map(|place| self.searched + place);
             let length = end.unwrap_or(self.bytes.len());
             if self.cut {
                 self.left_out.in_no_line += length as u64;
                 self.cut = end.is_none();
-                self.remove(end.map_or(length, |end| end + 1));
+                self.remove_line(length, end);
                 if self.cut {
                     return None;
                 }
@@ -75,9 +82,15 @@ impl TextLines {
             let length = length.min(self.longest);
             let text = String::from_utf8_lossy(&self.bytes[..length]).into_owned();
             self.cut = long;
-            self.remove(if long { length } else { end.map_or(length, |end| end + 1) });
+            self.remove_line(length, end.filter(|_| !long));
             return Some(TextLine { text, bytes: length as u64, cut: long });
         }
+    }
+
+    /// Removes a line of so many bytes, with its end where that is there.
+    fn remove_line(&mut self, length: usize, end: Option<usize>) {
+        self.returned = end.is_some_and(|end| self.bytes[end] == b'\r');
+        self.remove(end.map_or(length, |end| end + 1));
     }
 
     fn remove(&mut self, bytes: usize) {
@@ -115,7 +128,15 @@ mod tests {
     /// The lines of bytes by their definition, each with whether it is only a beginning, and what is left out.
     fn split(bytes: &[u8], longest: usize) -> (Vec<TextLine>, LeftOut) {
         let (mut lines, mut left_out) = (vec![], LeftOut::default());
-        let mut parts: Vec<&[u8]> = bytes.split(|byte| matches!(byte, b'\n' | b'\r')).collect();
+        let is_second = |k: usize| k > 0 && bytes[k - 1..=k] == *b"\r\n";
+        let ends = (0..bytes.len()).filter(|&k| matches!(bytes[k], b'\n' | b'\r') && !is_second(k));
+        let mut parts: Vec<&[u8]> = vec![];
+        let mut begin = 0;
+        for end in ends {
+            parts.push(&bytes[begin..end]);
+            begin = end + 1 + usize::from(bytes[end..].starts_with(b"\r\n"));
+        }
+        parts.push(&bytes[begin..]);
         let last = parts.pop().unwrap_or_default();
         if last.len() > longest {
             parts.push(last);
@@ -166,6 +187,18 @@ mod tests {
             assert_eq!(reader.take_left_out(), left_out, "seed {seed}");
             assert_eq!(reader.take_left_out(), LeftOut::default());
         }
+    }
+
+    #[test]
+    fn both_characters_end_one_line_also_where_they_arrive_apart_and_a_line_is_put_back_between() {
+        let mut lines = TextLines::new(8);
+        lines.push(b"1,2\r");
+        let first = lines.next(false).unwrap();
+        lines.push(b"\n\r\n3,4\r\n");
+        lines.put_back(&first);
+        let texts: Vec<String> = std::iter::from_fn(|| lines.next(false)).map(|line| line.text).collect();
+        assert_eq!(texts, ["1,2", "", "3,4"]);
+        assert_eq!((lines.waiting(), lines.take_left_out()), (0, LeftOut::default()));
     }
 
     #[test]
