@@ -16,7 +16,7 @@ import pytest
 from loopback import free_port, until
 
 import taxel
-from taxel.live import Live
+from taxel.live import Live, Panel
 
 from .boards import LOOPBACK, SMALL, command, play, presses, touch, wait_for
 
@@ -222,9 +222,19 @@ def test_a_destination_that_is_none_is_refused(to: object, kind: type[Exception]
     assert said in str(refused.value)
 
 
-def test_without_a_readout_nothing_is_sent() -> None:
-    with pytest.raises(taxel.ProblemError, match=r"send to lines\+udp:127\.0\.0\.1:9 without a readout"):
-        Live(0, host=LOOPBACK, send="lines+udp:127.0.0.1:9")
+def test_a_readout_that_the_page_chooses_sends_too(tmp_path: Path) -> None:
+    touch().save(tmp_path / "touch.json")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind((LOOPBACK, 0))
+        other.settimeout(30)
+        send_to = f"lines+udp:{LOOPBACK}:{other.getsockname()[1]}"
+        with Live(0, host=LOOPBACK, array=SMALL, send=send_to, guard_frames=1e6) as live, Panel(live) as panel:
+            play(presses(3), live.address[1])
+            assert live.counters["detections"] == 0
+            panel.read_out(tmp_path / "touch.json")
+            assert panel.live is not None
+            play(presses(3), panel.live.address[1])
+            assert set(json.loads(other.recv(65_536))) == KEYS
 
 
 def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:
@@ -256,7 +266,7 @@ def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:
     assert f"taxel: lines not sent to lines:{pipe}: 3 of 3: no reader" in told
     assert process.returncode == 3
     said = subprocess.run(
-        command("live", "--panel", "--send", "lines+udp:127.0.0.1:9"), capture_output=True, text=True, check=False
+        command("live", "--send", "lines+udp:127.0.0.1:9"), capture_output=True, text=True, check=False
     )
-    assert said.stderr == "taxel: --tare, --report and --send belong to a readout: give --readout FILE\n"
+    assert said.stderr == "taxel: nothing to do: give --readout FILE to detect, or --panel to show the board\n"
     assert said.returncode == 2

@@ -204,9 +204,6 @@ impl Live {
             wire::v2::checked_stride(&options.array)?;
             options.registers.check(&options.array)?;
         }
-        if let (ReadoutSetup::None, Some(to)) = (&readout, options.send.first()) {
-            return Err(problem!("send to {to} without a readout: nothing would be detected").into());
-        }
         match &readout {
             ReadoutSetup::Taring(stretch_us, _) if *stretch_us <= 0 => {
                 return Err(problem!("tare"; " of {stretch_us} us: must be above 0").into());

@@ -59,10 +59,11 @@ export class Detections {
     if (this.listed === this.shown.length && this.listed < MOST_STORED) return;
     this.listed = this.shown.length;
     const rows = this.shown.slice(0, LISTED).map(({ label, t_us, latency_us }) => {
-      const late = latency_us === null ? "" : short(latency_us);
+      // A line holds a frame that is over; a recording takes it as known at the time of the next one.
+      const late = latency_us === null ? "" : latency_us < 0 ? "at once" : short(latency_us);
       const button = make(
         "button",
-        { type: "button", class: "link row", "aria-label": `${label} at ${seconds(t_us)}${late && `, reported ${late} later`}` },
+        { type: "button", class: "link row", "aria-label": `${label} at ${seconds(t_us)}${late && `, reported ${late === "at once" ? late : `${late} later`}`}` },
         make("span", { class: this.shape(label) }),
         make("span", { class: "what" }, label),
         make("span", { class: "when" }, seconds(t_us)),

@@ -218,8 +218,8 @@ def _check_options(options: dict[str, Any], typed: _LiveArguments) -> None:
     readout, tare, send = (options[name] for name in ("readout", "tare", "send"))
     if readout is None and not typed.panel:
         raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to show the board")
-    if readout is None and (tare or typed.report or send):
-        raise ProblemError("--tare, --report and --send belong to a readout: give --readout FILE")
+    if readout is None and (tare or typed.report):
+        raise ProblemError("--tare and --report belong to a readout: give --readout FILE")
     if typed.folder is not None and not typed.panel:
         raise ProblemError("--folder belongs to the panel: give --panel")
 
@@ -316,7 +316,9 @@ def _drain(pipeline: Live, console: Console, echo: Callable[[str], None], wait_s
         wait_s = 0.0
         if not console.quiet:
             delay = to_ms(detection.latency or 0)
-            echo(f"{detection.t / 1e6:10.4f} s  {detection.label:<16} output {delay:.2f} ms after it was known")
+            # A line holds a frame that is over; a recording takes it as known at the time of the next one.
+            when = f"{delay:.2f} ms after it was known" if delay >= 0 else f"{-delay:.2f} ms before the next frame"
+            echo(f"{detection.t / 1e6:10.4f} s  {detection.label:<16} output {when}")
 
 
 def _silence(now: dict[str, Any], place: str) -> str:

@@ -179,6 +179,8 @@ impl InputState {
     /// Processes a line of text.
     fn line(&mut self, line: &TextLine, arrived_ns: i64) {
         if let Some((t, values)) = self.frames.push(line, arrived_ns) {
+            // A line that failed is there again.
+            self.trouble = None;
             write_message(t, values, &mut self.message);
             self.feed.push(arrived_ns, &self.message);
         }

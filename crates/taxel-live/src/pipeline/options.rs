@@ -126,7 +126,7 @@ options! {
         ///
         /// UDP sends a datagram each, TCP connects; the named pipe must exist; ``,baud=`` may follow a serial port; "lsl:NAME" sends the label in a stream of markers of the lab
         /// streaming layer. Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and
-        /// counted.
+        /// counted. Without a readout nothing is sent until one is chosen on the page.
         send: Vec<String> = vec![], "metavar" = "WHERE", "python" = "str | Sequence[str]", "typed" = "May be repeated.";
         /// How much may wait in the kernel, bytes.
         kernel_buffer_bytes: usize = ReceiverOptions::default().kernel_buffer_bytes, "commands" = "",

@@ -174,11 +174,13 @@ impl NumberStream {
 
     /// Reads lines until the end.
     fn read_lines(&self, reader: &mut LineReader) -> Result<()> {
+        let mut failed = false;
         while !self.ends.load(Ordering::Acquire) {
             let ended = match reader.fill() {
                 Ok(ended) => ended,
                 Err(error) => {
                     *lock(&self.trouble) = Some(reader.broken(error).to_string());
+                    failed = true;
                     reader.reopen();
                     continue;
                 }
@@ -188,6 +190,9 @@ impl NumberStream {
                     self.count_left_out(LeftOut { unfinished: line.bytes, ..LeftOut::default() })?;
                 } else {
                     self.line(at_ns, &line)?;
+                }
+                if std::mem::take(&mut failed) {
+                    *lock(&self.trouble) = None;
                 }
             }
             if ended {
