@@ -37,12 +37,18 @@ class AddressForm {
     };
     part(`${name}-form`, HTMLFormElement).onsubmit = (event) => {
       event.preventDefault();
-      const address = this.input.value.trim();
+      const { address } = this;
       connect(address).then(() => {
         this.refuse(null);
         this.remember(address);
       }, (error) => this.refuse(error.message));
     };
+  }
+
+  /** @returns {string} what is typed; the bare name of a serial port is a source of lines by its kind */
+  get address() {
+    const typed = this.input.value.trim();
+    return this.setting === "sources" && /^(\/dev\/|COM\d)/i.test(typed) ? `serial:${typed}` : typed;
   }
 
   /** @param {string | null} reason */
@@ -108,7 +114,7 @@ export class Connection {
     this.source = new AddressForm("numbers", "sources", settings, (source) => server.request({ type: "read_source", source }));
     part("numbers-look", HTMLButtonElement).onclick = () => {
       write(part("numbers-about", HTMLElement), "Reading for two seconds …");
-      server.request({ type: "preview_source", source: this.source.input.value.trim() }).then(() => this.source.refuse(null), (error) => {
+      server.request({ type: "preview_source", source: this.source.address }).then(() => this.source.refuse(null), (error) => {
         write(part("numbers-about", HTMLElement), "");
         this.source.refuse(error.message);
       });
@@ -123,7 +129,7 @@ export class Connection {
     const name = part("layout-name", HTMLInputElement);
     part("layout-save", HTMLButtonElement).onclick = () => {
       if (!name.value.trim()) return name.focus();
-      server.request({ type: "save_layout", source: this.source.input.value.trim(), name: name.value.trim() }).then(() => this.source.refuse(null), (error) => this.source.refuse(error.message));
+      server.request({ type: "save_layout", source: this.source.address, name: name.value.trim() }).then(() => this.source.refuse(null), (error) => this.source.refuse(error.message));
     };
     const drop = part("control-drop", HTMLButtonElement);
     drop.onclick = () => server.request({ type: "control", place: null }).then(() => this.line.refuse(null), failed);
@@ -140,7 +146,7 @@ export class Connection {
 
   /** Ticks "Turn values" as the source says, and shows the command that reads the same. */
   showSource() {
-    const source = this.source.input.value.trim();
+    const source = this.source.address;
     entitle(this.source.input, "title", source);
     part("numbers-falls", HTMLInputElement).checked = /,falls=(?!false)/.test(source);
     const command = part("numbers-command", HTMLElement);
