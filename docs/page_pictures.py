@@ -30,6 +30,7 @@ from tests.test_start import LISTENING, blocks
 #: What each page shows: the arguments of taxel view, and the readout that is chosen.
 SHOWN = {
     "start-board": (["ball.mcap"], "touch.json"),
+    "start-camera": (["skin.raw", "--polarity", "on"], "contact.json"),
     "start-insole": (["walk.npz"], "gait.json"),
     "start-nothing": (["disc.npz"], ""),
     "start-plate": (["plate.npz"], "plate.json"),

@@ -77,6 +77,15 @@ pub struct Mistake {
     pub trial: String,
 }
 
+/// What a training returns.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TrainingReply {
+    /// Its result.
+    Trained(TrainingResult),
+    /// It has not begun: nearly no label lies near anything felt, and a person must confirm that these are the labels.
+    Question(String),
+}
+
 /// What a training has made.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TrainingResult {
@@ -351,8 +360,8 @@ pub trait LabelRequests: Send + Sync {
 /// Requests about readouts: training one on a recording, and running it on another.
 #[allow(clippy::missing_errors_doc)]
 pub trait TrainingRequests: Send + Sync {
-    /// Trains a readout on the labels of a recording, and writes it to `out`.
-    fn train(&self, recording: &Path, out: &Path) -> Reply<TrainingResult>;
+    /// Trains a readout on the labels of a recording, and writes it to `out`. With `labels_as_given` it asks no question.
+    fn train(&self, recording: &Path, out: &Path, labels_as_given: bool) -> Reply<TrainingReply>;
 
     /// Returns what does the same in a shell.
     fn command(&self, recording: &Path, out: &Path) -> Reply<String>;

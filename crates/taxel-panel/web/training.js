@@ -2,6 +2,7 @@
 
 import { make, part, write } from "./dom.js";
 import { failed, notify } from "./notice.js";
+import { RefusedError } from "./server.js";
 
 /** @typedef {import("./messages.js").Recordings} Recordings */
 /** @typedef {import("./messages.js").Trained} Trained */
@@ -23,23 +24,28 @@ export class Training {
     this.source = null;
     this.button = part("train", HTMLButtonElement);
     this.button.onclick = () => (this.since === null ? this.begin() : this.end());
+    /** Trains although nearly no label lies near anything felt. */
+    this.nonetheless = part("train-nonetheless", HTMLButtonElement);
+    this.nonetheless.onclick = () => this.begin(true);
     /** The readout that reads what is shown; "" without one. */
     this.reads = "";
     this.readout = part("readout", HTMLSelectElement);
     this.readout.onchange = () => this.read(this.readout.value);
   }
 
-  async begin() {
+  /** @param {boolean} [labelsAsGiven] whether a question about the labels was answered */
+  async begin(labelsAsGiven = false) {
     this.since = performance.now();
     this.text("");
     this.mistakes.clear();
     const asking = setInterval(() => this.server.send({ type: "training" }), ASKED_MS);
     this.write();
     try {
-      await this.server.request({ type: "train" });
+      await this.server.request({ type: "train", labels_as_given: labelsAsGiven });
     } catch (error) {
       this.text(error instanceof Error ? error.message : String(error));
       part("train-text", HTMLElement).classList.add("bad");
+      this.nonetheless.hidden = !(error instanceof RefusedError && error.field === "labels_as_given");
     }
     clearInterval(asking);
     this.since = null;
@@ -55,6 +61,7 @@ export class Training {
     const output = part("train-text", HTMLElement);
     output.hidden = !text;
     output.classList.remove("bad");
+    this.nonetheless.hidden = true;
     write(output, ...text.split("\n"));
     part("train-next", HTMLElement).hidden = !next;
     write(part("train-detect", HTMLElement), next);

@@ -109,8 +109,9 @@ pub(crate) enum Request {
     Health {},
     /// Train a readout on the labels of the recording shown, of a file with several trials on those that have labels, as `taxel
     /// train --labels notes` does, into `NAME.readout.json` beside it, which it replaces. Answered when the training has ended;
-    /// `trained` comes before. One training runs at a time.
-    Train {},
+    /// `trained` comes before. One training runs at a time. Labels of which nearly none lies near anything felt are refused, with
+    /// the field `labels_as_given`, unless it is true.
+    Train { labels_as_given: Option<bool> },
     /// Requests `training`: how far the training that runs is.
     Training {},
     /// End the training that runs: it is refused, and writes nothing.

@@ -16,7 +16,7 @@ use taxel_panel::{
     Activity, BagTopic, BoardLines, BoardRequests, Cut, Description, Detected, EditOutcome, FileRequests, FrameArea,
     FrameFile, FrameIndex, FrameRest, FrameSource, FramesRead, LabelConflict, LabelEdit, LabelRequests, LabelRow,
     LabelScore, LabelTable, Mistake, Opening, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
-    RestSource, TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
+    RestSource, TrainingReply, TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 
 use crate::held::from_touches;
@@ -198,9 +198,13 @@ impl LabelRequests for PythonHandler {
 }
 
 impl TrainingRequests for PythonHandler {
-    fn train(&self, recording: &Path, out: &Path) -> Reply<TrainingResult> {
-        let trained: Trained = self.call(|handler| handler.call_method1("train", (recording, out))?.extract())?;
-        let Trained { text, judged_on, scores, mistakes, next, options } = trained;
+    fn train(&self, recording: &Path, out: &Path, labels_as_given: bool) -> Reply<TrainingReply> {
+        let arguments = (recording, out, labels_as_given);
+        let reply: Training = self.call(|handler| handler.call_method1("train", arguments)?.extract())?;
+        let Trained { text, judged_on, scores, mistakes, next, options } = match reply {
+            Training::Trained(trained) => trained,
+            Training::Question(text) => return Ok(TrainingReply::Question(text)),
+        };
         let scores = scores.into_iter().map(|(label, is_plain_rule, found, missed, wrong, delay_ms)| LabelScore {
             label,
             is_plain_rule,
@@ -217,7 +221,7 @@ impl TrainingRequests for PythonHandler {
             trial,
         });
         let (scores, mistakes) = (scores.collect(), mistakes.collect());
-        Ok(TrainingResult { text, judged_on, scores, mistakes, next, options })
+        Ok(TrainingReply::Trained(TrainingResult { text, judged_on, scores, mistakes, next, options }))
     }
 
     fn command(&self, recording: &Path, out: &Path) -> Reply<String> {
@@ -337,6 +341,13 @@ struct Trained {
     mistakes: Vec<(String, i64, bool, String, String)>,
     next: String,
     options: Vec<String>,
+}
+
+/// What a training returns: its result, or what must be confirmed first.
+#[derive(FromPyObject)]
+enum Training {
+    Question(String),
+    Trained(Trained),
 }
 
 fn all<T, U: From<T>>(rows: Vec<T>) -> Vec<U> {

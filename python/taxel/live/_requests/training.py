@@ -93,9 +93,13 @@ class TrainingRequests:
             self._closed = True
         self.end()
 
-    def train(self, recording: Path, out: Path) -> TrainedReadout:
-        """Train on the labels of a recording."""
-        request = {"recordings": [str(recording)], "open": self._opening.options_of(recording).given()}
+    def train(self, recording: Path, out: Path, labels_as_given: bool) -> TrainedReadout | str:
+        """Train on the labels of a recording; return a question instead where someone must confirm the labels first."""
+        request = {
+            "recordings": [str(recording)],
+            "open": self._opening.options_of(recording).given(),
+            "options": {"labels_as_given": labels_as_given},
+        }
         with self._lock:
             if self._closed:
                 raise ProblemError(_STOPPED)
@@ -110,6 +114,8 @@ class TrainingRequests:
         finally:
             self._training = None
         if answer["type"] == "error":
+            if answer["question"] is not None:
+                return str(answer["question"])
             raise ProblemError(answer["text"])
         if answer["type"] != "result":
             stopped = code < 0 or code == _INTERRUPTED
