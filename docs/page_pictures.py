@@ -24,8 +24,7 @@ sys.path[:0] = [str(DOCS.parent), str(DOCS.parent / "tests")]  # the tests walk 
 
 from tests.panel.browser import CHROMIUM, FLAGS, running
 from tests.panel.pages import clock, shows, until
-from tests.test_readme import Shell
-from tests.test_start import LISTENING, blocks
+from tests.test_start import Shell, blocks, waits_for_another
 
 #: What each page shows: the arguments of taxel view, and the readout that is chosen.
 SHOWN = {
@@ -33,6 +32,7 @@ SHOWN = {
     "start-camera": (["skin.raw", "--polarity", "on"], "contact.json"),
     "start-insole": (["walk.npz"], "gait.json"),
     "start-nothing": (["disc.npz"], ""),
+    "start-numbers": (["mat.mcap"], "press.json"),
     "start-plate": (["plate.npz"], "plate.json"),
     "start-robot": (["grasps", "--topic", "/finger", "--field", "data", "--array", "8x8"], "grasp.json"),
 }
@@ -71,7 +71,7 @@ def walk(name: str) -> None:
         if language == "python":
             exec(compile(text, name, "exec"), {"__name__": name})
         elif not language:
-            shell.beside(*lines) if lines[0].startswith(LISTENING) else [shell.run(line) for line in lines]
+            shell.beside(*lines) if waits_for_another(lines[0]) else [shell.run(line) for line in lines]
 
 
 def draw_recording(browser: Any, name: str, picture: str) -> None:

@@ -43,7 +43,8 @@ class Shell:
         # Ctrl-C ends what listens: a busy machine may need longer than a page says.
         line = line.replace("--port 5208", f"--port {self.port}").replace("--seconds 20", "--seconds 600")
         words = shlex.split(line, comments=True)[1:]
-        here = ["--host", LOOPBACK] if words[0] in ("record", "live") else []
+        receives = words[0] in ("record", "live") and "--source" not in words
+        here = ["--host", LOOPBACK] if receives else []
         return [sys.executable, "-m", "taxel", *words, *here]
 
     def run(self, line: str) -> str:
@@ -76,6 +77,11 @@ def blocks(page: Path) -> list[tuple[str, str]]:
     return [(language, text) for language, text in found if language in ("", "python", "text")]
 
 
+def waits_for_another(line: str) -> bool:
+    """Return whether a command waits for a board, which the next line emulates."""
+    return line.startswith(LISTENING) and "--source" not in line
+
+
 def command(line: str) -> str:
     """Return a line without its comment, and without the option that writes a report beside all else."""
     return re.sub(r"\s+#.*| --report \S+", "", line).strip()
@@ -103,7 +109,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
                     whole, cut, _ = " ".join(line.split()).partition(" ...")
                     found = whole in said or (cut and any(one.startswith(whole) for one in said))
                     assert found, f"{page.name}: {line!r} is not in\n{printed}"
-            elif lines[0].startswith(LISTENING):
+            elif waits_for_another(lines[0]):
                 printed = by_line[command(lines[0])] = shell.beside(*lines)
                 by_line[command(lines[1])] = ""
             else:

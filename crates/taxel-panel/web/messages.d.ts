@@ -890,10 +890,11 @@ export interface HealthRequest {
   id?: number;
 }
 
-/** Train a readout on the labels of the recording shown, of a file with several trials on those that have labels, as `taxel train --labels notes` does, into `NAME.readout.json` beside it, which it replaces. Answered when the training has ended; `trained` comes before. One training runs at a time. */
+/** Train a readout on the labels of the recording shown, of a file with several trials on those that have labels, as `taxel train --labels notes` does, into `NAME.readout.json` beside it, which it replaces. Answered when the training has ended; `trained` comes before. One training runs at a time. Labels of which nearly none lies near anything felt are refused, with the field `labels_as_given`, unless it is true. */
 export interface TrainRequest {
   type: "train";
   id?: number;
+  labels_as_given?: boolean | null;
 }
 
 /** Requests `training`: how far the training that runs is. */

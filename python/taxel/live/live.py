@@ -104,7 +104,8 @@ class Live:
         Send each detection as a line of JSON to serial:PLACE, lines:PATH (a named pipe), lines+tcp:HOST:PORT or
         lines+udp:HOST:PORT. UDP sends a datagram each, TCP connects; the named pipe must exist; ``,baud=`` may follow a
         serial port; "lsl:NAME" sends the label in a stream of markers of the lab streaming layer. Up to 1024 lines wait
-        for a slow reader; lines without room, or without a reader, are lost and counted.
+        for a slow reader; lines without room, or without a reader, are lost and counted. Without a readout nothing is
+        sent until one is chosen on the page.
     kernel_buffer_bytes : int, 0 to 2147483647
         How much may wait in the kernel, bytes.
     queue_bytes : int, 0 to 2147483647
