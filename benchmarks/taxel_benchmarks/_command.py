@@ -218,7 +218,7 @@ class _Others:
     @staticmethod
     def _used() -> float:
         """Return the CPU time of this computer less that of this process and its ended children, s."""
-        times = psutil.cpu_times()._asdict()
+        times: dict[str, float] = psutil.cpu_times()._asdict()
         # A guest's time is in that of its user.
         busy = sum(times[name] for name in times.keys() - {"idle", "iowait", "guest", "guest_nice"})
         return busy - sum(os.times()[:4])

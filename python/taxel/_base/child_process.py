@@ -44,6 +44,9 @@ GRACE_S = 3.0
 _EXIT_TIMEOUT_S = GRACE_S + 1.0
 
 
+_running: weakref.WeakSet[ChildProcess] = weakref.WeakSet()
+
+
 class ChildProcess(subprocess.Popen[Any]):
     """A Python process that ends within `GRACE_S` when this one ends or calls `end`.
 
@@ -167,8 +170,6 @@ def search_path() -> list[str]:
 
 if sys.platform != "win32":
     import fcntl
-
-    _running: weakref.WeakSet[ChildProcess] = weakref.WeakSet()
 
     def _let_go_of_all() -> None:
         """Close the pipes in a fork of this process, which would keep the children running after their parent."""

@@ -159,13 +159,13 @@ def available(root: Path = Path("/")) -> int:
     return max(0, min([psutil.virtual_memory().available, *_of_process(), *_of_groups(root)]))
 
 
-def _of_process() -> Iterator[int]:
-    """Yield what the limit of this process's addresses leaves, where there is one."""
-    if sys.platform == "linux":
-        process = psutil.Process()
-        most, _ = process.rlimit(psutil.RLIMIT_AS)
-        if most != psutil.RLIM_INFINITY:
-            yield most - process.memory_info().vms
+def _of_process() -> list[int]:
+    """Return what the limit of this process's addresses leaves, where there is one."""
+    if sys.platform != "linux":
+        return []
+    process = psutil.Process()
+    most, _ = process.rlimit(psutil.RLIMIT_AS)
+    return [] if most == psutil.RLIM_INFINITY else [most - process.memory_info().vms]
 
 
 #: By version of control groups: the folder, and the names of the limit, the usage, and the part of the usage that is

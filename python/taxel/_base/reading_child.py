@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
@@ -69,8 +70,9 @@ class ReadingChild:
         except BaseException:
             self._file.close()
             raise
-        assert self._child.stdin is not None and self._child.stdout is not None  # noqa: PT018  pipes
-        self._stdin, self._stdout = self._child.stdin, self._child.stdout
+        requests, answers = self._child.stdin, self._child.stdout
+        assert isinstance(requests, io.BufferedWriter) and isinstance(answers, io.BufferedReader)  # noqa: PT018  pipes
+        self._stdin, self._stdout = requests, answers
         self._watching = threading.Thread(target=self._watch, name="taxel-patience", daemon=True)
         self._watching.start()
         try:
@@ -116,7 +118,7 @@ class ReadingChild:
         """Return the bytes that follow a line."""
         data = np.empty(size, np.uint8)
         self._wait = [self._patience_s]
-        read = self._stdout.readinto(data)
+        read = self._stdout.readinto(data.data)
         self._wait = None
         if read < size:
             raise self._end(self._patience_s)

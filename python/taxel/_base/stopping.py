@@ -72,14 +72,15 @@ if sys.platform == "win32":
     #: Longer than the 5 s that Windows gives to a program whose console closes, s.
     _FOREVER_S = 60.0
 
-    @ctypes.WINFUNCTYPE(ctypes.c_int, ctypes.c_uint)
-    def _on_console_event(event: int) -> int:
+    def _stop_on_close(event: int) -> int:
         """Stop the main thread where the console closes: Windows ends the process as soon as this returns."""
         if event not in _CLOSES:
             return False
         _thread.interrupt_main(signal.SIGBREAK)
         time.sleep(_FOREVER_S)
         return True
+
+    _on_console_event = ctypes.WINFUNCTYPE(ctypes.c_int, ctypes.c_uint)(_stop_on_close)
 
 
 @contextlib.contextmanager
