@@ -140,7 +140,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "tare.json": tare,
     "rule.json": as_json(PlainRule.load),
     "recipe.json": recipe,
-    "encoder.json": lambda path: json.loads(Encoder.from_json(path.read_text()).to_json()),
+    "encoder.json": lambda path: json.loads(Encoder.from_json(path.read_text("utf-8")).to_json()),
     "fit.calibration.json": calibration,
     "law.calibration.json": calibration,
     **dict.fromkeys(("readout.json", "touch.json", "trained.json"), readout),
@@ -153,7 +153,7 @@ def contents(path: Path) -> Any:
 
 
 PINNED: dict[str, Any] = (
-    json.loads((BEFORE / "contents.json").read_text()) if (BEFORE / "contents.json").exists() else {}
+    json.loads((BEFORE / "contents.json").read_text("utf-8")) if (BEFORE / "contents.json").exists() else {}
 )
 
 
@@ -163,7 +163,7 @@ def test_a_file_opens_with_the_contents_that_it_had(name: str) -> None:
 
 
 def test_every_file_is_pinned() -> None:
-    beside = {"make.py", "README.md", "contents.json", "events.lss"}
+    beside = {"make.py", "region.py", "README.md", "contents.json", "events.lss"}
     assert {file.name for file in BEFORE.iterdir() if file.is_file()} - beside == set(PINNED)
 
 

@@ -16,6 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, BinaryIO
 
+import psutil
 import typer
 
 import taxel_benchmarks
@@ -205,27 +206,21 @@ def _row(goal: Any, result: Mapping[str, Any]) -> list[str]:
 
 
 class _Others:
-    """How many cores other programs use, from here on; on Linux, else None."""
+    """How many cores other programs use, from here on."""
 
     def __init__(self) -> None:
         self._begun, self._before = time.monotonic(), self._used()
 
-    def cores(self) -> float | None:
+    def cores(self) -> float:
         """Return the mean number since the beginning."""
-        used = self._used()
-        if used is None or self._before is None:
-            return None
-        return max(0.0, (used - self._before) / (time.monotonic() - self._begun))
+        return max(0.0, (self._used() - self._before) / (time.monotonic() - self._begun))
 
     @staticmethod
-    def _used() -> float | None:
+    def _used() -> float:
         """Return the CPU time of this computer less that of this process and its ended children, s."""
-        try:
-            line = Path("/proc/stat").read_text(encoding="ascii").splitlines()[0]
-        except OSError:
-            return None
-        # user, nice, system, -, -, interrupts, soft interrupts, stolen by another virtual machine: proc(5)
-        busy = sum(int(line.split()[1 + k]) for k in (0, 1, 2, 5, 6, 7)) / os.sysconf("SC_CLK_TCK")
+        times: dict[str, float] = psutil.cpu_times()._asdict()
+        # A guest's time is in that of its user.
+        busy = sum(times[name] for name in times.keys() - {"idle", "iowait", "guest", "guest_nice"})
         return busy - sum(os.times()[:4])
 
 

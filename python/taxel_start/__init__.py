@@ -35,7 +35,8 @@ _WRONG_INPUT = 2
 
 def main() -> NoReturn:
     """Load the command line, then run it."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # those of all systems
+    for number in [getattr(signal, name) for name in names if hasattr(signal, name)]:
         # What was ignored when the program began, as by nohup, stays ignored.
         if signal.getsignal(number) is not signal.SIG_IGN:
             # Nothing is open yet that would have to be closed.

@@ -22,6 +22,7 @@ from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
+import psutil
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from taxel import DeviceError, ProblemError
@@ -135,7 +136,7 @@ class Results:
         """Append one result to the file at once."""
         seconds = round(seconds, 3)
         row = {"params": task.params, "seed": task.seed, "code": self.code, "seconds": seconds}
-        with self.path.open("a", encoding="utf-8") as file:
+        with self.path.open("a", encoding="utf-8", newline="\n") as file:
             file.write(json.dumps(row | {"result": result}) + "\n")
         self._results[task.key(self.code)], self._seconds[task.key(self.code)] = result, seconds
 
@@ -239,7 +240,7 @@ def _end_with_parent(parent: int) -> None:
     def watch() -> None:
         while os.getppid() == parent:
             time.sleep(_ASK_EVERY_S)
-        os.kill(os.getpid(), signal.SIGKILL)
+        psutil.Process().kill()
 
     threading.Thread(target=watch, name="taxel-parent", daemon=True).start()
 

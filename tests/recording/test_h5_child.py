@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
@@ -52,29 +51,6 @@ def test_a_library_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.Monke
     with pytest.raises(FormatError, match=r"a\.h5: not a whole HDF5 file \(the library has read nothing for 0\.5 s\)"):
         taxel.open(path)
     assert gone(int((tmp_path / "child.pid").read_text()))
-
-
-@pytest.mark.parametrize(("entries", "code"), [("max(iter(int, 1))", -signal.SIGALRM), ("()", 0)])
-def test_a_child_whose_parent_is_gone_ends_by_itself(tmp_path: Path, entries: str, code: int) -> None:
-    """Its parent would end it in time; to wait for a request is no hang."""
-    taxel.convert(some_events(20), tmp_path / "a.h5")
-    begin = "from taxel._base import h5_child; h5_child.LIMIT_S = 1; "
-    begin += f"h5_child.Listing.entries = lambda *_: list({entries}); "
-    with (tmp_path / "a.h5").open("rb") as file:
-        child = subprocess.Popen(
-            [sys.executable, "-c", begin + "h5_child.main()", str(file.fileno())],
-            pass_fds=[file.fileno()],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-    assert child.stdin is not None
-    child.stdin.write(json.dumps(sys.path) + "\n")
-    child.stdin.flush()
-    if code == 0:
-        time.sleep(2.5)
-    child.communicate(timeout=60)
-    assert child.returncode == code
 
 
 def test_a_library_that_keeps_the_interpreter_ends_with_a_killed_parent(tmp_path: Path) -> None:

@@ -240,12 +240,10 @@ def test_plug_ins_are_not_loaded_from_the_current_folder(tmp_path: Path) -> None
         "h5_child.orders = lambda: h5_child.send(path=os.environ.get('HDF5_PLUGIN_PATH')) or []; h5_child.main()"
     )
     for given, kept in ((".:here::", "null"), (f"here:{tmp_path}", f'"{tmp_path}"')):
-        with (tmp_path / "a.h5").open("rb") as file:
-            done = subprocess.run(
-                [sys.executable, "-c", listing, str(file.fileno())],
-                input=json.dumps(sys.path) + "\n", capture_output=True, text=True, check=True, pass_fds=[file.fileno()],
-                env={**os.environ, "HDF5_PLUGIN_PATH": given}, cwd=tmp_path,
-            )  # fmt: skip
+        done = subprocess.run(
+            [sys.executable, "-c", listing, tmp_path / "a.h5"], input=json.dumps(sys.path) + "\n", capture_output=True,
+            text=True, check=True, env={**os.environ, "HDF5_PLUGIN_PATH": given}, cwd=tmp_path,
+        )  # fmt: skip
         assert f'{{"path": {kept}}}' in done.stdout
 
 

@@ -10,10 +10,12 @@ import sys
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
 import numpy as np
+import psutil
 import pytest
 from draws import mixed
 from formats import bags
@@ -485,12 +487,15 @@ def test_memory_that_is_missing_is_said_with_what_there_is(tmp_path: Path, monke
 # what is available
 
 
-def machine(folder: Path, *, free_kib: int, groups: str = "") -> Path:
+@pytest.fixture
+def small_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The machine has 1000 KiB available."""
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=1_024_000))
+
+
+def in_groups(folder: Path, groups: str) -> None:
     (folder / "proc/self").mkdir(parents=True)
-    (folder / "proc/meminfo").write_text(f"MemTotal: 99999999 kB\nMemAvailable:   {free_kib} kB\n")
-    (folder / "proc/self/statm").write_text("1 1 1 0 0 0 0\n")
     (folder / "proc/self/cgroup").write_text(groups)
-    return folder
 
 
 def group(folder: Path, version: int, limit: object, used: int, files: int) -> None:
@@ -502,22 +507,25 @@ def group(folder: Path, version: int, limit: object, used: int, files: int) -> N
     (folder / "memory.stat").write_text(f"anon 5\n{inactive} {files}\n")
 
 
+@pytest.mark.usefixtures("small_machine")
 def test_what_is_available_is_that_of_the_machine(tmp_path: Path) -> None:
-    assert limits.available(machine(tmp_path, free_kib=1000)) == 1_024_000
+    assert limits.available(tmp_path) == 1_024_000
 
 
+@pytest.mark.usefixtures("small_machine")
 @pytest.mark.parametrize("inner", ["a/b", ""])
 def test_the_limits_of_all_control_groups_above_count(inner: str, tmp_path: Path) -> None:
-    machine(tmp_path, free_kib=1000, groups=f"0::/{inner}\n")
+    in_groups(tmp_path, f"0::/{inner}\n")
     top = tmp_path / "sys/fs/cgroup"
     group(top / inner, 2, "max", 10, 0)
     group(top / "a", 2, 900_000, 500_000, 100_000)
     assert limits.available(tmp_path) == (500_000 if inner else 1_024_000)
 
 
+@pytest.mark.usefixtures("small_machine")
 @pytest.mark.parametrize("place", ["docker/77", ""])
 def test_a_control_group_of_version_1_counts_also_from_within_a_container(place: str, tmp_path: Path) -> None:
-    machine(tmp_path, free_kib=1000, groups="4:cpu,cpuacct:/x\n3:memory:/docker/77\n")
+    in_groups(tmp_path, "4:cpu,cpuacct:/x\n3:memory:/docker/77\n")
     group(tmp_path / "sys/fs/cgroup/memory" / place, 1, 800_000, 700_000, 50_000)
     assert limits.available(tmp_path) == 150_000
     group(tmp_path / "sys/fs/cgroup/memory" / place, 1, 600_000, 700_000, 50_000)

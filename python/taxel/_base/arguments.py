@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.errors import refused
 from taxel._base.messages import plain
+from taxel._base.windows_names import name_fault
 from taxel._core import ProblemError
 
 T = TypeVar("T")
@@ -277,6 +278,8 @@ def checked_path(name: str, value: object) -> str:
         encoded = b""
     if not isinstance(plain, str) or not encoded or b"\0" in encoded:
         raise refused(name, f" is {shown(value)}: must be a path")
+    if sys.platform == "win32" and (fault := name_fault(plain)):
+        raise refused(name, f" is {shown(value)}: {fault}")
     return plain
 
 

@@ -10,12 +10,15 @@ standard library alone::
     child = ChildProcess(Path("h5_child.py"), [path, memory], pass_fds=[memory], stdin=PIPE, stdout=PIPE)
 
 A child has a session of its own: Ctrl-C in the terminal reaches the parent alone, which then ends its children.
+
+On Windows a child has a console of its own and belongs to a job (`taxel._base.windows_job`), by which the system kills
+it and its descendants as soon as the parent has ended; unfinished files are left.
 """
 
 from __future__ import annotations
 
 import contextlib
-import fcntl
+import errno
 import json
 import os
 import runpy
@@ -25,14 +28,23 @@ import sys
 import threading
 import time
 import weakref
-from collections.abc import Iterable, Mapping, MutableMapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
 
+if sys.platform == "win32":
+    from taxel._base.h5_child import JOB_MEMORY
+    from taxel._base.windows_job import Job
+
+#: Exit code of a child that was ended, on Windows: that of what Ctrl-C stopped.
+_ENDED = 130
 #: How long a child may take to end by itself after its parent has ended, s.
 GRACE_S = 3.0
 #: How long its parent waits for that, s.
 _EXIT_TIMEOUT_S = GRACE_S + 1.0
+
+
+_running: weakref.WeakSet[ChildProcess] = weakref.WeakSet()
 
 
 class ChildProcess(subprocess.Popen[Any]):
@@ -47,7 +59,8 @@ class ChildProcess(subprocess.Popen[Any]):
         Files that the child writes and that are removed if its parent ends before it.
     at_once : bool
         Whether the system kills the child when this process ends, also while a library keeps the interpreter from its
-        threads: for a child that has nothing to clean up.
+        threads: for a child that has nothing to clean up. It may take no more memory than `JOB_MEMORY` on Windows;
+        elsewhere it limits itself.
     env : mapping, optional
         Variables beside those of this process.
     pass_fds : sequence of int
@@ -65,6 +78,19 @@ class ChildProcess(subprocess.Popen[Any]):
         pass_fds: Sequence[int] = (),
         **options: Any,
     ) -> None:
+        variables = {**os.environ, **(env or {})}
+        make_safe(variables)
+        if sys.platform == "win32":
+            self._job = Job(JOB_MEMORY if at_once else 0)
+            words = [program] if isinstance(program, Path) else ["-m", program]
+            super().__init__(
+                [sys.executable, "-P", *map(str, (*words, *arguments))],
+                env=variables,
+                creationflags=subprocess.CREATE_NO_WINDOW,
+                **options,
+            )
+            self._job.add(int(self._handle))  # type: ignore[attr-defined]  # not in the stubs
+            return
         read_end, write_end = os.pipe()
         self._write_ends = [write_end]
         order = {
@@ -73,8 +99,6 @@ class ChildProcess(subprocess.Popen[Any]):
             "is_file": isinstance(program, Path),
             "at_once": at_once,
         }
-        variables = {**os.environ, **(env or {})}
-        make_safe(variables)
         try:
             super().__init__(
                 [sys.executable, "-P", __file__, json.dumps(order), str(program), *map(str, arguments)],
@@ -91,7 +115,10 @@ class ChildProcess(subprocess.Popen[Any]):
         _running.add(self)
 
     def _let_go(self) -> None:
-        """Close this end of the pipe; several threads may do so at a time."""
+        """Close this end of the pipe, or end the job; several threads may do so at a time."""
+        if sys.platform == "win32":
+            self._job.end(_ENDED)
+            return
         with contextlib.suppress(IndexError):
             os.close(self._write_ends.pop())
 
@@ -115,16 +142,14 @@ class ChildProcess(subprocess.Popen[Any]):
         super().__exit__(*raised)
 
 
-_running: weakref.WeakSet[ChildProcess] = weakref.WeakSet()
-
-
-def _let_go_of_all() -> None:
-    """Close the pipes in a fork of this process, which would keep the children running after their parent."""
-    for child in list(_running):
-        child._let_go()
-
-
-os.register_at_fork(after_in_child=_let_go_of_all)
+@contextlib.contextmanager
+def pipe_may_be_closed() -> Iterator[None]:
+    """Let a pipe be written whose reader may have ended: Windows has another error for it."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in ((errno.EPIPE, errno.EINVAL) if sys.platform == "win32" else (errno.EPIPE,)):
+            raise
 
 
 def make_safe(variables: MutableMapping[str, str]) -> None:
@@ -143,40 +168,47 @@ def search_path() -> list[str]:
     return [entry for entry in sys.path if entry]
 
 
-def _watch(watched: int, unfinished: Sequence[str]) -> None:
-    """Wait for the end of the parent, then end this process and those that it has started."""
-    # Nothing is ever written: to read returns when the parent's end is closed.
-    os.read(watched, 1)
-    _remove(unfinished)
-    os.killpg(0, signal.SIGTERM)
-    time.sleep(GRACE_S)
-    _remove(unfinished)
-    os.killpg(0, signal.SIGKILL)
+if sys.platform != "win32":
+    import fcntl
 
+    def _let_go_of_all() -> None:
+        """Close the pipes in a fork of this process, which would keep the children running after their parent."""
+        for child in list(_running):
+            child._let_go()
 
-def _remove(files: Sequence[str]) -> None:
-    for file in files:
-        with contextlib.suppress(OSError):
-            os.unlink(file)
+    os.register_at_fork(after_in_child=_let_go_of_all)
 
+    def _watch(watched: int, unfinished: Sequence[str]) -> None:
+        """Wait for the end of the parent, then end this process and those that it has started."""
+        # Nothing is ever written: to read returns when the parent's end is closed.
+        os.read(watched, 1)
+        _remove(unfinished)
+        os.killpg(0, signal.SIGTERM)
+        time.sleep(GRACE_S)
+        _remove(unfinished)
+        os.killpg(0, signal.SIGKILL)
 
-def _main() -> None:
-    """Run a program in the child."""
-    order = json.loads(sys.argv[1])
-    os.set_inheritable(order["watched"], False)
-    if order["at_once"]:
-        # SIGIO, which ends a process by default, is sent when the other end of the pipe is closed.
-        fcntl.fcntl(order["watched"], fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(order["watched"], fcntl.F_SETFL, os.O_ASYNC)
-    threading.Thread(
-        target=_watch, args=(order["watched"], order["unfinished"]), name="taxel-parent", daemon=True
-    ).start()
-    sys.argv = sys.argv[2:]
-    if order["is_file"]:
-        runpy.run_path(sys.argv[0], run_name="__main__")
-    else:
-        runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+    def _remove(files: Sequence[str]) -> None:
+        for file in files:
+            with contextlib.suppress(OSError):
+                os.unlink(file)
 
+    def _main() -> None:
+        """Run a program in the child."""
+        order = json.loads(sys.argv[1])
+        os.set_inheritable(order["watched"], False)
+        if order["at_once"]:
+            # SIGIO, which ends a process by default, is sent when the other end of the pipe is closed.
+            fcntl.fcntl(order["watched"], fcntl.F_SETOWN, os.getpid())
+            fcntl.fcntl(order["watched"], fcntl.F_SETFL, os.O_ASYNC)
+        threading.Thread(
+            target=_watch, args=(order["watched"], order["unfinished"]), name="taxel-parent", daemon=True
+        ).start()
+        sys.argv = sys.argv[2:]
+        if order["is_file"]:
+            runpy.run_path(sys.argv[0], run_name="__main__")
+        else:
+            runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
 
-if __name__ == "__main__":
-    _main()
+    if __name__ == "__main__":
+        _main()

@@ -4,14 +4,49 @@ from __future__ import annotations
 
 import errno
 import os
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from taxel import _core
 from taxel._base.arguments import checked_path, flag
-from taxel._core import open_regular
+
+if sys.platform == "win32":
+    import _winapi
+    import msvcrt
+
+    #: FILE_SHARE_READ, FILE_SHARE_WRITE and FILE_SHARE_DELETE together; OPEN_EXISTING and CREATE_NEW.
+    _SHARED, _THERE, _NEW = 7, 3, 1
+
+    def _descriptor(path: str | os.PathLike[str], access: int, how: int, flags: int) -> int:
+        try:
+            handle = _winapi.CreateFile(os.fspath(path), access, _SHARED, 0, how, 0, 0)
+        except OSError as error:
+            error.filename = os.fspath(path)
+            raise
+        return msvcrt.open_osfhandle(handle, flags)
+
+    def open_regular(path: str | os.PathLike[str]) -> int:
+        """Return the descriptor of a file, opened for reading; other programs may rename and delete it meanwhile."""
+        return _descriptor(path, _winapi.GENERIC_READ, _THERE, os.O_RDONLY)
+
+    def open_new(path: str | os.PathLike[str], mode: int = 0o666) -> int:  # noqa: ARG001  as elsewhere
+        """Return the descriptor of a file that was not there; other programs may rename and delete it meanwhile."""
+        return _descriptor(path, _winapi.GENERIC_READ | _winapi.GENERIC_WRITE, _NEW, os.O_RDWR)
+
+else:
+    open_regular = _core.open_regular
+
+    def open_new(path: str | os.PathLike[str], mode: int = 0o666) -> int:
+        """Return the descriptor of a file that was not there."""
+        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode)
+
+
+#: What file systems answer that have no hard links.
+_NO_LINK = (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS)
 
 
 def beside(path: Path, name: str) -> Path:
@@ -41,7 +76,9 @@ def open_file(path: str | os.PathLike[str]) -> BinaryIO:
     FormatError : a named pipe, a socket or a device
     OSError : the file is not there, or cannot be read
     """
-    return open(path, "rb", opener=lambda name, _: open_regular(name))
+    # Where no file waits for a writer, a file that is open keeps its name.
+    opener = None if sys.platform == "win32" else lambda name, _: open_regular(name)
+    return open(path, "rb", opener=opener)
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object], *, overwrite: bool = False) -> Path:
@@ -105,16 +142,39 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
         if overwrite:
             os.replace(name, target)
         else:
-            # A link, unlike a rename, fails if another process has created the file meanwhile.
-            os.link(name, target)
-            os.unlink(name)
+            create(name, target)
     except BaseException as error:
         Path(name).unlink(missing_ok=True)
         if isinstance(error, OSError):
             error.filename = str(target)
+            if sys.platform == "win32" and isinstance(error, PermissionError):
+                error.strerror = "another program has it open, or the folder is write-protected"
             # Python shows a second name also where it is None.
             del error.filename2
         raise
+
+
+def create(name: str | os.PathLike[str], target: str | os.PathLike[str]) -> None:
+    """Give a new file its name in one step.
+
+    Raises
+    ------
+    FileExistsError : another process has created a file of that name meanwhile
+    """
+    if sys.platform == "win32":
+        # Fails if there is a file.
+        os.rename(name, target)
+        return
+    try:
+        # A link, unlike a rename, fails if there is a file.
+        os.link(name, target)
+    except OSError as error:
+        if error.errno not in _NO_LINK:
+            raise
+        os.close(open_new(target))
+        os.replace(name, target)
+    else:
+        os.unlink(name)
 
 
 class _Writable(Exception):  # noqa: N818  no error

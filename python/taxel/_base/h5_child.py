@@ -8,7 +8,8 @@ The file is a stranger's, so the child neither opens another file nor takes more
 
 - It walks the hard links first, without a value being read, and refuses the file if a link or a data set leads to
   another file. Soft links are followed only then: a path through them reaches no other links than these.
-- While it does so, the limit on descriptors is 0, so that the system refuses what the checks may miss.
+- While it does so, the limit on descriptors is 0, so that the system refuses what the checks may miss. Windows has no
+  such limit.
 """
 
 import contextlib
@@ -16,8 +17,6 @@ import itertools
 import json
 import math
 import os
-import resource
-import signal
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -32,11 +31,8 @@ LISTED, SHARE = 1 << 24, 64
 MEMORY = 192 << 20
 #: Bytes of the texts of a data set: 64 MiB; and how often a text that the file holds may be in memory on its way.
 TEXT, COPIES = 1 << 26, 4
-#: Where the library has returned nothing for so long, s, as it may on a damaged file, the child ends by itself: its
-#: parent ends it much sooner, unless it was killed.
-LIMIT_S = 60
-#: What the system lets this process have from its start on.
-INHERITED = resource.getrlimit(resource.RLIMIT_AS)
+#: Bytes that the parent lets this process have where the process cannot limit itself (`taxel._base.windows_job`).
+JOB_MEMORY = 1 << 30
 
 
 class Refused(Exception):  # noqa: N818  what the file holds is no error of this program
@@ -45,7 +41,7 @@ class Refused(Exception):  # noqa: N818  what the file holds is no error of this
 
 def main() -> None:
     """Answer requests until there are no more."""
-    descriptor = int(sys.argv[1])
+    path = sys.argv[1]
     sys.path[:] = json.loads(sys.stdin.readline())
     # HDF5 loads plug-ins from these folders: not from one that depends on the current folder.
     folders = [folder for folder in os.environ.pop("HDF5_PLUGIN_PATH", "").split(os.pathsep) if os.path.isabs(folder)]
@@ -55,11 +51,10 @@ def main() -> None:
     import numpy as np  # noqa: F401, PLC0415  no module can be loaded later
 
     send(running=True)
-    begin = memory()
+    most = begin = memory()
     try:
-        bound_memory(begin + MEMORY)
-        # The very file that the parent has opened, whatever its name stands for by now.
-        with h5py.File(f"/dev/fd/{descriptor}") as h5, no_other_file():
+        most = bound_memory(begin + MEMORY)
+        with h5py.File(path) as h5, files(allowed=False):
             listing = Listing(h5, h5py)
             listing.entries()
             send(listed=True)
@@ -69,7 +64,7 @@ def main() -> None:
                     continue
                 data = h5py.Dataset(listing.opened(order["name"]))
                 if order["text"]:
-                    bound_memory(begin + MEMORY + COPIES * min(TEXT, os.fstat(descriptor).st_size))
+                    most = bound_memory(begin + MEMORY + COPIES * min(TEXT, os.stat(path).st_size))
                     send_texts(data)
                 else:
                     send_numbers(data)
@@ -79,57 +74,69 @@ def main() -> None:
     # The errors that h5py raises on damage are not documented.
     except BaseException as error:
         if isinstance(error, MemoryError) or "memory allocation failed" in str(error):
-            most = resource.getrlimit(resource.RLIMIT_AS)[0] - begin
-            send(refused=f"needs more than {most} bytes of memory beside its values", entry="")
+            send(refused=f"needs more than {most - begin} bytes of memory beside its values", entry="")
         else:
             send(error=(str(error).splitlines() or [type(error).__name__])[0][:200])
 
 
 def orders() -> Iterator[Any]:
-    """Yield the requests; to wait for one is no reason to end."""
-    signal.alarm(0)
-    for line in sys.stdin:
-        signal.alarm(LIMIT_S)
-        yield json.loads(line)
-        signal.alarm(0)
+    """Yield the requests."""
+    yield from map(json.loads, sys.stdin)
 
 
 def send(*pieces: Any, **message: Any) -> None:
-    """Write a line and the bytes that follow it; from then on the limit counts anew."""
-    # The parent may be stopped for any time.
-    signal.alarm(0)
+    """Write a line and the bytes that follow it."""
     sys.stdout.buffer.write(json.dumps(message).encode() + b"\n")
     for piece in pieces:
         sys.stdout.buffer.write(piece)
     sys.stdout.buffer.flush()
-    signal.alarm(LIMIT_S)
 
 
-def memory() -> int:
-    """Return the bytes that this process has asked for; a very large number where the system does not say."""
-    try:
-        with open("/proc/self/statm", encoding="ascii") as file:
-            return int(file.read().split()[0]) * resource.getpagesize()
-    except (OSError, ValueError):
-        return 1 << 50
+if sys.platform == "win32":
 
+    def memory() -> int:
+        """Return 0: bytes count from the start of the process on."""
+        return 0
 
-def bound_memory(most: int) -> None:
-    """Limit what this process may ask for."""
-    least = min([most, *(limit for limit in INHERITED if limit != resource.RLIM_INFINITY)])
-    with contextlib.suppress(OSError, ValueError):
-        resource.setrlimit(resource.RLIMIT_AS, (least, INHERITED[1]))
+    def bound_memory(_most: int) -> int:
+        """Return the limit of this process's memory, which its parent has set."""
+        return JOB_MEMORY
 
-
-@contextlib.contextmanager
-def no_other_file() -> Iterator[None]:
-    """Let no file be opened within the block."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (0, hard))
-    try:
+    @contextlib.contextmanager
+    def files(*, allowed: bool) -> Iterator[None]:  # noqa: ARG001  as elsewhere
+        """Leave it to the checks that no other file is opened."""
         yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+else:
+    import resource
+
+    #: What the system lets this process have from its start on.
+    INHERITED = resource.getrlimit(resource.RLIMIT_AS)
+
+    def memory() -> int:
+        """Return the bytes that this process has asked for; a very large number where the system does not say."""
+        try:
+            with open("/proc/self/statm", encoding="ascii") as file:
+                return int(file.read().split()[0]) * resource.getpagesize()
+        except (OSError, ValueError):
+            return 1 << 50
+
+    def bound_memory(most: int) -> int:
+        """Limit what this process may ask for; return the limit."""
+        least = min([most, *(limit for limit in INHERITED if limit != resource.RLIM_INFINITY)])
+        with contextlib.suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_AS, (least, INHERITED[1]))
+        return least
+
+    @contextlib.contextmanager
+    def files(*, allowed: bool) -> Iterator[None]:
+        """Let files be opened within the block, or none."""
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard if allowed else 0, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
 class Listing:
@@ -221,10 +228,8 @@ class Listing:
             return
         for code in {how.get_filter(k)[0] for k in range(how.get_nfilters())} - self.filters:
             self.filters.add(code)
-            limit = resource.getrlimit(resource.RLIMIT_NOFILE)
-            resource.setrlimit(resource.RLIMIT_NOFILE, (limit[1], limit[1]))
-            self.h5py.h5z.filter_avail(code)
-            resource.setrlimit(resource.RLIMIT_NOFILE, limit)
+            with files(allowed=True):
+                self.h5py.h5z.filter_avail(code)
 
     def address(self, group: Any) -> tuple[int, int]:
         """Return what tells a group from all others: its file and its address there."""

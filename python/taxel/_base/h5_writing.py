@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
-from taxel._base.child_process import ChildProcess, search_path
+from taxel._base.child_process import ChildProcess, pipe_may_be_closed, search_path
 from taxel._base.files import whole_file
 from taxel._core import Error
 
@@ -56,12 +56,9 @@ def write_h5(
         assert child.stdout is not None
         try:
             # A child that has failed reads no more, and has said why.
-            try:
-                with child.stdin as pipe:
-                    pipe.write(json.dumps(search_path()).encode() + b"\n")
-                    send(cast(BinaryIO, pipe))
-            except BrokenPipeError:
-                pass
+            with pipe_may_be_closed(), child.stdin as pipe:
+                pipe.write(json.dumps(search_path()).encode() + b"\n")
+                send(cast(BinaryIO, pipe))
             reply = child.stdout.read()
         except BaseException:
             child.kill()

@@ -6,7 +6,7 @@ sensors record. Those of .mcap are in its reader (crates/taxel-live/src/recordin
 
 from __future__ import annotations
 
-import resource
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -15,6 +15,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 from taxel._base.errors import helped
 from taxel._core import FormatError
@@ -153,28 +154,18 @@ def available(root: Path = Path("/")) -> int:
     Parameters
     ----------
     root : Path
-        Where ``proc`` and ``sys`` are.
+        Where ``proc`` and ``sys`` are, of which the control groups of Linux are read.
     """
-    return max(0, min([_of_machine(root), _of_process(root), *_of_groups(root)]))
+    return max(0, min([psutil.virtual_memory().available, *_of_process(), *_of_groups(root)]))
 
 
-def _of_machine(root: Path) -> int:
-    """Return what the machine has available; without an answer of the system what a process can address."""
-    with suppress(OSError, ValueError):
-        for line in (root / "proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                return int(line.split()[1]) * 1024
-    return 1 << 47
-
-
-def _of_process(root: Path) -> int:
-    """Return what the limit of this process's addresses leaves."""
-    most, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if most == resource.RLIM_INFINITY:
-        return 1 << 47
-    with suppress(OSError, ValueError):
-        return most - int((root / "proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    return most
+def _of_process() -> list[int]:
+    """Return what the limit of this process's addresses leaves, where there is one."""
+    if sys.platform != "linux":
+        return []
+    process = psutil.Process()
+    most, _ = process.rlimit(psutil.RLIMIT_AS)
+    return [] if most == psutil.RLIM_INFINITY else [most - process.memory_info().vms]
 
 
 #: By version of control groups: the folder, and the names of the limit, the usage, and the part of the usage that is

@@ -1,9 +1,14 @@
-"""How a command or a task is stopped: by Ctrl-C, SIGTERM (a service that ends) and SIGHUP (a terminal that closes)."""
+"""How a command or a task is stopped: by Ctrl-C, SIGTERM (a service that ends) and SIGHUP (a terminal that closes).
+
+Windows has Ctrl-C, Ctrl-Break and a console that closes.
+"""
 
 from __future__ import annotations
 
+import _thread
 import atexit
 import contextlib
+import ctypes
 import os
 import signal
 import sys
@@ -16,6 +21,9 @@ from typing import NoReturn
 #: A terminal that closes sends SIGHUP twice, and a service that ends SIGTERM and SIGHUP: signals that follow another
 #: within this time are not taken for a second request, s.
 _ONE_REQUEST_S = 1.0
+
+#: Those of all systems.
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 _Handler = Callable[[int, FrameType | None], None]
 
@@ -45,7 +53,7 @@ def _handle(handler: _Handler) -> dict[int, object]:
 
     A signal that was ignored when the program began, as by nohup, stays ignored.
     """
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    numbers = [getattr(signal, name) for name in _NAMES if hasattr(signal, name)]
     handled = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
     return {number: signal.signal(number, handler) for number in handled}
 
@@ -53,6 +61,26 @@ def _handle(handler: _Handler) -> dict[int, object]:
 def stop_on_signals() -> None:
     """Raise KeyboardInterrupt on SIGTERM and SIGHUP as on Ctrl-C, so that recordings are closed and files removed."""
     _handle(_stop)
+    if sys.platform == "win32":
+        # After the handler of Python's library, so that Windows calls it before that one.
+        ctypes.windll.kernel32.SetConsoleCtrlHandler(_on_console_event, True)
+
+
+if sys.platform == "win32":
+    #: CTRL_CLOSE_EVENT, CTRL_LOGOFF_EVENT and CTRL_SHUTDOWN_EVENT.
+    _CLOSES = (2, 5, 6)
+    #: Longer than the 5 s that Windows gives to a program whose console closes, s.
+    _FOREVER_S = 60.0
+
+    def _stop_on_close(event: int) -> int:
+        """Stop the main thread where the console closes: Windows ends the process as soon as this returns."""
+        if event not in _CLOSES:
+            return False
+        _thread.interrupt_main(signal.SIGBREAK)
+        time.sleep(_FOREVER_S)
+        return True
+
+    _on_console_event = ctypes.WINFUNCTYPE(ctypes.c_int, ctypes.c_uint)(_stop_on_close)
 
 
 @contextlib.contextmanager

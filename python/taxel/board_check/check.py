@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import socket
 from collections.abc import Callable, Iterator
 
 import numpy as np
-import psutil
 
 from taxel import _core
 from taxel._base.arguments import callback, integer, number, text
 from taxel._base.errors import refused
+from taxel._base.interfaces import blocked, interfaces
 from taxel._base.messages import counted
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
@@ -34,23 +33,12 @@ _ANSWER_S = 30.0
 _EXPLAINED = 0.5
 
 
-def _interfaces() -> list[tuple[str, str, bool, int]]:
-    """Return name, IPv4 address, whether it is up and speed (Mbit/s) of this machine's interfaces."""
-    states = psutil.net_if_stats()
-    return [
-        (name, address.address, states[name].isup, states[name].speed)
-        for name, addresses in psutil.net_if_addrs().items()
-        for address in addresses
-        if address.family == socket.AF_INET and name in states
-    ]
-
-
 def _nothing(port: int, seconds: float) -> str:
     """Return why no datagram may have come."""
-    interfaces = _interfaces()
-    there = ", ".join(f"{name} {address}" for name, address, _, _ in interfaces)
-    begin = f"none came to port {port} within {seconds:g} s. "
-    for name, address, up, speed in interfaces:
+    found = interfaces()
+    there = ", ".join(f"{name} {address}" for name, address, _, _ in found)
+    begin = f"none came to port {port} within {seconds:g} s{blocked()}. "
+    for name, address, up, speed in found:
         if address == HOST:
             if not up:
                 return (

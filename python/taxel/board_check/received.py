@@ -6,6 +6,7 @@ import contextlib
 import ipaddress
 import math
 import socket
+import sys
 import time
 from dataclasses import dataclass, field
 
@@ -43,8 +44,9 @@ class Receiver:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WAITING)
-            # Linux tells by which interface a datagram came, and to which address.
-            self.socket.setsockopt(socket.IPPROTO_IP, getattr(socket, "IP_PKTINFO", 8), 1)
+            if sys.platform != "win32":
+                # The kernel tells by which interface a datagram came, and to which address.
+                self.socket.setsockopt(socket.IPPROTO_IP, getattr(socket, "IP_PKTINFO", 8), 1)
             self.socket.bind((host, port))
         except BaseException:
             self.socket.close()
@@ -56,7 +58,7 @@ class Receiver:
         while (left := until - time.monotonic()) > 0:
             self.socket.settimeout(left)
             try:
-                data, ancillary, _, (host, port) = self.socket.recvmsg(_LARGEST, 64)
+                data, ancillary, (host, port) = self._receive()
             except TimeoutError:
                 break
             if not capture.datagrams:
@@ -70,6 +72,14 @@ class Receiver:
             capture.datagrams.append(data)
             capture.arrived_us.append(round(time.monotonic() * 1e6))
         return capture
+
+    def _receive(self) -> tuple[bytes, list[tuple[int, int, bytes]], tuple[str, int]]:
+        """Return a datagram, what the kernel tells of it, and its sender."""
+        if sys.platform == "win32":
+            data, sender = self.socket.recvfrom(_LARGEST)
+            return data, [], sender
+        data, ancillary, _, sender = self.socket.recvmsg(_LARGEST, 64)
+        return data, ancillary, sender
 
     def drain(self, seconds: float) -> None:
         """Let pass what has arrived, and what arrives within so long; then what waits."""

@@ -7,6 +7,7 @@ SIGHUP.
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import sys
 from collections.abc import Callable
@@ -54,6 +55,10 @@ def _root(version: bool = typer.Option(False, "--version", help="Print the versi
 def program() -> NoReturn:
     """Run the command line as the only work of this process: its environment and its signals are the command's."""
     make_safe(os.environ)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # What a console's encoding lacks is shown escaped, as control characters are.
+            stream.reconfigure(errors="backslashreplace")
     try:
         # An interrupt within an import can come out of a library as another error: until then it ends the process.
         main(loaded=stop_on_signals)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import select
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -33,9 +32,8 @@ def noting(write: Callable[[str], None], report: Callable[[str], None]) -> Itera
     """
     try:
         source = sys.stdin.fileno()
-        keys = os.isatty(source)
-        # Reading a terminal from the background would stop the whole program.
-        if keys and os.tcgetpgrp(source) != os.getpgrp():
+        keys = _is_terminal(source)
+        if keys and not _is_in_front(source):
             source = -1
     except (OSError, ValueError, AttributeError):
         source, keys = -1, False
@@ -58,10 +56,10 @@ def _read(
 ) -> None:
     pending = b""
     while not over.is_set():
-        if not select.select([source], [], [], _POLL_S)[0]:
-            continue
         try:
-            typed = os.read(source, 4096)
+            if not _is_typed(source, keys):
+                continue
+            typed = _typed(source, keys)
         except OSError:
             return
         pending += typed
@@ -91,15 +89,75 @@ def _keys(typed: str) -> list[str]:
     ]
 
 
-@contextlib.contextmanager
-def _by_key(source: int) -> Iterator[None]:
-    """Let a terminal pass each key at once, without showing it; Ctrl-C works as before."""
-    import termios  # noqa: PLC0415  Unix only
-    import tty  # noqa: PLC0415
+if sys.platform == "win32":
+    import _winapi
+    import ctypes
+    import msvcrt
+    import time
 
-    before = termios.tcgetattr(source)
-    tty.setcbreak(source)
-    try:
-        yield
-    finally:
-        termios.tcsetattr(source, termios.TCSADRAIN, before)
+    def _is_terminal(source: int) -> bool:
+        """Return whether an input is a console: NUL, which Python takes for a terminal, is none."""
+        return bool(ctypes.windll.kernel32.GetConsoleMode(_handle(source), ctypes.byref(ctypes.c_uint())))
+
+    def _is_in_front(source: int) -> bool:  # noqa: ARG001  as elsewhere
+        return True
+
+    def _handle(source: int) -> ctypes.c_void_p:
+        return ctypes.c_void_p(msvcrt.get_osfhandle(source))
+
+    def _is_typed(source: int, keys: bool) -> bool:
+        """Wait a moment for what can be read, the end included."""
+        if keys:
+            is_there = msvcrt.kbhit()
+        else:
+            handle = msvcrt.get_osfhandle(source)
+            try:
+                is_pipe = _winapi.GetFileType(handle) == _winapi.FILE_TYPE_PIPE
+                is_there = not is_pipe or _winapi.PeekNamedPipe(handle)[-2] > 0
+            except BrokenPipeError:
+                is_there = True
+        if not is_there:
+            time.sleep(_POLL_S)
+        return is_there
+
+    def _typed(source: int, keys: bool) -> bytes:
+        if not keys:
+            return os.read(source, 4096)
+        key = msvcrt.getwch()
+        # An arrow key and the like are two characters.
+        if key in "\0\xe0" and msvcrt.kbhit():
+            msvcrt.getwch()
+            return b"\x1b"
+        return key.encode("utf-8", "replace")
+
+    def _by_key(source: int) -> contextlib.nullcontext[None]:  # noqa: ARG001  as elsewhere
+        """Leave a console as it is: keys are asked for one by one."""
+        return contextlib.nullcontext()
+
+else:
+    import select
+    import termios
+    import tty
+
+    _is_terminal = os.isatty
+
+    def _is_in_front(source: int) -> bool:
+        """Return whether a terminal can be read: from the background that would stop the whole program."""
+        return os.tcgetpgrp(source) == os.getpgrp()
+
+    def _is_typed(source: int, keys: bool) -> bool:  # noqa: ARG001  as on Windows
+        """Wait a moment for what can be read, the end included."""
+        return bool(select.select([source], [], [], _POLL_S)[0])
+
+    def _typed(source: int, keys: bool) -> bytes:  # noqa: ARG001  as on Windows
+        return os.read(source, 4096)
+
+    @contextlib.contextmanager
+    def _by_key(source: int) -> Iterator[None]:
+        """Let a terminal pass each key at once, without showing it; Ctrl-C works as before."""
+        before = termios.tcgetattr(source)
+        tty.setcbreak(source)
+        try:
+            yield
+        finally:
+            termios.tcsetattr(source, termios.TCSADRAIN, before)

@@ -350,7 +350,7 @@ class _TruthTable:
     def __init__(self, path: Path | None, overwrite: bool) -> None:
         self._pending: deque[tuple[float, str]] = deque()
         # Written line by line, not by `write_whole`, so that Ctrl-C leaves the lines of what has happened.
-        self._file = None if path is None else path.open("w" if overwrite else "x", encoding="utf-8")
+        self._file = None if path is None else path.open("w" if overwrite else "x", encoding="utf-8", newline="\n")
         self._put("label,t_us,host_ns")
 
     def add(self, contacts: list[Contact]) -> None:

@@ -14,6 +14,7 @@ import typer
 from rich.live import Live as Display
 
 from taxel import _core
+from taxel._base.interfaces import blocked
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import OUTSIDE, App, SecondsOption, with_out
@@ -126,7 +127,7 @@ def _automatic(file: Path, live: dict[str, Any], typed: _RecordArguments, consol
             codes.append(exit_code(ended, receiver.array))
             empty = 0
         else:
-            say(f"taxel: {name}: nothing arrived at {receiver.place}; not saved", err=True)
+            say(f"taxel: {name}: nothing arrived at {receiver.place}{blocked()}; not saved", err=True)
             empty += 1
 
     name = following(0)

@@ -12,6 +12,7 @@ from typing import Any
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+import psutil
 from markupsafe import Markup
 
 import taxel
@@ -43,7 +44,7 @@ def figures(
         else "in real time, over UDP",
         "board_seconds": evaluation.seconds,
         "rest_seconds": evaluation.start_us * 1e-6,
-        "machine": {"cores": os.cpu_count(), "load": os.getloadavg()[0], "taxel": taxel.__version__},
+        "machine": {"cores": os.cpu_count(), "load": psutil.getloadavg()[0], "taxel": taxel.__version__},
         "neuron": evaluation.judged.to_dict(),
         "plain_rule": evaluation.judged_plain.to_dict(),
         "detections": len(evaluation.detections),
@@ -83,7 +84,7 @@ def write(folder: Path, values: Mapping[str, Any], evaluation: Evaluation) -> Pa
         written=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
     )
     for path, content in ((folder / "report.json", json.dumps(values, indent=1) + "\n"), (page, text)):
-        with path.open("x", encoding="utf-8") as file:
+        with path.open("x", encoding="utf-8", newline="\n") as file:
             file.write(content)
     return page
 

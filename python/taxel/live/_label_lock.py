@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import random
 import stat
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -22,6 +22,34 @@ _WITHIN_S = 20.0
 
 #: How long at most another process sleeps before it tries again, s.
 _TRIES_S = 0.004
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    _HOW = 0
+
+    def _lock(descriptor: int) -> bool:
+        """Lock a file until it is closed; return False where another process has locked it."""
+        try:
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        except PermissionError:
+            return False
+        return True
+
+else:
+    import fcntl
+
+    #: A named pipe would be waited for.
+    _HOW = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
+
+    def _lock(descriptor: int) -> bool:
+        """Lock a file until it is closed; return False where another process has locked it."""
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        return True
 
 
 class _Turn:
@@ -91,21 +119,17 @@ def locked_at_once(folder: Path) -> Iterator[bool]:
 @contextlib.contextmanager
 def _file(path: Path) -> Iterator[bool]:
     """Lock a file unless another process has locked it; yield whether it is locked."""
-    # A named pipe would be waited for.
-    how = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
     try:
-        lock = os.open(path, os.O_RDWR | os.O_CREAT | how, 0o666)
+        lock = os.open(path, os.O_RDWR | os.O_CREAT | _HOW, 0o666)
     except PermissionError:
         # That of another user.
         if not path.exists():
             raise
-        lock = os.open(path, os.O_RDONLY | how)
+        lock = os.open(path, os.O_RDONLY | _HOW)
     try:
         if not stat.S_ISREG(os.fstat(lock).st_mode):
             raise ProblemError(f"{path}: is no regular file, as the lock of tables must be; nothing was saved")
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        if not _lock(lock):
             yield False
             return
         try:

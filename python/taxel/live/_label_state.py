@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import json
 import os
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from taxel._core import FormatError, open_regular
+from taxel._base.files import open_regular
+from taxel._core import FormatError
 from taxel.labels import Note
 from taxel.live._label_join import Acknowledged
 
@@ -20,12 +22,14 @@ MOST_SAVED = 1 << 26
 NOT_SAVED = (ValueError, TypeError, KeyError, IndexError, RecursionError)
 
 
+#: A descriptor has one position, at which several threads may read.
+_reading = threading.Lock()
+
+
 def bytes_of(descriptor: int) -> bytes:
-    parts, at = [], 0
-    while part := os.pread(descriptor, 1 << 20, at):
-        parts.append(part)
-        at += len(part)
-    return b"".join(parts)
+    with _reading, open(descriptor, "rb", closefd=False) as file:
+        file.seek(0)
+        return file.read()
 
 
 def state_path(path: Path) -> Path:

@@ -22,6 +22,7 @@ import os
 import re
 import secrets
 import stat
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -32,9 +33,9 @@ from typing import Any
 from taxel._base.arguments import shown
 from taxel._base.documents import decoded
 from taxel._base.encodings import mark_of
-from taxel._base.files import check_writable
+from taxel._base.files import check_writable, create, open_new, open_regular
 from taxel._base.header_table import lines_of, separator_of
-from taxel._core import FormatError, ProblemError, open_regular
+from taxel._core import FormatError, ProblemError
 from taxel.labels import Note, rows_of, text_with
 from taxel.live._label_join import Acknowledged, Conflict, Edit, Joined, conflict_of, fold, join, minus, settled
 from taxel.live._label_lock import LOCK, locked, locked_at_once
@@ -73,8 +74,9 @@ _BEGINNING = 1 << 16
 _EXCHANGE, _HERE = 2, -100
 _NO_EXCHANGE = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)
 
-#: Those of file systems that have no hard links.
-_NO_LINK = (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS)
+
+if sys.platform == "win32":
+    _replace_file = ctypes.WinDLL("kernel32", use_last_error=True).ReplaceFileW
 
 
 class _BeingWritten(Exception):  # noqa: N818  no error
@@ -202,7 +204,10 @@ def _digest(text: bytes | None) -> str:
 
 
 def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+    if sys.platform == "win32":
+        # A folder is no file there, and a rename waits for the disk.
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:
@@ -211,6 +216,12 @@ def _sync_folder(folder: Path) -> None:
 
 def _exchange(first: str, second: Path) -> bool:
     """Exchange two files in one step; return False where the file system cannot."""
+    if sys.platform == "win32":
+        out = _new_name(second)
+        if not _replace_file(str(second), first, out, 0, None, None):
+            raise ctypes.WinError(ctypes.get_last_error(), str(second))
+        os.rename(out, first)
+        return True
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except AttributeError:
@@ -634,16 +645,20 @@ def _is_old(name: str, file: _File) -> bool:
     return os.path.samestat(there, os.fstat(file.descriptor)) and bytes_of(file.descriptor) == file.text
 
 
+def _new_name(path: Path) -> str:
+    """Return the name of a new file beside another, as `_clean` finds it."""
+    return str(path.with_name(f".{path.name}.{secrets.token_hex(4)}.new"))
+
+
 @contextlib.contextmanager
 def _new_file(path: Path, about: os.stat_result | None, text: bytes) -> Iterator[tuple[int, str]]:
     """Write a new text to a file beside that which it will replace, on the disk; remove what is there afterwards."""
-    name = str(path.with_name(f".{path.name}.{secrets.token_hex(4)}.new"))
+    name = _new_name(path)
     try:
-        how = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
         mode = 0o666 if about is None else stat.S_IMODE(about.st_mode)
-        descriptor = os.open(name, how, mode if about is None else mode & 0o600)
+        descriptor = open_new(name, mode if about is None else mode & 0o600)
         try:
-            if about is not None:
+            if about is not None and sys.platform != "win32":
                 # A user cannot give a file to a group without being in it.
                 with contextlib.suppress(OSError):
                     os.fchown(descriptor, -1, about.st_gid)
@@ -664,17 +679,9 @@ def _put(name: str, file: _File) -> bool:
     """Put a new file in the place of a table, the old one in its own; return False if there is a table by now."""
     if file.descriptor is None:
         try:
-            os.link(name, file.path)
+            create(name, file.path)
         except FileExistsError:
             return False
-        except OSError as error:
-            if error.errno not in _NO_LINK:
-                raise
-            try:
-                os.close(os.open(file.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666))
-            except FileExistsError:
-                return False
-            os.replace(name, file.path)
     elif not _exchange(name, file.path):
         os.replace(name, file.path)
     return True

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
-import socket
-import struct
 import threading
 from collections.abc import Callable
 from pathlib import Path
 
+from taxel._base.interfaces import interfaces
 from taxel._core import ProblemError
 from taxel.device import Cable
 from taxel.live._requests.reasons import reasons
 from taxel.wire import Command
-
-#: SIOCGIFADDR of Linux (netdevice(7)).
-_ADDRESS_OF = 0x8915
 
 
 class BoardRequests:
@@ -101,14 +95,8 @@ class BoardRequests:
 
     def addresses(self) -> list[tuple[str, str]]:
         """Return the IPv4 addresses of this machine, each with the name of its network interface."""
-        addresses = []
-        with reasons(), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
-            for _, name in socket.if_nameindex():
-                # An interface that is down has none. struct ifreq: the name, then the address from byte 20 on.
-                with contextlib.suppress(OSError):
-                    answer = fcntl.ioctl(any_socket, _ADDRESS_OF, struct.pack("256s", name.encode()[:15]))
-                    addresses.append((socket.inet_ntoa(answer[20:24]), name))
-        return addresses
+        with reasons():
+            return [(interface.address, interface.name) for interface in interfaces()]
 
     def read_out(self, readout: Path) -> None:
         """Read the board out with another readout."""

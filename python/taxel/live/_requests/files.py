@@ -168,12 +168,12 @@ class FileRequests:
             text = "" if there is None else read_text(there)
             written = layout_text.with_keys(target, text, keys)
             with whole_file(target, overwrite=True) as part:
-                part.write_text(written, "utf-8")
+                part.write_text(written, "utf-8", newline="\n")
         self._files.forget()
 
     def save_layout(self, source: str, out: Path) -> str:
         """Write the layout file of a source of lines, which must not exist; return the command that reads it live."""
         written = layout_text.of_source(source)
         with reasons(), whole_file(out) as part:
-            part.write_text(written, "utf-8")
+            part.write_text(written, "utf-8", newline="\n")
         return shlex.join(["taxel", "live", "--panel", "--source", typed(out)])

@@ -42,4 +42,4 @@ class PresetRequests:
         with reasons(), self._lock:
             path.parent.mkdir(parents=True, exist_ok=True)
             with whole_file(path, overwrite=True) as part:
-                part.write_text("\n".join(lines) + "\n", "utf-8")
+                part.write_text("\n".join(lines) + "\n", "utf-8", newline="\n")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import shlex
 import threading
@@ -13,7 +12,7 @@ from pathlib import Path
 from subprocess import PIPE
 from typing import Any
 
-from taxel._base.child_process import ChildProcess
+from taxel._base.child_process import ChildProcess, pipe_may_be_closed
 from taxel._base.progress import Steps
 from taxel._core import ProblemError
 from taxel.detect import Readout, load
@@ -138,7 +137,7 @@ class TrainingRequests:
         assert training.stdout is not None
         line: dict[str, Any] = {"type": "progress"}
         # A training that was stopped meanwhile reads nothing.
-        with contextlib.suppress(BrokenPipeError), training.stdin:
+        with pipe_may_be_closed(), training.stdin:
             training.stdin.write(json.dumps(request))
         for written in training.stdout:
             if not written.endswith("\n"):  # it was stopped while it wrote

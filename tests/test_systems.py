@@ -1,0 +1,209 @@
+"""What systems do differently: paths, names, line ends, consoles, files that are open elsewhere, ends of commands."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live.label_tables import held, mark
+from loopback import free_port, until
+from recording.making import some_events
+from shell import run
+
+import taxel
+from taxel import Frames, Labels, Neuron, ProblemError, Readout
+from taxel._base import interfaces
+from taxel._base.arguments import checked_path
+from taxel._base.files import create, write_whole
+from taxel._base.stopping import asked_to_end
+from taxel._base.windows_names import name_fault
+from taxel.encode import LevelCrossing
+from taxel.live import Live
+from taxel.live._label_table import LabelTables
+
+on_windows = pytest.mark.skipif(sys.platform != "win32", reason="a matter of Windows alone")
+
+#: Folders that a program may fail to find again; one of more than 300 characters has parts of 60.
+FOLDERS = {
+    "spaces": "my  recordings of a day",
+    "beyond ASCII": "Messung ä ł 足 \U0001f9b6",
+    "300 characters": "/".join(["long" * 15] * 5),
+}
+
+
+@pytest.fixture(params=FOLDERS, ids=lambda name: name.replace(" ", "-"))
+def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    made = tmp_path / FOLDERS[request.param]
+    try:
+        made.mkdir(parents=True)
+    except OSError as error:
+        pytest.skip(f"this system has no such folder: {error.strerror}")
+    return made
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".npz", ".h5", ".csv"])
+def test_a_recording_is_written_and_opened_in_any_folder(folder: Path, ending: str) -> None:
+    events = some_events(50)
+    path = folder / f"a walk é{ending}"
+    taxel.convert(events, path)
+    opened = taxel.open(path).events
+    assert opened.t.tolist() == events.t.tolist()
+    said = run("info", path, "--json")
+    assert said.returncode == 0, said.stderr
+    assert json.loads(said.stdout)
+
+
+def test_a_board_is_recorded_and_labelled_in_any_folder(folder: Path) -> None:
+    path = folder / "a walk é.mcap"
+    with Live(0, host="127.0.0.1", record=path) as live, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
+        board.sendto(taxel.wire.encode(some_events(20)), live.address)
+        until(lambda: live.counters["capture"]["datagrams"] == 1)
+        live.stop()
+    assert len(taxel.open(path).events) == 20
+    tables, table = LabelTables(), folder / "a walk é.notes.csv"
+    try:
+        for t in (7, 9):
+            mark(tables, table, "heel ł", t)
+    finally:
+        tables.close()
+    assert held(table) == {("heel ł", 7): 1, ("heel ł", 9): 1}
+
+
+def test_a_readout_is_saved_in_any_folder(folder: Path) -> None:
+    readout = Readout(
+        LevelCrossing(levels=[50.0]), {"ł": (Neuron(tau=2.0), [0.5] * 4)}, array=taxel.Array(1, 2), unit="N"
+    )
+    readout.save(folder / "é.json")
+    assert Readout.load(folder / "é.json").labels == ("ł",)
+
+
+@pytest.mark.parametrize(
+    ("path", "fault"),
+    [
+        ("aux.mcap", "device"), ("data/Com1", "device"), ("nul .tar.gz", "device"), ("CON", "device"),
+        ("lpt²", "device"), ("12:30.mcap", "':'"), ("a/what?.csv", "'?'"), ('"', "has '\"'"), ("x\n", "has '\\n'"),
+        ("walk. ", "ends with ' '"), ("data./walk.mcap", "ends with '.'"),
+    ],
+)  # fmt: skip
+def test_a_name_that_windows_forbids_is_refused_there(path: str, fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert fault in name_fault(path)
+    with monkeypatch.context() as patched:
+        patched.setattr(sys, "platform", "win32")
+        with pytest.raises(ProblemError, match="Windows"):
+            checked_path("path", path)
+        patched.setattr(sys, "platform", "linux")
+        assert checked_path("path", path) == path
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["walk.mcap", "auxiliary.mcap", "com10", "a/../b", "./walk", r"C:\data\walk.mcap", r"\\server\share\walk.mcap",
+     "com0", r"\\?\C:\data\walk.mcap", "C:walk.mcap", "...walk", "Messung ä ł 足", "con-1/walk.npz", "/home/walk.mcap"],
+)  # fmt: skip
+def test_any_other_name_is_none(path: str) -> None:
+    assert name_fault(path) == ""
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"], ids=["LF", "CRLF"])
+def test_texts_are_read_with_the_line_ends_of_every_system(tmp_path: Path, end: str) -> None:
+    events, frames = some_events(20), Frames(np.arange(12.0).reshape(3, 2, 2), [0, 1000, 2000], unit="N")
+    taxel.convert(events, tmp_path / "events.csv")
+    taxel.convert(frames, tmp_path / "frames.csv")
+    (tmp_path / "walk.notes.csv").write_bytes(b"label,t_us\nheel,5\ntoe,9\n")
+    for file in tmp_path.iterdir():
+        text = file.read_bytes()
+        # What taxel writes has the same bytes on every system.
+        assert b"\r" not in text
+        file.write_bytes(text.replace(b"\n", end.encode()))
+    assert taxel.open(tmp_path / "events.csv").events.t.tolist() == events.t.tolist()
+    assert taxel.open(tmp_path / "frames.csv").frames().values.tolist() == frames.values.tolist()
+    assert [note.t for note in Labels(tmp_path / "walk.notes.csv").rows] == [5, 9]
+
+
+def test_a_console_that_lacks_a_character_shows_it_escaped(tmp_path: Path) -> None:
+    taxel.convert(some_events(20), tmp_path / "walk ä ł.mcap")
+    variables = {**os.environ, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
+    command = [sys.executable, "-m", "taxel", "info", "walk ä ł.mcap"]
+    done = subprocess.run(command, cwd=tmp_path, env=variables, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "walk ä \\u0142.mcap".encode("cp1252") in done.stdout
+
+
+@on_windows
+def test_a_file_that_another_program_holds_is_named_and_stays_whole(tmp_path: Path) -> None:
+    path = tmp_path / "walk.csv"
+    taxel.convert(some_events(20), path)
+    before = path.read_bytes()
+    with path.open("rb"), pytest.raises(PermissionError, match="another program has it open") as raised:
+        taxel.convert(some_events(30), path, overwrite=True)
+    assert raised.value.filename == str(path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_new_file_never_replaces_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On file systems without links too."""
+
+    def no_link(*_: object) -> None:
+        raise OSError(errno.EPERM, "no links")
+
+    for k, links in enumerate((True, False)):
+        if not links:
+            monkeypatch.setattr(os, "link", no_link)
+        new, other = tmp_path / f"new{k}", tmp_path / f"other{k}"
+        new.write_text("new"), other.write_text("other")
+        with pytest.raises(FileExistsError):
+            create(new, other)
+        assert (new.read_text(), other.read_text()) == ("new", "other")
+        other.unlink()
+        create(new, other)
+        assert (new.exists(), other.read_text()) == (False, "new")
+    assert write_whole(tmp_path / "whole", lambda file: file.write(b"1")).read_bytes() == b"1"
+
+
+def test_windows_firewall_is_named_on_windows_alone() -> None:
+    assert "Windows' firewall" in interfaces.blocked("win32")
+    assert interfaces.blocked("linux") == ""
+
+
+def test_ctrl_break_stops_as_ctrl_c_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another signal stands for it where there is none."""
+    if not hasattr(signal, "SIGBREAK"):
+        monkeypatch.setattr(signal, "SIGBREAK", signal.SIGUSR1, raising=False)
+    before = signal.getsignal(signal.SIGBREAK)
+    with asked_to_end() as request:
+        assert not request.is_set()
+        signal.raise_signal(signal.SIGBREAK)
+        assert request.is_set()
+    assert signal.getsignal(signal.SIGBREAK) == before
+
+
+@on_windows
+@pytest.mark.parametrize("event", ["CTRL_BREAK_EVENT", "CTRL_C_EVENT"])
+def test_a_recording_is_complete_after_ctrl_break(tmp_path: Path, event: str) -> None:
+    port = free_port()
+    command = ["record", "walk.mcap", "--host", "127.0.0.1", "--port", str(port), "--array", "64x64"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "taxel", *command],
+        cwd=tmp_path,
+        stdin=subprocess.DEVNULL,
+        creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) if "BREAK" in event else 0,
+    )
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
+        until((tmp_path / "walk.mcap").exists)
+        board.sendto(taxel.wire.encode(some_events(20)), ("127.0.0.1", port))
+    time.sleep(1.0)
+    process.send_signal(getattr(signal, event))
+    assert process.wait(60) == 0
+    recording = taxel.open(tmp_path / "walk.mcap")
+    assert len(recording.events) == 20
+    assert not recording.truncated
