@@ -194,7 +194,7 @@ def test_a_command_that_fills_the_disk_with_hdf5_ends_with_one_line_and_exit_cod
         "resource.setrlimit(resource.RLIMIT_FSIZE, (3000, resource.RLIM_INFINITY))\n"
         "main(sys.argv[1:])\n"
     )
-    for arguments in (["convert", "a.npz", "b.h5"], ["cut", "a.npz", "b.h5", "--from", "0", "--to", "9"]):
+    for arguments in (["convert", "a.npz", "b.h5"], ["cut", "a.npz", "b.h5", "--from", "0.001", "--to", "9"]):
         done = subprocess.run(
             [sys.executable, "-c", code, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
         )

@@ -233,6 +233,32 @@ def test_cut_and_merge_as_a_shell_sees_them(tmp_path: Path) -> None:
         assert (said.returncode, said.stderr.count("\n")) == (2, 1), said.stderr
 
 
+@pytest.mark.parametrize("begin_us", [0, 5_000_000, 1_795_000_000_000_000])
+def test_a_shell_counts_the_seconds_of_a_stretch_as_info_does(begin_us: int, tmp_path: Path) -> None:
+    """From the beginning where times count from 1970; else they are the board's."""
+    t = begin_us + 10_000 * np.arange(1000)
+    frames = taxel.Frames(np.zeros((1000, 2, 2)), t, unit="counts", array=taxel.Array(2, 2))
+    taxel.convert(frames, tmp_path / "a.npz")
+    first = begin_us / 1e6 if begin_us < 10**15 else 0.0
+    said = run("cut", tmp_path / "a.npz", tmp_path / "b.npz", "--from", first + 3.2, "--to", first + 4)
+    assert said.returncode == 0, said.stderr
+    assert np.array_equal(taxel.open(tmp_path / "b.npz").frames().t, t[320:400])
+    lasts = f"a.npz lasts from {first:g} to {first + 9.99:g} s"
+    for ends, why in (
+        (("--from", first), "must cut something off"),
+        (("--from", first - 1, "--to", first + 10), "must cut something off"),
+        (("--from", first + 3, "--to", first + 3), "holds nothing there"),
+        (("--from", first + 3.001, "--to", first + 3.009), "holds nothing there"),
+        (("--from", first + 20), "must be at most its end"),
+        (("--to", first), "must be above its beginning"),
+    ):
+        said = run("cut", tmp_path / "a.npz", tmp_path / "c.npz", *ends)
+        assert (said.returncode, said.stderr.count("\n")) == (2, 1)
+        assert why in said.stderr
+        assert lasts.removeprefix("a.npz ") in said.stderr
+    assert not (tmp_path / "c.npz").exists()
+
+
 # notes while recording
 
 #: Program of a child process: makes its standard input the controlling terminal, then executes taxel.

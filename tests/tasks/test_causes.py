@@ -19,8 +19,10 @@ from tests.detect.test_levels import steps
 import taxel
 from taxel._base.messages import collected
 from taxel._base.progress import Forecast
-from taxel.detect import Example
-from taxel.detect.examples import array_of
+from taxel.detect import Example, Recipe
+from taxel.detect.causes import Evidence
+from taxel.detect.examples import array_of, check_examples
+from taxel.detect.floors import measured_floor
 from taxel.recording.contents import alone, source_from
 from taxel.recording.sections import Origin
 
@@ -259,6 +261,38 @@ def test_causes_are_data_and_their_arguments_are_options_of_a_training(tmp_path:
     again = taxel.train(taxel.open(tmp_path / "a.npz"), late, replace(options, **cause.arguments))
     assert (again.score.found, again.score.false, again.causes) == (20, 0, ())
     assert "labels moved by -300 ms before, as asked" in again.lines()
+
+
+def grasped(seed: int) -> tuple[taxel.Frames, Labels]:
+    """Return grasps on 8 x 8 taxels at 100 Hz; what is held slips by a taxel while it is touched."""
+    random = np.random.default_rng(seed)
+    begins = 100 + np.cumsum(random.integers(110, 160, 15))
+    slips = begins + random.integers(20, 60, 15)
+    ends, values = slips + random.integers(20, 60, 15), random.normal(50, 0.5, (int(begins[-1]) + 200, 8, 8))
+    for begin, slip, end in zip(begins, slips, ends, strict=True):
+        y, x, load = *random.integers(0, 5, 2), random.uniform(40, 50)
+        values[begin:slip, y : y + 3, x : x + 2] += load
+        values[slip:end, y : y + 3, x + 1 : x + 3] += load
+    t = 10_000 * np.arange(len(values))
+    labels = {"onset": t[begins], "release": t[ends], "slip": t[slips]}
+    return taxel.Frames(values, t, unit="counts", array=taxel.Array(8, 8)), labels
+
+
+@pytest.mark.parametrize("later", [0, 300_000])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_what_happens_while_a_touch_lasts_is_no_label_of_another_recording(seed: int, later: int) -> None:
+    frames, labels = grasped(seed)
+    if later:  # each at the same time after its onset, which is no late clock
+        labels["slip"] = labels["onset"] + later
+    example = Example(frames, labels, taxel.Tare.take(frames.between(0, 900_000)))
+    plan = Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example]))
+    (cause,) = Evidence([example], check_examples([example]), plan).causes({"slip": 15})
+    assert (cause.kind, cause.labels, cause.mistakes) == ("label_name", ("slip",), 15)
+    assert "lie within touches, which onset, release fit, and no recipe tells what happens while a" in cause.measured
+    # Where no label fits the touches, labels may be of another recording.
+    alone = example._replace(labels={"slip": labels["slip"]})
+    causes = Evidence([alone], check_examples([alone]), plan).causes({"slip": 15})
+    assert [cause.kind for cause in causes] == ["shifted_labels" if later else "foreign_labels"]
 
 
 def test_two_feet_are_no_two_sensors_at_different_places() -> None:

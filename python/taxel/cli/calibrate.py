@@ -27,9 +27,11 @@ def calibrate(
     files: FileOptions,
     load: Annotated[float | None, typer.Option(help="A known load, on the sensor from --from to --to.")] = None,
     start: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="Start of the load, board time, s.")
+        float | None, typer.Option("--from", metavar="S", help="Start of the load, s, as taxel info counts.")
     ] = None,
-    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="End of the load, board time, s.")] = None,
+    stop: Annotated[
+        float | None, typer.Option("--to", metavar="S", help="End of the load, s, as taxel info counts.")
+    ] = None,
     load_unit: Annotated[str, typer.Option(help="Unit of --load: N (total) or kPa (at every taxel).")] = "N",
     loads: Annotated[
         Path | None,

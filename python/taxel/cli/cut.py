@@ -7,11 +7,13 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import typer
 
 import taxel
 from taxel import _core
 from taxel._base.messages import plain
+from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.cli._app import App, JsonOption, OverwriteOption, with_out
 from taxel.cli._opening import FileOptions
@@ -36,9 +38,11 @@ def cut(
     ],
     files: FileOptions,
     start: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="Start of the part, board time, s.")
+        float | None, typer.Option("--from", metavar="S", help="Start of the part, s, as taxel info counts.")
     ] = None,
-    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="End of the part, board time, s.")] = None,
+    stop: Annotated[
+        float | None, typer.Option("--to", metavar="S", help="End of the part, s, as taxel info counts.")
+    ] = None,
     columns: Annotated[str | None, typer.Option(metavar="A:B", help="Columns A to B - 1, as 0:32.")] = None,
     rows: Annotated[str | None, typer.Option(metavar="A:B", help="Rows A to B - 1, as 10:20.")] = None,
     label: Annotated[str | None, typer.Option(help="Cut a part around each note with this text.")] = None,
@@ -56,22 +60,24 @@ def cut(
 ) -> None:
     """Cut a recording by time, by region or by label.
 
+    Times are those of taxel info: the board's, or from the recording's beginning where they count from 1970.
+
     Example: taxel cut walk.mcap heel.mcap --from 1.5 --to 3 --rows 0:20
     """
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {plain(start)} --to {plain(stop)}: the part must not end before it begins")
     source_recording = of_source(files.opener.open_one(recording), source)
+    start_us, stop_us = _stretch_us(source_recording, start, stop)
     parts = taxel.cut(
         source_recording,
-        start_us=float("-inf") if start is None else start * 1e6,
-        stop_us=float("inf") if stop is None else stop * 1e6,
+        start_us=start_us,
+        stop_us=stop_us,
         columns=_range("--columns", columns),
         rows=_range("--rows", rows),
         label=label,
         before_us=before * 1e6,
         after_us=after * 1e6,
     )
-    _check_time(source_recording, start, stop)
     if not parts:
         raise ProblemError(f"{recording}: no note {label!r} with a time in it; taxel info --json lists the notes")
     written = []
@@ -85,18 +91,32 @@ def cut(
         say(json.dumps({"recording": str(recording), "written": written}))
 
 
-def _check_time(recording: Recording, start: float | None, stop: float | None) -> None:
-    """Refuse a time before or after the whole recording, as its file would be empty; a silence within it is allowed."""
+def _stretch_us(recording: Recording, start: float | None, stop: float | None) -> tuple[float, float]:
+    """Return from when to when a part lasts, us, by the times of the recording.
+
+    Refused is a part that cuts nothing off, or holds nothing; a silence of a board within its recording is allowed.
+    """
     if start is None and stop is None:
-        return
+        return -np.inf, np.inf
     from taxel.recording.cut import span_us  # noqa: PLC0415  the command line starts quickly
 
-    first, last = (t / 1e6 for t in span_us(recording))
-    lasts = f"{recording.path} lasts from {plain(first)} to {plain(last)} s"
-    if start is not None and start > last:
+    first, last = span_us(recording)
+    begin_us = beginning_us(np.array([first]))
+    start_us = -np.inf if start is None else begin_us + start * 1e6
+    stop_us = np.inf if stop is None else begin_us + stop * 1e6
+    first_s, last_s = ((t - begin_us) / 1e6 for t in (first, last))
+    lasts = f"{recording.path} lasts from {plain(first_s)} to {plain(last_s)} s"
+    if start is not None and start_us > last:
         raise ProblemError(f"--from {plain(start)}: {lasts}; must be at most its end")
-    if stop is not None and stop <= first:
+    if stop is not None and stop_us <= first:
         raise ProblemError(f"--to {plain(stop)}: {lasts}; must be above its beginning")
+    options = {"--from": start, "--to": stop}
+    given = " ".join(f"{option} {plain(s)}" for option, s in options.items() if s is not None)
+    if start_us <= first and stop_us > last:
+        raise ProblemError(f"{given}: {lasts}; must cut something off")
+    if start_us == stop_us or not (recording.has_events or len(recording.frames().between(start_us, stop_us))):
+        raise ProblemError(f"{given}: {recording.path} holds nothing there; {lasts.removeprefix(f'{recording.path} ')}")
+    return start_us, stop_us
 
 
 def _range(option: str, text: str | None) -> slice | None:

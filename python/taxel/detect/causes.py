@@ -247,9 +247,26 @@ class Evidence:
         if advice and wrong:
             # What else is measured is measured upside down.
             return [Cause("falling_values", tuple(wrong), sum(wrong.values()), measured, advice)]
+        while_lasting = [cause for label, count in wrong.items() for cause in self._while_lasting(label, count)]
+        wrong = {label: count for label, count in wrong.items() if all(label not in c.labels for c in while_lasting)}
         shifts = list(self._shifts(wrong))
         found = [cause for label, count in wrong.items() for cause in self._of_label(label, count)]
-        return shifts or [*found, *(cause for label, count in wrong.items() for cause in self._foreign(label, count))]
+        found += [cause for label, count in wrong.items() for cause in self._foreign(label, count)]
+        return [*while_lasting, *(shifts or found)]
+
+    def _while_lasting(self, label: str, wrong: int) -> Iterator[Cause]:
+        """Yield that most labels of a name lie within touches, where most labels of another name lie at their edges."""
+        near, at_edge, total = self._near.get(label, (0, 0, 0))
+        fits = [name for name, (_, edge, of) in self._near.items() if name != label and 2 * edge > of]
+        within = near - at_edge
+        # A tare that does not fit lets touches seem to last.
+        if recipes.knows("touch", label) or not fits or 2 * within <= total or self._loaded >= TOUCH:
+            return
+        measured = (
+            f"{within} of {counted(total, 'label')} {_lie(within)} within touches, which {', '.join(fits)} "
+            f"{'fits' if len(fits) == 1 else 'fit'}, and no recipe tells what happens while a touch lasts"
+        )
+        yield Cause("label_name", (label,), wrong, measured, "labels of where touches begin or end")
 
     def _foreign(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield at how many labels no load begins or ends; all mistakes may be by them if that is most."""
@@ -359,6 +376,8 @@ class Mistakes:
         found += evidence.causes(wrong)
         if not any(cause.kind in ("falling_values", "shifted_labels") for cause in found):
             for label, mistakes in wrong.items():
+                if any(cause.kind == "label_name" and label in cause.labels for cause in found):
+                    continue
                 found += [*self._unlabelled_time(evidence.sound, label), *self._name(label, mistakes)]
                 # A tare that does not fit lets labels lie far from what is felt, too.
                 if not any(cause.kind in ("foreign_labels", "tare") and label in cause.labels for cause in found):

@@ -15,6 +15,7 @@ from taxel._base.arguments import checked_path, finite, flag, instance, mapping,
 from taxel._base.arguments import text as checked_text
 from taxel._base.errors import helped, refused
 from taxel._base.messages import collected
+from taxel._base.times import beginning_us
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration, Load
@@ -35,7 +36,8 @@ class KnownLoad:
     unit : {"N", "kPa"}
         Force in all, or the same pressure at every taxel.
     from_s, to_s : float, s, optional
-        From when to when, by the board's time; default: from the beginning, to the end.
+        From when to when, by the board's time, or from the recording's beginning where times count from 1970; default:
+        from the beginning, to the end.
     taxel : (int, int), optional
         Column and row of the only taxel that bears it.
     place : str
@@ -233,7 +235,8 @@ def _read(recording: Recording, tare: GivenTare | None) -> tuple[Frames, NDArray
 
 
 def _load(frames: Frames, known: KnownLoad) -> Load:
-    first, last = (None if s is None else s * 1e6 for s in (known.from_s, known.to_s))
+    begin_us = beginning_us(frames.t)
+    first, last = (None if s is None else begin_us + s * 1e6 for s in (known.from_s, known.to_s))
     loaded = frames.between(float("-inf") if first is None else first, float("inf") if last is None else last)
     if not len(loaded):
         raise ProblemError(f"{known.place}: nothing was recorded{_span(known.from_s, known.to_s)}")
