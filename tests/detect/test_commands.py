@@ -500,6 +500,24 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
     assert "contact, chosen: tau 1.5" in out
 
 
+def test_a_report_that_fails_loses_no_score(folder: Path, capsys, tmp_path: Path, monkeypatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise taxel.ProblemError("no page")
+
+    monkeypatch.setattr("taxel.report.write_detections", fail)
+    plan = ("--recipe", folder / "recipe.toml", "--tare", folder / "tare.json", "--folds", 0)
+    out, report = tmp_path / "touch.json", ("--report", tmp_path / "r")
+    arguments = ("train", folder / "1.npz", "--labels", folder / "labels.csv", *plan, "-o", out, *report)
+    code, said, error = call(capsys, *arguments)
+    assert (code, error.splitlines()[-1]) == (2, "taxel: no page")
+    assert "not held out" in said
+    assert f"written to {out}; next: " in said
+    code, said, _ = call(capsys, *arguments, "--overwrite", "--json")
+    assert (code, json.loads(said)["readout"]) == (2, str(out))
+    code, said, _ = call(capsys, "detect", folder / "9.npz", "--readout", out, "--tare", folder / "tare.json", *report)
+    assert (code, "slope (mV/ms)" in said) == (2, True)
+
+
 @pytest.mark.usefixtures("drawn")
 def test_a_report_shows_the_sum_of_each_foot(capsys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Figure] = []

@@ -23,7 +23,7 @@ from taxel.spikes import to_ms
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from taxel.detect import Outcome
+    from taxel.detect import Outcome, PlainRule, Readout
     from taxel.tasks import Detected, Detecting
 
 app = App()
@@ -76,28 +76,36 @@ def detect(
         found = taxel.tasks.detect(loaded, opened, truth, options, progress=update)
     if out is not None:
         write_whole(out, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
-    if report is not None:
-        taxel.report.write_detections(report, loaded, found.outcomes, title=f"Detections of {readout} in {recording}")
     say_warnings(found.warnings)
-    written = {"written": out, "report": None if report is None else report / "report.html"}
-    files_written = {name: str(path) for name, path in written.items() if path is not None}
     if as_json:
+        written = {"written": out, "report": None if report is None else report / "report.html"}
+        files_written = {name: str(path) for name, path in written.items() if path is not None}
         say(json.dumps(_result(recording, readout, found.to_dict()) | files_written))
-        return
+    else:
+        _say_found(found, loaded, recording, truth, given=tare is not None, lists=lists)
+        say(*[] if out is None else [f"written to {out}"])
+    if report is not None:  # last, so that nothing is lost where it fails
+        title = f"Detections of {readout} in {recording}"
+        place = taxel.report.write_detections(report, loaded, found.outcomes, title=title)
+        say(*[] if as_json else [f"report: {place}"])
+
+
+def _say_found(
+    found: Detecting, readout: Readout | PlainRule, recording: Path, truth: str | None, *, given: bool, lists: bool
+) -> None:
+    """Print score and detections; `given`: whether a tare is."""
     several = recording.is_dir() or len(found.each) > 1
     if found.score is not None:
-        _print_score(found, loaded.labels, truth, several=several)
+        _print_score(found, readout.labels, truth, several=several)
     for each in found.each:
         if found.score is None or lists or not several:
-            _print(each, given=tare is not None, named=several, rows=None if lists else _ROWS * (found.score is None))
-            if isinstance(loaded, taxel.Readout):
+            _print(each, given=given, named=several, rows=None if lists else _ROWS * (found.score is None))
+            if isinstance(readout, taxel.Readout):
                 say(each.outcome.outside_text)
         elif each.hint is not None:
             say(f"{each.outcome.name}: {each.hint}")
     if found.score is not None and not lists:
         say("--list prints the detections")
-    for name, path in files_written.items():
-        say(f"written to {path}" if name == "written" else f"{name}: {path}")
 
 
 def _result(recording: Path, readout: Path, found: dict[str, Any]) -> dict[str, Any]:

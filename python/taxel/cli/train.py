@@ -131,8 +131,17 @@ def train(
     training = _trained(opened, labels, options, as_json=as_json)
     training.readout.save(out, overwrite=overwrite)
     rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
-    if report is not None:
-        taxel.report.write_detections(
+    say_warnings(training.warned)
+    if as_json:
+        written: dict[str, Any] = {"rules": {str(path): each for path, each in rules.items()}} if rules else {}
+        written |= {} if report is None else {"report": str(report / "report.html")}
+        say(json.dumps({"readout": str(out), **training.to_dict(), **written}))
+    else:
+        say(*training.lines(), "", f"written to {out}; next: {_next(training, out, tare)}")
+        say(*(f"plain rule of {' and '.join(each)}: written to {path}" for path, each in rules.items()))
+        say(*(f"warning: {warning}" for warning in training.unreliable()))
+    if report is not None:  # last, so that nothing is lost where it fails
+        place = taxel.report.write_detections(
             report,
             training.readout,
             training.outcomes,
@@ -142,16 +151,7 @@ def train(
             alignments=training.made.alignments,
             scored=training.scored,
         )
-    say_warnings(training.warned)
-    if as_json:
-        written: dict[str, Any] = {"rules": {str(path): each for path, each in rules.items()}} if rules else {}
-        written |= {} if report is None else {"report": str(report / "report.html")}
-        say(json.dumps({"readout": str(out), **training.to_dict(), **written}))
-        return
-    lines = [*training.lines(), "", f"written to {out}; next: {_next(training, out, tare)}"]
-    lines += [f"plain rule of {' and '.join(each)}: written to {path}" for path, each in rules.items()]
-    lines += [] if report is None else [f"report: {report / 'report.html'}"]
-    say(*lines, *(f"warning: {warning}" for warning in training.unreliable()))
+        say(*[] if as_json else [f"report: {place}"])
 
 
 def _trained(opened: Sequence[Recording], labels: str, options: TrainOptions, *, as_json: bool) -> Training:

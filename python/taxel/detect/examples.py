@@ -156,23 +156,28 @@ def sizes_of(examples: Sequence[Example]) -> list[tuple[int, int]]:
 
 
 def _padded(examples: list[Example]) -> list[Example]:
-    """Return examples of grids of several sizes padded at their far edges to the largest; all others as they are.
-
-    A taxel beyond an edge reads 0, and has no rest in a tare, so that it counts nowhere.
-    """
+    """Return examples of grids of several sizes padded at their far edges to the largest; all others as they are."""
     shapes = sizes_of(examples)
     if not shapes:
         return examples
     rows, columns = (max(sizes) for sizes in zip(*shapes, strict=True))
     padded = []
     for example in examples:
-        source, tare = example.source, example.tare
-        assert isinstance(source, Frames)
-        array = source.array._padded((rows, columns))
-        beyond = [(0, 0), (0, rows - source.array.rows), (0, columns - source.array.columns)]
-        values = Frames(np.pad(source.values, beyond), source.t, unit=source.unit, array=array)
-        padded.append(example._replace(source=values, tare=None if tare is None else tare._padded_to(array)))
+        assert isinstance(example.source, Frames)
+        source, tare = padded_to(example.source, example.tare, (rows, columns))
+        padded.append(example._replace(source=source, tare=tare))
     return padded
+
+
+def padded_to(frames: Frames, tare: Tare | None, shape: tuple[int, int]) -> tuple[Frames, Tare | None]:
+    """Return frames of a grid, and their tare, padded at the far edges to a larger grid.
+
+    A taxel beyond an edge reads 0, and has no rest in a tare, so that it counts nowhere.
+    """
+    array = frames.array._padded(shape)
+    beyond = [(0, 0), *((0, most - size) for size, most in zip(frames.array.shape, shape, strict=True))]
+    values = Frames(np.pad(frames.values, beyond), frames.t, unit=frames.unit, array=array)
+    return values, None if tare is None else tare._padded_to(array)
 
 
 def array_of(examples: Sequence[Example]) -> Array | None:

@@ -24,7 +24,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import Alignment, Judged, Outcome, PlainRule, Readout, Score
 from taxel.detect.detector import detector
-from taxel.detect.examples import array_of
+from taxel.detect.examples import array_of, padded_to
 from taxel.encode import Composite, Encoder
 from taxel.frames import Frames
 from taxel.recorded import recorded
@@ -303,15 +303,19 @@ def _moves(aligned: Alignment | None) -> Figure | None:
 
 
 def _trains(readout: Readout, outcome: Outcome) -> SpikeTrains:
-    encoder = readout.encoder if outcome.example.tare is None else readout.encoder.with_tare(outcome.example.tare)
-    source = outcome.example.source
-    return source if isinstance(source, SpikeTrains) else encoder.encode(source)
+    source, tare, array = recorded(outcome.example.source), outcome.example.tare, readout.array
+    if isinstance(source, SpikeTrains):
+        return source
+    # A readout of grids of several sizes has weights for the largest.
+    if isinstance(source, Frames) and array is not None and array.shape != source.array.shape:
+        source, tare = padded_to(source, tare, array.shape)
+    return (readout.encoder if tare is None else readout.encoder.with_tare(tare)).encode(source)
 
 
 def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
     """Draw weights over the array where trains are taxels', else as bars."""
     weights = np.asarray(readout.neurons[label].weights)
-    array = array_of([outcome.example])
+    array = array_of([outcome.example]) if readout.array is None else readout.array
     if array is None:
         raise ProblemError(f"{outcome.name}: spike trains do not state their array")
     largest = float(np.abs(weights).max()) or 1.0
