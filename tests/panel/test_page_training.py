@@ -186,8 +186,8 @@ def test_what_a_training_missed_is_in_a_table_and_in_the_lanes(chromium: Any, tm
 def test_labels_far_from_anything_felt_are_a_question_with_a_button_to_go_on(chromium: Any, tmp_path: Path) -> None:
     frames, truth = frames_of_mat()
     taxel.convert(frames, tmp_path / "mat.npz")
-    # Within each touch: nothing begins or ends there.
-    rows = [f"contact,{t + 100_000}" for t in truth["contact"]]
+    # Between touches: nothing begins or ends there, and they are as far from one as from the next.
+    rows = [f"contact,{t - 125_000}" for t in truth["contact"]]
     (tmp_path / "mat.notes.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
     with Panel(tmp_path / "mat.npz") as panel, opened(chromium, panel.url) as page:
         shows(page, "label-count", "^8 labels$")
