@@ -32,7 +32,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-live",
         &[
-            &["error", "latency", "locked", "text_lines"],
+            &["error", "kernel_drops", "latency", "locked", "text_lines"],
             &["clock", "host_clock", "regular_file"],
             &["address", "bridged", "ports"],
             &["serial_line"],

@@ -7,6 +7,7 @@ pub mod clock;
 pub mod error;
 pub mod frame_lines;
 pub mod host_clock;
+mod kernel_drops;
 mod latency;
 pub mod line_input;
 pub mod line_place;
@@ -22,5 +23,6 @@ pub mod pipeline;
 pub mod recording;
 
 pub use error::{Error, Result};
+pub use kernel_drops::KernelDrops;
 pub use latency::Quantiles;
 pub use regular_file::open_regular;
