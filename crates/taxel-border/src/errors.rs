@@ -65,11 +65,11 @@ fn os_error(source: std::io::Error, place: String) -> PyErr {
         _ => None,
     });
     let message = source.to_string();
+    let text = message.split(" (os error").next().unwrap_or(&message).to_owned();
     match code {
-        Some(code) => {
-            let text = message.split(" (os error").next().unwrap_or(&message).to_owned();
-            PyOSError::new_err((code, text, place))
-        }
+        // Python finds the code of its classes by that of Windows, which comes last.
+        Some(code) if cfg!(windows) && source.raw_os_error().is_some() => PyOSError::new_err((0, text, place, code)),
+        Some(code) => PyOSError::new_err((code, text, place)),
         None => PyOSError::new_err(format!("{place}: {message}")),
     }
 }

@@ -32,8 +32,8 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-live",
         &[
-            &["error", "latency", "locked", "text_lines"],
-            &["clock", "host_clock", "regular_file"],
+            &["error", "kernel_drops", "latency", "locked", "read_at", "readable_file", "system_error", "text_lines"],
+            &["clock", "host_clock", "named_pipe", "regular_file"],
             &["address", "bridged", "ports"],
             &["serial_line"],
             &["board_line", "line_place", "recording"],
@@ -62,7 +62,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-python",
         &[
-            &["thread_state", "threaded"],
+            &["descriptors", "thread_state", "threaded"],
             &["bridge", "cone_x"],
             &[
                 "calibration",

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::host_clock::HostOffset;
+use crate::kernel_drops::KernelDrops;
 
 /// Counts of what a bridge delivered and lost.
 ///
@@ -18,7 +19,7 @@ pub struct Bridged {
     /// Datagrams that the other computer dropped because its queues were full.
     pub dropped: u64,
     /// Messages that the other computer's kernel dropped.
-    pub dropped_by_kernel: u64,
+    pub dropped_by_kernel: KernelDrops,
     /// Parcels that were delivered repeatedly, and ignored.
     pub repeated: u64,
     /// Parcels that could not be parsed.
@@ -41,7 +42,8 @@ impl Bridged {
     pub fn since(&self, earlier: &Self) -> Self {
         taxel_core::counts_since! {
             self, earlier;
-            parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences;
+            parcels, missing, dropped, repeated, refused, restarts, silences;
+            dropped_by_kernel: self.dropped_by_kernel.since(earlier.dropped_by_kernel),
             ..*self
         }
     }

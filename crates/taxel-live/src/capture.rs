@@ -10,6 +10,9 @@
 //!
 //! A *message* is what one receive call returns: a datagram, or, with `UDP_GRO`, a train of datagrams that the kernel
 //! merged. The kernel counts its drops in messages, so a datagram-exact count of what it dropped needs `gro` off.
+//!
+//! Linux counts its drops and stamps arrivals. By the portable calls the drops are unknown, and a datagram's arrival is when
+//! it was read; on Linux `TAXEL_CAPTURE=portable` selects these calls.
 
 mod counts;
 mod feed;
@@ -19,6 +22,7 @@ mod parcel;
 mod queue;
 mod sender;
 mod socket;
+mod system_calls;
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -39,6 +43,7 @@ use queue::BatchQueue;
 pub use queue::{Batch, Datagram};
 pub use sender::{SendCounts, Sender};
 use socket::Socket;
+use system_calls::SystemCalls;
 
 /// Interval at which the thread checks whether it must stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -96,7 +101,7 @@ impl Receiver {
     /// # Errors
     ///
     /// `Socket` if the address cannot be bound (taken, not ours), `Core(Problem)` if the queue is smaller than
-    /// the largest datagram.
+    /// the largest datagram, or `TAXEL_CAPTURE` has a value that it cannot have.
     pub fn bind(address: SocketAddr, options: ReceiverOptions) -> Result<Self> {
         if options.queue_bytes < socket::LARGEST {
             return Err(taxel_core::problem!(
@@ -107,11 +112,13 @@ impl Receiver {
             .into());
         }
         let name = format!("UDP {address}");
-        let socket = Socket::bind(address, &options).map_err(Error::socket(&name))?;
+        let socket = Socket::bind(address, &options, SystemCalls::selected()?).map_err(Error::socket(&name))?;
         let address = socket.address().map_err(Error::socket(&name))?;
         let counts = CaptureCounts {
             kernel_buffer_bytes: socket.kernel_buffer_bytes(),
             gro: socket.gro(),
+            stamped_when_read: socket.stamps_when_read(),
+            dropped_by_kernel: socket.totals().dropped_by_kernel,
             ..CaptureCounts::default()
         };
         let queue = Arc::new(BatchQueue::new(options.queue_bytes, counts));
@@ -231,7 +238,7 @@ impl Receiver {
         if let Ok(messages) = filled {
             self.queue.count(batch, messages, socket.totals());
         }
-        if filled.is_err() || stopped_ns.is_some_and(|stopped_ns| batch.ends_after(stopped_ns)) {
+        if filled.is_err() || stopped_ns.is_some_and(|stopped_ns| socket.has_read_until(stopped_ns, batch)) {
             self.queue.close(None);
         }
         filled.map(|messages| messages > 0)
@@ -277,7 +284,7 @@ fn receive(mut socket: Socket, queue: &BatchQueue, gather: Duration) {
         let stopped_ns = queue.stopped_ns();
         match fill(&mut socket, &mut scratch, stopped_ns.map_or(Some(LOOK_EVERY), |_| None)) {
             Ok(messages) => {
-                let ended = stopped_ns.is_some_and(|stopped_ns| scratch.ends_after(stopped_ns));
+                let ended = stopped_ns.is_some_and(|stopped_ns| socket.has_read_until(stopped_ns, &scratch));
                 let full = scratch.room() < socket::LARGEST;
                 queue.put(&mut scratch, messages, socket.totals());
                 if ended {

@@ -7,13 +7,18 @@ pub mod clock;
 pub mod error;
 pub mod frame_lines;
 pub mod host_clock;
+mod kernel_drops;
 mod latency;
 pub mod line_input;
 pub mod line_place;
 pub mod locked;
+mod named_pipe;
 pub mod ports;
+mod read_at;
+mod readable_file;
 mod regular_file;
 pub mod serial_line;
+mod system_error;
 pub mod text_lines;
 
 pub mod capture;
@@ -22,5 +27,8 @@ pub mod pipeline;
 pub mod recording;
 
 pub use error::{Error, Result};
+pub use kernel_drops::KernelDrops;
 pub use latency::Quantiles;
+pub use read_at::read_exact_at;
+pub use readable_file::ReadableFile;
 pub use regular_file::open_regular;

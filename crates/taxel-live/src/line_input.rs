@@ -1,14 +1,12 @@
 //! Lines of text from a serial line, a pipe, a file that grows, TCP or UDP, as they arrive.
 
-use std::fs::File;
-use std::io::{self, ErrorKind, Read};
+use std::io::{self, ErrorKind};
 use std::net::UdpSocket;
-use std::os::fd::{AsFd, AsRawFd, RawFd};
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::line_place::LinePlace;
+use crate::readable_file::ReadableFile;
 use crate::recording::now_ns;
 use crate::serial_line::{CONNECT, SerialLine};
 use crate::text_lines::{TextLine, TextLines};
@@ -38,7 +36,7 @@ pub struct LineReader {
 
 enum OpenInput {
     Serial(SerialLine),
-    File(File),
+    File(ReadableFile),
     Udp(UdpSocket),
 }
 
@@ -80,19 +78,15 @@ impl LineReader {
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => 0,
                 received => received?,
             },
-            Some(OpenInput::File(file)) if is_readable(file.as_raw_fd(), LOOK_EVERY) => {
-                match file.read(&mut self.piece) {
-                    Ok(0) if self.place == LinePlace::File(PathBuf::from("-")) => return Ok(true),
-                    // A pipe without a writer, or the end of a file: a program may still write to it.
-                    Ok(0) => {
-                        std::thread::sleep(LOOK_EVERY);
-                        0
-                    }
-                    Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => 0,
-                    read => read?,
+            Some(OpenInput::File(file)) => match file.read(&mut self.piece, LOOK_EVERY)? {
+                Some(0) if self.place == LinePlace::File(PathBuf::from("-")) => return Ok(true),
+                // A pipe without a writer, or the end of a file: a program may still write to it.
+                Some(0) => {
+                    std::thread::sleep(LOOK_EVERY);
+                    0
                 }
-            }
-            Some(OpenInput::File(_)) => 0,
+                read => read.unwrap_or(0),
+            },
         };
         if n > 0 {
             self.came_ns = now_ns();
@@ -129,14 +123,10 @@ impl OpenInput {
     fn open(place: &LinePlace) -> Result<Self> {
         match place {
             LinePlace::Serial(place) | LinePlace::Tcp(place) => SerialLine::open(place, CONNECT).map(Self::Serial),
-            LinePlace::File(path) if path == Path::new("-") => {
-                // Bypasses the program's own buffer, whose content `poll` does not see.
-                let input = io::stdin().as_fd().try_clone_to_owned().map_err(Error::file(path))?;
-                Ok(Self::File(File::from(input)))
-            }
             LinePlace::File(path) => {
-                let file = File::options().read(true).custom_flags(libc::O_NONBLOCK).open(path);
-                Ok(Self::File(file.map_err(Error::file(path))?))
+                let is_input = path == Path::new("-");
+                let file = if is_input { ReadableFile::standard_input() } else { ReadableFile::open(path) };
+                file.map(Self::File).map_err(Error::file(path))
             }
             LinePlace::Udp(address) => {
                 let socket = UdpSocket::bind(address).and_then(|socket| {
@@ -147,12 +137,4 @@ impl OpenInput {
             }
         }
     }
-}
-
-/// Waits until data can be read, or the end was reached.
-fn is_readable(descriptor: RawFd, most: Duration) -> bool {
-    let mut asked = libc::pollfd { fd: descriptor, events: libc::POLLIN, revents: 0 };
-    let most = i32::try_from(most.as_millis()).unwrap_or(i32::MAX);
-    // SAFETY: one entry, on our stack, of a descriptor that the caller holds open.
-    unsafe { libc::poll(&raw mut asked, 1, most) > 0 }
 }

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use taxel_core::detect::Detection;
 use taxel_core::wire::{self, Registers, v2};
 use taxel_core::{Array, Marker, Stop};
+use taxel_live::KernelDrops;
+use taxel_live::bridged::Bridged;
 use taxel_live::recording::{
     Compression, FileEnding, Header, NOTHING_LOST, Reader, RecordingCounts, RecordingStatus, Topic, Writer,
     WriterOptions, damage,
@@ -307,7 +309,7 @@ fn the_verdict_states_what_was_lost_where() {
     let lossy = RecordingCounts {
         received: 10,
         recorded: 6,
-        dropped_by_kernel: 2,
+        dropped_by_kernel: KernelDrops(Some(2)),
         dropped_by_queue: 3,
         ..RecordingCounts::default()
     };
@@ -319,4 +321,28 @@ fn the_verdict_states_what_was_lost_where() {
     }
     let damaged = RecordingCounts { decoder: [("skipped".to_owned(), 7), ("short".to_owned(), 0)].into(), ..sound };
     assert_eq!(damaged.verdict().text, format!("{NOTHING_LOST}; in the bytes that came: 7 skipped"));
+}
+
+#[test]
+fn what_a_kernel_does_not_count_is_unknown_unless_the_board_numbers_what_it_sends() {
+    let sound = RecordingCounts { received: 10, recorded: 10, ..RecordingCounts::default() };
+    let uncounted = RecordingCounts { dropped_by_kernel: KernelDrops::UNKNOWN, ..sound.clone() };
+    let verdict = uncounted.verdict();
+    assert_eq!(verdict.status, RecordingStatus::Unknown);
+    assert_eq!(verdict.text, "what was lost is not known: the kernel does not count what it drops");
+    let numbered = RecordingCounts { missing: Some(0), ..uncounted.clone() }.verdict();
+    assert_eq!((numbered.status, numbered.text.as_str()), (RecordingStatus::Complete, "nothing lost"));
+    let missing = RecordingCounts { missing: Some(5), dropped_by_queue: 2, recorded: 8, ..uncounted.clone() }.verdict();
+    assert_eq!(missing.lost, [("dropped_by_queue".to_owned(), 2), ("lost_on_the_way_or_dropped".to_owned(), 3)].into());
+    let dropped = RecordingCounts { dropped_by_queue: 1, recorded: 9, ..uncounted.clone() }.verdict();
+    assert_eq!(dropped.text, "LOST: 1 datagram dropped by taxel's queue, and what the kernel dropped uncounted");
+    // A kernel of another computer that does not count is no better.
+    let bridged = Bridged { dropped_by_kernel: KernelDrops::UNKNOWN, ..Bridged::default() };
+    let verdict = RecordingCounts { bridged: Some(Box::new(bridged)), ..sound.clone() }.verdict();
+    assert_eq!(verdict.status, RecordingStatus::Unknown);
+    // In a file it is null; a file that says nothing of it was written where the kernel counts.
+    let json = serde_json::to_value(&uncounted).unwrap();
+    assert_eq!(json["dropped_by_kernel"], serde_json::Value::Null);
+    assert_eq!(serde_json::from_value::<RecordingCounts>(json).unwrap(), uncounted);
+    assert_eq!(serde_json::from_str::<RecordingCounts>("{\"received\":10,\"recorded\":10}").unwrap(), sound);
 }

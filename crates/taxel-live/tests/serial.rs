@@ -1,5 +1,7 @@
 //! Serial lines, as ports (pseudo-terminals) and over TCP: a board's commands and answers, and what can go wrong.
 
+#![cfg(unix)]
+
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -35,8 +35,9 @@ export function writeCounters(counters, drawn) {
   put("frames", number(arrives ? counters.frames_per_s : null, integer));
   entitle(part("frames", HTMLElement), "title", counters.frames_per_s === null ? "not known: give --rate-hz and --bits, or --preset, or connect the control line" : arrives ? "" : `nothing arrives; the registers say ${integer(counters.frames_per_s)}/s`);
   // Events that only the panel lacks are in every recording and in the readout.
-  const all = Object.entries(lost).reduce((sum, [stage, count]) => sum + (stage === "panel" ? 0 : count), 0);
-  put("lost", integer(all));
+  const all = Object.entries(lost).reduce((sum, [stage, count]) => sum + (stage === "panel" ? 0 : count ?? 0), 0);
+  // What the kernel does not count may be more.
+  put("lost", lost.kernel !== null ? integer(all) : all > 0 ? `${integer(all)} or more` : "unknown");
   part("lost-block", HTMLElement).classList.toggle("bad", all > 0);
   put("queue", number(counters.queue, integer));
   // The latency of detections, where there are any; else that of decoding.
@@ -49,7 +50,7 @@ export function writeCounters(counters, drawn) {
       row = make("tr", { "data-place": stage }, make("th", { scope: "row", title: LOSSES[stage] ?? "" }, stage), make("td"));
       list.append(row);
     }
-    write(/** @type {Element} */ (row.lastElementChild), integer(count));
+    write(/** @type {Element} */ (row.lastElementChild), count === null ? "unknown" : integer(count));
   }
   put("reach", counters.reach_us ? `the last ${((counters.reach_us[1] - counters.reach_us[0]) / 1e6).toFixed(0)} s can be viewed` : "");
   put("wire", counters.wire_version ? `wire version ${counters.wire_version}` : "");

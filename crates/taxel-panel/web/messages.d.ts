@@ -190,8 +190,8 @@ export interface LiveFrames {
 
 /** What was lost, by cause. */
 export interface Lost {
-  /** Messages. */
-  kernel: number;
+  /** Messages; `null` where the system does not count them. */
+  kernel: number | null;
   /** Datagrams. */
   queue: number;
   /** Datagrams of version 2 that never arrived intact. */

@@ -1,7 +1,6 @@
 //! Recordings: the live format's reader and writer, and the manual's raw files.
 
 use std::collections::BTreeMap;
-use std::os::fd::IntoRawFd;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -18,6 +17,7 @@ use taxel_live::recording::{
     WriterOptions, damage_of_version_1, decode_lsa, numbered,
 };
 
+use crate::descriptors::into_descriptor;
 use crate::threaded::Threaded;
 use taxel_border::convert::{ArrayParts, Column, array, column, from_events, slice, to_array};
 use taxel_border::enter::enter;
@@ -460,7 +460,7 @@ pub fn clock_doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<Stri
 /// The descriptor of a regular file, opened for reading.
 #[pyfunction]
 pub fn open_regular(py: Python<'_>, path: PathBuf) -> PyResult<i32> {
-    Ok(enter(py, |_| taxel_live::open_regular(&path))?.into_raw_fd())
+    into_descriptor(py, enter(py, |_| taxel_live::open_regular(&path))?)
 }
 
 /// The name of a recording in automatic mode: the index appended to the name.

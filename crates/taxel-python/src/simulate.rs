@@ -1,6 +1,5 @@
 //! Simulated touch, and the board that reads it, as fast as it goes.
 
-use std::os::fd::BorrowedFd;
 use std::path::PathBuf;
 
 use numpy::{PyArray1, PyReadonlyArray1};
@@ -19,6 +18,7 @@ use taxel_live::address::of_text;
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{Emulator, EmulatorOptions, PipedFrames, Replay, Report, Scenes, Touch};
 
+use crate::descriptors::file_of;
 use taxel_border::convert::{ArrayParts, Column, EventsIn, array, column, from_events, slice, to_array};
 use taxel_border::enter::{Exclusive, enter, enter_with_progress};
 use taxel_border::errors::core;
@@ -294,9 +294,8 @@ pub fn emulate(
             Felt::Other(Box::new(enter(py, |_| Replay::frames(&array, t, values, frame_us, speed))?))
         }
         TouchIn::Pipe(descriptor, ahead, shift, most) => {
-            // SAFETY: Python has the descriptor open as long as this call lasts; the copy is ours.
-            let from = unsafe { BorrowedFd::borrow_raw(descriptor) }.try_clone_to_owned()?;
-            Felt::Other(Box::new(PipedFrames::new(array.len(), from.into(), ahead, shift, most)))
+            let from = file_of(py, descriptor)?;
+            Felt::Other(Box::new(PipedFrames::new(array.len(), from, ahead, shift, most)))
         }
     };
     enter_with_progress(py, |stop, caller| {

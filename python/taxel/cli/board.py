@@ -208,7 +208,9 @@ def _bridge_rows(counts: dict[str, Any] | None) -> list[tuple[str, str, str]]:
         state = "connected"
     else:
         state = "SILENT: the other computer, or the network to it, is gone; waiting"
-    lost = f"{counts['missing']:,} on the way, {counts['dropped'] + counts['dropped_by_kernel']:,} there"
+    there = (counts["dropped_by_kernel"] or 0) + counts["dropped"]
+    more = " or more" if counts["dropped_by_kernel"] is None else ""
+    lost = f"{counts['missing']:,} on the way, {there:,}{more} there"
     clock = counts["clock"]
     compared = "not compared yet"
     if clock is not None:
@@ -290,7 +292,8 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
     capture, wire, earlier = now["capture"], now["wire"], before["capture"]
     damaged = wire["skipped"] + wire["contradictory"] + wire["outside"] + wire["unpaired"]
     damage = f"{damaged:,} bytes and words, {wire['back']:,} events out of order"
-    lost = f"{capture['dropped_by_kernel']:,} by the kernel, {capture['dropped_by_queue']:,} by our queue"
+    by_kernel = "unknown" if capture["dropped_by_kernel"] is None else f"{capture['dropped_by_kernel']:,}"
+    lost = f"{by_kernel} by the kernel, {capture['dropped_by_queue']:,} by our queue"
     if now["wire_version"] == 2:
         second = now["wire_v2"]
         damaged = second["checksum"] + second["short"] + second["foreign"] + second["malformed"]

@@ -386,6 +386,8 @@ def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name in always:
         if counts.get(name) is not None:
             yield name.replace("_", " "), str(counts[name])
+        elif name == "dropped_by_kernel" and counts.get("received") is not None:
+            yield name.replace("_", " "), "unknown: the system does not count them"
     no_loss = {"bytes", "words", "changes", "intensities", "markers", "datagrams", "intact", "events", "states"}
     no_loss |= {"messages", "frames", "samples"}
     others = {name: n for name, n in counts.items() if isinstance(n, int) and name not in {*always, *facts["rebuilt"]}}

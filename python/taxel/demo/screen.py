@@ -51,7 +51,9 @@ class Screen:
             self._rate = (counters["events"] - events) / (now - then)
             self._before = (now, counters["events"])
         capture = counters["capture"]
-        lost = capture["dropped_by_kernel"] + capture["dropped_by_queue"] + counters["events_dropped"]
+        by_kernel = capture["dropped_by_kernel"]
+        known = (by_kernel or 0) + capture["dropped_by_queue"] + counters["events_dropped"]
+        lost = f"{known} or more" if by_kernel is None else known
         rows = Table.grid(padding=(0, 2))
         for name, value in (
             ("events/s", f"{self._rate:,.0f}"),

@@ -262,8 +262,9 @@ class Live:
     def counters(self) -> dict[str, Any]:
         """Counts of what was received, decoded and lost so far, by place.
 
-        Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
-        (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
+        Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...;
+        dropped_by_kernel is None where the system does not count it, here and of `bridged`), `decoded` (datagrams),
+        `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
         `taxel.wire.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
         `wire_late` (events of version 2 that arrived after time had passed theirs), `wire_jumps` (of the times of
         version 1 ahead of this computer's clock), `wire_repeated` (datagrams of version 1 that came again),
@@ -281,7 +282,8 @@ class Live:
         each other source; of one of lines: lines, strange, bytes_in_no_line, bytes_of_unfinished_lines, trouble),
         `sent` (of each destination: to,
         sent, lost, waiting, trouble), `decode_latency` and
-        `report_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
+        `report_latency` (count, p50_us, p99_us, max_us; None where nothing was measured, as where the
+        kernel does not stamp arrivals), `offset` (board_us, host_ns,
         drift_ppm, or None), `pace` (drift_ppm, delay: as a latency, beyond the shortest; doubt: why they cannot be, or
         None; None at first), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
 

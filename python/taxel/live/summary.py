@@ -45,22 +45,22 @@ class Summary:
 
     @property
     def lost(self) -> int:
-        """Number of losses after arrival: messages in the kernel, datagrams in the queue.
+        """Number of losses after arrival: messages in the kernel if it counts them, datagrams in the queue.
 
         For a board of another computer with the losses there and between the two computers.
         """
         boards = [self.counters, *(source for source in self.counters["sources"].values() if "capture" in source)]
         lost = sum(
-            int(board["capture"]["dropped_by_kernel"] + board["capture"]["dropped_by_queue"]) for board in boards
+            (board["capture"]["dropped_by_kernel"] or 0) + board["capture"]["dropped_by_queue"] for board in boards
         )
         bridged = self.counters["bridged"] or {}
-        return lost + sum(int(bridged.get(cause, 0)) for cause in ("missing", "dropped", "dropped_by_kernel"))
+        return lost + sum(bridged.get(cause) or 0 for cause in ("missing", "dropped", "dropped_by_kernel"))
 
     @property
     def nothing_came(self) -> bool:
         """Whether no datagram has arrived, lost ones included."""
         capture = self.counters["capture"]
-        return not capture["messages"] + capture["dropped_by_kernel"]
+        return not capture["messages"] + (capture["dropped_by_kernel"] or 0)
 
 
 def summary_of(ended: _core.Ended) -> Summary:

@@ -161,7 +161,10 @@ def _counts(source: RecordedSource, written: RecordedSource) -> dict[str, Any]:
     if not isinstance(written, BoardSource):
         return {"received": received}
     counts = source.losses.counts()
-    known = {name: counts.get(name) or 0 for name in ("dropped_by_kernel", "dropped_by_queue", "received")}
+    known = {name: counts.get(name) or 0 for name in ("dropped_by_queue", "received")}
+    by_kernel = counts.get("dropped_by_kernel")
+    # Where it is not counted it is unknown; a file without its end says nothing of it.
+    known["dropped_by_kernel"] = by_kernel if known["received"] else by_kernel or 0
     decoder = counts.get("decoder")
     damage = _core.recording_damage(json.dumps(decoder)) if decoder else {}
     return {**known, "decoder": damage}

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::kernel_drops::KernelDrops;
+
 /// Counts of what arrived and what was lost so far; see [`crate::capture`] for the equations between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct CaptureCounts {
@@ -12,7 +14,7 @@ pub struct CaptureCounts {
     /// Number of payload bytes in the messages.
     pub bytes: u64,
     /// Number of messages that the kernel dropped because its own queue was full.
-    pub dropped_by_kernel: u64,
+    pub dropped_by_kernel: KernelDrops,
     /// Datagrams that were dropped because they were not read in time.
     pub dropped_by_queue: u64,
     /// Number of payload bytes in those datagrams.
@@ -29,12 +31,15 @@ pub struct CaptureCounts {
     pub kernel_buffer_bytes: u64,
     /// Whether one receive call can return several datagrams (`UDP_GRO`).
     pub gro: bool,
+    /// Whether a datagram's arrival is when it was read from the socket, as the system does not state when it arrived:
+    /// latencies are unknown then.
+    pub stamped_when_read: bool,
 }
 
 /// What a socket counts.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Totals {
-    pub(super) dropped_by_kernel: u64,
+    pub(super) dropped_by_kernel: KernelDrops,
     pub(super) changes_between_senders: u64,
     pub(super) changes_of_address: u64,
 }

@@ -10,6 +10,7 @@ use super::parcel::Parcel;
 use super::queue::{Batch, BatchQueue};
 use crate::bridged::Bridged;
 use crate::host_clock::{HostClock, RoundTrip};
+use crate::kernel_drops::KernelDrops;
 use crate::locked::lock;
 
 /// A bridge sends a parcel every 10 ms: after this long without one the bridge or the network is down.
@@ -22,7 +23,7 @@ struct FeedSession {
     /// The number of the next datagram if none is missing.
     next: u64,
     dropped: u64,
-    dropped_by_kernel: u64,
+    dropped_by_kernel: KernelDrops,
 }
 
 #[derive(Debug, Default)]
@@ -73,8 +74,10 @@ impl ParcelFeed {
                 let dropped = parcel.dropped.saturating_sub(known.dropped);
                 bridged.dropped += dropped;
                 bridged.missing += parcel.before.saturating_sub(known.next).saturating_sub(dropped);
-                bridged.dropped_by_kernel += parcel.dropped_by_kernel.saturating_sub(known.dropped_by_kernel);
+                let by_kernel = parcel.dropped_by_kernel.since(known.dropped_by_kernel);
+                bridged.dropped_by_kernel = bridged.dropped_by_kernel.plus(by_kernel);
             }
+            None if !parcel.dropped_by_kernel.are_known() => bridged.dropped_by_kernel = KernelDrops::UNKNOWN,
             None => {}
         }
         *session = Some(FeedSession {

@@ -18,14 +18,19 @@
 //! | 36-39 | number of datagrams |
 //! | 40-47 | number of datagrams that the computer had received before them |
 //! | 48-55 | number of those that it dropped because its queues were full |
-//! | 56-63 | number of messages that its kernel had dropped |
+//! | 56-63 | number of messages that its kernel had dropped; 2^64-1 if that is unknown |
 //! | 64... | each datagram: its length (u16), its arrival time in ns from the base (i32), its bytes |
 
 use std::hash::{BuildHasher, RandomState};
 
+use crate::kernel_drops::KernelDrops;
+
 const MAGIC: [u8; 4] = *b"TXLP";
 const VERSION: u8 = 1;
 const HEADER: usize = 64;
+
+/// What stands for a number of dropped messages that is unknown.
+const UNKNOWN: u64 = u64::MAX;
 
 /// Length and time before each datagram, bytes.
 const ENTRY: usize = 6;
@@ -47,7 +52,7 @@ pub(super) struct Parcel<'a> {
     pub(super) count: u32,
     pub(super) before: u64,
     pub(super) dropped: u64,
-    pub(super) dropped_by_kernel: u64,
+    pub(super) dropped_by_kernel: KernelDrops,
     body: &'a [u8],
 }
 
@@ -70,7 +75,7 @@ impl<'a> Parcel<'a> {
             count: short(36),
             before: long(40),
             dropped: long(48),
-            dropped_by_kernel: long(56),
+            dropped_by_kernel: KernelDrops(Some(long(56)).filter(|n| *n != UNKNOWN)),
             body,
         };
         let mut rest = body;
@@ -143,7 +148,13 @@ impl ParcelPacker {
 
     /// Adds a datagram, with its number among those received; returns the previous parcel if the datagram does not fit
     /// into it.
-    pub fn push(&mut self, number: u64, arrived_ns: i64, bytes: &[u8], dropped_by_kernel: u64) -> Option<Vec<u8>> {
+    pub fn push(
+        &mut self,
+        number: u64,
+        arrived_ns: i64,
+        bytes: &[u8],
+        dropped_by_kernel: KernelDrops,
+    ) -> Option<Vec<u8>> {
         let since = arrived_ns.checked_sub(self.base_ns).and_then(|since| i32::try_from(since).ok());
         let fits = self.next == number && since.is_some() && self.body.len() + bytes.len() <= FULL;
         let closed = (self.count > 0 && !fits).then(|| self.close(i64::MIN, dropped_by_kernel, false));
@@ -163,7 +174,7 @@ impl ParcelPacker {
     }
 
     /// Closes the parcel, which may be empty: all datagrams that arrived before `until_ns` are in it or in earlier ones.
-    pub fn close(&mut self, until_ns: i64, dropped_by_kernel: u64, last: bool) -> Vec<u8> {
+    pub fn close(&mut self, until_ns: i64, dropped_by_kernel: KernelDrops, last: bool) -> Vec<u8> {
         if self.count == 0 {
             (self.base_ns, self.before) = (until_ns, self.next);
         }
@@ -179,7 +190,7 @@ impl ParcelPacker {
         parcel.extend_from_slice(&self.count.to_le_bytes());
         parcel.extend_from_slice(&self.before.to_le_bytes());
         parcel.extend_from_slice(&self.dropped.to_le_bytes());
-        parcel.extend_from_slice(&dropped_by_kernel.to_le_bytes());
+        parcel.extend_from_slice(&dropped_by_kernel.0.unwrap_or(UNKNOWN).to_le_bytes());
         parcel.append(&mut self.body);
         self.number += 1;
         self.count = 0;
@@ -204,16 +215,16 @@ mod tests {
             .collect();
         let mut parcels = vec![];
         for (k, (at, bytes)) in sent.iter().enumerate() {
-            parcels.extend(packer.push(k as u64, *at, bytes, 3));
+            parcels.extend(packer.push(k as u64, *at, bytes, KernelDrops(Some(3))));
         }
-        parcels.push(packer.close(sent.last().expect("some").0 + 5, 3, true));
+        parcels.push(packer.close(sent.last().expect("some").0 + 5, KernelDrops(Some(3)), true));
         assert!(parcels.len() > 5, "full ones are closed, and those that last too long");
         let mut got = vec![];
         for (k, bytes) in parcels.iter().enumerate() {
             assert!(bytes.len() <= LONGEST);
             let parcel = Parcel::read(bytes).expect("whole");
             assert_eq!((parcel.number, parcel.before), (k as u64, got.len() as u64));
-            assert_eq!((parcel.dropped, parcel.dropped_by_kernel), (0, 3));
+            assert_eq!((parcel.dropped, parcel.dropped_by_kernel), (0, KernelDrops(Some(3))));
             assert_eq!(parcel.last, k + 1 == parcels.len());
             got.extend(parcel.datagrams().map(|(at, bytes)| (at, bytes.to_vec())));
         }
@@ -224,14 +235,15 @@ mod tests {
     #[test]
     fn datagrams_that_a_queue_dropped_are_counted() {
         let mut packer = ParcelPacker::after(10);
-        assert!(packer.push(10, 0, b"ten", 0).is_none());
-        let parcel = packer.push(15, 0, b"fifteen", 0).expect("11 to 14 are missing");
+        assert!(packer.push(10, 0, b"ten", KernelDrops::default()).is_none());
+        let parcel = packer.push(15, 0, b"fifteen", KernelDrops::UNKNOWN).expect("11 to 14 are missing");
         assert_eq!(Parcel::read(&parcel).expect("whole").dropped, 0);
-        let parcel = packer.close(1, 0, false);
+        let parcel = packer.close(1, KernelDrops::UNKNOWN, false);
         let read = Parcel::read(&parcel).expect("whole");
         assert_eq!((read.before, read.dropped, read.count), (15, 4, 1));
+        assert_eq!(read.dropped_by_kernel, KernelDrops::UNKNOWN);
         packer.count_dropped(&parcel);
-        let read = packer.close(2, 0, false);
+        let read = packer.close(2, KernelDrops::default(), false);
         let read = Parcel::read(&read).expect("whole");
         assert_eq!((read.number, read.before, read.dropped, read.count), (2, 16, 5, 0));
     }
@@ -240,9 +252,9 @@ mod tests {
     fn what_is_cut_or_changed_is_refused_or_read_and_never_a_panic() {
         let mut packer = ParcelPacker::after(0);
         for k in 0..3 {
-            packer.push(k, i64::MAX - 5, b"bytes", 0);
+            packer.push(k, i64::MAX - 5, b"bytes", KernelDrops::default());
         }
-        let whole = packer.close(i64::MAX, 0, false);
+        let whole = packer.close(i64::MAX, KernelDrops::default(), false);
         assert!(Parcel::read(&whole).is_some());
         for cut in 0..whole.len() {
             assert!(Parcel::read(&whole[..cut]).is_none(), "{cut}");

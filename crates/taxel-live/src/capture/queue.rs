@@ -86,11 +86,6 @@ impl Batch {
         self.datagrams.clear();
     }
 
-    /// Whether the batch is empty, or contains a datagram that arrived at `ns` or later.
-    pub(super) fn ends_after(&self, ns: i64) -> bool {
-        self.datagrams.last().is_none_or(|last| last.arrived_ns >= ns)
-    }
-
     /// Numbers the batch's datagrams.
     fn number_from(&mut self, first: u64) {
         for (number, datagram) in (first..).zip(&mut self.datagrams) {

@@ -1,25 +1,21 @@
 //! Sends and counts UDP datagrams, for the emulated board and the benchmarks.
 
+#[cfg(target_os = "linux")]
+mod linux;
+mod portable;
+
 use std::io;
-use std::mem::{size_of, zeroed};
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
-use std::os::fd::AsRawFd;
-use std::ptr::from_mut;
 use std::time::{Duration, Instant};
 
-use libc::c_void;
 use serde::Serialize;
-use socket2::SockAddr;
 use taxel_core::{Stop, problem};
 
+use super::system_calls::SystemCalls;
 use crate::{Error, Result};
 
 /// Largest datagram or train, bytes: it must fit in one IPv4 packet with its headers.
 const LARGEST: usize = 65_507;
-
-/// Largest train that the kernel accepts (`UDP_MAX_SEGMENTS` of linux/udp.h before 6.9; later kernels accept twice
-/// that).
-const TRAIN_DATAGRAMS: usize = 64;
 
 /// Counts of what was sent, whether it was received or not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -40,6 +36,7 @@ pub struct SendCounts {
 /// of each frame.
 #[derive(Debug)]
 pub struct Sender {
+    calls: SystemCalls,
     socket: UdpSocket,
     to: SocketAddr,
     train: Vec<u8>,
@@ -57,15 +54,12 @@ fn unspecified(to: SocketAddr) -> SocketAddr {
     }
 }
 
-#[repr(C, align(8))]
-struct Control([u8; 64]);
-
 impl Sender {
     /// Prepares to send to `to`; with `segment`, in trains if the kernel can split them.
     ///
     /// # Errors
     ///
-    /// `Socket` if no socket can be opened.
+    /// `Socket` if no socket can be opened, `Core(Problem)` if `TAXEL_CAPTURE` has a value that it cannot have.
     pub fn open(to: SocketAddr, segment: bool) -> Result<Self> {
         Self::open_from(0, to, segment)
     }
@@ -81,10 +75,10 @@ impl Sender {
         let socket = UdpSocket::bind(from).map_err(Error::socket(format!("UDP from port {port} to {to}")))?;
         // The socket is not connected: a connected socket returns errors while there is no receiver, and a board sends
         // regardless.
-        let segmenting =
-            segment && super::socket::set(socket.as_raw_fd(), libc::SOL_UDP, libc::UDP_SEGMENT, &0).is_ok();
+        let calls = SystemCalls::selected()?;
+        let segmenting = segment && calls.split_trains(&socket);
         let counts = SendCounts { segmenting, ..SendCounts::default() };
-        Ok(Self { socket, to, train: Vec::with_capacity(LARGEST), segment: 0, datagrams: 0, counts })
+        Ok(Self { calls, socket, to, train: Vec::with_capacity(LARGEST), segment: 0, datagrams: 0, counts })
     }
 
     /// Counts of what was sent.
@@ -101,7 +95,7 @@ impl Sender {
     pub fn push(&mut self, datagram: &[u8]) -> Result<()> {
         let joins = self.counts.segmenting
             && self.datagrams > 0
-            && self.datagrams < TRAIN_DATAGRAMS
+            && self.datagrams < self.calls.train_datagrams()
             && !datagram.is_empty()
             && datagram.len() <= self.segment
             && self.train.len() == self.datagrams * self.segment
@@ -171,19 +165,14 @@ impl Sender {
         Ok(())
     }
 
-    /// Adds to an error that the datagram is too long, if that is its cause: "message too long", or "invalid argument"
-    /// for a train on older kernels.
+    /// Adds to an error that the datagram is too long, if that is its cause.
     fn explain(&self, error: io::Error) -> io::Error {
-        let too_long = match error.raw_os_error() {
-            Some(libc::EMSGSIZE) => true,
-            Some(libc::EINVAL) => self.datagrams > 1,
-            _ => false,
-        };
-        if !too_long {
+        let bytes = self.segment;
+        if bytes <= LARGEST && !self.calls.refuse_length(&error, self.datagrams > 1) {
             return error;
         }
-        let (bytes, headers) = (self.segment, if self.to.is_ipv4() { 28 } else { 48 });
-        let text = match self.path_mtu() {
+        let headers = if self.to.is_ipv4() { 28 } else { 48 };
+        let text = match self.calls.path_mtu(self.to) {
             _ if bytes > LARGEST => format!("a datagram of {bytes} bytes: UDP carries at most {LARGEST}"),
             Some(mtu) if bytes + headers > mtu => {
                 format!("a datagram of {bytes} bytes, and {headers} of headers, is larger than the path's MTU, {mtu}")
@@ -193,40 +182,51 @@ impl Sender {
         io::Error::new(io::ErrorKind::InvalidInput, text)
     }
 
-    /// The path MTU as far as the kernel knows it, bytes; the kernel knows it only for connected sockets.
-    fn path_mtu(&self) -> Option<usize> {
-        let ask = UdpSocket::bind(unspecified(self.to)).ok()?;
-        ask.connect(self.to).ok()?;
-        let (level, name) =
-            if self.to.is_ipv4() { (libc::IPPROTO_IP, libc::IP_MTU) } else { (libc::IPPROTO_IPV6, libc::IPV6_MTU) };
-        usize::try_from(super::socket::number(ask.as_raw_fd(), level, name).ok()?).ok()
+    fn send(&mut self) -> io::Result<()> {
+        match self.calls {
+            #[cfg(target_os = "linux")]
+            SystemCalls::Linux if self.datagrams > 1 => {
+                linux::send_train(&self.socket, &mut self.train, self.segment, self.to)
+            }
+            _ => self.socket.send_to(&self.train, self.to).map(drop),
+        }
+    }
+}
+
+/// What sending by these calls can do; the portable ones send one datagram in a call.
+impl SystemCalls {
+    fn split_trains(self, socket: &UdpSocket) -> bool {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Linux => linux::splits_trains(socket),
+            Self::Portable => portable::splits_trains(socket),
+        }
     }
 
-    fn send(&mut self) -> io::Result<()> {
-        if self.datagrams == 1 {
-            return self.socket.send_to(&self.train, self.to).map(drop);
+    /// The largest number of datagrams in a train.
+    fn train_datagrams(self) -> usize {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Linux => linux::TRAIN_DATAGRAMS,
+            Self::Portable => portable::TRAIN_DATAGRAMS,
         }
-        let to = SockAddr::from(self.to);
-        let mut part = libc::iovec { iov_base: self.train.as_mut_ptr().cast::<c_void>(), iov_len: self.train.len() };
-        let mut control = Control([0; 64]);
-        // SAFETY: msghdr is plain data, for which all zeros is a valid value; the name, the buffer and the control
-        // memory that it points to live through the call, and the control memory has room for one u16.
-        let sent = unsafe {
-            let mut message: libc::msghdr = zeroed();
-            message.msg_name = to.as_ptr().cast_mut().cast::<c_void>();
-            message.msg_namelen = to.len();
-            message.msg_iov = &raw mut part;
-            message.msg_iovlen = 1;
-            message.msg_control = from_mut(&mut control).cast::<c_void>();
-            message.msg_controllen = libc::CMSG_SPACE(size_of::<u16>() as u32) as _;
-            let header = libc::CMSG_FIRSTHDR(&raw const message);
-            (*header).cmsg_level = libc::SOL_UDP;
-            (*header).cmsg_type = libc::UDP_SEGMENT;
-            (*header).cmsg_len = libc::CMSG_LEN(size_of::<u16>() as u32) as _;
-            let segment = u16::try_from(self.segment).unwrap_or(u16::MAX);
-            libc::CMSG_DATA(header).cast::<u16>().write_unaligned(segment);
-            libc::sendmsg(self.socket.as_raw_fd(), &raw const message, 0)
-        };
-        if sent < 0 { Err(io::Error::last_os_error()) } else { Ok(()) }
+    }
+
+    /// Whether an error says that a datagram is too long for its path.
+    fn refuse_length(self, error: &io::Error, is_train: bool) -> bool {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Linux => linux::is_too_long(error, is_train),
+            Self::Portable => portable::is_too_long(error, is_train),
+        }
+    }
+
+    /// The path MTU as far as the system tells it, bytes.
+    fn path_mtu(self, to: SocketAddr) -> Option<usize> {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Linux => linux::path_mtu(unspecified(to), to),
+            Self::Portable => portable::path_mtu(unspecified(to), to),
+        }
     }
 }

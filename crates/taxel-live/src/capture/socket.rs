@@ -1,208 +1,107 @@
-//! A UDP socket whose kernel stamps arrivals, merges datagrams and counts drops.
+//! A UDP socket that datagrams are received from, by the system's calls that are selected.
+
+#[cfg(target_os = "linux")]
+mod linux;
+mod portable;
+mod senders;
 
 use std::io;
-use std::mem::{size_of, size_of_val, zeroed};
-use std::net::{SocketAddr, UdpSocket};
-use std::os::fd::{AsRawFd, RawFd};
-use std::ptr::{from_mut, from_ref};
+use std::net::SocketAddr;
 use std::time::Duration;
 
-use libc::{c_int, c_void};
+#[cfg(target_os = "linux")]
+pub(super) use linux::{number, set};
 
 use super::counts::Totals;
 use super::options::ReceiverOptions;
 use super::queue::Batch;
-use crate::recording::now_ns;
+use super::system_calls::SystemCalls;
+#[cfg(target_os = "linux")]
+use linux::LinuxSocket;
+use portable::PortableSocket;
 
 /// Largest UDP message, single or train, bytes.
 pub(super) const LARGEST: usize = 1 << 16;
 
-/// Index of the drop count among the numbers of `SO_MEMINFO` (`SK_MEMINFO_DROPS` of linux/sock_diag.h).
-const MEMINFO_DROPS: usize = 8;
-const MEMINFO_NUMBERS: usize = 9;
-
-/// Room for three control messages: stamp, drop count, segment size.
-const CONTROL_BYTES: usize = 128;
-
-#[repr(C, align(8))]
-struct Control([u8; CONTROL_BYTES]);
-
 #[derive(Debug)]
-pub(super) struct Socket {
-    socket: UdpSocket,
-    gro: bool,
-    totals: Totals,
-    /// The addresses of the last two senders, the latest first; zeros before.
-    senders: [Address; 2],
+pub(super) enum Socket {
+    #[cfg(target_os = "linux")]
+    Linux(LinuxSocket),
+    Portable(PortableSocket),
 }
 
-/// The address of a sender as the kernel writes it.
-type Address = [u8; size_of::<libc::sockaddr_in6>()];
+/// Calls the method of the socket that is open.
+macro_rules! of_either {
+    ($socket:expr, $open:ident => $call:expr) => {
+        match $socket {
+            #[cfg(target_os = "linux")]
+            Socket::Linux($open) => $call,
+            Socket::Portable($open) => $call,
+        }
+    };
+}
 
 impl Socket {
-    pub(super) fn bind(address: SocketAddr, options: &ReceiverOptions) -> io::Result<Self> {
-        let socket = UdpSocket::bind(address)?;
-        let fd = socket.as_raw_fd();
-        let bytes = c_int::try_from(options.kernel_buffer_bytes).unwrap_or(c_int::MAX);
-        // With CAP_NET_ADMIN the size may exceed net.core.rmem_max; without it, that is the limit.
-        if set(fd, libc::SOL_SOCKET, libc::SO_RCVBUFFORCE, &bytes).is_err() {
-            set(fd, libc::SOL_SOCKET, libc::SO_RCVBUF, &bytes)?;
+    pub(super) fn bind(address: SocketAddr, options: &ReceiverOptions, calls: SystemCalls) -> io::Result<Self> {
+        match calls {
+            #[cfg(target_os = "linux")]
+            SystemCalls::Linux => LinuxSocket::bind(address, options).map(Self::Linux),
+            SystemCalls::Portable => PortableSocket::bind(address, options).map(Self::Portable),
         }
-        set(fd, libc::SOL_SOCKET, libc::SO_TIMESTAMPNS, &1_i32)?;
-        set(fd, libc::SOL_SOCKET, libc::SO_RXQ_OVFL, &1_i32)?;
-        socket.set_nonblocking(true)?;
-        // Kernels before 5.0 have no UDP_GRO: then each datagram needs its own call, and `gro` is false.
-        let gro = options.gro && set(fd, libc::SOL_UDP, libc::UDP_GRO, &1_i32).is_ok();
-        Ok(Self { socket, gro, totals: Totals::default(), senders: Default::default() })
     }
 
     pub(super) fn address(&self) -> io::Result<SocketAddr> {
-        self.socket.local_addr()
+        of_either!(self, open => open.address())
     }
 
+    /// Whether one call can return several datagrams.
     pub(super) fn gro(&self) -> bool {
-        self.gro
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Linux(open) => open.gro(),
+            Self::Portable(_) => false,
+        }
+    }
+
+    /// Whether a datagram's arrival is when it was read, as the kernel does not stamp it.
+    pub(super) fn stamps_when_read(&self) -> bool {
+        matches!(self, Self::Portable(_))
     }
 
     /// What it counted so far; the messages that the kernel has dropped as last read.
     pub(super) fn totals(&self) -> Totals {
-        self.totals
+        of_either!(self, open => open.totals())
     }
 
+    /// Size of the kernel's queue, bytes.
     pub(super) fn kernel_buffer_bytes(&self) -> u64 {
-        let mut bytes = [0_u32; 1];
-        let got = get(self.socket.as_raw_fd(), libc::SO_RCVBUF, &mut bytes);
-        if got.is_ok() { u64::from(bytes[0]) } else { 0 }
+        of_either!(self, open => open.kernel_buffer_bytes())
     }
 
     /// Waits for a message, at most for `timeout`; returns false if none arrived.
-    pub(super) fn wait(&self, timeout: Duration) -> io::Result<bool> {
-        let mut asked = libc::pollfd { fd: self.socket.as_raw_fd(), events: libc::POLLIN, revents: 0 };
-        let timeout = libc::timespec {
-            tv_sec: timeout.as_secs().try_into().unwrap_or(libc::time_t::MAX),
-            tv_nsec: timeout.subsec_nanos().into(),
-        };
-        // SAFETY: one pollfd and the timeout live through the call; no signal mask is given.
-        let ready = unsafe { libc::ppoll(&raw mut asked, 1, &raw const timeout, std::ptr::null()) };
-        match ready {
-            1.. => Ok(true),
-            0 => Ok(false),
-            _ => match io::Error::last_os_error() {
-                error if error.kind() == io::ErrorKind::Interrupted => Ok(false),
-                error => Err(error),
-            },
-        }
+    pub(super) fn wait(&mut self, timeout: Duration) -> io::Result<bool> {
+        of_either!(self, open => open.wait(timeout))
     }
 
     /// Appends the next message to `batch`, which must have room for [`LARGEST`] bytes; returns false if there is none. With
     /// `ask` its sender is compared with those before.
+    #[inline]
     pub(super) fn receive(&mut self, batch: &mut Batch, ask: bool) -> io::Result<bool> {
-        let start = batch.bytes.len();
-        let room = batch.bytes.spare_capacity_mut();
-        let mut part = libc::iovec { iov_base: room.as_mut_ptr().cast::<c_void>(), iov_len: room.len() };
-        let mut control = Control([0; CONTROL_BYTES]);
-        // SAFETY: msghdr is plain data, for which all zeros is a valid value (no name, no buffers, no control memory).
-        let mut message: libc::msghdr = unsafe { zeroed() };
-        message.msg_iov = &raw mut part;
-        message.msg_iovlen = 1;
-        message.msg_control = from_mut(&mut control).cast::<c_void>();
-        message.msg_controllen = CONTROL_BYTES as _;
-        let mut sender = Address::default();
-        if ask {
-            message.msg_name = from_mut(&mut sender).cast::<c_void>();
-            message.msg_namelen = size_of_val(&sender) as libc::socklen_t;
-        }
-        // SAFETY: `message` points to memory that lives through the call: the spare capacity of `batch`, `control`
-        // and `sender`.
-        let got = unsafe { libc::recvmsg(self.socket.as_raw_fd(), &raw mut message, 0) };
-        let Ok(got) = usize::try_from(got) else {
-            let error = io::Error::last_os_error();
-            return match error.kind() {
-                io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => Ok(false),
-                _ => Err(error),
-            };
-        };
-        if ask {
-            self.note_sender(sender);
-        }
-        // SAFETY: the kernel wrote `got` bytes into the spare capacity, which is at least as long.
-        unsafe { batch.bytes.set_len(start + got) };
-        let mut arrived_ns = None;
-        let mut segment = 0;
-        // SAFETY: `message` was filled by recvmsg and its control memory is alive; the macros stay inside
-        // msg_controllen, and each payload is read unaligned, of the type that the kernel writes for that kind.
-        unsafe {
-            let mut header = libc::CMSG_FIRSTHDR(&raw const message);
-            while !header.is_null() {
-                let data = libc::CMSG_DATA(header);
-                match ((*header).cmsg_level, (*header).cmsg_type) {
-                    (libc::SOL_SOCKET, libc::SCM_TIMESTAMPNS) => {
-                        let stamp = data.cast::<libc::timespec>().read_unaligned();
-                        arrived_ns = Some(stamp.tv_sec * 1_000_000_000 + stamp.tv_nsec);
-                    }
-                    (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => self.note_dropped(data.cast::<u32>().read_unaligned()),
-                    (libc::SOL_UDP, libc::UDP_GRO) => {
-                        segment = usize::try_from(data.cast::<c_int>().read_unaligned()).unwrap_or(0);
-                    }
-                    _ => {}
-                }
-                header = libc::CMSG_NXTHDR(&raw const message, header);
-            }
-        }
-        // The kernel stamps messages that arrive after SO_TIMESTAMPNS was set; one that was queued before has no stamp.
-        batch.note_message(start, segment, arrived_ns.unwrap_or_else(now_ns));
-        Ok(true)
+        of_either!(self, open => open.receive(batch, ask))
     }
 
     /// Reads the drop count from the kernel: the count in a message only includes drops before that message.
     pub(super) fn ask_dropped(&mut self) -> io::Result<()> {
-        let mut numbers = [0_u32; MEMINFO_NUMBERS];
-        get(self.socket.as_raw_fd(), libc::SO_MEMINFO, &mut numbers)?;
-        self.note_dropped(numbers[MEMINFO_DROPS]);
-        Ok(())
-    }
-
-    /// Adds the kernel's count, which has 32 bits and wraps around.
-    #[allow(clippy::cast_possible_truncation)]
-    fn note_dropped(&mut self, total: u32) {
-        let more = total.wrapping_sub(self.totals.dropped_by_kernel as u32);
-        // A message may contain an older count than the one that was last read.
-        if more <= u32::MAX / 2 {
-            self.totals.dropped_by_kernel += u64::from(more);
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Linux(open) => open.ask_dropped(),
+            Self::Portable(_) => Ok(()),
         }
     }
 
-    /// A board may get another address; two boards take turns.
-    fn note_sender(&mut self, sender: Address) {
-        let [last, before] = self.senders;
-        if sender != last {
-            self.totals.changes_between_senders += u64::from(sender == before);
-            self.totals.changes_of_address += u64::from(sender != before && last != Address::default());
-            self.senders = [sender, last];
-        }
+    /// Whether all that had arrived by `stopped_ns`, when the end was requested, was read; `batch` is what was read last, since
+    /// then.
+    pub(super) fn has_read_until(&mut self, stopped_ns: i64, batch: &Batch) -> bool {
+        of_either!(self, open => open.has_read_until(stopped_ns, batch))
     }
-}
-
-pub(super) fn set(fd: RawFd, level: c_int, name: c_int, value: &c_int) -> io::Result<()> {
-    let length = size_of::<c_int>() as libc::socklen_t;
-    // SAFETY: `value` lives through the call and `length` is its size.
-    let done = unsafe { libc::setsockopt(fd, level, name, from_ref(value).cast::<c_void>(), length) };
-    if done == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
-}
-
-/// Reads one of the socket's numbers from the kernel.
-pub(super) fn number(fd: RawFd, level: c_int, name: c_int) -> io::Result<c_int> {
-    let mut value: c_int = 0;
-    let mut length = size_of::<c_int>() as libc::socklen_t;
-    // SAFETY: `value` and `length` live through the call, and `length` is the size of `value` in bytes.
-    let done = unsafe { libc::getsockopt(fd, level, name, from_mut(&mut value).cast::<c_void>(), &raw mut length) };
-    if done == 0 { Ok(value) } else { Err(io::Error::last_os_error()) }
-}
-
-fn get(fd: RawFd, name: c_int, numbers: &mut [u32]) -> io::Result<()> {
-    let mut length = size_of_val(numbers) as libc::socklen_t;
-    // SAFETY: `numbers` lives through the call and `length` is its size in bytes; any bytes are valid u32.
-    let done =
-        unsafe { libc::getsockopt(fd, libc::SOL_SOCKET, name, numbers.as_mut_ptr().cast::<c_void>(), &raw mut length) };
-    if done == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
 }

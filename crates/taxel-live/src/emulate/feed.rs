@@ -1,22 +1,22 @@
 //! Reads frames of any other sensor from a pipe: 16-bit numbers, little-endian, frame after frame.
 
 use std::fs::File;
-use std::io::{ErrorKind, Read};
-use std::os::fd::AsRawFd;
+use std::time::Duration;
 
 use taxel_core::Stop;
 
 use super::Touch;
+use crate::readable_file::ReadableFile;
 use crate::{Error, Result};
 
-/// Longest wait for data before the board reads commands again, ms.
-const LOOK_EVERY_MS: i32 = 10;
+/// Longest wait for data before the board reads commands again.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
 
 /// Frames from a pipe as the input of a board. The pipe determines the pace: the board scans a frame whenever one is
 /// complete.
 #[derive(Debug)]
 pub struct PipedFrames {
-    from: File,
+    from: ReadableFile,
     /// Bytes of frames that were already read together with the preceding header line.
     bytes: Vec<u8>,
     /// Number of bits by which values are shifted right, so that they fit the ramp.
@@ -33,7 +33,7 @@ impl PipedFrames {
     /// shifted right by `shift` and limited to `most`.
     #[must_use]
     pub fn new(taxels: usize, from: File, ahead: Vec<u8>, shift: u32, most: u16) -> Self {
-        Self { from, bytes: ahead, shift, most, wanted: 2 * taxels, frames: 0, ended: false }
+        Self { from: ReadableFile::new(from), bytes: ahead, shift, most, wanted: 2 * taxels, frames: 0, ended: false }
     }
 }
 
@@ -41,19 +41,11 @@ impl Touch for PipedFrames {
     fn has_frame(&mut self) -> Result<bool> {
         let mut piece = [0; 1 << 16];
         while !self.ended && self.bytes.len() < self.wanted {
-            let mut poll = libc::pollfd { fd: self.from.as_raw_fd(), events: libc::POLLIN, revents: 0 };
-            // SAFETY: one entry, on our stack, with a descriptor that we own.
-            if unsafe { libc::poll(&raw mut poll, 1, LOOK_EVERY_MS) } == 0 {
-                return Ok(false);
-            }
             let room = (self.wanted - self.bytes.len()).min(piece.len());
-            match self.from.read(&mut piece[..room]) {
-                Ok(0) => self.ended = true,
-                Ok(n) => self.bytes.extend_from_slice(&piece[..n]),
-                Err(error) if matches!(error.kind(), ErrorKind::Interrupted | ErrorKind::WouldBlock) => {
-                    return Ok(false);
-                }
-                Err(error) => return Err(Error::socket("standard input")(error)),
+            match self.from.read(&mut piece[..room], LOOK_EVERY).map_err(Error::socket("standard input"))? {
+                None => return Ok(false),
+                Some(0) => self.ended = true,
+                Some(n) => self.bytes.extend_from_slice(&piece[..n]),
             }
         }
         Ok(true)

@@ -1,13 +1,21 @@
 //! An emulated serial line: a pseudo-terminal with a stable name, limited to the throughput of its baud rate.
 
+#[cfg(target_os = "linux")]
+mod linux;
+#[cfg(not(target_os = "linux"))]
+mod portable;
+
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
-use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::{Error, Result};
+use crate::Result;
+#[cfg(target_os = "linux")]
+use linux as terminal;
+#[cfg(not(target_os = "linux"))]
+use portable as terminal;
 
 /// Number of bits on the line per byte: start, 8 of data, stop.
 const BITS_A_BYTE: f64 = 10.0;
@@ -23,7 +31,7 @@ const WAITING: usize = 4096;
 pub(super) struct PseudoTerminal {
     ours: File,
     /// Kept open, so that the line stays up while no other program has it open.
-    _client: OwnedFd,
+    _client: File,
     link: PathBuf,
     bytes_per_s: f64,
     /// Number of bytes that may be transferred now, in each direction.
@@ -38,45 +46,10 @@ impl PseudoTerminal {
     ///
     /// # Errors
     ///
-    /// `File` if no pseudo-terminal is available, or something other than a link exists at `link`.
+    /// `File` if no pseudo-terminal is available, or something other than a link exists at `link`; `Core(Problem)` if the
+    /// system has none.
     pub(super) fn open(link: &Path, baud: u32) -> Result<Self> {
-        let (mut ours, mut client) = (-1, -1);
-        let mut name = [0 as libc::c_char; 128];
-        // SAFETY: openpty writes two descriptors and a name of some 12 bytes into the buffers given; no settings are
-        // passed.
-        let opened = unsafe {
-            libc::openpty(&raw mut ours, &raw mut client, name.as_mut_ptr(), std::ptr::null(), std::ptr::null())
-        };
-        if opened != 0 {
-            return Err(Error::file(link)(std::io::Error::last_os_error()));
-        }
-        // SAFETY: both descriptors are open and owned by this function alone; the name ends within its buffer.
-        let (ours, client, name) = unsafe {
-            let name = std::ffi::CStr::from_ptr(name.as_ptr()).to_string_lossy().into_owned();
-            (File::from_raw_fd(ours), OwnedFd::from_raw_fd(client), name)
-        };
-        // Set to raw mode before a program can open it: otherwise the board's output would be echoed back to it.
-        // SAFETY: a descriptor that we own, and settings on our stack.
-        let ready = unsafe {
-            let mut settings = std::mem::zeroed();
-            libc::tcgetattr(client.as_raw_fd(), &raw mut settings) == 0
-                && {
-                    libc::cfmakeraw(&raw mut settings);
-                    libc::tcsetattr(client.as_raw_fd(), libc::TCSANOW, &raw const settings) == 0
-                }
-                && libc::fcntl(ours.as_raw_fd(), libc::F_SETFL, libc::O_NONBLOCK) == 0
-        };
-        if !ready {
-            return Err(Error::file(link)(std::io::Error::last_os_error()));
-        }
-        if std::fs::symlink_metadata(link).is_ok_and(|metadata| !metadata.file_type().is_symlink()) {
-            return Err(Error::file(link)(std::io::Error::from_raw_os_error(libc::EEXIST)));
-        }
-        // The link is created under another name and renamed, so that a valid link exists at all times.
-        let mut temporary = link.as_os_str().to_owned();
-        temporary.push(format!(".{}", std::process::id()));
-        let made = std::os::unix::fs::symlink(&name, &temporary).and_then(|()| std::fs::rename(&temporary, link));
-        made.map_err(Error::file(link))?;
+        let (ours, client) = terminal::open(link)?;
         let (link, bytes_per_s) = (link.to_owned(), f64::from(baud) / BITS_A_BYTE);
         let (looked, waiting) = (Instant::now(), VecDeque::new());
         Ok(Self { ours, _client: client, link, bytes_per_s, into: 0.0, out: 0.0, looked, waiting })
@@ -133,6 +106,8 @@ impl Drop for PseudoTerminal {
 
 #[cfg(test)]
 mod tests {
+    #![cfg(target_os = "linux")]
+
     use std::time::Duration;
 
     use super::*;

@@ -39,11 +39,16 @@ impl FramePacer {
     }
 }
 
-/// Asks the kernel not to gather this thread's wake-ups: it may let them come 50 us late, a quarter of a frame.
+/// Asks Linux not to gather this thread's wake-ups: it may let them come 50 us late, a quarter of a frame.
+#[cfg(target_os = "linux")]
 pub(super) fn wake_sharply() {
     // SAFETY: PR_SET_TIMERSLACK takes one number and touches no memory of ours; where it fails, sleeps are coarser.
     unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1_u64) };
 }
+
+/// Elsewhere a sleep is as sharp as the system's timers; in Windows `sleep` uses those of high resolution, where there are any.
+#[cfg(not(target_os = "linux"))]
+pub(super) fn wake_sharply() {}
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,8 @@
 //! Writes the edges of the board's sync line as lines of text.
 
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::Write;
+#[cfg(unix)]
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
 
@@ -22,14 +23,10 @@ impl Sync {
     ///
     /// `File` if the file cannot be opened, or if it exists and may not be replaced.
     pub(super) fn open(path: &Path, overwrite: bool) -> Result<Self> {
-        let metadata = std::fs::metadata(path).ok();
-        let pipe = metadata.is_some_and(|m| m.file_type().is_fifo() || m.file_type().is_char_device());
         let mut options = File::options();
         options.write(true);
-        if pipe {
-            // Opened for reading too, so that a pipe opens before it has a reader; non-blocking, so that a slow reader
-            // never delays the board.
-            options.read(true).custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY);
+        if set_up_for_pipe(path, &mut options) {
+            // It exists, and keeps what was written to it.
         } else if overwrite {
             options.create(true).truncate(true);
         } else {
@@ -55,4 +52,22 @@ impl Sync {
         // Without a reader the line of text is lost, as an edge is that no input samples.
         let _ = self.out.write_all(line.as_bytes());
     }
+}
+
+/// Whether the path is that of a pipe or a terminal; then it is opened for reading too, so that a pipe opens before it has a
+/// reader, and non-blocking, so that a slow reader never delays the board.
+#[cfg(unix)]
+fn set_up_for_pipe(path: &Path, options: &mut OpenOptions) -> bool {
+    let metadata = std::fs::metadata(path).ok();
+    let is_pipe = metadata.is_some_and(|m| m.file_type().is_fifo() || m.file_type().is_char_device());
+    if is_pipe {
+        options.read(true).custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY);
+    }
+    is_pipe
+}
+
+/// Elsewhere a path is that of a file.
+#[cfg(not(unix))]
+fn set_up_for_pipe(_: &Path, _: &mut OpenOptions) -> bool {
+    false
 }

@@ -12,6 +12,7 @@ use serde_json::json;
 use super::shared::PipelineShared;
 use super::sink::OutputDetection;
 use crate::capture::{Batch, ParcelPacker};
+use crate::kernel_drops::KernelDrops;
 use crate::recording::{LOW_RATE_EVERY, now_ns};
 
 /// Longest time for which a parcel gathers datagrams.
@@ -111,7 +112,7 @@ pub(super) fn copier(received: u64) -> (Copier, channel::Receiver<Vec<u8>>) {
 
 impl Copier {
     /// Adds what arrived.
-    pub(super) fn push(&mut self, batch: &Batch, dropped_by_kernel: u64) {
+    pub(super) fn push(&mut self, batch: &Batch, dropped_by_kernel: KernelDrops) {
         for (datagram, bytes) in batch.iter() {
             if self.packer.waiting() == 0 {
                 self.since = Instant::now();
@@ -126,7 +127,7 @@ impl Copier {
 
     /// Closes a parcel that is due, or states that nothing arrived before `silent_until`; returns false if there is no
     /// receiver any more.
-    pub(super) fn tick(&mut self, silent_until: Option<i64>, dropped_by_kernel: u64) -> bool {
+    pub(super) fn tick(&mut self, silent_until: Option<i64>, dropped_by_kernel: KernelDrops) -> bool {
         let since = self.since.elapsed();
         let due =
             if self.packer.waiting() > 0 { since >= GATHER } else { since >= STILL_HERE && silent_until.is_some() };
@@ -139,7 +140,7 @@ impl Copier {
     }
 
     /// Sends the last parcel, with the datagrams that still wait.
-    pub(super) fn finish(&mut self, dropped_by_kernel: u64) {
+    pub(super) fn finish(&mut self, dropped_by_kernel: KernelDrops) {
         let parcel = self.packer.close(now_ns(), dropped_by_kernel, true);
         // Waits for room, because only this parcel contains the last counts of losses; without a receiver it is dropped
         // at once.

@@ -39,7 +39,7 @@ pub struct Counters {
     pub sent: Vec<Sent>,
     /// Counts of the recording's other sources.
     pub sources: BTreeMap<String, SourceCounts>,
-    /// Latency from the kernel's stamp to the end of decoding, per datagram.
+    /// Latency from the kernel's stamp to the end of decoding, per datagram; none if the kernel does not stamp.
     pub decode_latency: Quantiles,
     /// Latency from `known` to the output, by the board's clock.
     pub report_latency: Quantiles,
@@ -174,7 +174,7 @@ impl Counters {
     #[must_use]
     pub fn nothing_came(&self) -> bool {
         let lines = self.lines.as_ref().map_or(0, |counts| counts.lines);
-        self.capture.messages + self.capture.dropped_by_kernel + lines == 0
+        self.capture.messages + self.capture.dropped_by_kernel.known() + lines == 0
     }
 
     /// The difference from earlier counts. Clocks, versions and latencies are the current ones; datagrams that still
@@ -190,7 +190,7 @@ impl Counters {
             messages: if datagrams == 0 { 0 } else { (now.messages - before.messages).max(1) },
             datagrams,
             bytes: now.bytes - before.bytes,
-            dropped_by_kernel: now.dropped_by_kernel - before.dropped_by_kernel,
+            dropped_by_kernel: now.dropped_by_kernel.since(before.dropped_by_kernel),
             dropped_by_queue,
             bytes_dropped_by_queue: now.bytes_dropped_by_queue - before.bytes_dropped_by_queue,
             changes_between_senders: now.changes_between_senders - before.changes_between_senders,

@@ -470,6 +470,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         recorded: now.decoding.decoded,
         dropped_by_kernel: now.capture.dropped_by_kernel,
         dropped_by_queue: now.capture.dropped_by_queue,
+        stamped_when_read: now.capture.stamped_when_read,
         several_a_message: counters.capture.gro && counters.capture.datagrams > counters.capture.messages,
         decoder,
         steps_back: now.decoding.wire_steps.clone(),
@@ -482,6 +483,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::KernelDrops;
 
     #[test]
     fn only_a_recording_of_nothing_but_version_2_says_that_nothing_is_missing() {
@@ -511,7 +513,7 @@ mod tests {
     fn where_a_dropped_message_may_have_been_several_datagrams_it_is_not_known_what_the_way_lost() {
         let mut now = Counters::default();
         (now.decoding.wire_v2.datagrams, now.decoding.wire_v2.intact, now.decoding.wire_v2.missing) = (100, 100, 7);
-        (now.capture.messages, now.capture.datagrams, now.capture.dropped_by_kernel) = (100, 100, 2);
+        (now.capture.messages, now.capture.datagrams, now.capture.dropped_by_kernel) = (100, 100, KernelDrops(Some(2)));
         now.capture.gro = true;
         let lost = losses(&now, None).verdict().lost;
         assert_eq!((lost["dropped_by_kernel"], lost["lost_on_the_way"]), (2, 5));

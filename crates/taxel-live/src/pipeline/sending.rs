@@ -8,7 +8,6 @@ use std::fmt::{self, Display, Formatter};
 use std::fs::File;
 use std::io::{self, ErrorKind, Write};
 use std::net::{SocketAddr, UdpSocket};
-use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::str::FromStr;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -20,6 +19,7 @@ use taxel_core::problem;
 use super::sink::{OutputDetection, Sink};
 use crate::line_place::{FORMS, LinePlace};
 use crate::locked::lock;
+use crate::named_pipe::open_to_write;
 use crate::serial_line::{CONNECT, SerialLine};
 use crate::{Error, Result};
 
@@ -251,16 +251,7 @@ impl Device {
                 let socket = UdpSocket::bind(any).and_then(|s| s.set_nonblocking(true).map(|()| s));
                 Ok(Some(Self::Udp(socket.map_err(Error::socket(to))?, *address)))
             }
-            LinePlace::File(path) => {
-                if !std::fs::metadata(path).map_err(Error::file(path))?.file_type().is_fifo() {
-                    return Err(problem!("{}: is no named pipe; mkfifo makes one", path.display()).into());
-                }
-                match File::options().write(true).custom_flags(libc::O_NONBLOCK).open(path) {
-                    Ok(file) => Ok(Some(Self::File(file))),
-                    Err(error) if error.raw_os_error() == Some(libc::ENXIO) => Ok(None),
-                    Err(error) => Err(Error::file(path)(error)),
-                }
-            }
+            LinePlace::File(path) => Ok(open_to_write(path)?.map(Self::File)),
             LinePlace::Serial(place) | LinePlace::Tcp(place) => {
                 Ok(Some(Self::Serial(SerialLine::open(place, CONNECT)?)))
             }

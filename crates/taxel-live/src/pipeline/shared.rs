@@ -23,7 +23,7 @@ use super::source::NamedSource;
 use super::viewer_queue::ViewerEvents;
 use crate::capture::{Origin, Receiver};
 use crate::frame_lines::FrameLayout;
-use crate::latency::Latencies;
+use crate::latency::{Latencies, Quantiles};
 use crate::locked::lock;
 use crate::recording::{Decoding, Header, SourceWriter, now_ns};
 use crate::{Error, Result};
@@ -149,12 +149,14 @@ impl PipelineShared {
     }
 
     pub(super) fn counters(&self) -> Counters {
-        let published = self.published();
+        let (published, capture) = (self.published(), self.receiver.counts());
+        let decoding =
+            if capture.stamped_when_read { Quantiles::default() } else { published.decode_latency.quantiles() };
         Counters {
-            capture: self.receiver.counts(),
+            capture,
             bridged: self.receiver.bridged(),
             lines: self.frames.as_ref().map(|frames| frames.counts()),
-            decode_latency: published.decode_latency.quantiles(),
+            decode_latency: decoding,
             report_latency: published.report_latency.quantiles(),
             sent: self.sending.iter().map(|line| line.counts()).collect(),
             seconds: self.begun.elapsed().as_secs_f64(),

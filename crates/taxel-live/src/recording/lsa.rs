@@ -10,7 +10,7 @@ use taxel_core::{Array, Events, Stop};
 
 use super::{OutputFile, limits};
 use crate::regular_file::open_regular;
-use crate::{Error, Result};
+use crate::{Error, Result, system_error};
 
 /// Writes a `.lsa`. Its `.lss` is created by [`LsaWriter::finish`] only.
 #[derive(Debug)]
@@ -51,7 +51,7 @@ impl LsaWriter {
     pub(crate) fn reserve(path: &Path, overwrite: bool) -> Result<OutputFile> {
         let marker = completion_marker(path);
         if !overwrite && marker.exists() {
-            return Err(Error::file(&marker)(std::io::Error::from_raw_os_error(libc::EEXIST)));
+            return Err(Error::file(&marker)(system_error::exists()));
         }
         OutputFile::open(path, overwrite)
     }

@@ -1,16 +1,24 @@
 //! The file of a recording: locked while it is written, and checked at the end.
 //!
 //! A second recorder that should replace the file of a running one is refused by the lock, which the system releases
-//! when the process ends. Other programs do not check the lock: they may remove, rename or replace the file, and what
-//! is written then goes into a file without a name. Therefore the end of a recording checks that the name still refers
-//! to the file that was written.
+//! when the process ends. In Unix other programs do not check the lock: they may remove, rename or replace the file, and
+//! what is written then goes into a file without a name. Therefore the end of a recording checks that the name still refers
+//! to the file that was written. In Windows they cannot.
 
-use std::fs::{File, OpenOptions, TryLockError};
+#[cfg(unix)]
+mod unix;
+#[cfg(windows)]
+mod windows;
+
+use std::fs::{File, OpenOptions};
 use std::io::{Error as IoError, ErrorKind, Result as IoResult};
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-use crate::{Error, Result};
+use crate::{Error, Result, system_error};
+#[cfg(unix)]
+use unix as reserved;
+#[cfg(windows)]
+use windows as reserved;
 
 /// A file that is reserved for one recording.
 #[derive(Debug)]
@@ -34,16 +42,9 @@ impl OutputFile {
         }
         loop {
             let (file, new) = open(path, overwrite).map_err(Error::file(path))?;
-            match file.try_lock() {
-                Ok(()) => {}
-                Err(TryLockError::WouldBlock) => {
-                    let text = "is being recorded by another program; end that first, or name another file";
-                    return Err(Error::file(path)(IoError::new(ErrorKind::ResourceBusy, text)));
-                }
-                // Some file systems, for example of networks, have no locks: a loss is then detected at the end.
-                Err(TryLockError::Error(error))
-                    if matches!(error.raw_os_error(), Some(libc::ENOLCK | libc::EOPNOTSUPP)) => {}
-                Err(TryLockError::Error(error)) => return Err(Error::file(path)(error)),
+            if !reserved::lock(&file).map_err(Error::file(path))? {
+                let text = "is being recorded by another program; end that first, or name another file";
+                return Err(Error::file(path)(IoError::new(ErrorKind::ResourceBusy, text)));
             }
             let output = Self { path: path.to_owned(), file, new };
             // The previous holder of the lock may have removed the file.
@@ -84,12 +85,7 @@ impl OutputFile {
 
     /// Whether the path still refers to this file.
     fn is_in_place(&self) -> Result<bool> {
-        let ours = self.file.metadata().map_err(Error::file(&self.path))?;
-        match std::fs::metadata(&self.path) {
-            Ok(named) => Ok((named.dev(), named.ino()) == (ours.dev(), ours.ino())),
-            Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(false),
-            Err(error) => Err(Error::file(&self.path)(error)),
-        }
+        reserved::is_in_place(&self.file, &self.path).map_err(Error::file(&self.path))
     }
 
     /// Checks at the end of a recording that its path still refers to the file; `written` describes its content in the
@@ -113,7 +109,7 @@ impl OutputFile {
     /// `File` where the system refuses.
     pub fn discard(self) -> Result<()> {
         if self.new && self.is_in_place()? {
-            std::fs::remove_file(&self.path).map_err(Error::file(&self.path))?;
+            reserved::remove(self.file, &self.path).map_err(Error::file(&self.path))?;
         }
         Ok(())
     }
@@ -124,16 +120,16 @@ fn open(path: &Path, overwrite: bool) -> IoResult<(File, bool)> {
     let mut options = OpenOptions::new();
     options.read(true).write(true);
     if !overwrite {
-        return options.create_new(true).open(path).map(|file| (file, true));
+        return reserved::open(options.create_new(true), path).map(|file| (file, true));
     }
     let new = !path.exists();
-    options.create(true).truncate(false).open(path).map(|file| (file, new))
+    reserved::open(options.create(true).truncate(false), path).map(|file| (file, new))
 }
 
 /// Refuses a write-protected file, also for the superuser, who could write to it.
 fn replaceable(path: &Path) -> Result<()> {
     match std::fs::metadata(path) {
-        Ok(file) if file.permissions().readonly() => Err(Error::file(path)(IoError::from_raw_os_error(libc::EACCES))),
+        Ok(file) if file.permissions().readonly() => Err(Error::file(path)(system_error::denied())),
         _ => Ok(()),
     }
 }

@@ -16,11 +16,15 @@ use super::damage::{
 };
 use super::topic::Topic;
 use crate::bridged::Bridged;
+use crate::kernel_drops::KernelDrops;
 
 /// The wording of version 1 when nothing was dropped between the socket and the file.
 pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)";
 /// The same for a stream of numbers.
 const NO_LINE_LOST: &str = "nothing lost after arrival (lines without numbers cannot show what was lost before it)";
+
+/// The wording where a kernel does not count what it drops, and the board does not number what it sends.
+const UNCOUNTED: &str = "what was lost is not known: the kernel does not count what it drops";
 
 /// The wording where the record with the final counts is damaged.
 const NO_END: &str = "the final counts are damaged: what was lost since the last before them is not known";
@@ -34,7 +38,7 @@ pub enum RecordingStatus {
     /// Everything that arrived; what was lost before cannot be known.
     #[serde(rename = "complete after arrival")]
     CompleteAfterArrival,
-    /// The file does not say what was lost.
+    /// Neither the file nor the kernel says what was lost.
     #[default]
     Unknown,
     /// Bytes that arrived, or their times, cannot be relied upon.
@@ -81,12 +85,16 @@ pub struct RecordingCounts {
     /// Datagrams in this recording.
     pub recorded: u64,
     /// What the kernel dropped because its receive buffer was full: datagrams, or with `UDP_GRO` trains of them.
-    pub dropped_by_kernel: u64,
+    /// `null` where the system does not count them.
+    pub dropped_by_kernel: KernelDrops,
     /// Datagrams that taxel dropped because its own queue was full.
     pub dropped_by_queue: u64,
     /// Whether datagrams came several a message (`UDP_GRO`), so that the kernel may have dropped several at once.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub several_a_message: bool,
+    /// Whether the arrival of a datagram is when it was read from the socket, as the system does not state when it arrived.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub stamped_when_read: bool,
     /// Datagrams or lines whose arrival numbers a file without its end lacks, but for those dropped by the queue.
     #[serde(skip)]
     pub left_out: u64,
@@ -249,7 +257,7 @@ impl Verdict {
         let bridged = counts.bridged.as_deref().copied().unwrap_or_default();
         let of_board = |cause: &str| counts.decoder.get(cause).copied().unwrap_or(0);
         let dropped = [
-            (counts.dropped_by_kernel, "dropped_by_kernel", "messages dropped by the kernel"),
+            (counts.dropped_by_kernel.known(), "dropped_by_kernel", "messages dropped by the kernel"),
             (counts.dropped_by_queue, "dropped_by_queue", "datagrams dropped by taxel's queue"),
             (counts.left_out, LEFT_OUT, "messages dropped by taxel's queue or left out of the file"),
             (
@@ -260,7 +268,11 @@ impl Verdict {
             (of_board(IN_NO_LINE), IN_NO_LINE, "bytes in no line of numbers"),
             (bridged.missing, "lost_between_computers", "datagrams lost between the computers"),
             (bridged.dropped, "dropped_by_other_computer", "datagrams dropped by the other computer"),
-            (bridged.dropped_by_kernel, "dropped_by_other_kernel", "messages dropped by the other computer's kernel"),
+            (
+                bridged.dropped_by_kernel.known(),
+                "dropped_by_other_kernel",
+                "messages dropped by the other computer's kernel",
+            ),
         ];
         // The board's numbers also skip what was dropped after it was sent, which is counted above.
         let not_sent = ["not_recorded", IN_NO_LINE];
@@ -268,13 +280,20 @@ impl Verdict {
         let missing = counts.missing.unwrap_or(0);
         // Which of them were dropped is not known where more was dropped than is missing (datagrams that came again, or came
         // after the last number), or more datagrams than messages.
-        let several = counts.several_a_message && counts.dropped_by_kernel > 0 && missing > behind;
+        let several = counts.several_a_message && counts.dropped_by_kernel.known() > 0 && missing > behind;
         let unclear = missing.min(behind) > 0 && (several || missing < behind || of_board(REPEATED) > 0);
+        let counted_by_kernel = counts.dropped_by_kernel.plus(bridged.dropped_by_kernel).are_known();
         let board = [
             (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events"),
             (of_board(EVENTS_DROPPED), EVENTS_DROPPED, "events dropped by the board by its own count"),
         ];
-        let way = if unclear {
+        let way = if !counted_by_kernel && missing > behind {
+            (
+                missing - behind,
+                "lost_on_the_way_or_dropped",
+                "datagrams lost or damaged on the way or dropped by a kernel that does not count them",
+            )
+        } else if unclear {
             (missing, "lost_on_the_way_or_dropped", "datagrams lost or damaged on the way or among those dropped")
         } else {
             (missing.saturating_sub(behind), "lost_on_the_way", "datagrams lost or damaged on the way")
@@ -298,19 +317,29 @@ impl Verdict {
         let knows = counts.missing.is_some() && of_board(BOARD_RESET) == 0;
         verdict.status = match (&words[..], knows) {
             ([], true) => RecordingStatus::Complete,
+            ([], false) if !counted_by_kernel => RecordingStatus::Unknown,
             ([], false) => RecordingStatus::CompleteAfterArrival,
             _ => RecordingStatus::Lost,
         };
         let hidden = counts.missing.is_some() && !knows;
         let mut pieces = vec![if !words.is_empty() {
-            let but = if hidden { ", and what resets hide" } else { "" };
+            let but = match (hidden, knows || counted_by_kernel) {
+                (true, true) => ", and what resets hide",
+                (true, false) => ", and what resets hide or the kernel dropped uncounted",
+                (false, true) => "",
+                (false, false) => ", and what the kernel dropped uncounted",
+            };
             format!("LOST: {}{but}", words.join(", "))
         } else if knows && of_board(OTHER_BOARD) > 0 {
             "nothing lost but what another board sent".to_owned()
         } else if knows {
             "nothing lost".to_owned()
-        } else if hidden {
+        } else if hidden && counted_by_kernel {
             "nothing lost but for what resets hide".to_owned()
+        } else if hidden {
+            "nothing lost but for what resets hide or the kernel dropped uncounted".to_owned()
+        } else if !counted_by_kernel {
+            UNCOUNTED.to_owned()
         } else {
             nothing_lost.to_owned()
         }];

@@ -181,7 +181,7 @@ impl LiveSource {
             arrival: now.arrival(now_ns()),
             pace: now.board.pace.clone(),
             lost: Lost {
-                kernel: now.capture.dropped_by_kernel,
+                kernel: now.capture.dropped_by_kernel.0,
                 queue: now.capture.dropped_by_queue,
                 wire: v2.missing,
                 damaged: now.decoding.wire.skipped + v2.checksum + v2.short + v2.foreign,

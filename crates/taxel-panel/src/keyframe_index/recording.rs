@@ -4,7 +4,6 @@
 //! events as they were.
 
 use std::fs::File;
-use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -203,7 +202,7 @@ impl RecordingIndex {
                 let offset = k as u64 * LSA_PIECE;
                 bytes = LSA_PIECE.min(length - offset);
                 let mut piece = vec![0; usize::try_from(bytes).unwrap_or(0)];
-                file.read_exact_at(&mut piece, offset).map_err(Error::file(&self.path))?;
+                taxel_live::read_exact_at(file, &mut piece, offset).map_err(Error::file(&self.path))?;
                 decoder.push_into(&piece, None, events);
             }
             _ => {}

@@ -384,8 +384,8 @@ impl From<&Array> for ArrayInfo {
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
 pub(crate) struct Lost {
-    /// Messages.
-    pub(crate) kernel: u64,
+    /// Messages; `null` where the system does not count them.
+    pub(crate) kernel: Option<u64>,
     /// Datagrams.
     pub(crate) queue: u64,
     /// Datagrams of version 2 that never arrived intact.

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 use mcap::parse_record;
@@ -10,6 +9,7 @@ use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::summary::FileSummary;
+use crate::read_at::read_exact_at;
 use crate::recording::{Header, limits};
 use crate::{Error, Result};
 
@@ -65,7 +65,7 @@ impl Blocks {
     pub(super) fn message_indexes(&self, block: FileBlock) -> Result<Option<IndexedChunks>> {
         // Times of the first and the last message, both 0 in a chunk without messages.
         let mut times = [0; 16];
-        self.file.read_exact_at(&mut times, block.offset + 9).map_err(Error::file(&self.path))?;
+        read_exact_at(&self.file, &mut times, block.offset + 9).map_err(Error::file(&self.path))?;
         let all = message_indexes_from(&self.path, &self.file, self.length, block.offset + block.length)?;
         Ok((times == [0; 16] || !all.is_empty()).then_some(all))
     }
@@ -91,7 +91,7 @@ pub(super) fn records(
 ) -> Result<bool> {
     let Ok(length) = usize::try_from(block.length) else { return Ok(false) };
     bytes.resize(length, 0);
-    file.read_exact_at(bytes, block.offset).map_err(Error::file(path))?;
+    read_exact_at(file, bytes, block.offset).map_err(Error::file(path))?;
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)
         .with_skip_end_magic(true)
@@ -130,7 +130,7 @@ pub(super) fn records(
 pub(super) fn message_indexes_from(path: &Path, file: &File, length: u64, mut at: u64) -> Result<IndexedChunks> {
     let (mut all, mut head) = (IndexedChunks::new(), [0; 15]);
     while at.checked_add(15).is_some_and(|end| end <= length) {
-        file.read_exact_at(&mut head, at).map_err(Error::file(path))?;
+        read_exact_at(file, &mut head, at).map_err(Error::file(path))?;
         let Some((channel, messages)) = index_entry(&head).filter(|_| head[0] == op::MESSAGE_INDEX) else { break };
         *all.entry(channel).or_default() += messages;
         at += 15 + 16 * messages;

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::os::unix::fs::FileExt;
 
 use mcap::parse_record;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
+use crate::read_at::read_exact_at;
 use crate::recording::limits;
 use crate::recording::metadata::END;
 
@@ -36,7 +36,7 @@ impl FileSummary {
             match event.ok()? {
                 LinearReadEvent::ReadRequest(wanted) => {
                     let more = wanted.min(usize::try_from(length - at).unwrap_or(usize::MAX));
-                    file.read_exact_at(reader.insert(more), at).ok()?;
+                    read_exact_at(file, reader.insert(more), at).ok()?;
                     reader.notify_read(more);
                     at += more as u64;
                 }

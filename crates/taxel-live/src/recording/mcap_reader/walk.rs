@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 use mcap::records::{Record, op};
@@ -10,6 +9,7 @@ use mcap::{MAGIC, parse_record};
 
 use super::blocks::{FileBlock, IndexedChunks, index_entry, message_indexes_from, records};
 use super::summary::FileSummary;
+use crate::read_at::read_exact_at;
 use crate::recording::metadata::{BEGIN, CHECK, END, check};
 use crate::recording::{FileEnding, Header, Rebuilt, RecordingCounts, limits};
 use crate::{Error, Result};
@@ -80,7 +80,7 @@ impl<'a> FileWalk<'a> {
     fn bytes(&self, offset: u64, wanted: u64) -> Result<Vec<u8>> {
         let n = usize::try_from(wanted.min(self.length.saturating_sub(offset))).unwrap_or(0);
         let mut bytes = vec![0; n];
-        self.file.read_exact_at(&mut bytes, offset).map_err(Error::file(self.path))?;
+        read_exact_at(self.file, &mut bytes, offset).map_err(Error::file(self.path))?;
         Ok(bytes)
     }
 

@@ -338,8 +338,13 @@ impl WriteFailure {
 }
 
 /// Raises the calling thread's priority on a busy machine, if the system allows it (the superuser, or `LimitNICE`).
+#[cfg(target_os = "linux")]
 fn raise_priority() {
     // SAFETY: a system call with numbers only; on Linux 0 selects the calling thread. If the call is refused, nothing
     // changes.
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, -10) };
 }
+
+/// Elsewhere the priority stays.
+#[cfg(not(target_os = "linux"))]
+fn raise_priority() {}

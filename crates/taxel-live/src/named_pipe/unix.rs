@@ -1,0 +1,25 @@
+//! Named pipes as `mkfifo` makes them.
+
+use std::fs::File;
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::path::Path;
+
+use taxel_core::problem;
+
+use crate::{Error, Result};
+
+/// Opens a pipe, which never blocks its writer; `None` if it has no reader.
+///
+/// # Errors
+///
+/// `File` if it cannot be opened, `Core(Problem)` if it is no pipe.
+pub(crate) fn open_to_write(path: &Path) -> Result<Option<File>> {
+    if !std::fs::metadata(path).map_err(Error::file(path))?.file_type().is_fifo() {
+        return Err(problem!("{}: is no named pipe; mkfifo makes one", path.display()).into());
+    }
+    match File::options().write(true).custom_flags(libc::O_NONBLOCK).open(path) {
+        Ok(file) => Ok(Some(file)),
+        Err(error) if error.raw_os_error() == Some(libc::ENXIO) => Ok(None),
+        Err(error) => Err(Error::file(path)(error)),
+    }
+}

@@ -1,0 +1,39 @@
+//! A recording's file in Unix: a lock, which other programs may ignore.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{ErrorKind, Result};
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+
+/// Opens the file for one recording.
+pub(super) fn open(options: &mut OpenOptions, path: &Path) -> Result<File> {
+    options.open(path)
+}
+
+/// Locks the file; false if another recording has locked it.
+pub(super) fn lock(file: &File) -> Result<bool> {
+    match file.try_lock() {
+        Ok(()) => Ok(true),
+        Err(TryLockError::WouldBlock) => Ok(false),
+        // Some file systems, for example of networks, have no locks: a loss is then detected at the end.
+        Err(TryLockError::Error(error)) if matches!(error.raw_os_error(), Some(libc::ENOLCK | libc::EOPNOTSUPP)) => {
+            Ok(true)
+        }
+        Err(TryLockError::Error(error)) => Err(error),
+    }
+}
+
+/// Whether the path still refers to this file.
+pub(super) fn is_in_place(file: &File, path: &Path) -> Result<bool> {
+    let ours = file.metadata()?;
+    match std::fs::metadata(path) {
+        Ok(named) => Ok((named.dev(), named.ino()) == (ours.dev(), ours.ino())),
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// Removes the file while its lock is held.
+pub(super) fn remove(_locked: File, path: &Path) -> Result<()> {
+    std::fs::remove_file(path)
+}

@@ -1,0 +1,40 @@
+//! A recording's file in Windows: while it is open, others can read it, and nobody can write, rename or remove it.
+
+use std::fs::{File, OpenOptions};
+use std::io::{Error, ErrorKind, Result};
+use std::os::windows::fs::OpenOptionsExt;
+use std::path::Path;
+
+/// `FILE_SHARE_READ` of winnt.h.
+const OTHERS_READ: u32 = 1;
+/// `ERROR_SHARING_VIOLATION` of winerror.h.
+const HELD: i32 = 32;
+
+/// Opens the file for one recording.
+pub(super) fn open(options: &mut OpenOptions, path: &Path) -> Result<File> {
+    options.share_mode(OTHERS_READ).open(path).map_err(|error| match error.raw_os_error() {
+        Some(HELD) => Error::new(
+            ErrorKind::ResourceBusy,
+            "another program has opened this file; close it there, or name another file",
+        ),
+        _ => error,
+    })
+}
+
+/// Opening has reserved the file.
+#[allow(clippy::unnecessary_wraps)]
+pub(super) fn lock(_: &File) -> Result<bool> {
+    Ok(true)
+}
+
+/// Nobody can move an open file that others may only read.
+#[allow(clippy::unnecessary_wraps)]
+pub(super) fn is_in_place(_: &File, _: &Path) -> Result<bool> {
+    Ok(true)
+}
+
+/// Closes the file, as an open one cannot be removed, and removes it.
+pub(super) fn remove(file: File, path: &Path) -> Result<()> {
+    drop(file);
+    std::fs::remove_file(path)
+}
