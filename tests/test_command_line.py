@@ -315,7 +315,7 @@ def test_labels_of_a_recording_that_is_not_there_are_left_out_with_one_warning(h
         (("walk", "wlak", "wlak"), "left out 2 events of wlak, which is not here; there is walk.npz"),
         (
             ("walk", *(f"a{k}" for k in range(7))),
-            "left out 7 events of a0, a1, a2, a3, a4 and 2 more, which are not here",
+            "left out 7 events of a0, a1, a2 and 4 more, which are not here",
         ),
     ):
         Path("labels.csv").write_text("recording,label,t_us\n" + "".join(f"{name},contact,500000\n" for name in names))

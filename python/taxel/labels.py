@@ -17,11 +17,12 @@ from taxel._base.arguments import checked_path, shown, text
 from taxel._base.errors import refused
 from taxel._base.files import beside as beside_file
 from taxel._base.files import named
-from taxel._base.header_table import HeaderTable, text_of
+from taxel._base.header_table import HeaderTable, separator_of, text_of
 from taxel._base.messages import counted, escaped
 from taxel._base.number_text import int_of
 from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
+from taxel.event_table import with_known_columns
 from taxel.recorded import Recorded
 
 __all__ = [
@@ -93,7 +94,9 @@ class Labels:
         tabs between; all but `label` and `t_us` may be absent. A label without a source is of all sources of its
         recording; a source that was a topic of a ROS bag may have the topic's name. A row with `replaces_us` stands for
         the recording's own note of that time; one without a label says that this note is none. Other columns are kept
-        (`Note.others`). An empty text has no labels.
+        (`Note.others`). An empty text has no labels. Without `t_us` a column of times by its name is read: numbers in
+        the unit that the name states ("Zeit [s]", "t_ms"), or dates, which count from 1970; without `label` one of
+        that name in capitals, of the name event, Ereignis, name, marker or annotation, or the only column of texts.
 
     Attributes
     ----------
@@ -119,7 +122,7 @@ class Labels:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         file = Path(checked_path("path", path))
-        rows, _ = rows_of(file, text_of(file))
+        rows = _rows(_table(file))
         self.path, self.rows = file, tuple(row for row in rows if row.text)
         self.removed = tuple(row for row in rows if not row.text)
 
@@ -274,12 +277,27 @@ def rows_of(location: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...
     (400, ('t_us', 'label', 'comment'))
     """
     table = HeaderTable.read(location, lines)
+    return _rows(table), table.header
+
+
+def _table(file: Path) -> HeaderTable:
+    """Return a table in columns of taxel; one in those of another program may be in Windows-1252 too."""
+    try:
+        lines = text_of(file)
+    except FormatError:
+        lines = text_of(file, otherwise="cp1252")
+        if set(_WANTED) <= set(HeaderTable.read(file, lines).header):
+            raise
+    names = next((line for line in lines if line.strip()), "")
+    return with_known_columns(HeaderTable.read(file, lines), separator_of(names))
+
+
+def _rows(table: HeaderTable) -> tuple[Note, ...]:
     if not table.header:
         # An editor empties a table before it writes it.
-        return (), ()
+        return ()
     table.has(_WANTED)
-    rows = tuple(_row(f"{location}, line {line}", cells) for line, cells in table)
-    return rows, table.header
+    return tuple(_row(f"{table.location}, line {line}", cells) for line, cells in table)
 
 
 def text_with(rows: Iterable[Note], columns: Iterable[str] = (), end: str = "\n", separator: str = ",") -> str:

@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import shutil
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -115,6 +116,29 @@ def test_the_recording_of_a_folder_that_does_not_fit_is_named(tmp_path: Path, tr
     code, _, error = call(capsys, "detect", tmp_path / "smaller.npz", "--readout", trained)
     assert code == 2
     assert re.search(r"smaller.npz: an array of 3 x 3 taxels: the readout was trained on 8 x 8$", error.strip())
+
+
+def test_recordings_of_other_arrays_are_left_out_where_one_fits(
+    tmp_path: Path, folder: Path, trained: Path, capsys
+) -> None:
+    small = taxel.Events([0, 1000], [0, 1], [0, 1], [1, 1], array=taxel.Array(4, 4))
+    for name in ("1", "2", "3", "4"):
+        taxel.convert(small, tmp_path / f"{name}.npz")
+    shutil.copy(folder / "9.npz", tmp_path)
+    rows = [f"9,{line}" for line in (folder / "truth.csv").read_text().splitlines()[1:]]
+    (tmp_path / "labels.csv").write_text(
+        "\n".join(["recording,label,t_us", *rows, *(f"{k},contact,500" for k in (1, 4))])
+    )
+    arguments = ("detect", tmp_path, "--readout", trained, "--tare", folder / "tare.json")
+    code, said, error = call(capsys, *arguments, "--truth", tmp_path / "labels.csv", "--window-ms", 10)
+    names = ", ".join(str(tmp_path / f"{k}.npz") for k in (1, 2, 3))
+    warning = f"left out 4 recordings of other arrays than the 8 x 8 taxels that the readout was trained on: {names}"
+    assert (code, f"taxel: warning: {warning} and 1 more" in error.splitlines()) == (0, True), error
+    assert "(window 10 ms), in 1 of 5 recordings, as the others do not fit:" in said.splitlines()[0]
+    code, said, _ = call(capsys, *arguments, "--json")
+    found = json.loads(said)
+    assert (code, [Path(each["recording"]).name for each in found["recordings"]]) == (0, ["9.npz"])
+    assert [Path(name).name for name in found["left_out"]] == ["1.npz", "2.npz", "3.npz", "4.npz"]
 
 
 def test_detections_go_to_a_table(folder: Path, trained: Path, capsys) -> None:

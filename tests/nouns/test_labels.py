@@ -241,3 +241,75 @@ def test_an_empty_table_has_no_labels(text: bytes, name: str, tmp_path: Path) ->
     # It is no recording of its folder.
     assert [one.path for one in taxel.open_all(tmp_path)] == [made.path]
     assert not is_recording(place)
+
+
+GERMAN = [["Zeit", "Ereignis"], ["02.01.1970 00:00:00,5", "Fuß auf"], ["02.01.1970 00:00:01,25", "Abheben"]]
+
+
+@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+@pytest.mark.parametrize(
+    ("rows", "separator", "times"),
+    [
+        (GERMAN, ";", [86_400_500_000, 86_401_250_000]),
+        ([["Zeit [s]", "EVENT"], ["0,21", "Fuß auf"], ["1,0000004", "Abheben"]], ";", [210_000, 1_000_000]),
+        ([["Annotation", "Zeit (ms)"], ["Fuß auf", "210,5"], ["Abheben", "1e3"]], "\t", [210_500, 1_000_000]),
+        ([["side", "t_ms", "what"], ["1", "210.5", "Fuß auf"], ["2", "9", "Abheben"]], ",", [210_500, 9_000]),
+        ([["t_us", "Name"], ["5", "Fuß auf"], ["7", "Abheben"]], ",", [5, 7]),
+        ([["label", "time"], ["Fuß auf", "2024-05-01T10:15:02.010"], ["Abheben", "2024-05-01 12:15:03+02:00"]], ",",
+         [1_714_558_502_010_000, 1_714_558_503_000_000]),
+    ],
+)  # fmt: skip
+def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
+    tmp_path: Path, rows: list[list[str]], separator: str, times: list[int], code: str
+) -> None:
+    place = tmp_path / "walk.csv"
+    place.write_bytes("".join(separator.join(row) + "\r\n" for row in rows).encode(code))
+    assert [(row.text, row.t) for row in taxel.Labels(place).rows] == list(
+        zip(["Fuß auf", "Abheben"], times, strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("Zeit;Ereignis\n0,21;auf\n", r"line 2: Zeit is '0,21', of no unit; name its column as 'Zeit \[s\]' or \(ms\)"),
+        ("t_s,event\n0:0x,auf\n", "line 2: t_s is '0:0x'; must be a number, or as 2024-05-01"),
+        ('t_s,event\n"0,21",auf\n', "line 2: t_s is '0,21'; must be a number"),
+        ("t_s,event\n1e308,auf\n", "line 2: t_s is '1e308'; must be a number"),
+        ("t_s,event\nnan,auf\n", "line 2: t_s is 'nan'; must be a number"),
+        ("time,t_s,event\n1,1,auf\n", "line 1: 'time' and 't_s' are times; name that of the labels t_us"),
+        ("t_s,what,comment\n1,auf,late\n", "line 1: 'what' and 'comment' are texts; there are 't_s', 'what', "),
+        ("t_s,value\n1,2\n", "line 1: no column 'label'; there are 't_s', 'value'; must be label,t_us"),
+        ("start;Ereignis\n1;auf\n", "line 1: no column 't_us'; there are 'start', 'Ereignis'; must be label,t_us"),
+        ("# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
+        ("t_s;Ereignis\n1\n", "line 2: 1 cells, must have 2"),
+    ],
+)
+def test_a_table_of_another_program_without_times_or_labels_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    place = tmp_path / "labels.csv"
+    place.write_text(text)
+    with pytest.raises(taxel.FormatError, match=said):
+        taxel.Labels(place)
+
+
+def test_the_page_refuses_a_table_of_another_program_and_leaves_it_alone(tmp_path: Path) -> None:
+    place = tmp_path / "walk.notes.csv"
+    place.write_text("Zeit [s];Ereignis\n0,21;auf\n")
+    before = place.read_bytes()
+    handler = LabelRequests(Opening())
+    edit = (None, {"text": "ball", "t": 5})
+    with pytest.raises(taxel.ProblemError, match=r"line 1: no column 'label'; .*: mend the table, then try again"):
+        handler.change(place, "walk.mcap", 1, [[edit]])
+    assert place.read_bytes() == before
+
+
+def test_a_table_of_another_program_is_no_recording_of_its_folder(tmp_path: Path) -> None:
+    made = record(tmp_path / "walk.mcap", 0, 1.0)
+    (tmp_path / "Ereignisse.csv").write_text("Zeit [s];Ereignis\n0,21;auf\n")
+    assert is_label_table(tmp_path / "Ereignisse.csv")
+    assert [each.path for each in taxel.open_all(tmp_path)] == [made.path]
+    (tmp_path / "walk.notes.csv").write_text("Zeit [s];Ereignis\n0,21;auf\n")
+    assert [(note.text, note.t) for note in taxel.open(made.path).notes] == [("auf", 210_000)]
+    # Numbers of two channels are one.
+    (tmp_path / "two.csv").write_text("time,marker\n0.21,0\n")
+    assert not is_label_table(tmp_path / "two.csv")

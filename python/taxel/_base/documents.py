@@ -9,6 +9,7 @@ import sys
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any, NoReturn
 
 from taxel._base.arguments import shown
@@ -39,7 +40,7 @@ class NotTomlError(FormatError):
     """Says that a text is not TOML, and not that it is too long or too deep."""
 
 
-def read_text(path: str | os.PathLike[str], most: int = BY_HAND) -> str:
+def read_text(path: str | os.PathLike[str], most: int = BY_HAND, otherwise: str = "") -> str:
     """Return the text of a file (`decoded`).
 
     Raises
@@ -51,11 +52,11 @@ def read_text(path: str | os.PathLike[str], most: int = BY_HAND) -> str:
         data = file.read(most + 1)
     if len(data) > most:
         raise FormatError(f"{path}: more than {most} bytes; must be at most that")
-    return decoded(path, data)
+    return decoded(path, data, otherwise)
 
 
-def decoded(path: str | os.PathLike[str], data: bytes) -> str:
-    """Return the text of a file's bytes, UTF-8 with or without BOM, or UTF-16 with one.
+def decoded(path: str | os.PathLike[str], data: bytes, otherwise: str = "") -> str:
+    """Return the text of a file's bytes, UTF-8 with or without BOM, or UTF-16 with one; if neither, in `otherwise`.
 
     Raises
     ------
@@ -65,6 +66,9 @@ def decoded(path: str | os.PathLike[str], data: bytes) -> str:
     try:
         return data[len(mark) :].decode(encoding)
     except UnicodeDecodeError as error:
+        if otherwise and not mark:
+            with suppress(UnicodeDecodeError):
+                return data.decode(otherwise)
         # Counted in the whole file, with its BOM.
         before = error.object[: error.start].decode(encoding, "replace")
         line = len(before.replace("\r\n", "\n").replace("\r", "\n").split("\n"))

@@ -18,31 +18,20 @@ if sys.platform == "win32":
     import _winapi
     import msvcrt
 
-    #: FILE_SHARE_READ, FILE_SHARE_WRITE and FILE_SHARE_DELETE together; OPEN_EXISTING and CREATE_NEW.
-    _SHARED, _THERE, _NEW = 7, 3, 1
-
-    def _descriptor(path: str | os.PathLike[str], access: int, how: int, flags: int) -> int:
-        try:
-            handle = _winapi.CreateFile(os.fspath(path), access, _SHARED, 0, how, 0, 0)
-        except OSError as error:
-            error.filename = os.fspath(path)
-            raise
-        return msvcrt.open_osfhandle(handle, flags)
+    #: FILE_SHARE_READ, FILE_SHARE_WRITE and FILE_SHARE_DELETE together; OPEN_EXISTING.
+    _SHARED, _THERE = 7, 3
 
     def open_regular(path: str | os.PathLike[str]) -> int:
         """Return the descriptor of a file, opened for reading; other programs may rename and delete it meanwhile."""
-        return _descriptor(path, _winapi.GENERIC_READ, _THERE, os.O_RDONLY)
-
-    def open_new(path: str | os.PathLike[str], mode: int = 0o666) -> int:  # noqa: ARG001  as elsewhere
-        """Return the descriptor of a file that was not there; other programs may rename and delete it meanwhile."""
-        return _descriptor(path, _winapi.GENERIC_READ | _winapi.GENERIC_WRITE, _NEW, os.O_RDWR)
+        try:
+            handle = _winapi.CreateFile(os.fspath(path), _winapi.GENERIC_READ, _SHARED, 0, _THERE, 0, 0)
+        except OSError as error:
+            error.filename = os.fspath(path)
+            raise
+        return msvcrt.open_osfhandle(handle, os.O_RDONLY)
 
 else:
     open_regular = _core.open_regular
-
-    def open_new(path: str | os.PathLike[str], mode: int = 0o666) -> int:
-        """Return the descriptor of a file that was not there."""
-        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode)
 
 
 #: What file systems answer that have no hard links.
@@ -171,7 +160,7 @@ def create(name: str | os.PathLike[str], target: str | os.PathLike[str]) -> None
     except OSError as error:
         if error.errno not in _NO_LINK:
             raise
-        os.close(open_new(target))
+        os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
         os.replace(name, target)
     else:
         os.unlink(name)

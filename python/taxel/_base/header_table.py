@@ -179,15 +179,17 @@ def separator_of(names: str) -> str:
     return max(",;\t", key=bare.count)
 
 
-def text_of(path: Path) -> list[str]:
+def text_of(path: Path, *, otherwise: str = "") -> list[str]:
     """Read the lines of a text (`read_text`), including line ends, as a quoted cell may contain one.
+
+    `otherwise` is the encoding of one that is not UTF-8, which is refused without it.
 
     Raises
     ------
     FormatError : no text
     OSError : the file is not there, or cannot be read
     """
-    text = read_text(path, TEXT)
+    text = read_text(path, TEXT, otherwise)
     # As in JSON, a character is in the text, in its line and in its cell.
     characters = len(text) * (6 if text.isascii() else 12)
     lines = max(text.count("\n"), text.count("\r"))

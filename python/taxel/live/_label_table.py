@@ -33,7 +33,7 @@ from typing import Any
 from taxel._base.arguments import shown
 from taxel._base.documents import decoded
 from taxel._base.encodings import mark_of
-from taxel._base.files import check_writable, create, open_new, open_regular
+from taxel._base.files import check_writable, create, open_regular
 from taxel._base.header_table import lines_of, separator_of
 from taxel._core import FormatError, ProblemError
 from taxel.labels import Note, rows_of, text_with
@@ -219,7 +219,7 @@ def _exchange(first: str, second: Path) -> bool:
     if sys.platform == "win32":
         out = _new_name(second)
         if not _replace_file(str(second), first, out, 0, None, None):
-            raise ctypes.WinError(ctypes.get_last_error(), str(second))
+            raise ctypes.WinError(ctypes.get_last_error())
         os.rename(out, first)
         return True
     try:
@@ -315,12 +315,12 @@ def _save(file: _File, saved: dict[str, Any]) -> None:
     if len(text) > MOST_SAVED:
         raise ProblemError(f"{file.path}: more labels than the {MOST_SAVED} bytes of what taxel saves beside it hold")
     state = state_path(file.path)
-    with _new_file(state, _about(file), text) as (_, name):
+    with _new_file(state, _about(file), text) as name:
         os.replace(name, state)
     if file.link is None:
         return
     # The link may become a file again.
-    with contextlib.suppress(OSError), _new_file(state := state_path(file.link), _about(file), text) as (_, name):
+    with contextlib.suppress(OSError), _new_file(state := state_path(file.link), _about(file), text) as name:
         os.replace(name, state)
 
 
@@ -545,12 +545,12 @@ class LabelTables:
         _save(file, {**states, "before": _digest(file.text), "after": _digest(text)})
         replaced = False
         try:
-            with _new_file(path, None if file.descriptor is None else _about(file), text) as (descriptor, name):
+            with _new_file(path, None if file.descriptor is None else _about(file), text) as name:
                 replaced = file.is_current() and _put(name, file)
                 if replaced and not _is_old(name, file):
                     # Another program was quicker: its file comes back. It may have written to ours in the meantime.
                     _exchange(name, path)
-                    self._watch(replace(file, descriptor=os.dup(descriptor), text=text, rows=joined.rows))
+                    self._watch(replace(file, descriptor=open_regular(name), text=text, rows=joined.rows))
                     replaced = False
         finally:
             if not replaced:
@@ -651,24 +651,24 @@ def _new_name(path: Path) -> str:
 
 
 @contextlib.contextmanager
-def _new_file(path: Path, about: os.stat_result | None, text: bytes) -> Iterator[tuple[int, str]]:
+def _new_file(path: Path, about: os.stat_result | None, text: bytes) -> Iterator[str]:
     """Write a new text to a file beside that which it will replace, on the disk; remove what is there afterwards."""
     name = _new_name(path)
+    mode = 0o666 if about is None else stat.S_IMODE(about.st_mode)
+    first = mode if about is None else mode & 0o600
     try:
-        mode = 0o666 if about is None else stat.S_IMODE(about.st_mode)
-        descriptor = open_new(name, mode if about is None else mode & 0o600)
         try:
-            if about is not None and sys.platform != "win32":
-                # A user cannot give a file to a group without being in it.
-                with contextlib.suppress(OSError):
-                    os.fchown(descriptor, -1, about.st_gid)
-                os.fchmod(descriptor, mode)
-            with open(descriptor, "wb", closefd=False) as part:
+            with open(name, "xb", opener=lambda path, flags: os.open(path, flags, first)) as part:
+                if about is not None and sys.platform != "win32":
+                    # A user cannot give a file to a group without being in it.
+                    with contextlib.suppress(OSError):
+                        os.fchown(part.fileno(), -1, about.st_gid)
+                    os.fchmod(part.fileno(), mode)
                 part.write(text)
-            os.fsync(descriptor)
-            yield descriptor, name
+                part.flush()
+                os.fsync(part.fileno())
+            yield name
         finally:
-            os.close(descriptor)
             Path(name).unlink(missing_ok=True)
     except OSError as error:
         error.filename, error.filename2 = None, None

@@ -16,6 +16,7 @@ from taxel._base.arguments import checked_path
 from taxel._base.encodings import as_utf_8
 from taxel._base.files import open_file
 from taxel._core import FormatError
+from taxel.event_table import are_of_events
 from taxel.formats.layout import Layout, advice
 from taxel.formats.ros import is_bag
 from taxel.recording.kinds import ENDINGS, LABELS
@@ -255,10 +256,10 @@ def _has_layout(path: Path, layout: GivenLayout) -> bool:
 
 
 def is_label_table(path: Path) -> bool:
-    """Return whether a .csv is a table of labels (`taxel.Labels`): by its first line, or empty by its name."""
-    names = _first_line(path)
+    """Return whether a .csv is a table of labels (`taxel.Labels`): by its first lines, or empty by its name."""
+    names, cells = _first_lines(path)
     is_named = path.name == LABELS or path.name.endswith(".notes.csv")
-    return {"label", "t_us"} <= set(names) or (names == [""] and is_named)
+    return {"label", "t_us"} <= set(names) or (names == [""] and is_named) or are_of_events(names, cells)
 
 
 def are_spike_trains(path: Path) -> bool:
@@ -286,18 +287,19 @@ def _companion(path: Path, *, has_layout: bool) -> str:
 
 def _is_table_of_taxel(path: Path) -> bool:
     """Return whether the first line of a .csv begins as taxel's own recordings do."""
-    names = _first_line(path)
+    names, _ = _first_lines(path)
     return names[0] == "t_us" and len(names) > 1
 
 
-def _first_line(path: Path) -> list[str]:
-    """Return the names in the first line of a table, as far as they are within 64 kB."""
+def _first_lines(path: Path) -> tuple[list[str], list[str]]:
+    """Return the cells of the first line of a table, and of the second, as far as they are within 64 kB."""
     with open_file(path) as file:
         try:
-            return names_in(as_utf_8(path.name, file).readline(1 << 16))
+            text = as_utf_8(path.name, file)
+            return names_in(text.readline(1 << 16)), names_in(text.readline(1 << 16))
         except FormatError:
             # The reader of tables reports what is no text.
-            return [""]
+            return [""], [""]
 
 
 def _is_of_another_program(path: Path, layout: GivenLayout) -> bool:

@@ -27,7 +27,7 @@ from taxel.recording import Recording
 from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
-from taxel.tasks.labels import GivenLabels, references, sources_without
+from taxel.tasks.labels import GivenLabels, few, references, sources_without
 from taxel.tasks.rest import GivenTare, TakenRest, check_tare, rest
 
 #: No event.
@@ -127,6 +127,8 @@ class Detecting:
         The sources that no row of the truth names, by label, where rows name sources: they are not scored for it.
     window_ms : float, ms
     warnings : tuple of str
+    left_out : tuple of str
+        The recordings of other arrays than the readout's, beside those that fit.
     """
 
     each: tuple[Detected, ...]
@@ -135,6 +137,7 @@ class Detecting:
     unlabelled: Mapping[str, tuple[str, ...]]
     window_ms: float
     warnings: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
 
     @property
     def outcomes(self) -> list[Outcome]:
@@ -143,7 +146,11 @@ class Detecting:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the detections and scores as plain values for JSON."""
-        result: dict[str, Any] = {"recordings": [each.to_dict() for each in self.each], "warnings": list(self.warnings)}
+        result: dict[str, Any] = {
+            "recordings": [each.to_dict() for each in self.each],
+            "left_out": list(self.left_out),
+            "warnings": list(self.warnings),
+        }
         if self.score is None:
             return result
         unlabelled = {label: list(sources) for label, sources in self.unlabelled.items()}
@@ -211,8 +218,11 @@ def detect(
                 "truth", f" is {truth}: names no event in {', '.join(recording.title for recording in opened)}"
             )
         unlabelled = {} if truth is None else sources_without(truth, opened, events)
+        left_out = _of_other_arrays(readout, opened)
         each = []
         for recording, labelled in zip(opened, events, strict=True):
+            if left_out and not readout._accepts(recording.array):
+                continue
             update(f"detecting in {recording.title}", 0, 0)
             without = {label for label, sources in unlabelled.items() if recording.label in sources}
             each.append(_detected(readout, recording, labelled, without, options))
@@ -223,7 +233,22 @@ def detect(
     unknown = sorted(
         {label for labels_of in events if labels_of is not None for label in labels_of} - set(readout.labels)
     )
-    return Detecting(tuple(each), together, tuple(unknown), unlabelled, options.window_ms, tuple(warnings))
+    names = tuple(recording.title for recording in left_out)
+    return Detecting(tuple(each), together, tuple(unknown), unlabelled, options.window_ms, tuple(warnings), names)
+
+
+def _of_other_arrays(readout: Readout | PlainRule, recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the recordings that are left out as the readout is of another array, with a warning; none if all are."""
+    others = [recording for recording in recordings if not readout._accepts(recording.array)]
+    array = readout.array
+    if not others or len(others) == len(recordings) or array is None:
+        return []
+    warn(
+        f"left out {counted(len(others), 'recording')} of other arrays than the {array.rows} x {array.columns} taxels "
+        f"that the {readout._WHAT} was trained on: {few(recording.title for recording in others)}",
+        stacklevel=3,
+    )
+    return others
 
 
 def _detected(

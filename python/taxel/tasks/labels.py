@@ -114,9 +114,9 @@ def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
     strange = [name for name in table.recordings if name not in known]
     if strange:
         count = counted(sum(row.recording in strange for row in table.rows), "event")
-        there = _few(dict.fromkeys(recording.title for recording in recordings))
+        there = few(dict.fromkeys(recording.title for recording in recordings))
         warn(
-            f"{table.path}: left out {count} of {_few(strange)}, which {'is' if len(strange) == 1 else 'are'} "
+            f"{table.path}: left out {count} of {few(strange)}, which {'is' if len(strange) == 1 else 'are'} "
             f"not here; there {'is' if len(recordings) == 1 else 'are'} {there}",
             stacklevel=3,
         )
@@ -132,10 +132,16 @@ def _named(table: Labels, recordings: Sequence[Recording]) -> list[tuple[str, se
     return [(label, {table.named(path), table.named(path, trial, label), trial}) for path, trial, label in trials]
 
 
-def _few(names: Iterable[str]) -> str:
-    """Return the first five names, and how many more there are."""
+def few(names: Iterable[str]) -> str:
+    """Return the first three names, and how many more there are.
+
+    Examples
+    --------
+    >>> few(["a", "b", "c", "d", "e"])
+    'a, b, c and 2 more'
+    """
     all_names = list(names)
-    return ", ".join(all_names[:5]) + f" and {len(all_names) - 5} more" * (len(all_names) > 5)
+    return ", ".join(all_names[:3]) + f" and {len(all_names) - 3} more" * (len(all_names) > 3)
 
 
 def labelled_trials(source: GivenLabels, recordings: Sequence[Recording]) -> list[Recording]:

@@ -16,6 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import short, shown
+from taxel._base.cells import (
+    are_units,
+    cells,
+    ends_in_separator,
+    seconds_of,
+    times_of,
+    unquote,
+)
 from taxel._base.columns import Growing
 from taxel._base.limits import COLUMNS
 from taxel._base.messages import counted, first_line
@@ -29,14 +37,6 @@ from taxel.formats.checks import whole_us
 from taxel.formats.layout import ISO, UNITS_US, Layout, Table
 from taxel.recording.contents import RecordedSource, source_from
 from taxel.recording.once import known
-from taxel.recording.readers.cells import (
-    are_units,
-    cells,
-    ends_in_separator,
-    seconds_of,
-    times_of,
-    unquote,
-)
 from taxel.recording.readers.npz import around
 from taxel.recording.sections import Losses, Origin
 

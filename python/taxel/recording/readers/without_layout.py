@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.cells import MISSING, are_units, cells, ends_in_separator, seconds_of, times_of, unit_of
 from taxel._base.limits import LINE, TIME_US
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._core import FormatError
 from taxel.formats import text
 from taxel.formats.layout import ISO, UNITS_US, advice
-from taxel.recording.readers.cells import MISSING, are_units, cells, ends_in_separator, seconds_of, times_of, unit_of
 from taxel.recording.readers.foreign import ARRAYS, arrays_of, list_arrays, shapes_of
 
 #: A column is one of times, if its name does not say so, if it ascends for so many lines.

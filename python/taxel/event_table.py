@@ -1,0 +1,129 @@
+"""Tables of labels as other programs write them: times with their unit or date, and texts, in columns of any name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from taxel._base.arguments import shown
+from taxel._base.cells import seconds_of, unit_of
+from taxel._base.header_table import HeaderTable
+from taxel._base.number_text import float_of
+from taxel._core import FormatError
+
+__all__ = ["are_of_events", "with_known_columns"]
+
+#: What the column of labels is called, the first that is there; capitals do not matter.
+_LABELS = ("label", "event", "ereignis", "name", "marker", "annotation")
+#: Columns that hold neither times of events nor labels.
+_OTHERS = ("recording", "source", "host_ns", "replaces_us")
+_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
+_RIGHT = "must be label,t_us ..., or a column of texts and times with their unit, as label,time [s]"
+
+
+def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
+    """Return a table with its labels in a column `label`, and its times in a column `t_us`; as it is if it has both.
+
+    Parameters
+    ----------
+    table : HeaderTable
+    separator : str
+        What separates its cells: if it is no comma, numbers may have decimal commas.
+
+    Raises
+    ------
+    FormatError : no column of times or of labels, a time without a unit (names line and column)
+
+    Examples
+    --------
+    >>> table = HeaderTable.read("a.csv", ["Zeit;Ereignis", "02.01.1970 00:00:00,5;heel"])
+    >>> list(with_known_columns(table, ";"))
+    [(2, {'t_us': '86400500000', 'label': 'heel'})]
+    """
+    header = list(table.header)
+    if not header or {"label", "t_us"} <= set(header):
+        return table
+    time = header.index("t_us") if "t_us" in header else _time(table)
+    rows, name, header[time] = list(table.rows), header[time], "t_us"
+    for k, (line, cells) in enumerate(rows if name != "t_us" else ()):
+        us = _us(f"{table.location}, line {line}", name, cells[time].strip(), separator)
+        rows[k] = line, (*cells[:time], str(us), *cells[time + 1 :])
+    if "label" not in header:
+        header[_label(table, header, [cells for _, cells in rows], separator)] = "label"
+    return replace(table, header=tuple(header), lines=tuple(rows))
+
+
+def are_of_events(names: Sequence[str], cells: Sequence[str]) -> bool:
+    """Return whether a table is one of labels, by its names and first row: it has times and a text, and nothing else.
+
+    Examples
+    --------
+    >>> are_of_events(["Zeit", "Ereignis"], ["10:15:02", "heel"]), are_of_events(["time", "event"], ["0.5", "0"])
+    (True, False)
+    """
+    kinds = ["time" if unit_of(name) is not None else name.lower() for name in names]
+    labels = [k for k, kind in enumerate(kinds) if kind in _LABELS]
+    known = all(kind == "time" or kind in (*_LABELS, *_OTHERS) for kind in kinds)
+    return known and kinds.count("time") == len(labels) == 1 and len(cells) == len(names) and _is_text(cells[labels[0]])
+
+
+def _time(table: HeaderTable) -> int:
+    """Return which column holds the times, by its name."""
+    times = [k for k, name in enumerate(table.header) if name not in _OTHERS and unit_of(name) is not None]
+    if len(times) == 1:
+        return times[0]
+    there = ", ".join(map(shown, table.header))
+    if times:
+        names = " and ".join(shown(table.header[k]) for k in times)
+        raise FormatError(
+            f"{table.location}, line 1: {names} are times; name that of the labels t_us, or leave one out"
+        )
+    missing = "t_us" if any(name.lower() in _LABELS for name in table.header) else "label"
+    raise FormatError(f"{table.location}, line 1: no column {missing!r}; there are {there}; {_RIGHT}")
+
+
+def _label(table: HeaderTable, header: Sequence[str], rows: Sequence[Sequence[str]], separator: str) -> int:
+    """Return which column holds the labels: by its name, else the only one of texts."""
+    names = [name.lower() for name in header]
+    named = next((label for label in _LABELS if label in names), None)
+    if named is not None:
+        return names.index(named)
+    texts = [
+        k
+        for k, name in enumerate(header)
+        if name not in ("t_us", *_OTHERS, "") and rows and all(_is_text(row[k], separator) for row in rows)
+    ]
+    if len(texts) == 1:
+        return texts[0]
+    found = f"{' and '.join(shown(header[k]) for k in texts)} are texts" if texts else "no column 'label'"
+    there = ", ".join(map(shown, table.header))
+    raise FormatError(f"{table.location}, line 1: {found}; there are {there}; {_RIGHT}")
+
+
+def _is_text(cell: str, separator: str = ";") -> bool:
+    return bool(cell.strip()) and math.isnan(_number(cell, separator)) and math.isnan(seconds_of(cell.strip()))
+
+
+def _us(location: str, name: str, cell: str, separator: str) -> int:
+    """Return the time of a cell in whole us."""
+    number, unit = _number(cell, separator), unit_of(name) or ""
+    if math.isnan(number):
+        number, unit = seconds_of(cell), "s"
+    elif not unit:
+        raise FormatError(f"{location}: {name} is {shown(cell)}, of no unit; name its column as '{name} [s]' or (ms)")
+    us = number * _US[unit]
+    if not math.isfinite(us):
+        raise FormatError(
+            f"{location}: {name} is {shown(cell)}; must be a number, or as 2024-05-01 10:15:02.25 or "
+            "01.05.2024 10:15:02,25"
+        )
+    return round(us)
+
+
+def _number(cell: str, separator: str) -> float:
+    """Return the number of a cell, with a decimal comma where that is no separator; NaN of a text."""
+    try:
+        return float_of(cell if separator == "," else cell.replace(",", "."))
+    except ValueError:
+        return math.nan
