@@ -17,7 +17,7 @@ from taxel import Array, Frames, Tare
 from taxel.detect import Example, score
 from taxel.detect.causes import _chance
 from taxel.detect.examples import check_examples
-from taxel.detect.label_times import FeltLoads, held_by_tare
+from taxel.detect.label_times import FeltLoads, Off, held_by_tare
 
 ARRAY = Array(6, 6, pitch_mm=5.0)
 FLOOR = 0.05
@@ -48,9 +48,14 @@ def example(seed: int, shift_ms: float, **more: Any) -> Example:
     return one
 
 
+def far(one: Example, *labels: str) -> dict[str, Off]:
+    """Return the distances of labels that are too far off to be aligned."""
+    return {label: off for label, off in FeltLoads([one], FLOOR).distances(labels).items() if off.is_far}
+
+
 @given(st.integers(0, 1000), st.floats(-900, 900))
 def test_labels_that_are_off_are_measured_and_others_are_not_called_so(seed: int, shift_ms: float) -> None:
-    found = FeltLoads([example(seed, shift_ms)], FLOOR).off_by(["contact", "lift"])
+    found = far(example(seed, shift_ms), "contact", "lift")
     if abs(shift_ms) < 40:
         assert found == {}
     if abs(shift_ms) > 60:
@@ -62,7 +67,7 @@ def test_labels_that_are_off_are_measured_and_others_are_not_called_so(seed: int
 
 @given(st.integers(0, 1000))
 def test_labels_of_touches_that_all_last_as_long_are_not_off_by_that(seed: int) -> None:
-    assert FeltLoads([example(seed, 0, hold_s=(0.4, 0.4))], FLOOR).off_by(["contact", "lift"]) == {}
+    assert far(example(seed, 0, hold_s=(0.4, 0.4)), "contact", "lift") == {}
 
 
 @given(st.integers(0, 1000))
@@ -71,7 +76,19 @@ def test_labels_that_nothing_follows_are_not_off(seed: int) -> None:
     random = np.random.default_rng(seed)
     labels = {"odd": np.sort(random.integers(3_000_000, int(frames.t[-1]), 12))}
     (one,) = check_examples([Example(frames, labels, Tare.take(frames, stop_us=2_000_000))])
-    assert FeltLoads([one], FLOOR).off_by(["odd"]) == {}
+    assert far(one, "odd") == {}
+
+
+@given(st.integers(0, 1000), st.sampled_from([-300.0, 200.0, 250.0, 350.0]), st.floats(30, 55))
+def test_keys_pressed_live_have_a_distance_and_a_window(seed: int, lag_ms: float, spread_ms: float) -> None:
+    one, random = example(seed, 0, count=35), np.random.default_rng(seed)
+    late = np.rint(1000 * random.normal(lag_ms, spread_ms, 35)).astype(np.int64)
+    felt = FeltLoads([one._replace(labels={"contact": one.labels["contact"] + late})], FLOOR)
+    off = felt.distances(["contact"])["contact"]
+    assert abs(off.ms - lag_ms) < 40
+    if off.within_ms:
+        assert 1.5 * spread_ms < off.within_ms < 6 * spread_ms
+        assert off.alike >= 30
 
 
 @given(st.integers(0, 1000), st.floats(0, 0.9))

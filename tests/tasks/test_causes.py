@@ -144,6 +144,13 @@ def early(folder: Path, seed: int) -> Situation:
     return shifted(folder, seed, -300)
 
 
+def by_hand(folder: Path, seed: int) -> Situation:
+    """Labels of a key that a hand pressed live, late by a quarter of a second."""
+    frames, labels = pressed(seed, 25)
+    late = np.random.default_rng(seed).normal(250, 50, 25)
+    return Situation(saved(folder, frames, {"contact": labels["contact"] + np.rint(1000 * late).astype(int)}))
+
+
 def recipe(folder: Path, seed: int) -> Situation:
     """Contact and lift of a mat, learnt by the recipe of insoles."""
     frames, labels = pressed(seed)
@@ -162,6 +169,7 @@ SITUATIONS = {
     "recipe durations": durations,
     "shifted_labels": shifted,
     "shifted_labels early": early,
+    "shifted_labels by hand": by_hand,
     "recipe": recipe,
 }
 

@@ -47,6 +47,8 @@ _MANY = 0.05
 _NEARLY_NONE = 0.1
 #: ... of so many or more.
 _LEAST_LABELS = 4
+#: Labels of several names are moved together whose distances from what was felt differ by so many windows at most.
+_TOGETHER = 1.5
 #: How long before a label the sensor is looked at, us: as long as a tare ends before the first label.
 _BEFORE_US = 20_000
 #: How many labels at either end of a recording are looked at.
@@ -284,18 +286,28 @@ class Evidence:
         yield Cause("foreign_labels", (label,), mistakes, measured, _FOREIGN)
 
     def _shifts(self, wrong: Mapping[str, int]) -> Iterator[Cause]:
-        """Yield by how much labels are off, which one option moves if all are alike."""
-        off = self._felt.off_by(list(wrong))
-        shifts = [distance.ms for distance in off.values()]
-        alike = bool(off) and max(shifts) - min(shifts) <= WINDOW_MS and off.keys() == wrong.keys()
-        shift_ms = -round(float(np.median(shifts))) if alike else 0
-        for label, distance in off.items():
+        """Yield by how much labels are off, which one option moves if no label is then too far off.
+
+        Where a hand set them live another one is for their spread.
+        """
+        distances = self._felt.distances(self._counts)
+        all_ms = [distance.ms for distance in distances.values()]
+        together = bool(all_ms) and max(all_ms) - min(all_ms) <= _TOGETHER * WINDOW_MS
+        shift_ms = -round((max(all_ms) + min(all_ms)) / 2) if together else 0
+        within_ms = max((distance.within_ms for distance in distances.values()), default=0.0)
+        for label, distance in distances.items():
+            if label not in wrong or not distance.is_far:
+                continue
             measured = f"{distance}, and are aligned within {WINDOW_MS:.0f} ms only"
-            if alike:
-                option = f"--shift-ms {shift_ms}"
-                yield _by_option("shifted_labels", label, wrong[label], measured, option, shift_ms=float(shift_ms))
+            if together:
+                option, arguments = f"--shift-ms {shift_ms}", {"shift_ms": float(shift_ms)}
+                if within_ms > WINDOW_MS:
+                    option, arguments = f"{option} --window-ms {within_ms:.0f}", arguments | {"window_ms": within_ms}
+                yield _by_option("shifted_labels", label, wrong[label], measured, option, **arguments)
             else:
-                yield Cause("shifted_labels", (label,), wrong[label], measured, "other times of the labels")
+                side = "earlier" if distance.ms > 0 else "later"
+                advice = f"times of {label} {abs(distance.ms):.0f} ms {side} in the labels, as others fit"
+                yield Cause("shifted_labels", (label,), wrong[label], measured, advice)
 
     def _of_label(self, label: str, wrong: int) -> Iterator[Cause]:
         if (count := self._counts.get(label, 0)) < TWO_FOLDS:

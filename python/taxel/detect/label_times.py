@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from math import comb
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,13 @@ _FARTHEST_MS, _SAME_MS = 1000.0, 50.0
 #: Labels are off where this share of them has the same distance, and so many; of fewer chance may do so. They are not
 #: where as many are near.
 _SHARE, _LEAST = 0.8, 5
+#: Marks that a hand sets live have a common distance of at most that, ms, and the same share of them lies in a stretch
+#: of at most that, ms; all but a few in so many standard deviations around it, in steps of that, ms.
+_HAND_MS, _HAND_SPREAD_MS, _DEVIATIONS, _STEP_MS = 500.0, 170.0, 3.0, 10.0
+#: The standard deviation of normal values that have the median deviation of 1.
+_NORMAL = 1.4826
+#: Chance brings as many labels to one distance with at most this probability.
+_CHANCE = 0.01
 #: Touches that are so many times as many as the labels are at some distance of them by chance.
 _MOST_A_LABEL = 4
 #: This share of a tare, at its beginning, holds no touch.
@@ -35,15 +43,25 @@ _TIMES, _OF_FLOOR = 3.0, 6.0
 
 
 class Off(NamedTuple):
-    """By how much labels of one name lie after what was felt, ms; how many lie there, and of how many."""
+    """By how much labels of one name lie after what was felt, ms; how many lie there, and of how many.
+
+    Of marks that a hand set live also within how many ms of that distance these lie; else 0.
+    """
 
     ms: float
     alike: int
     labels: int
+    within_ms: float = 0.0
+
+    @property
+    def is_far(self) -> bool:
+        """Whether the distance is too large for the labels to be aligned."""
+        return abs(self.ms) > WINDOW_MS
 
     def __str__(self) -> str:
         side = "after" if self.ms > 0 else "before"
-        return f"{self.alike} of {self.labels} lie {abs(self.ms):.0f} ms {side} what the sensor felt (median)"
+        hand = f" and within {self.within_ms:.0f} ms of that, as keys pressed live" if self.within_ms else ""
+        return f"{self.alike} of {self.labels} lie {abs(self.ms):.0f} ms {side} what the sensor felt (median){hand}"
 
 
 class FeltLoads:
@@ -85,10 +103,11 @@ class FeltLoads:
                 at_edge |= np.diff(np.searchsorted(edge, [times - reach, times + reach]), axis=0)[0] > 0
         return int(near.sum()), int(at_edge.sum()), len(times)
 
-    def off_by(self, labels: Sequence[str]) -> dict[str, Off]:
-        """Return which labels lie at one distance from what was felt that is too large for them to be aligned.
+    def distances(self, labels: Iterable[str]) -> dict[str, Off]:
+        """Return by how much labels lie after what was felt, of each name of which most lie at one distance.
 
-        What was felt are the begins or the ends of loads, whichever more labels follow.
+        What was felt are the begins or the ends of loads, whichever more labels follow. Where no distance is the same,
+        it is that of marks that a hand set live.
         """
         if self._loads is None:
             return {}
@@ -98,9 +117,55 @@ class FeltLoads:
         for label in labels:
             times = self._loads.truth(label, self._loads.whole_examples)
             steady = [felt_edge for edge in felt for felt_edge in _steady(times, edge)]
-            if steady and all(abs(shift.ms) > WINDOW_MS for shift, _ in steady):
-                found[label], _ = min(steady, key=lambda found_edge: (-found_edge[0].alike, found_edge[1]))
+            near = [felt_edge for felt_edge in steady if not felt_edge[0].is_far]
+            by_hand = [] if steady else [felt_edge for edge in felt for felt_edge in _by_hand(times, edge)]
+            if alike := near or steady:
+                found[label], _ = min(alike, key=lambda found_edge: (-found_edge[0].alike, found_edge[1]))
+            elif by_hand:
+                found[label], _ = min(by_hand, key=lambda found_edge: found_edge[1])
         return found
+
+
+def _apart(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the distances of labels from these times up to the farthest, ms, ascending, and the labels' places."""
+    far = round(to_us(_FARTHEST_MS))
+    reach = np.searchsorted(felt, [times - far, times + far])
+    label_index = np.repeat(np.arange(len(times)), reach[1] - reach[0])
+    beside = np.concatenate([np.arange(*span) for span in reach.T])
+    apart = to_ms(times[label_index] - felt[beside])
+    order = np.argsort(apart, kind="stable")
+    return apart[order], label_index[order]
+
+
+def _by_hand(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple[Off, float]]:
+    """Yield the distance around which most labels lie from these times as a hand sets them, with its spread, ms."""
+    least = int(np.ceil(max(_LEAST, _SHARE * len(times))))
+    if len(times) < least or len(felt) > _MOST_A_LABEL * len(times):
+        return
+    apart, label_index = _apart(times, felt)
+    counts, begin, narrowest = np.zeros(len(times), np.int64), 0, (np.inf, 0, 0)
+    for end, label in enumerate(label_index, start=1):
+        counts[label] += 1
+        while np.count_nonzero(counts) >= least:
+            narrowest = min(narrowest, (float(apart[end - 1] - apart[begin]), begin, end))
+            counts[label_index[begin]] -= 1
+            begin += 1
+    spread_ms, *stretch = narrowest
+    if spread_ms > _HAND_SPREAD_MS or _by_chance(least, len(times), len(apart), spread_ms) > _CHANCE:
+        return
+    ms = float(np.median(apart[slice(*stretch)]))
+    nearest = np.full(len(times), np.inf)
+    np.minimum.at(nearest, label_index, np.abs(apart - ms))
+    within_ms = _STEP_MS * np.ceil(_DEVIATIONS * _NORMAL * float(np.median(nearest)) / _STEP_MS)
+    if abs(ms) <= _HAND_MS:
+        yield Off(ms, int(np.count_nonzero(nearest <= within_ms)), len(times), float(within_ms)), spread_ms
+
+
+def _by_chance(least: int, labels: int, pairs: int, spread_ms: float) -> float:
+    """Return how probable it is that so many labels have pairs in one of the stretches of that length by chance."""
+    stretches = 2 * _FARTHEST_MS / max(spread_ms, 1.0)
+    share = min(1.0, pairs / labels / stretches)
+    return stretches * sum(comb(labels, k) * share**k * (1 - share) ** (labels - k) for k in range(least, labels + 1))
 
 
 def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple[Off, float]]:
@@ -108,13 +173,7 @@ def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple
     least = max(_LEAST, _SHARE * len(times))
     if len(times) < least or len(felt) > _MOST_A_LABEL * len(times):
         return
-    far = round(to_us(_FARTHEST_MS))
-    reach = np.searchsorted(felt, [times - far, times + far])
-    label_index = np.repeat(np.arange(len(times)), reach[1] - reach[0])
-    beside = np.concatenate([np.arange(*span) for span in reach.T])
-    apart = to_ms(times[label_index] - felt[beside])
-    order = np.argsort(apart, kind="stable")
-    apart, label_index = apart[order], label_index[order]
+    apart, label_index = _apart(times, felt)
     for k, end in enumerate(np.searchsorted(apart, apart + _SAME_MS, side="right")):
         if end - k >= least and (alike := len(np.unique(label_index[k:end]))) >= least:
             yield Off(float(np.median(apart[k:end])), alike, len(times)), float(apart[end - 1] - apart[k])
