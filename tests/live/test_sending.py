@@ -230,7 +230,7 @@ def test_a_readout_that_the_page_chooses_sends_too(tmp_path: Path) -> None:
         send_to = f"lines+udp:{LOOPBACK}:{other.getsockname()[1]}"
         with Live(0, host=LOOPBACK, array=SMALL, send=send_to, guard_frames=1e6) as live, Panel(live) as panel:
             play(presses(3), live.address[1])
-            until(lambda: live.frame.any())
+            until(lambda: bool(live.frame.any()))
             assert live.counters["detections"] == 0
             panel.read_out(tmp_path / "touch.json")
             assert panel.live is not None

@@ -216,7 +216,7 @@ def _report_unsent(summary: Summary) -> None:
 
 def _check_options(options: dict[str, Any], typed: _LiveArguments) -> None:
     """Refuse options that would have no effect."""
-    readout, tare, send = (options[name] for name in ("readout", "tare", "send"))
+    readout, tare = options["readout"], options["tare"]
     if readout is None and not typed.panel:
         raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to show the board")
     if readout is None and (tare or typed.report):
