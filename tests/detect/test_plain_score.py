@@ -162,6 +162,30 @@ def test_the_page_of_training_says_that_the_rule_knows_sooner() -> None:
     )
 
 
+def test_where_the_rule_is_better_both_delays_are_said() -> None:
+    true = {"hit": [1000, 9000]}
+
+    def better(rule: list[int], neuron: list[int]) -> str:
+        mine = taxel.detect.score(taxel.Detections(["hit"] * 2, [1000, 9000], rule), true)
+        other = taxel.detect.score(taxel.Detections(["hit"] * len(neuron), [1000] * len(neuron), neuron), true)
+        plain = taxel.detect.PlainScore({"hit": taxel.detect.PlainRule("area", 2)}, mine)
+        result = Training(TrainOptions(), (), None, SimpleNamespace(plain=plain, together=other), "", {}, (), ())
+        (line,) = result._better()
+        return line.partition("; --rule")[0]
+
+    assert better([205_000, 213_000], [15_000]) == (
+        "hit: the plain rule is better but knows later: 0 missed and false, known +204 ms after the label (median); "
+        "the neuron: 1 missed and false, +14 ms"
+    )
+    assert better([3_000, 11_000], [15_000]) == (
+        "hit: the plain rule is better and knows no later: 0 missed and false, known +2 ms after the label (median); "
+        "the neuron: 1 missed and false, +14 ms"
+    )
+    assert better([3_000, 11_000], []) == (
+        "hit: the plain rule is better: 0 missed and false; the neuron: 2 missed and false"
+    )
+
+
 def test_where_the_rule_is_better_the_training_says_how_to_write_it() -> None:
     true = {"hit": [1000]}
     mine = taxel.detect.score(taxel.Detections(["hit"], [1000], [1200]), true)

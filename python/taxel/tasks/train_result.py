@@ -280,8 +280,15 @@ class Training:
         if plain is None or plain.together is None:
             return
         for label in plain.better(self.scored.together):
-            rule, neuron = (scores[label].rank[0] for scores in (plain.together, self.scored.together))
-            yield f"{label}: the plain rule is better: {rule} missed and false, the neuron {neuron}; {_RULE_FILE}"
+            rule_score, score = (scores[label] for scores in (plain.together, self.scored.together))
+            rule, neuron = (f"{each.rank[0]} missed and false" for each in (rule_score, score))
+            when = ""
+            if rule_score.found and score.found:
+                later = rule_score.delay.median > score.delay.median
+                when = " but knows later" if later else " and knows no later"
+                rule += f", known {rule_score.delay.median:+.3g} ms after the label (median)"
+                neuron += f", {score.delay.median:+.3g} ms"
+            yield f"{label}: the plain rule is better{when}: {rule}; the neuron: {neuron}; {_RULE_FILE}"
         for label in plain.sooner(self.scored.together):
             rule_score, score = (scores[label] for scores in (plain.together, self.scored.together))
             yield (
