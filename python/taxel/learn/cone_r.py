@@ -437,10 +437,12 @@ def _warn(cone: ConeR) -> None:
             stacklevel=4,
         )
     if cone.refires_:
+        neuron = cone.neuron_
+        others = [] if neuron.after_spike == "reset" else ['after_spike "reset"']
+        others += [f"a refractory above {neuron.refractory:g} ms", f"a theta_plus above {neuron.theta_plus:g} mV"]
         warn(
             f"the trained neuron fires again {cone.refires_} times after its own spikes on its training patterns: "
-            f'after_spike is "{cone.neuron_.after_spike}"; "reset", a longer refractory or a larger '
-            "theta_plus would end that",
+            f"{', '.join(others[:-1])} or {others[-1]} would end that",
             stacklevel=4,
         )
     if cone.status_ != "solved":
