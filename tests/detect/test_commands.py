@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from formats.making import write_gaitpdb
+from formats.making import write_gaitpdb, write_plate
 from matplotlib.figure import Figure
 from shell import call
 from test_readout import ARRAY, recipe, tare, touches
@@ -139,6 +139,26 @@ def test_recordings_of_other_arrays_are_left_out_where_one_fits(
     found = json.loads(said)
     assert (code, [Path(each["recording"]).name for each in found["recordings"]]) == (0, ["9.npz"])
     assert [Path(name).name for name in found["left_out"]] == ["1.npz", "2.npz", "3.npz", "4.npz"]
+
+
+def test_how_labels_name_trials_of_a_file_is_said_in_short_lines(tmp_path: Path, capsys) -> None:
+    file, labels = write_plate(tmp_path, count=5), tmp_path / "labels.csv"
+    code, said, _ = call(capsys, "info", file)
+    assert (code, said.splitlines()[-1]) == (0, "labels name a trial in their column recording, as subj900/00")
+    names = f"subj900/00, subj900/01, subj900/02 and 2 more of {file}"
+    labels.write_text("recording,label,t_us\n" + "".join(f"{name},contact,9000\n" for name in "abcde"))
+    command = ("train", file, "--labels", labels, "-o", tmp_path / "r.json")
+    code, _, error = call(capsys, *command)
+    assert (code, f"names no event in {names}; it names a, b, c and 2 more" in error) == (2, True), error
+    labels.write_text("label,t_us\ncontact,9000\n")
+    code, _, error = call(capsys, *command)
+    assert (code, "must have the column recording, with names as subj900/00" in error) == (2, True), error
+    code, _, error = call(capsys, "info", file, "--picture", tmp_path / "p.png")
+    assert code == 2
+    assert f"a picture or a table is of one: taxel convert {file} FOLDER writes each to a file of its own" in error
+    assert call(capsys, "convert", file, tmp_path / "each")[0] == 0
+    code, _, error = call(capsys, "info", tmp_path / "each", "--picture", tmp_path / "p.png")
+    assert (code, "a picture or a table is of one: name its file" in error) == (2, True), error
 
 
 def test_detections_go_to_a_table(folder: Path, trained: Path, capsys) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import warnings
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from taxel import Neuron, SpikeTrains
 from taxel.detect import Readout, run
 from taxel.encode import LevelCrossing
 from taxel.learn import ConeR, ConeX, OnlineConeR
+from taxel.learn.cone_r import _warn
 
 #: A potential this far below a level counts as at it, in thresholds.
 AT = 1e-11
@@ -199,3 +202,22 @@ def test_who_cannot_have_it_refuses_it_by_name(tmp_path) -> None:
     with refused("NIR: rearm of 'a' is 0.4"):
         readout().to_nir(tmp_path / "one.nir")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("after_spike", "said"),
+    [
+        ("keep", 'after_spike "reset", a refractory above 3 ms or a theta_plus above 0.2 mV would end that'),
+        ("reset", "its training patterns: a refractory above 3 ms or a theta_plus above 0.2 mV would end that"),
+    ],
+)
+def test_the_warning_of_repeated_spikes_names_what_is_not_set(after_spike: str, said: str) -> None:
+    trains = SpikeTrains.from_lists([[20.0 + n] for n in range(20)], stop=150.0)
+    neuron = Neuron(tau=30.0, theta_plus=0.2, refractory=3.0, after_spike=after_spike)
+    cone = ConeR(neuron=neuron, lambdas=(0, 1, 0, 1000, 0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        cone.fit([trains], [[45.0]])
+    cone.refires_ = 3
+    with pytest.warns(UserWarning, match=re.escape(said)):
+        _warn(cone)

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -75,6 +76,7 @@ def info(
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
     from taxel.recording.analysis.pressure import above_rest  # noqa: PLC0415
     from taxel.recording.recognition import are_spike_trains  # noqa: PLC0415
+    from taxel.tasks.labels import are_trials, trial_name  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
@@ -99,6 +101,8 @@ def info(
             infos = [taxel.tasks.info(each, tare) for each in recordings]
             of_each = [found.facts for found in infos]
             say(*_of_several(file, of_each, as_json=as_json, each=each))
+            if are_trials(recordings) and not as_json:
+                say(f"labels name a trial in their column recording, as {trial_name(recordings[0])}")
             say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
             return
         found = taxel.tasks.info(recording, tare)
@@ -159,7 +163,9 @@ def _draw(picture: Path, recording: Recording, above: tuple[Frames, float, Rest]
 def _several(file: Path, recordings: Sequence[Recording]) -> str:
     """Return why there is no picture or table of several recordings, or of one with several sources."""
     if len(recordings) > 1:
-        return f"{file}: holds {len(recordings)} recordings; a picture or a table is of one"
+        alone = f"taxel convert {quote(str(file))} FOLDER writes each to a file of its own"
+        alone = "name its file" if file.is_dir() else alone
+        return f"{file}: holds {len(recordings)} recordings; a picture or a table is of one: {alone}"
     names = ", ".join(recordings[0].sources)
     return (
         f"{file}: holds {len(recordings[0].sources)} sources ({names}); a picture or a table is of one: taxel convert "

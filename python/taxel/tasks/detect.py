@@ -27,7 +27,7 @@ from taxel.recording import Recording
 from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
-from taxel.tasks.labels import GivenLabels, few, references, sources_without
+from taxel.tasks.labels import GivenLabels, few, references, sources_without, titles_of
 from taxel.tasks.rest import GivenTare, TakenRest, check_tare, rest
 
 #: No event.
@@ -214,9 +214,7 @@ def detect(
     with collected() as warnings:
         events = [None] * len(opened) if truth is None else references(truth, opened, "truth")
         if truth is not None and not any(events):
-            raise refused(
-                "truth", f" is {truth}: names no event in {', '.join(recording.title for recording in opened)}"
-            )
+            raise refused("truth", f" is {truth}: names no event in {titles_of(opened)}")
         unlabelled = {} if truth is None else sources_without(truth, opened, events)
         left_out = _of_other_arrays(readout, opened)
         each = []

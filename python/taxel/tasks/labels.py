@@ -46,21 +46,22 @@ def references(
         return noted
     table = Labels(source)
     # The sources of one file are one recording.
-    count = len({(recording.path, _trial(recording)) for recording in recordings})
+    count = len({(recording.path, trial_name(recording)) for recording in recordings})
     if count > 1 and any(not row.recording for row in table.rows):
+        trials = f", with names as {trial_name(recordings[0])}" if are_trials(recordings) else ""
         raise refused(
-            argument, f" is {source}: names no recording, and there are {count}; must have the column recording"
+            argument, f" is {source}: names no recording, and there are {count}; must have the column recording{trials}"
         )
     _check_sources(table, argument, recordings)
     named = {
-        recording.title: table.named(recording.path, _trial(recording), recording.label) for recording in recordings
+        recording.title: table.named(recording.path, trial_name(recording), recording.label) for recording in recordings
     }
-    unnamed = [title for title, name in named.items() if name is None]
+    unnamed = [recording for recording in recordings if named[recording.title] is None]
     known = set(named.values())
     others = [name for name in table.recordings if name not in known]
     if unnamed and (others or len(unnamed) == len(recordings)):
-        names = f"it names {', '.join(table.recordings)}" if table.rows else "it is empty"
-        raise refused(argument, f" is {source}: names no event in {', '.join(unnamed)}; {names}")
+        names = f"it names {few(table.recordings)}" if table.rows else "it is empty"
+        raise refused(argument, f" is {source}: names no event in {titles_of(unnamed)}; {names}")
     _warn_of_strangers(table, recordings)
     return [_within(table, recording, argument) for recording in recordings]
 
@@ -122,13 +123,26 @@ def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
         )
 
 
-def _trial(recording: Recording) -> str:
+def trial_name(recording: Recording) -> str:
+    """Return the name by which labels name a trial of a file with several."""
     return trial_of(recording.name, recording.label)
+
+
+def are_trials(recordings: Sequence[Recording]) -> bool:
+    """Return whether recordings are several trials of one file."""
+    return len({each.path for each in recordings}) == 1 < len({trial_name(each) for each in recordings})
+
+
+def titles_of(recordings: Sequence[Recording]) -> str:
+    """Return the titles of the first recordings, of trials of one file as labels name them; and how many more."""
+    if not are_trials(recordings):
+        return few(recording.title for recording in recordings)
+    return f"{few(dict.fromkeys(map(trial_name, recordings)))} of {recordings[0].path}"
 
 
 def _named(table: Labels, recordings: Sequence[Recording]) -> list[tuple[str, set[str | None]]]:
     """Return the source of each recording, and the names by which the table may name it."""
-    trials = [(recording.path, _trial(recording), recording.label) for recording in recordings]
+    trials = [(recording.path, trial_name(recording), recording.label) for recording in recordings]
     return [(label, {table.named(path), table.named(path, trial, label), trial}) for path, trial, label in trials]
 
 
@@ -153,7 +167,7 @@ def labelled_trials(source: GivenLabels, recordings: Sequence[Recording]) -> lis
         return list(recordings)
     trials: dict[Path, set[str]] = {}
     for recording in recordings:
-        trials.setdefault(recording.path, set()).add(_trial(recording))
+        trials.setdefault(recording.path, set()).add(trial_name(recording))
     named: dict[Path, set[str]] = {}
     for path, names in trials.items():
         table = beside(path) if source == "notes" else Path(source)
@@ -163,7 +177,7 @@ def labelled_trials(source: GivenLabels, recordings: Sequence[Recording]) -> lis
                 f"{path}: left out {len(names) - len(named[path])} of its {len(names)} trials, which have no labels",
                 stacklevel=2,
             )
-    return [each for each in recordings if not named[each.path] or _trial(each) in named[each.path]]
+    return [each for each in recordings if not named[each.path] or trial_name(each) in named[each.path]]
 
 
 def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]) -> None:

@@ -35,7 +35,7 @@ from taxel.recording.cut import span_us
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains, to_us
 from taxel.tare import Tare
-from taxel.tasks.labels import GivenLabels, labelled_trials, references, sources_without
+from taxel.tasks.labels import GivenLabels, labelled_trials, references, sources_without, titles_of
 from taxel.tasks.rest import GivenTare, given_tare, tare_before, tare_if_any
 from taxel.tasks.train_result import Training, TrainOptions
 
@@ -103,7 +103,7 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     opened = labelled_trials(labels, recordings)
     labelled = references(labels, opened)
     if not any(labelled):
-        titles = ", ".join(recording.title for recording in opened)
+        titles = titles_of(opened)
         if labels == "notes":
             raise helped(ProblemError(f"notes: names no event in {titles}"), "labels", "give")
         raise refused("labels", f" is {_named(labels)}: names no event in {titles}")
