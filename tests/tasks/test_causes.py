@@ -151,6 +151,20 @@ def by_hand(folder: Path, seed: int) -> Situation:
     return Situation(saved(folder, frames, {"contact": labels["contact"] + np.rint(1000 * late).astype(int)}))
 
 
+def in_pictures(folder: Path, seed: int) -> Situation:
+    """Labels at 25 pictures a second, of a camera that was started a little later."""
+    frames, labels = pressed(seed, 20)
+    return Situation(saved(folder, frames, {label: t // 40_000 * 40_000 - 35_000 for label, t in labels.items()}))
+
+
+def window(folder: Path, seed: int) -> Situation:
+    """Some labels that are off by little more than the window."""
+    frames, labels = pressed(seed, 20)
+    off = np.zeros(20, int)
+    off[np.random.default_rng(seed).choice(20, 3, replace=False)] = [-62_100, -63_900, -71_000]
+    return Situation(saved(folder, frames, {"contact": labels["contact"] + off}))
+
+
 def recipe(folder: Path, seed: int) -> Situation:
     """Contact and lift of a mat, learnt by the recipe of insoles."""
     frames, labels = pressed(seed)
@@ -170,6 +184,8 @@ SITUATIONS = {
     "shifted_labels": shifted,
     "shifted_labels early": early,
     "shifted_labels by hand": by_hand,
+    "shifted_labels in pictures": in_pictures,
+    "window": window,
     "recipe": recipe,
 }
 

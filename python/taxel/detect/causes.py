@@ -23,7 +23,8 @@ from taxel.detect.levels import LEAST_LEVELS, loaded_levels
 from taxel.detect.loads import lacks_neighbours
 from taxel.detect.plain_score import PlainScore, floor_of
 from taxel.detect.recipe import Recipe
-from taxel.detect.scoring import Score
+from taxel.detect.scoring import APART_US, Mistake, Score, score
+from taxel.detections import Detections
 from taxel.encode import ContactArea, Encoder, Moments
 from taxel.events import Events
 from taxel.frames import Frames
@@ -35,8 +36,8 @@ from taxel.tare import Tare
 #: The kinds of causes. Where two concern equally many mistakes the earlier comes first: the later may follow from it.
 KINDS = (
     "falling_values", "shifted_labels", "few_labels", "unlabelled_source", "levels", "foreign_labels", "tare",
-    "durations", "recipe", "unlabelled_time", "label_name", "plain_rule", "no_neighbours", "indistinct_kinds",
-    "overfitting", "parameters",
+    "durations", "recipe", "window", "unlabelled_time", "label_name", "plain_rule", "no_neighbours",
+    "indistinct_kinds", "overfitting", "parameters",
 )  # fmt: skip
 
 #: What helps against labels that lie elsewhere.
@@ -73,8 +74,8 @@ class Cause:
     ----------
     kind : str
         "falling_values", "shifted_labels", "few_labels", "unlabelled_source", "levels", "foreign_labels", "tare",
-        "durations", "recipe", "unlabelled_time", "label_name", "plain_rule", "no_neighbours", "indistinct_kinds",
-        "overfitting" or "parameters"; the page on training explains each.
+        "durations", "recipe", "window", "unlabelled_time", "label_name", "plain_rule", "no_neighbours",
+        "indistinct_kinds", "overfitting" or "parameters"; the page on training explains each.
     labels : tuple of str
         The labels that it concerns.
     mistakes : int, 0 or more
@@ -357,6 +358,9 @@ class Mistakes:
         Whether its parameters were chosen among those of the recipe.
     plain : PlainScore, optional
         The scores of the plain rules on the labels of `scored`.
+    mistakes : sequence of Mistake
+        What `scored` calls missed and false, with a window of ...
+    window_ms : float, ms
     """
 
     trained: Trained
@@ -365,6 +369,8 @@ class Mistakes:
     each: Sequence[Score] = ()
     searched: bool = False
     plain: PlainScore | None = None
+    mistakes: Sequence[Mistake] = ()
+    window_ms: float = WINDOW_MS
 
     def causes(self, evidence: Evidence) -> tuple[Cause, ...]:
         """Return the causes for the labels of which more than 5 % are missed or false, those of most mistakes first."""
@@ -391,6 +397,7 @@ class Mistakes:
                 if any(cause.kind == "label_name" and label in cause.labels for cause in found):
                     continue
                 found += [*self._unlabelled_time(evidence.sound, label), *self._name(label, mistakes)]
+                found += self._window(label, mistakes)
                 # A tare that does not fit lets labels lie far from what is felt, too.
                 if not any(cause.kind in ("foreign_labels", "tare") and label in cause.labels for cause in found):
                     found += self._unpaired(label)
@@ -443,6 +450,24 @@ class Mistakes:
                 "labelled",
                 "labels of all events",
             )
+
+    def _window(self, label: str, wrong: int) -> Iterator[Cause]:
+        """Yield the window that pairs what is missed with what is false, if most of it lies so near."""
+        missed, false = (
+            np.sort([m.recording * APART_US + m.t for m in self.mistakes if (m.label, m.is_missed) == (label, missed)])
+            for missed in (True, False)
+        )
+        reach_ms = 2 * self.window_ms
+        pairs = score(Detections([label] * len(false), false, false), {label: missed}, reach_ms)
+        if 2 * pairs.found <= len(missed):
+            return
+        window_ms = float(np.ceil(np.abs(pairs.errors_ms).max()))
+        measured = (
+            f"{pairs.found} of {len(missed)} missed {'has' if pairs.found == 1 else 'have'} a false detection within "
+            f"{reach_ms:g} ms, at most {window_ms:g} ms away"
+        )
+        mistakes = min(2 * pairs.found, wrong)
+        yield _by_option("window", label, mistakes, measured, f"--window-ms {window_ms:g}", window_ms=window_ms)
 
     def _unpaired(self, label: str) -> Iterator[Cause]:
         """Yield how many labels lie far from what the neuron learnt them by."""

@@ -43,20 +43,21 @@ _TIMES, _OF_FLOOR = 3.0, 6.0
 
 
 class Off(NamedTuple):
-    """By how much labels of one name lie after what was felt, ms; how many lie there, and of how many.
+    """By how much labels of one name lie after what was felt, ms; how many lie there, how many of them too far, of all.
 
     Of marks that a hand set live also within how many ms of that distance these lie; else 0.
     """
 
     ms: float
     alike: int
+    beyond: int
     labels: int
     within_ms: float = 0.0
 
     @property
     def is_far(self) -> bool:
-        """Whether the distance is too large for the labels to be aligned."""
-        return abs(self.ms) > WINDOW_MS
+        """Whether more than a few of the labels lie too far from what was felt to be aligned."""
+        return self.beyond > (1 - _SHARE) * self.alike
 
     def __str__(self) -> str:
         side = "after" if self.ms > 0 else "before"
@@ -117,7 +118,7 @@ class FeltLoads:
         for label in labels:
             times = self._loads.truth(label, self._loads.whole_examples)
             steady = [felt_edge for edge in felt for felt_edge in _steady(times, edge)]
-            near = [felt_edge for felt_edge in steady if not felt_edge[0].is_far]
+            near = [felt_edge for felt_edge in steady if abs(felt_edge[0].ms) <= WINDOW_MS]
             by_hand = [] if steady else [felt_edge for edge in felt for felt_edge in _by_hand(times, edge)]
             if alike := near or steady:
                 found[label], _ = min(alike, key=lambda found_edge: (-found_edge[0].alike, found_edge[1]))
@@ -158,7 +159,21 @@ def _by_hand(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tupl
     np.minimum.at(nearest, label_index, np.abs(apart - ms))
     within_ms = _STEP_MS * np.ceil(_DEVIATIONS * _NORMAL * float(np.median(nearest)) / _STEP_MS)
     if abs(ms) <= _HAND_MS:
-        yield Off(ms, int(np.count_nonzero(nearest <= within_ms)), len(times), float(within_ms)), spread_ms
+        yield _off(ms, apart, label_index, np.abs(apart - ms) <= within_ms, len(times), float(within_ms)), spread_ms
+
+
+def _off(
+    ms: float,
+    apart: NDArray[np.float64],
+    label_index: NDArray[np.int64],
+    here: slice | NDArray[np.bool_],
+    labels: int,
+    within_ms: float = 0.0,
+) -> Off:
+    """Return the distance of labels whose pairs lie here."""
+    near = np.unique(label_index[here][np.abs(apart[here]) <= WINDOW_MS])
+    alike = np.unique(label_index[here])
+    return Off(ms, len(alike), len(alike) - len(near), labels, within_ms)
 
 
 def _by_chance(least: int, labels: int, pairs: int, spread_ms: float) -> float:
@@ -175,8 +190,9 @@ def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple
         return
     apart, label_index = _apart(times, felt)
     for k, end in enumerate(np.searchsorted(apart, apart + _SAME_MS, side="right")):
-        if end - k >= least and (alike := len(np.unique(label_index[k:end]))) >= least:
-            yield Off(float(np.median(apart[k:end])), alike, len(times)), float(apart[end - 1] - apart[k])
+        if end - k >= least and len(np.unique(label_index[k:end])) >= least:
+            off = _off(float(np.median(apart[k:end])), apart, label_index, slice(k, end), len(times))
+            yield off, float(apart[end - 1] - apart[k])
 
 
 def unlabelled_us(examples: Sequence[Example], label: str) -> tuple[int, int]:

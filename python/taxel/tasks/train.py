@@ -263,7 +263,7 @@ class _Work:
             loads = sound, list(truths[0]), [clock_of(example) for example in self.examples], floor_of(plan.encoder)
             scored = replace(trained_on, plain=plain_score(*loads, [], truths, window_ms, self.update))
         scores = scored.together, trained_on.together, scored.scores
-        causes = Mistakes(trained, *scores, search, scored.plain).causes(evidence)
+        causes = Mistakes(trained, *scores, search, scored.plain, scored.mistakes, window_ms).causes(evidence)
         if evidence.falls and not causes:
             warn(evidence.falls)
         taken = _taken(self.examples) if self.options.tare is None else ()
