@@ -14,6 +14,7 @@ from taxel import Events, FormatError, Frames, ProblemError
 from taxel.cli import main
 from taxel.formats import event_camera
 from taxel.formats.event_camera import Reduction, reading
+from taxel.tasks import Training
 
 from .event_files import ENCODED, READ, some_rows, write
 
@@ -231,6 +232,37 @@ def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(t
     assert len(taxel.detect.run(training.readout, frames, tare=taxel.Tare.take(frames, stop_us=500_000))) == 12
     with refused("in events/2 ms, and the readout was trained on events/5 ms"):
         taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=2).frames())
+
+
+def bursts(begins: np.ndarray, rates: np.ndarray, strengths: np.ndarray, seed: int) -> Frames:
+    """Draw counts of these rates, and bursts of 4 frames at places that differ."""
+    rng = np.random.default_rng(seed)
+    for begin, strength in zip(begins, strengths, strict=True):
+        row, column = rng.integers(2, 10, 2)
+        rates[begin : begin + 4, row : row + 5, column : column + 5] += strength
+    return Frames(rng.poisson(rates).astype(np.float32), np.arange(len(rates)) * 5000, unit="events/5 ms")
+
+
+def trained(frames: Frames, begins: np.ndarray, folder: Path) -> Training:
+    taxel.convert(frames, folder / "a.npz")
+    return taxel.train(taxel.open(folder / "a.npz"), [{"jolt": (begins * 5000).tolist()}])
+
+
+def test_weak_bursts_are_learnt_among_hot_pixels_and_noise_that_grows(tmp_path: Path) -> None:
+    """Noise crossed levels of the area and sum of the whole array: 7 to 13 were found."""
+    rates, begins = np.full((4000, 16, 20), 0.05) * np.linspace(1, 2, 4000)[:, None, None], np.arange(300, 3900, 150)
+    rates[:, [1, 4, 7, 9, 12, 15], [3, 17, 9, 1, 12, 6]] += [7.0, 5.0, 3.0, 2.0, 1.0, 0.5]
+    found = trained(bursts(begins, rates, np.full(24, 0.8), 5), begins, tmp_path).score["jolt"]
+    assert found.found >= 22
+    assert found.false <= 4
+
+
+def test_strong_bursts_are_told_from_weaker_ones(tmp_path: Path) -> None:
+    """Both reach the greatest sum of 3 x 3 taxels in units of noise: each weaker one was false."""
+    begins = np.arange(300, 3900, 150)
+    frames = bursts(begins, np.full((4000, 16, 20), 0.02), np.resize([40.0, 10.0], 24), 5)
+    found = trained(frames, begins[::2], tmp_path).score["jolt"]
+    assert (found.found, found.false) == (12, 0)
 
 
 @pytest.mark.parametrize(
