@@ -14,6 +14,7 @@ from taxel import Events, FormatError, Frames, ProblemError
 from taxel.cli import main
 from taxel.formats import event_camera
 from taxel.formats.event_camera import Reduction, reading
+from taxel.tasks import Training
 
 from .event_files import ENCODED, READ, some_rows, write
 
@@ -233,6 +234,37 @@ def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(t
         taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=2).frames())
 
 
+def bursts(begins: np.ndarray, rates: np.ndarray, strengths: np.ndarray, seed: int) -> Frames:
+    """Draw counts of these rates, and bursts of 4 frames at places that differ."""
+    rng = np.random.default_rng(seed)
+    for begin, strength in zip(begins, strengths, strict=True):
+        row, column = rng.integers(2, 10, 2)
+        rates[begin : begin + 4, row : row + 5, column : column + 5] += strength
+    return Frames(rng.poisson(rates).astype(np.float32), np.arange(len(rates)) * 5000, unit="events/5 ms")
+
+
+def trained(frames: Frames, begins: np.ndarray, folder: Path) -> Training:
+    taxel.convert(frames, folder / "a.npz")
+    return taxel.train(taxel.open(folder / "a.npz"), [{"jolt": (begins * 5000).tolist()}])
+
+
+def test_weak_bursts_are_learnt_among_hot_pixels_and_noise_that_grows(tmp_path: Path) -> None:
+    """Noise crossed levels of the area and sum of the whole array: 7 to 13 were found."""
+    rates, begins = np.full((4000, 16, 20), 0.05) * np.linspace(1, 2, 4000)[:, None, None], np.arange(300, 3900, 150)
+    rates[:, [1, 4, 7, 9, 12, 15], [3, 17, 9, 1, 12, 6]] += [7.0, 5.0, 3.0, 2.0, 1.0, 0.5]
+    found = trained(bursts(begins, rates, np.full(24, 0.8), 5), begins, tmp_path).score["jolt"]
+    assert found.found >= 22
+    assert found.false <= 4
+
+
+def test_strong_bursts_are_told_from_weaker_ones(tmp_path: Path) -> None:
+    """Both reach the greatest sum of 3 x 3 taxels in units of noise: each weaker one was false."""
+    begins = np.arange(300, 3900, 150)
+    frames = bursts(begins, np.full((4000, 16, 20), 0.02), np.resize([40.0, 10.0], 24), 5)
+    found = trained(frames, begins[::2], tmp_path).score["jolt"]
+    assert (found.found, found.false) == (12, 0)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -253,27 +285,39 @@ def test_an_option_that_does_not_fit_is_one_clear_error(options: dict[str, objec
         taxel.open(write(tmp_path / "a.raw", some_rows()), **options)
 
 
-def test_the_options_are_of_an_event_camera_alone(tmp_path: Path) -> None:
+def test_the_options_are_of_events_without_intensities_alone(tmp_path: Path) -> None:
     taxel.convert(Frames(np.zeros((3, 2, 2)), [0, 10, 20]), tmp_path / "a.npz")
-    for place in (tmp_path / "a.npz", tmp_path):
-        with refused("no event camera's file; region, bin, window_ms and polarity are of one"):
+    one = {"array": taxel.Array(4, 4), "intensity": [7]}
+    taxel.convert(Events([0], [0], [0], [True], **one), tmp_path / "b.npz")
+    for place in (tmp_path / "a.npz", tmp_path, tmp_path / "b.npz"):
+        with refused("holds no events without intensities, as an event camera's file does; region, bin, window_ms and"):
             taxel.open_all(place, bin=2)
 
 
-def test_windows_that_make_more_frames_than_may_be_read_are_refused(tmp_path: Path) -> None:
-    rows = some_rows(20)
-    rows[-1, 0] = 3_000_000_000
-    path = write(tmp_path / "a.dat", rows, "dat")
-    with pytest.raises(FormatError, match=r"frames of 48 x 64 taxels \(fewer by region, bin or window_ms\): claims"):
-        taxel.open(path, window_ms=1)
-
-
-def test_a_sensor_of_1280_x_720_is_read_and_larger_taxels_make_it_small(tmp_path: Path) -> None:
-    rows = some_rows(300, (1280, 720))
-    path = write(tmp_path / "a.raw", rows, size=(1280, 720))
-    assert (rows_of(taxel.open(path).events) == rows).all()
-    assert taxel.open(path, bin=4, window_ms=5).array.shape == (180, 320)
-    with refused(r"more than 65536 positions .*; .npz, .h5 and .csv hold such events; region and bin"):
-        taxel.convert(path, tmp_path / "a.mcap")
-    taxel.convert(taxel.open(path, bin=8), tmp_path / "a.mcap")
-    assert taxel.open(tmp_path / "a.mcap").events == taxel.open(path, bin=8).events
+@pytest.mark.parametrize("kind", ["table", "csv", "npz", "mcap"])
+@pytest.mark.parametrize("window_ms", [None, 5])
+def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: float | None, tmp_path: Path) -> None:
+    how = {"region": "3:50,7:41", "bin": 4, "window_ms": window_ms, "polarity": "on"}
+    by_camera = taxel.open(write(tmp_path / "a.raw", some_rows()), **how)
+    events = taxel.open(tmp_path / "a.raw").events
+    if kind == "table":
+        path = tmp_path / "b.csv"
+        path.write_text("".join(f"{x},{y},{int(p)},{t}\n" for t, x, y, p, *_ in events))
+        (tmp_path / "b.layout.toml").write_text(
+            "rows = 48\ncolumns = 64\n[event_camera]\nbin = 7\n"
+            '[table]\ncolumns = ["x", "y", "p", "t"]\ntime_column = "t"\ntime_unit = "us"\nevents = true\n'
+        )
+        assert taxel.open(path).array.shape == (7, 10), "the layout file says it too"
+    else:
+        path = tmp_path / f"b.{kind}"
+        taxel.convert(events, path)
+        how["array"] = None if kind == "mcap" else taxel.Array(48, 64)
+    read = taxel.open(path, **how)
+    if window_ms is None:
+        assert (rows_of(read.events) == rows_of(by_camera.events)).all()
+        assert read.array.shape == by_camera.array.shape
+    else:
+        frames, counts = read.frames(), by_camera.frames()
+        assert (frames.values == counts.values).all()
+        assert (frames.t == counts.t).all()
+        assert frames.unit == counts.unit

@@ -22,7 +22,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import Trial
-from taxel.formats.event_camera import Reduction
+from taxel.formats.event_camera import Reduction, reduced
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
@@ -79,19 +79,30 @@ class OpenOptions(SharedOptions):
         """What of a ROS bag is opened."""
         return Topics(self.topic, self.field, self.types, self.ros)
 
+    @property
+    def reduction(self) -> Reduction:
+        """What is read of the events of a camera."""
+        return Reduction(self.region, self.bin, self.window_ms, self.polarity)
+
     def how(self, path: Path, name: str, layout: Layout | None) -> dict[str, Reduction]:
-        """Return the arguments of a format's own with which a path is read; `name` is "" of what is of no format.
+        """Return the arguments of a format's own with which a path of this format is read.
 
         Raises
         ------
-        ProblemError : what is read of an event camera's file is given for another one
+        ProblemError : what is read of a camera's events is given for another format
         """
-        reduction = Reduction(self.region, self.bin, self.window_ms, self.polarity)
         if name == "event_camera":
-            return {"reduction": reduction.but(None if layout is None else layout.event_camera)}
-        if reduction.is_given:
-            raise ProblemError(f"{path}: no event camera's file; region, bin, window_ms and polarity are of one")
+            return {"reduction": self.reduction.but(None if layout is None else layout.event_camera)}
+        if self.reduction.is_given:
+            raise _no_camera(path)
         return {}
+
+
+def _no_camera(path: Path) -> ProblemError:
+    return ProblemError(
+        f"{path}: holds no events without intensities, as an event camera's file does; region, bin, window_ms and "
+        "polarity are of these"
+    )
 
 
 @with_fields_of(OpenOptions)
@@ -119,9 +130,9 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     types, ros : path and str, optional
         For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, as "humble".
     region, bin, window_ms, polarity : str, int, float (ms) and str, optional
-        What is read of an event camera's file: columns and rows as "100:420,60:300", of which the last are not
-        included; the side of the square of pixels that becomes a taxel; frames of counts, one each `window_ms`, at
-        the window's begin; and "on" or "off" events alone, not "both".
+        What is read of an event camera's file, or of other events without intensities: columns and rows as
+        "100:420,60:300", of which the last are not included; the side of the square of pixels that becomes a taxel;
+        frames of counts, one each `window_ms`, at the window's begin; and "on" or "off" events alone, not "both".
     limit : int, bytes, 1 or more, optional
         How much may be read into memory; default: three quarters of what is available, and at most the sizes of
         docs/files.md.
@@ -233,9 +244,9 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
     layout = recognition.layout_of(path, options.layout)
     try:
         found = recognition.recognise_recording(path, layout)
-        how = options.how(path, found.format if isinstance(found, recognition.FormatFile) else "", layout)
         match found:
             case recognition.FormatFile(name):
+                how = options.how(path, name, layout)
                 trials = _counting_memory(formats.trials(path, name, **how))
                 return [_recording_of(trial, path, name, options.layout) for trial in trials]
             case recognition.RosBag():
@@ -257,7 +268,9 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
                 if kind == "records" and array is None and layout is not None:
                     array = layout.grid()
                 contents = _read(path, kind, array, options.pairing, options.differences)
-        return [_with_layout(contents, layout, given=options.layout is not None)]
+        if layout is not None:
+            contents = apply_layout(contents, layout, given=options.layout is not None)
+        return [Recording(with_sidecars(_of_camera(contents, path, options.reduction, layout)))]
     except MemoryError:
         raise helped(
             FormatError(f"{path}: needs more memory than there is ({limits.available()} bytes are available)"),
@@ -266,9 +279,26 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
         ) from None
 
 
-def _with_layout(contents: Contents, layout: Layout | None, *, given: bool) -> Recording:
-    """Return a recording with what its layout, if any, and the files beside it say of it; see `apply_layout`."""
-    return Recording(with_sidecars(contents if layout is None else apply_layout(contents, layout, given=given)))
+def _of_camera(contents: Contents, path: Path, given: Reduction, layout: Layout | None) -> Contents:
+    """Return a recording with what is asked for of its events, if they are without intensities.
+
+    Raises
+    ------
+    ProblemError : it is given, and these are none
+    """
+    reduction, source = given.but(None if layout is None else layout.event_camera), contents.main
+    if not reduction.is_given:
+        return contents
+    events = source.table if isinstance(source, BoardSource) and not contents.is_several else None
+    if events is None or (events.present is not None and events.present.any()):
+        if given.is_given:
+            raise _no_camera(path)
+        return contents
+    table = reduced(str(path), events, reduction)
+    same = source_from(table, source.origin, sensor=replace(source.sensor, array=table.array))
+    return Contents.single(
+        replace(same, settings=source.settings, marks=source.marks, timing=source.timing, losses=source.losses)
+    )
 
 
 def _on_given(source: RecordedSource, array: Array) -> RecordedSource:
@@ -460,7 +490,9 @@ def _recording_of(trial: Trial, path: Path, kind: str, given_layout: str | os.Pa
         )
     )
     layout = recognition.layout_of(path, given_layout)
-    return _with_layout(contents, layout, given=given_layout is not None)
+    if layout is not None:
+        contents = apply_layout(contents, layout, given=given_layout is not None)
+    return Recording(with_sidecars(contents))
 
 
 def _beside_frames(trial: Trial) -> tuple[str, ...]:

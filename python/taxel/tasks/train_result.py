@@ -346,7 +346,9 @@ class Training:
                 more = f" and {len(events) - _NAMED} more" if len(events) > _NAMED else ""
                 labels = counted(len(events), "label")
                 named = ", ".join(events[:_NAMED]) + more
-                yield f"{label}: nothing was felt within 50 ms of {labels}, not learnt: {named}"
+                yield (
+                    f"{label}: nothing that {label} is known by was felt within 50 ms of {labels}, not learnt: {named}"
+                )
 
 
 def _line(label: str, by: str, score: Score) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.columns import frozen, frozen_whole
+from taxel._base.columns import frozen
 from taxel._base.limits import TIME_US, unpacked
 from taxel._base.messages import escaped, installing
 from taxel._base.reading_child import ReadingChild
@@ -18,6 +18,7 @@ from taxel._core import FormatError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import sensor
+from taxel.formats.event_camera.counting import Counts
 from taxel.formats.event_camera.headers import check
 from taxel.formats.event_camera.reduction import Reduction
 from taxel.frames import Frames
@@ -68,14 +69,11 @@ class _EventFile(ReadingChild):
         if not columns or not rows:
             raise FormatError(f"{self.path}: its header says no size; give it a line such as % geometry 640x480")
         left, right, top, bottom = reduction.bounds(columns, rows)
-        side = reduction.side
-        array = sensor(
-            str(self.path), Array(-(-(bottom - top) // side), -(-(right - left) // side), name="event camera")
-        )
+        array = sensor(str(self.path), Array(*reduction.shape(columns, rows), name="event camera"))
         how = {
             "kind": self._encoding,
             "bounds": [left, right, top, bottom],
-            "side": side,
+            "side": reduction.side,
             "polarity": reduction.polarity or "both",
         }
         self._order({**how, "columns": False})
@@ -89,7 +87,7 @@ class _EventFile(ReadingChild):
         self._order({**how, "columns": True})
         if reduction.window_us is None:
             return self._events(array, found["count"])
-        return self._counts(array, first, last, reduction.window_us, f"events/{reduction.window_ms:g} ms")
+        return self._counts(array, first, last, reduction)
 
     def _pieces(self) -> Iterator[dict[str, NDArray[Any]]]:
         """Yield the columns of some events after the other."""
@@ -112,19 +110,9 @@ class _EventFile(ReadingChild):
         t, x, y, p = (frozen(column) for column in read.values())
         return Events(t, x, y, p, array=array)
 
-    def _counts(self, array: Array, first: int, last: int, window_us: int, unit: str) -> Frames:
-        begin, count = first // window_us, last // window_us - first // window_us + 1
-        size = f"{count} frames of {array.rows} x {array.columns} taxels"
-        unpacked(
-            f"{self.path}, {size} (fewer by region, bin or window_ms)", count * (4 * array.rows * array.columns + 8)
-        )
-        values = np.zeros((count, *array.shape), np.float32)
+    def _counts(self, array: Array, first: int, last: int, reduction: Reduction) -> Frames:
+        counts = Counts(str(self.path), array, first, last, reduction)
         for piece in self._pieces():
-            window = piece["t"] // window_us - begin
-            if len(window) and not 0 <= window.min() <= window.max() < count:
+            if not counts.add(piece["t"], piece["x"], piece["y"]):
                 raise FormatError(f"{self.path}: was changed while it was read")
-            np.add.at(
-                values.reshape(-1), (window * array.rows + piece["y"]) * array.columns + piece["x"], np.float32(1)
-            )
-        t = (begin + np.arange(count, dtype=np.int64)) * window_us
-        return Frames(frozen_whole(values), frozen(t), unit=unit, array=array)
+        return counts.frames()

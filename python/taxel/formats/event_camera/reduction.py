@@ -1,4 +1,4 @@
-"""What is read of an event camera's file: a region, taxels of several pixels, a polarity, counts in windows."""
+"""What is read of the events of a camera: a region, taxels of several pixels, a polarity, counts in windows."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LONGEST_MS = 3.6e6
 
 @dataclass(frozen=True)
 class Reduction:
-    """Say what is read of an event camera's file; the arguments are those of `taxel.open`.
+    """Say what is read of the events of a camera; the arguments are those of `taxel.open`.
 
     Parameters
     ----------
@@ -78,6 +78,21 @@ class Reduction:
     def window_us(self) -> int | None:
         """The window, us; None for events."""
         return None if self.window_ms is None else round(to_us(self.window_ms))
+
+    @property
+    def unit(self) -> str:
+        """The unit of counts."""
+        return f"events/{self.window_ms:g} ms"
+
+    def shape(self, columns: int, rows: int) -> tuple[int, int]:
+        """Return the rows and columns of taxels on a sensor.
+
+        Raises
+        ------
+        ProblemError : a region beyond the sensor
+        """
+        left, right, top, bottom = self.bounds(columns, rows)
+        return -(-(bottom - top) // self.side), -(-(right - left) // self.side)
 
     def bounds(self, columns: int, rows: int) -> tuple[int, int, int, int]:
         """Return first and last (exclusive) column and row of the region on a sensor.
