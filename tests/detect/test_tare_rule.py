@@ -39,6 +39,17 @@ def test_a_drift_off_the_tare_is_said_and_a_load_that_stays_is_none(drift: float
         assert (30 <= count <= 36) if said else count == 0
 
 
+@pytest.mark.parametrize("begins", [500, 1600, 2200])
+def test_a_rest_that_is_another_after_a_gap_is_said(begins: int) -> None:
+    frames = touched(1)
+    values, t = frames.values.copy(), frames.t.copy()
+    values[begins:] += 32
+    shifted = [Frames(values, t + us * (t >= t[begins]), unit="counts", array=frames.array) for us in (0, 2_500_000)]
+    counts = [count_drifted(each, Tare.take(each, stop_us=1_000_000), FLOOR) for each in shifted]
+    assert counts[0] == 0
+    assert counts[1] >= 30
+
+
 def test_a_slow_press_is_no_drift() -> None:
     values = np.full((3000, 6, 6), 50.0)
     values[500:] += np.linspace(0, 300, 2500)[:, None, None]

@@ -58,6 +58,8 @@ _LABELS = 4
 _FIVE_FOLDS = 10
 #: Into so many parts a recording is divided to see a drift, at so many frames of each.
 _PARTS, _LOOKS = 8, 40
+#: Without frames for so long a sensor may have begun anew, us.
+_GAP_US = 1_000_000
 #: A touched taxel reads so many times its drift.
 _TIMES = 4
 #: From this share of the time before the first label and behind the last one on, some labels may be missing there.
@@ -615,8 +617,9 @@ def count_drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> in
     """Return how many taxels drifted above a tare by more than the noise floor; 0 where it may be a load.
 
     A taxel counts that reads no more in the first eighth of the recording and more in the last, in nine of ten
-    frames, came there little by little, and reads four times as much while it is touched: a load that stays comes at
-    once, or is all that a taxel reads. A quarter of the taxels that were touched must do so, and two at least.
+    frames, came there little by little, or while no frame came for a second, and reads four times as much while it is
+    touched: a load that stays comes at once, or is all that a taxel reads. A quarter of the taxels that were touched
+    must do so, and two at least.
 
     Parameters
     ----------
@@ -630,13 +633,19 @@ def count_drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> in
     if isinstance(source, Events):
         source = Frames.from_events(source, max(1, int(after[-1] - after[0]) // (_PARTS * _LOOKS)), int(after[0]))
     frames = source.between(tare.stop_us, np.inf)
+    gap_stamps = frames.t[1:][np.diff(frames.t) >= max(_GAP_US, 3 * np.median(np.diff(frames.t)))]
     frames = frames[:: max(1, len(frames) // (_PARTS * _LOOKS))]
     looks = len(frames) // _PARTS
     if looks < _LOOKS // 4:
         return 0
+    gaps = np.searchsorted(frames.t, gap_stamps)
     values = tare.off(frames).values[: _PARTS * looks]
     above, most = _core.touched_above(noise_floor), values.max(axis=0)
     least = np.quantile(values.reshape(_PARTS, looks, *most.shape), 0.1, axis=1)
-    slowly = np.diff(least, axis=0).max(axis=0) <= least[-1] / 2
+    steps = np.diff(least, axis=0)
+    # What a taxel reads otherwise after a gap, as of a sensor that began anew, is no load that came.
+    for gap in gaps // looks:
+        steps[max(0, gap - 1) : gap + 1] = 0
+    slowly = steps.max(axis=0) <= least[-1] / 2
     count = np.count_nonzero((least[0] < above) & (least[-1] >= above) & slowly & (most >= _TIMES * least[-1]))
     return int(count) if count >= max(TOUCH, np.count_nonzero(most >= _TIMES * above) / _TIMES) else 0
