@@ -62,25 +62,26 @@ def stop_on_signals() -> None:
     """Raise KeyboardInterrupt on SIGTERM and SIGHUP as on Ctrl-C, so that recordings are closed and files removed."""
     _handle(_stop)
     if sys.platform == "win32":
-        # After the handler of Python's library, so that Windows calls it before that one.
+        # After the handler of the C library, so that Windows calls it before that one, which returns at once.
         ctypes.windll.kernel32.SetConsoleCtrlHandler(_on_console_event, True)
 
 
 if sys.platform == "win32":
-    #: CTRL_CLOSE_EVENT, CTRL_LOGOFF_EVENT and CTRL_SHUTDOWN_EVENT.
-    _CLOSES = (2, 5, 6)
+    #: CTRL_C_EVENT and CTRL_BREAK_EVENT; the others are a console that closes, a user who leaves, and a shutdown.
+    _CTRL_C, _CTRL_BREAK = 0, 1
     #: Longer than the 5 s that Windows gives to a program whose console closes, s.
     _FOREVER_S = 60.0
 
-    def _stop_on_close(event: int) -> int:
-        """Stop the main thread where the console closes: Windows ends the process as soon as this returns."""
-        if event not in _CLOSES:
+    def _stop_main_thread(event: int) -> int:
+        """Stop the main thread; where the console closes Windows ends the process as soon as this returns."""
+        if event == _CTRL_C:
             return False
         _thread.interrupt_main(signal.SIGBREAK)
-        time.sleep(_FOREVER_S)
+        if event != _CTRL_BREAK:
+            time.sleep(_FOREVER_S)
         return True
 
-    _on_console_event = ctypes.WINFUNCTYPE(ctypes.c_int, ctypes.c_uint)(_stop_on_close)
+    _on_console_event = ctypes.WINFUNCTYPE(ctypes.c_int, ctypes.c_uint)(_stop_main_thread)
 
 
 @contextlib.contextmanager
