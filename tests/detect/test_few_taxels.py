@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import taxel
 from taxel import Array, Frames, Readout, Tare
@@ -125,3 +126,27 @@ def test_a_report_pads_a_smaller_grid_as_the_readout_does(tmp_path: Path) -> Non
         outcomes.append(Outcome("walk", example, found, score(found, example.labels, 50.0)))
     page = write_detections(tmp_path, readout, outcomes, title="Two sizes").read_text()
     assert "Two sizes" in page
+
+
+def test_a_report_draws_channels_by_name_and_ten_seconds_around_the_first_events(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Figure] = []
+    monkeypatch.setattr("taxel.report.detections.picture", lambda figure: drawn.append(figure) or "")
+    learnt = single((1, 4), 1, times=100.0)
+    assert isinstance(learnt.source, Frames)
+    names = ["heel", "ball", "big toe", "toes"]
+    t = learnt.source.t + 4_000_000
+    frames = Frames(learnt.source.values, t, unit="N", array=Array(1, 4, names=names))
+    example = Example(frames, {label: times + 4_000_000 for label, times in learnt.labels.items()})
+    learner = {"tau": 20.0, "ub": 30.0, "lb": -30.0, "delay_ms": 20.0, "after_spike": "reset"}
+    readout = fit([example], Recipe(LevelCrossing([2.0, 5.0]), learner, {"contact": {}, "lift": {}}))
+    outcome = Outcome("walk", example, run(readout, frames), None)
+    write_detections(tmp_path, readout, [outcome], title="channels")
+    titles = [[text.get_text() for text in axis.get_xticklabels()] for figure in drawn for axis in figure.axes[:1]]
+    assert titles.count(names) == 2
+    lines = next(figure.axes[0].lines for figure in drawn if figure.axes[0].get_xlabel() == "s")
+    seconds = lines[0].get_xdata()
+    first = int(np.concatenate([outcome.found.t, *example.labels.values()]).min()) / 1e6
+    assert (seconds[0], seconds[-1]) == (pytest.approx(first - 1.0, abs=0.02), pytest.approx(first + 9.0, abs=0.02))
+    assert all(((line.get_xdata() >= seconds[0]) & (line.get_xdata() <= seconds[-1])).all() for line in lines)

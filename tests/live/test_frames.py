@@ -19,7 +19,7 @@ from shell import call
 import taxel
 from live.boards import LOOPBACK
 from taxel import Array, Frames, Tare
-from taxel.detect import PlainRule, Readout, run
+from taxel.detect import Example, PlainRule, Readout, Recipe, fit, run
 from taxel.detect.readout import run_counting
 from taxel.detections import Detection
 from taxel.encode import LevelCrossing
@@ -243,6 +243,39 @@ def test_lines_of_the_standard_input_are_read_to_their_end(tmp_path: Path) -> No
     assert (done.returncode, done.stderr) == (0, "")
     expected = run(Readout.load(detector), taxel.open(path))
     assert len(done.stdout.splitlines()) == len(expected) > 3
+
+
+def test_the_report_says_how_many_detections_lie_outside_the_training(tmp_path: Path) -> None:
+    values = touches(np.random.default_rng(5), 2, 3, 400, "N")
+    frames = Frames(values, np.arange(len(values)) * PERIOD_US, unit="N", array=Array(2, 3))
+    risen = run(readout_of(2, 3, "N"), frames[:200]).t
+    labels = {"contact": risen[np.diff(risen, prepend=-PERIOD_US) >= PERIOD_US]}
+    learner = {"tau": 20.0, "ub": 3.0, "lb": -3.0, "delay_ms": 1.0, "after_spike": "reset"}
+    readout = fit([Example(frames[:200], labels)], Recipe(LevelCrossing([25.0]), learner, {"contact": {}}))
+    detector, path = readout.save(tmp_path / "a.json"), tmp_path / "a.mcap"
+    words = [
+        "live",
+        "--source",
+        "lines:-,array=2x3,time=1:us,unit=N",
+        "--readout",
+        detector,
+        "--record",
+        path,
+        "--json",
+    ]
+    done = subprocess.run(
+        [sys.executable, "-m", "taxel", *map(str, words), "--report", str(tmp_path / "r")],
+        input=lines_of(values, frames.t),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    found, outside = run_counting(readout, taxel.open(path))
+    assert outside is not None
+    page = (tmp_path / "r" / "report.html").read_text()
+    assert f"detections with an input outside what was seen in training: {outside} of {len(found)}" in page
 
 
 def test_numbers_that_a_program_passes_are_frames(tmp_path: Path) -> None:

@@ -37,6 +37,19 @@ def test_info_says_what_is_in_a_recording(walk: Path) -> None:
         assert words in said.stdout
 
 
+@pytest.mark.parametrize(
+    ("touched", "said"), [(4, "96 not touched enough to say whether they work\n"), (8, "at (row, ")]
+)
+def test_info_gives_no_places_of_most_of_an_array(tmp_path: Path, touched: int, said: str) -> None:
+    values = np.zeros((400, 12, 12))
+    for begin in range(20, 380, 20):
+        values[begin : begin + 10, :touched] = 50 + np.arange(12) + begin % 7
+    frames = taxel.Frames(values, np.arange(400) * 10_000, unit="counts", array=taxel.Array(12, 12, pitch_mm=5.0))
+    taxel.convert(frames, tmp_path / "mat.npz")
+    untested = run("info", tmp_path / "mat.npz").stdout.partition("other taxels")[2].partition("  rate")[0]
+    assert said in untested
+
+
 def test_info_as_json_holds_rates_by_both_clocks_losses_and_taxels(walk: Path) -> None:
     said = json.loads(run("info", walk, "--json").stdout)
     seconds = said["seconds"]

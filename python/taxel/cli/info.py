@@ -331,7 +331,9 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name, taxels in facts["taxels"].items():
         yield f"{name} taxels", f"{len(taxels)}{at(taxels, len(taxels))}"
     if untested := facts["taxels_untested"]:
-        where = at(facts["taxels_untested_at"], untested)
+        # The places of most of an array say nothing.
+        few = 2 * untested <= Array._from_geometry(facts["array"]).taxels
+        where = at(facts["taxels_untested_at"], untested) if few else ""
         yield "other taxels", f"{untested} not touched enough to say whether they work{where}"
 
 

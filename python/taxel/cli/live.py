@@ -135,7 +135,7 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
         tare.save(typed.save_tare)
         console.print(f"tare written to {typed.save_tare}")
     if typed.report is not None and trained is not None and summary.path is not None:
-        _report(typed.report, trained, summary.path, tare if tare is not None else rest)
+        _report(typed.report, trained, summary, tare if tare is not None else rest)
         console.print(f"report: {typed.report / 'report.html'}")
     _report_unsent(summary)
     if not lines:
@@ -175,16 +175,18 @@ def _show(
     return pipeline if shows is None or shows.live is None else shows.live
 
 
-def _report(folder: Path, readout: Readout | PlainRule, path: Path, tare: Tare | float | None) -> None:
+def _report(folder: Path, readout: Readout | PlainRule, summary: Summary, tare: Tare | float | None) -> None:
     """Write the report on a recording: its events and its detections."""
     import taxel  # noqa: PLC0415
     from taxel.detect import Example, Outcome  # noqa: PLC0415
     from taxel.report import write_detections  # noqa: PLC0415  pictures load slowly
 
-    recording = taxel.open(path)
+    assert summary.path is not None
+    recording = taxel.open(summary.path)
     rest = tare if isinstance(tare, Tare) else None
-    outcome = Outcome(str(path), Example(recording, {}, rest), recording.detections)
-    write_detections(folder, readout, [outcome], title=f"Live detections, recorded to {path}")
+    example, outside = Example(recording, {}, rest), summary.counters["outside"]
+    outcome = Outcome(str(summary.path), example, recording.detections, outside=outside)
+    write_detections(folder, readout, [outcome], title=f"Live detections, recorded to {summary.path}")
 
 
 def _print_summary(summary: Summary, guard_frames: float) -> None:

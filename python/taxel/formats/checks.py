@@ -15,7 +15,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["ascending", "candidates", "files_at", "sensor", "table", "whole_us"]
+__all__ = ["ascending", "candidates", "files_at", "in_s", "sensor", "table", "whole_us"]
 
 #: Times that are converted at once, so that little memory is taken beside them.
 _PIECE = 1 << 16
@@ -106,5 +106,16 @@ def ascending(location: str, t: NDArray[np.int64], first_line: int | Callable[[i
     if len(back):
         k = int(back[0]) + 1
         line = first_line(k) if callable(first_line) else first_line + k
-        raise FormatError(f"{location}, line {line}: time {t[k] / 1e6:g} s does not ascend")
+        raise FormatError(f"{location}, line {line}: time {in_s(t[k])} s does not ascend from {in_s(t[k - 1])} s")
     return t
+
+
+def in_s(us: int | np.int64) -> str:
+    """Return a time in s with all digits of its us, as times since 1970 differ in the last ones.
+
+    Examples
+    --------
+    >>> in_s(1_714_562_289_754_000), in_s(-20_000), in_s(0)
+    ('1714562289.754', '-0.02', '0')
+    """
+    return f"{us / 1e6:.6f}".rstrip("0").rstrip(".")

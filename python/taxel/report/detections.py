@@ -48,6 +48,8 @@ _MISSED_MS = 50.0
 _VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
 #: Recordings of frames whose sums are drawn, and stretches of a curve, each with its greatest value.
 _MOST_SUMS, _STRETCHES = 4, 1000
+#: How much of a sum is drawn at most, and how much before its first event, us.
+_SHOWN_US, _BEFORE_US = 10_000_000, 1_000_000
 #: Maps of weights that are drawn a label, those with the largest weights first.
 _MAPS = 8
 _DETECTED, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
@@ -203,11 +205,13 @@ def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
         )
         assert pressed is not None  # frames have values
         total, unit = (pressed.total, pressed.unit) if pressed.force is None else (pressed.force, "N")
-        begins = np.arange(0, len(total), 1 + len(total) // _STRETCHES)
-        seconds, most = (pressed.t[begins] - outcome.begin_us) / 1e6, np.fmax.reduceat(total, begins)
+        first, after = _shown(outcome, pressed.t)
+        begins = np.arange(first, after, 1 + (after - first) // _STRETCHES)
+        seconds, most = (pressed.t[begins] - outcome.begin_us) / 1e6, np.fmax.reduceat(total[:after], begins)
         axis.plot(seconds, most, color=INK, linewidth=0.9, label=escaped(f"sum, {unit}"))
         for k, label in enumerate(labels):
             at = (outcome.found[label].t - outcome.begin_us) / 1e6
+            at = at[(at >= seconds[0]) & (at <= seconds[-1])]
             axis.plot(
                 at,
                 np.interp(at, seconds, most),
@@ -215,11 +219,22 @@ def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
                 color=_DETECTED if k % 2 == 0 else _TRUE,
                 label=escaped(label),
             )
-        axis.set_title(escaped(outcome.name), fontsize=9)
+        part = f", {seconds[0]:.1f} to {seconds[-1]:.1f} s" if after - first < len(total) else ""
+        axis.set_title(escaped(outcome.name) + part, fontsize=9)
         axis.set_ylabel(escaped(unit))
-        axis.legend()
+        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes[-1][0].set_xlabel("s")
     return figure
+
+
+def _shown(outcome: Outcome, t: NDArray[np.int64]) -> tuple[int, int]:
+    """Return from which time to which a sum is drawn: all of it if it is short, else around its first events."""
+    if int(t[-1] - t[0]) <= _SHOWN_US:
+        return 0, len(t)
+    events = [int(np.min(times)) for times in (outcome.found.t, *outcome.example.labels.values()) if len(times)]
+    begin = min(min(events, default=int(t[0])) - _BEFORE_US, int(t[-1]) - _SHOWN_US)
+    first = int(np.searchsorted(t, begin))
+    return first, int(np.searchsorted(t, t[first] + _SHOWN_US, side="right"))
 
 
 def _row(outcome: Outcome, label: str, score: Score | None) -> dict[str, Any]:
@@ -327,6 +342,8 @@ def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
         _name_inputs(axis, readout.encoder_of(label), array, len(readout.delays_ms))
         axis.set_ylabel("weight, mV")
         return figure
+    if not array._has_neighbours:
+        return _channels(planes, array)
     planes = sorted(planes, key=lambda plane: -float(np.abs(plane[1]).max()))[:_MAPS]
     columns = min(4, len(planes))
     rows = -(-len(planes) // columns)
@@ -342,6 +359,22 @@ def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
         axis.set_xlabel("column")
         axis.set_ylabel("row")
     figure.colorbar(ScalarMappable(scale, "RdBu_r"), ax=axes, label="weight, mV")
+    return figure
+
+
+def _channels(planes: list[tuple[str, NDArray[np.float64]]], array: Array) -> Figure:
+    """Draw the weights of channels side by side, with their names: a row for each plane."""
+    rows = np.stack([plane for _, plane in planes])
+    size = (2.0 + 0.45 * rows.shape[1], 1.6 + 0.25 * len(rows))
+    figure, axis = plt.subplots(figsize=size, layout="constrained")
+    scale = Normalize(-(float(np.abs(rows).max()) or 1.0), float(np.abs(rows).max()) or 1.0)
+    axis.imshow(rows, "RdBu_r", scale, aspect="auto")
+    axis.set_yticks(range(len(rows)), [escaped(name or "weights") for name, _ in planes])
+    if array.names is not None and len(array.names) == rows.shape[1]:
+        axis.set_xticks(range(rows.shape[1]), [escaped(name) for name in array.names], rotation=45, ha="right")
+    else:
+        axis.set_xlabel("channel")
+    figure.colorbar(ScalarMappable(scale, "RdBu_r"), ax=axis, label="weight, mV")
     return figure
 
 

@@ -32,8 +32,8 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import text
+from taxel.formats.checks import in_s, whole_us
 from taxel.formats.checks import table as limited
-from taxel.formats.checks import whole_us
 from taxel.formats.layout import ISO, UNITS_US, Layout, Table
 from taxel.recording.contents import RecordedSource, source_from
 from taxel.recording.once import known
@@ -237,7 +237,10 @@ def read_events(path: Path, layout: Layout, array: Array | None) -> RecordedSour
         back = np.flatnonzero(np.diff(t, prepend=last) < 0)
         if len(back):
             at = int(back[0])
-            raise FormatError(f"{path.name}, line {line + at}: time {t[at] / 1e6:g} s is before that of the line above")
+            before = in_s(last if at == 0 else t[at - 1])
+            raise FormatError(
+                f"{path.name}, line {line + at}: time {in_s(t[at])} s is before that of the line above, {before} s"
+            )
         last = int(t[-1])
         read.add(t=t, x=by_name["x"], y=by_name["y"], p=by_name["p"] > 0)
     t, x, y, p = (read.column(name) for name in ("t", "x", "y", "p"))
