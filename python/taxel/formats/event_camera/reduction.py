@@ -81,8 +81,9 @@ class Reduction:
 
     @property
     def unit(self) -> str:
-        """The unit of counts."""
-        return f"events/{self.window_ms:g} ms"
+        """The unit of counts, which names a polarity that was chosen: what is trained on one does not fit the other."""
+        chosen = "" if self.polarity in (None, "both") else f"{self.polarity} "
+        return f"{chosen}events/{self.window_ms:g} ms"
 
     def shape(self, columns: int, rows: int) -> tuple[int, int]:
         """Return the rows and columns of taxels on a sensor.
