@@ -10,7 +10,7 @@ from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.spikes import to_us
 
-__all__ = ["POLARITIES", "Reduction"]
+__all__ = ["POLARITIES", "Reduction", "are_counts"]
 
 POLARITIES = ("both", "on", "off")
 #: The longest window, ms: an hour.
@@ -110,6 +110,11 @@ class Reduction:
                 f"region {shown(self.region)}: must lie within the sensor's {size}, as 0:{columns},0:{rows}"
             )
         return left, right, top, bottom
+
+
+def are_counts(unit: str) -> bool:
+    """Return whether values in a unit are counts of events (`Reduction.unit`)."""
+    return unit.startswith(("events/", "on events/", "off events/"))
 
 
 def _ends(region: str) -> tuple[int, int | None, int, int | None]:
