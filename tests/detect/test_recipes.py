@@ -63,9 +63,10 @@ def test_every_kind_of_recording_has_one_recipe() -> None:
 
 
 def test_counts_of_an_event_camera_have_their_recipe_whatever_window_and_label() -> None:
-    frames = Frames(np.zeros((2, 3, 4)), [0, 1000], unit="events/2.5 ms")
-    for labels in (["contact", "lift"], ["slip"], ["foot_off"], []):
-        assert recipes.fitting(frames, labels) == "event_counts"
+    for unit in ("events/2.5 ms", "on events/5 ms", "off events/5 ms"):
+        frames = Frames(np.zeros((2, 3, 4)), [0, 1000], unit=unit)
+        for labels in (["contact", "lift"], ["slip"], ["foot_off"], []):
+            assert recipes.fitting(frames, labels) == "event_counts"
     # A row of channels has no neighbours, which moments need.
     assert recipes.fitting(Frames(np.zeros((2, 1, 4)), [0, 1000], unit="events/5 ms")) == "gait_channel"
 

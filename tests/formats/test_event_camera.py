@@ -82,7 +82,8 @@ def test_counts_are_those_of_events_one_after_the_other(
     first = rows[0, 0] // reduction.window_us
     # The time of a frame is its begin: what is detected in it is known at its end.
     assert (frames.t == (first + np.arange(len(frames))) * reduction.window_us).all()
-    assert frames.unit == f"events/{window_ms:g} ms"
+    chosen = {"on": "on ", "off": "off "}.get(polarity or "", "")
+    assert frames.unit == f"{chosen}events/{window_ms:g} ms"
     assert frames.values.sum() == len(rows) or (region, polarity or "both") != (None, "both")
 
 
@@ -232,6 +233,10 @@ def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(t
     assert len(taxel.detect.run(training.readout, frames, tare=taxel.Tare.take(frames, stop_us=500_000))) == 12
     with refused("in events/2 ms, and the readout was trained on events/5 ms"):
         taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=2).frames())
+    on = taxel.open(path, bin=4, window_ms=5, polarity="on").frames()
+    for detector in (training.readout, taxel.detect.PlainRule("area", 2, unit="events/5 ms")):
+        with refused("in on events/5 ms, and the .* was trained on events/5 ms"):
+            taxel.detect.run(detector, on, tare=taxel.Tare.take(on, stop_us=500_000))
 
 
 def bursts(begins: np.ndarray, rates: np.ndarray, strengths: np.ndarray, seed: int) -> Frames:

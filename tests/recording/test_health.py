@@ -412,3 +412,16 @@ def test_a_taxel_of_a_board_that_a_state_shows_at_the_top_is_stuck() -> None:
         repaired=[True, *[False] * len(t)],
     )
     assert taxel.health(events).named()["stuck"] == [(1, 1)]
+
+
+@pytest.mark.parametrize("unit", ["events/5 ms", "on events/5 ms"])
+def test_a_pixel_that_counts_between_touches_is_not_dead(unit: str) -> None:
+    values = np.zeros((80, 5, 5))
+    for begin in range(5, 75, 10):
+        values[begin : begin + 4, 1:4, 1:4] = 20
+    values[:, 2, 2] = 0
+    as_counts = [taxel.health(taxel.Frames(values, np.arange(80) * 50_000, unit=name)).named() for name in (unit, "N")]
+    assert [found["dead"] for found in as_counts] == [[(2, 2)]] * 2
+    values[::10, 2, 2] = 20
+    as_counts = [taxel.health(taxel.Frames(values, np.arange(80) * 50_000, unit=name)).named() for name in (unit, "N")]
+    assert as_counts[0]["dead"] == []

@@ -12,10 +12,10 @@ from taxel.formats.checks import files_at
 from taxel.formats.event_camera.counting import reduced
 from taxel.formats.event_camera.headers import ENDINGS, is_dat
 from taxel.formats.event_camera.reading import read
-from taxel.formats.event_camera.reduction import Reduction
+from taxel.formats.event_camera.reduction import Reduction, are_counts
 from taxel.formats.trial import Trial
 
-__all__ = ["Reduction", "files", "reduced", "trials"]
+__all__ = ["Reduction", "are_counts", "files", "reduced", "trials"]
 
 
 def files(path: Path) -> list[Path]:

@@ -10,7 +10,7 @@ from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.spikes import to_us
 
-__all__ = ["POLARITIES", "Reduction"]
+__all__ = ["POLARITIES", "Reduction", "are_counts"]
 
 POLARITIES = ("both", "on", "off")
 #: The longest window, ms: an hour.
@@ -81,8 +81,9 @@ class Reduction:
 
     @property
     def unit(self) -> str:
-        """The unit of counts."""
-        return f"events/{self.window_ms:g} ms"
+        """The unit of counts, which names a polarity that was chosen: what is trained on one does not fit the other."""
+        chosen = "" if self.polarity in (None, "both") else f"{self.polarity} "
+        return f"{chosen}events/{self.window_ms:g} ms"
 
     def shape(self, columns: int, rows: int) -> tuple[int, int]:
         """Return the rows and columns of taxels on a sensor.
@@ -109,6 +110,11 @@ class Reduction:
                 f"region {shown(self.region)}: must lie within the sensor's {size}, as 0:{columns},0:{rows}"
             )
         return left, right, top, bottom
+
+
+def are_counts(unit: str) -> bool:
+    """Return whether values in a unit are counts of events (`Reduction.unit`)."""
+    return unit.startswith(("events/", "on events/", "off events/"))
 
 
 def _ends(region: str) -> tuple[int, int | None, int, int | None]:
