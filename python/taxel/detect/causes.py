@@ -476,7 +476,7 @@ class Mistakes:
         alignment = self.trained.alignments.get(label)
         if alignment is not None and (unpaired := int(alignment.unpaired.sum())):
             measured = (
-                f"nothing that {label} is known by was felt within {WINDOW_MS:.0f} ms of {counted(unpaired, 'label')}"
+                f"no input that {label} is learnt from lies within {WINDOW_MS:.0f} ms of {counted(unpaired, 'label')}"
             )
             mistakes = min(unpaired, self.scored[label].missed)
             yield Cause("foreign_labels", (label,), mistakes, measured, _FOREIGN)

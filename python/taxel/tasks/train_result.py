@@ -347,7 +347,7 @@ class Training:
                 labels = counted(len(events), "label")
                 named = ", ".join(events[:_NAMED]) + more
                 yield (
-                    f"{label}: nothing that {label} is known by was felt within 50 ms of {labels}, not learnt: {named}"
+                    f"{label}: no input that {label} is learnt from lies within 50 ms of {labels}, not learnt: {named}"
                 )
 
 
