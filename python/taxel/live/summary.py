@@ -50,7 +50,7 @@ class Summary:
         For a board of another computer with the losses there and between the two computers.
         """
         boards = [self.counters, *(source for source in self.counters["sources"].values() if "capture" in source)]
-        lost = sum(
+        lost: int = sum(
             (board["capture"]["dropped_by_kernel"] or 0) + board["capture"]["dropped_by_queue"] for board in boards
         )
         bridged = self.counters["bridged"] or {}
