@@ -13,6 +13,7 @@ import pytest
 
 import taxel
 from taxel import Array, Detection, DeviceError, Events, Neuron, ProblemError, Readout, Tare, wire
+from taxel.cli import main
 from taxel.detect import PlainRule
 from taxel.encode import ContactArea
 from taxel.live import Live, send
@@ -28,9 +29,14 @@ from .boards import (
 )
 
 
+@pytest.mark.parametrize("portable", [False, True])
 @pytest.mark.parametrize("segment", [False, True])
 @pytest.mark.parametrize("gro", [False, True])
-def test_the_sums_close_with_the_senders_own_count(segment: bool, gro: bool) -> None:
+def test_the_sums_close_with_the_senders_own_count(
+    monkeypatch: pytest.MonkeyPatch, segment: bool, gro: bool, portable: bool
+) -> None:
+    if portable:
+        monkeypatch.setenv("TAXEL_CAPTURE", "portable")
     with Live(0, host=LOOPBACK, gro=gro) as live:
         sent = send(
             [bytes.fromhex("c00005030 4".replace(" ", "")) * 280] * 7,
@@ -39,13 +45,42 @@ def test_the_sums_close_with_the_senders_own_count(segment: bool, gro: bool) -> 
             seconds=0.1,
             segment=segment,
         )
-    counters = live.stop().counters
+    summary = live.stop()
+    counters = summary.counters
     capture, words = counters["capture"], counters["wire"]
     whole_trains = capture["gro"] and sent["segmenting"]
-    assert capture["messages"] + capture["dropped_by_kernel"] == sent["messages" if whole_trains else "datagrams"]
+    dropped = capture["dropped_by_kernel"]
+    assert (dropped is None, capture["stamped_when_read"]) == (portable, portable)
+    assert capture["messages"] + (dropped or 0) == sent["messages" if whole_trains else "datagrams"]
     assert capture["datagrams"] == counters["decoded"] + capture["dropped_by_queue"]
     assert words["bytes"] == 5 * words["words"] + words["skipped"]
-    assert capture["dropped_by_kernel"] or words["bytes"] == sent["bytes"]
+    assert dropped or words["bytes"] == sent["bytes"]
+    assert (summary.lost, summary.nothing_came) == (0, False)
+
+
+def test_what_the_kernel_does_not_count_is_unknown_in_the_file_and_after_conversions(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TAXEL_CAPTURE", "portable")
+    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "walk.mcap") as live:
+        wait_for(live, play(presses(2), live.address[1]))
+    assert live.stop().verdict.status == "unknown"
+    taxel.convert(tmp_path / "walk.mcap", tmp_path / "walk.npz")
+    taxel.convert(tmp_path / "walk.npz", tmp_path / "again.mcap")
+    for name in ("walk.mcap", "walk.npz", "again.mcap"):
+        recording = taxel.open(tmp_path / name)
+        assert recording.verdict.status == "unknown"
+        assert recording.counts["dropped_by_kernel"] is None
+        with pytest.raises(SystemExit, match=r"^0$"):
+            main(["info", str(tmp_path / name)])
+        assert "unknown: the system does not count them" in capsys.readouterr().out
+
+
+def test_another_way_to_receive_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TAXEL_CAPTURE", "quick")
+    refused = r'^environment variable TAXEL_CAPTURE is "quick": must be "portable", or not set$'
+    with pytest.raises(ProblemError, match=refused):
+        Live(0, host=LOOPBACK)
 
 
 def test_what_is_recorded_is_what_was_sent(tmp_path: Path) -> None:

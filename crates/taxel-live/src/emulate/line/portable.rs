@@ -14,8 +14,6 @@ use crate::Result;
 /// `Core(Problem)`, which names what this system has.
 pub(super) fn open(link: &Path) -> Result<(File, File)> {
     let link = link.display();
-    Err(problem!(
-        "{link}: this system has no pseudo-terminals; the board's commands work over TCP (--control HOST:PORT)"
-    )
-    .into())
+    Err(problem!("{link}: this system has no pseudo-terminals; the board's commands work over TCP (--control PORT)")
+        .into())
 }
