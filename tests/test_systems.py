@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import json
 import os
@@ -9,7 +10,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -187,22 +187,28 @@ def test_ctrl_break_stops_as_ctrl_c_does(monkeypatch: pytest.MonkeyPatch) -> Non
     assert signal.getsignal(signal.SIGBREAK) == before
 
 
+def held_events(file: Path) -> int:
+    """Return how many events a recording that is being written holds so far."""
+    with contextlib.suppress(FileNotFoundError, taxel.FormatError):
+        return len(taxel.open(file).events)
+    return 0
+
+
 @on_windows
-@pytest.mark.parametrize("event", ["CTRL_BREAK_EVENT", "CTRL_C_EVENT"])
-def test_a_recording_is_complete_after_ctrl_break(tmp_path: Path, event: str) -> None:
+def test_a_recording_is_complete_after_ctrl_break(tmp_path: Path) -> None:
     port = free_port()
     command = ["record", "walk.mcap", "--host", "127.0.0.1", "--port", str(port), "--array", "64x64"]
     process = subprocess.Popen(
         [sys.executable, "-m", "taxel", *command],
         cwd=tmp_path,
         stdin=subprocess.DEVNULL,
-        creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) if "BREAK" in event else 0,
+        creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
     )
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
         until((tmp_path / "walk.mcap").exists)
         board.sendto(taxel.wire.encode(some_events(20)), ("127.0.0.1", port))
-    time.sleep(1.0)
-    process.send_signal(getattr(signal, event))
+    until(lambda: held_events(tmp_path / "walk.mcap") == 20)
+    process.send_signal(getattr(signal, "CTRL_BREAK_EVENT", 0))
     assert process.wait(60) == 0
     recording = taxel.open(tmp_path / "walk.mcap")
     assert len(recording.events) == 20

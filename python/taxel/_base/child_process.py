@@ -7,7 +7,7 @@ clean up handles SIGTERM, as the command line does. What still runs after `GRACE
 code for this. It may be a file that does not import taxel, such as ``h5_child.py``, because this one imports the
 standard library alone::
 
-    child = ChildProcess(Path("h5_child.py"), [path, memory], pass_fds=[memory], stdin=PIPE, stdout=PIPE)
+    child = ChildProcess(Path("h5_child.py"), ["/dev/fd/5"], pass_fds=[5], stdin=PIPE, stdout=PIPE)
 
 A child has a session of its own: Ctrl-C in the terminal reaches the parent alone, which then ends its children.
 
@@ -42,7 +42,6 @@ _ENDED = 130
 GRACE_S = 3.0
 #: How long its parent waits for that, s.
 _EXIT_TIMEOUT_S = GRACE_S + 1.0
-
 
 _running: weakref.WeakSet[ChildProcess] = weakref.WeakSet()
 
@@ -89,7 +88,13 @@ class ChildProcess(subprocess.Popen[Any]):
                 creationflags=subprocess.CREATE_NO_WINDOW,
                 **options,
             )
-            self._job.add(int(self._handle))  # type: ignore[attr-defined]  # not in the stubs
+            try:
+                self._job.add(int(self._handle))  # type: ignore[attr-defined]  # not in the stubs
+            except OSError:
+                # A process that has ended is added to no job.
+                if self.poll() is None:
+                    self.kill()
+                    raise
             return
         read_end, write_end = os.pipe()
         self._write_ends = [write_end]

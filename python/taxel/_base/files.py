@@ -11,28 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from taxel import _core
 from taxel._base.arguments import checked_path, flag
-
-if sys.platform == "win32":
-    import _winapi
-    import msvcrt
-
-    #: FILE_SHARE_READ, FILE_SHARE_WRITE and FILE_SHARE_DELETE together; OPEN_EXISTING.
-    _SHARED, _THERE = 7, 3
-
-    def open_regular(path: str | os.PathLike[str]) -> int:
-        """Return the descriptor of a file, opened for reading; other programs may rename and delete it meanwhile."""
-        try:
-            handle = _winapi.CreateFile(os.fspath(path), _winapi.GENERIC_READ, _SHARED, 0, _THERE, 0, 0)
-        except OSError as error:
-            error.filename = os.fspath(path)
-            raise
-        return msvcrt.open_osfhandle(handle, os.O_RDONLY)
-
-else:
-    open_regular = _core.open_regular
-
+from taxel._core import open_regular
 
 #: What file systems answer that have no hard links.
 _NO_LINK = (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS)

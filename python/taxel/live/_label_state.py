@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from taxel._base.files import open_regular
-from taxel._core import FormatError
+from taxel._core import FormatError, open_regular
 from taxel.labels import Note
 from taxel.live._label_join import Acknowledged
 

@@ -33,9 +33,9 @@ from typing import Any
 from taxel._base.arguments import shown
 from taxel._base.documents import decoded
 from taxel._base.encodings import mark_of
-from taxel._base.files import check_writable, create, open_regular
+from taxel._base.files import check_writable, create
 from taxel._base.header_table import lines_of, separator_of
-from taxel._core import FormatError, ProblemError
+from taxel._core import FormatError, ProblemError, open_regular
 from taxel.labels import Note, rows_of, text_with
 from taxel.live._label_join import Acknowledged, Conflict, Edit, Joined, conflict_of, fold, join, minus, settled
 from taxel.live._label_lock import LOCK, locked, locked_at_once
