@@ -112,6 +112,8 @@ def test_a_readout_detects_the_same_live_and_in_the_recording_beside_it(
     assert np.array_equal(frames.values, values.astype(np.float32))
     assert (frames.unit, recording.frame_us) == (unit, live.frame_us)
     assert summary.verdict.status == recording.verdict.status == "complete after arrival"
+    assert summary.verdict == recording.verdict
+    assert recording.verdict == "nothing lost after arrival (lines without numbers cannot show what was lost before it)"
     expected = run(detector, recording)
     # A taxel without neighbours has no area.
     assert len(expected) >= (0 if (rows, columns, kind) == (1, 1, "rule") else 5)
