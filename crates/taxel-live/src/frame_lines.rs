@@ -25,6 +25,8 @@ pub struct FrameLayout {
     pub turned: Option<f64>,
     /// Unit of the values.
     pub unit: String,
+    /// Whether the source states it.
+    pub unit_is_stated: bool,
     /// The names of the columns, if each is a quantity of its own.
     pub names: Vec<String>,
     /// Time from one frame to the next, us.
@@ -41,6 +43,13 @@ pub enum FrameEnd {
 }
 
 impl FrameLayout {
+    /// Takes the unit of a readout, if the source states none.
+    pub fn assume_unit(&mut self, unit: Option<&str>) {
+        if let Some(unit) = unit.filter(|_| !self.unit_is_stated) {
+            unit.clone_into(&mut self.unit);
+        }
+    }
+
     /// The properties that a recording states.
     #[must_use]
     pub fn properties(&self) -> FrameProperties {
@@ -137,6 +146,8 @@ pub struct FrameAssembler {
     /// When the last frame arrived, ns since 1970.
     arrived_ns: Option<i64>,
     silences: Silences,
+    /// When the last line was read that can come, ns since 1970.
+    ended_ns: Option<i64>,
 }
 
 /// Silences between frames that arrive.
@@ -174,6 +185,7 @@ impl FrameAssembler {
             last: None,
             arrived_ns: None,
             silences: Silences::default(),
+            ended_ns: None,
         }
     }
 
@@ -339,6 +351,11 @@ impl FrameAssembler {
         self.discard();
     }
 
+    /// Ends at this time, ns since 1970: no line can come, so that what follows is no silence.
+    pub fn end(&mut self, at_ns: i64) {
+        self.ended_ns = Some(at_ns);
+    }
+
     /// Counts bytes that are in no line.
     pub fn count_left_out(&mut self, bytes: LeftOut) {
         self.faults.count_left_out(bytes);
@@ -352,6 +369,7 @@ impl FrameAssembler {
 
     /// The silences so far, with that which lasts until `now_ns` since 1970.
     fn silences_until(&self, now_ns: i64) -> Silences {
+        let now_ns = self.ended_ns.unwrap_or(now_ns);
         let Silences { count, ns } = self.silences;
         #[allow(clippy::cast_possible_truncation)]
         let least = SILENT_NS.max((SILENT_FRAMES * 1000.0 * self.layout.frame_us) as i64);
@@ -407,4 +425,41 @@ pub fn read_message(message: &[u8]) -> (i64, impl Iterator<Item = f32> + '_) {
     let (t, values) = message.split_first_chunk().expect("a message begins with its time");
     let value = |four: &[u8]| f32::from_le_bytes([four[0], four[1], four[2], four[3]]);
     (i64::from_le_bytes(*t), values.chunks_exact(4).map(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Lines of so many values, and of a clock before them, that are frames of one row.
+    fn layout(values: usize, time: &[(usize, f64)]) -> FrameLayout {
+        let fields = values + time.len();
+        FrameLayout {
+            array: Array::unmeasured(1, u16::try_from(values).unwrap(), "row"),
+            fields,
+            time: time.to_vec(),
+            values: (time.len()..fields).collect(),
+            end: FrameEnd::Lines(1),
+            turned: None,
+            unit: "counts".to_owned(),
+            unit_is_stated: false,
+            names: vec![],
+            frame_us: 10_000.0,
+        }
+    }
+
+    fn line(text: &str) -> TextLine {
+        TextLine { text: text.to_owned(), bytes: text.len() as u64, cut: false }
+    }
+
+    #[test]
+    fn what_follows_the_end_is_no_silence() {
+        let mut frames = FrameAssembler::new(layout(2, &[]));
+        let silent_ms = |frames: &FrameAssembler, now_ns| frames.found(now_ns).damage[SILENT_MS];
+        frames.push(&line("1,2"), 0);
+        frames.push(&line("1,2"), 3_000_000_000);
+        assert_eq!(silent_ms(&frames, 8_000_000_000), 8_000);
+        frames.end(3_500_000_000);
+        assert_eq!(silent_ms(&frames, 600_000_000_000), 3_000);
+    }
 }
