@@ -157,6 +157,7 @@ def test_lines_that_are_no_frame_are_counted_and_the_next_frame_is_whole(tmp_pat
     kinds = {kind: (found["lines"], found["first"]) for kind, found in counts["unread"].items()}
     assert kinds == {
         "text": (1, "Hello from the mat"), "other_length": (1, "7"), "no_text": (0, ""), "unfinished_frames": (2, ""),
+        "repeated_stamps": (0, ""),
     }  # fmt: skip
     assert taxel.open(tmp_path / "a.mcap").verdict.damaged == summary.verdict.damaged
 

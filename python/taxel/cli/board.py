@@ -258,6 +258,8 @@ _UNREAD = {
     "other_length": "with another number of values",
     "no_text": "that are no text: is the speed of the line right?",
     "unfinished_frames": "of frames that lack lines",
+    "repeated_stamps": "with a time that is not after the one before: is a part of it in another column "
+    "(time=A+B for seconds and nanoseconds), or its unit another?",
 }
 
 
@@ -270,8 +272,9 @@ def unread(counters: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str
             found = kinds.get(kind, {"lines": 0})
             if found["lines"] and (source, kind) not in told:
                 told.add((source, kind))
+                noun = "frame" if kind == "repeated_stamps" else "line"
                 first = f", the first: {shown(found['first'])}" * bool(found["first"])
-                yield f"{source + ': ' * bool(source)}{counted(found['lines'], 'line')} {words}{first}"
+                yield f"{source + ': ' * bool(source)}{counted(found['lines'], noun)} {words}{first}"
 
 
 def _frames_table(now: dict[str, Any], frames: str, lines: str) -> Table:
