@@ -103,7 +103,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ),
         (
             ("encode", "walk.npz", "s.npz", "--encoder", "contact_area"),
-            "contact area without a tare; give --tare SECONDS|FILE",
+            "contact area without a tare; give --tare SECONDS or FILE",
         ),
         (("encode", "walk.npz", "nowhere/s.npz", "--encoder", "fa1"), "nowhere: no such folder"),
         (("detect", "walk.npz", "--readout", "touch.json", "--tare", "0.1", "--frame-us", "-5"), "--frame-us is -5"),

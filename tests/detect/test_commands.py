@@ -398,7 +398,7 @@ def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Pa
     code, _, error = call(capsys, "train", folder / "9.npz", "--labels", tmp_path / "early.csv", *plan, "-o", "no.json")
     assert (code, error.count("\n")) == (2, 1)
     assert "before its first label" in error
-    assert "give --tare SECONDS|FILE" in error
+    assert "give --tare SECONDS or FILE" in error
 
 
 @pytest.mark.parametrize("given", [None, "tare.json", "0.05"])

@@ -92,6 +92,14 @@ def test_a_sensor_of_ones_own_is_stated_by_rate_and_bits_alone(
     assert reason in capsys.readouterr().err
 
 
+def test_a_readout_without_a_tare_says_what_to_type(tmp_path: Path) -> None:
+    rule = tmp_path / "rule.json"
+    taxel.detect.PlainRule("area", 2, noise_floor=3.0).save(rule)
+    ended = run("live", "--readout", rule, "--port", 0, "--host", LOOPBACK, "--seconds", 0.1)
+    assert ended.returncode == 2
+    assert ended.stderr.splitlines()[-1] == "taxel: plain rule without a tare; give --tare FILE or SECONDS"
+
+
 def test_the_panels_address_is_on_standard_error_where_lines_are_json() -> None:
     ended = run("live", "--panel", "--json", "--port", 0, "--host", LOOPBACK, "--seconds", 0.1)
     assert ended.stdout == ""

@@ -112,6 +112,8 @@ def test_a_readout_detects_the_same_live_and_in_the_recording_beside_it(
     assert np.array_equal(frames.values, values.astype(np.float32))
     assert (frames.unit, recording.frame_us) == (unit, live.frame_us)
     assert summary.verdict.status == recording.verdict.status == "complete after arrival"
+    assert summary.verdict == recording.verdict
+    assert recording.verdict == "nothing lost after arrival (lines without numbers cannot show what was lost before it)"
     expected = run(detector, recording)
     # A taxel without neighbours has no area.
     assert len(expected) >= (0 if (rows, columns, kind) == (1, 1, "rule") else 5)
@@ -155,6 +157,7 @@ def test_lines_that_are_no_frame_are_counted_and_the_next_frame_is_whole(tmp_pat
     kinds = {kind: (found["lines"], found["first"]) for kind, found in counts["unread"].items()}
     assert kinds == {
         "text": (1, "Hello from the mat"), "other_length": (1, "7"), "no_text": (0, ""), "unfinished_frames": (2, ""),
+        "repeated_stamps": (0, ""),
     }  # fmt: skip
     assert taxel.open(tmp_path / "a.mcap").verdict.damaged == summary.verdict.damaged
 
@@ -226,12 +229,14 @@ def test_a_tare_is_measured_and_the_recording_tells_the_same(tmp_path: Path) -> 
     assert [(d.label, d.t, d.known) for d in found] == [(d.label, d.t, d.known) for d in expected]
 
 
-def test_lines_of_the_standard_input_are_read_to_their_end(tmp_path: Path) -> None:
+@pytest.mark.parametrize("shown", [[], ["--panel"]])
+def test_lines_of_the_standard_input_are_read_to_their_end(tmp_path: Path, shown: list[str]) -> None:
     values = touches(np.random.default_rng(5), 16, 16, 200, "counts")
     detector, path = tmp_path / "a.json", tmp_path / "a.mcap"
     readout_of(16, 16, "counts").save(detector)
     text = lines_of(values, np.arange(len(values)) * PERIOD_US)
     words = ["live", "--source", "lines:-,array=16x16,time=1:us", "--readout", detector, "--record", path, "--json"]
+    words += shown
     done = subprocess.run(
         [sys.executable, "-m", "taxel", *map(str, words)],
         input=text,
@@ -240,7 +245,7 @@ def test_lines_of_the_standard_input_are_read_to_their_end(tmp_path: Path) -> No
         timeout=60,
         check=False,
     )
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, done.stderr.startswith("panel: ")) == (0, bool(shown)), done.stderr
     expected = run(Readout.load(detector), taxel.open(path))
     assert len(done.stdout.splitlines()) == len(expected) > 3
 
@@ -293,7 +298,7 @@ def test_numbers_that_a_program_passes_are_frames(tmp_path: Path) -> None:
 
 def test_a_readout_of_another_unit_or_shape_is_refused(tmp_path: Path) -> None:
     for options, why in [
-        ("array=2x2,unit=kPa", "live values in kPa, and the readout was trained on N"),
+        ("array=2x2,unit=kPa", "live values in kPa, and the readout was trained on N.*state unit=N in --source"),
         ("array=2x3,unit=N", "trained on 2 x 2"),
         ("array=2x2,columns=a:b:c", "lines have 3 values: must be 4 a frame"),
         ("array=2x2,frame_lines=3", "lines have 1 values, 3 lines a frame: must be 4 a frame"),
@@ -301,6 +306,19 @@ def test_a_readout_of_another_unit_or_shape_is_refused(tmp_path: Path) -> None:
         with pytest.raises(taxel.ProblemError, match=why):
             Live(readout=readout_of(2, 2, "N"), sources=f"given,{options},rate=10", record=tmp_path / "a.mcap")
         assert not (tmp_path / "a.mcap").exists()
+
+
+def test_a_source_that_states_no_unit_is_taken_in_that_of_the_readout(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    for unit in ("N", "as sent"):
+        with Live(
+            readout=readout_of(2, 2, unit), sources="given,array=2x2,rate=10", record=path, overwrite=True
+        ) as live:
+            assert live.unit == unit
+            live.sample("frames", [1, 2, 3, 4])
+        assert taxel.open(path).frames().unit == unit
+    with Live(sources="given,array=2x2,rate=10") as live:
+        assert live.unit == "counts"
 
 
 def test_where_nothing_arrives_there_is_no_empty_board(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -135,7 +135,7 @@ def test_without_a_first_line_the_error_says_how_much_came(tmp_path: Path) -> No
     place = tmp_path / "pipe"
     with (
         writing(place, [b"x" * 200_000]),
-        pytest.raises(taxel.ProblemError, match="too few lines of numbers in the 200000 bytes that came"),
+        pytest.raises(taxel.ProblemError, match="no line of numbers in the 200000 bytes that came within 3 s"),
     ):
         Live(0, host=LOOPBACK, record=tmp_path / "a.mcap", sources={"imu": f"lines:{place}"})
 
@@ -194,4 +194,5 @@ def test_a_serial_line_is_read_again_after_it_was_unplugged(tmp_path: Path, kind
             summary = live.stop()
     counts = summary.counters["sources"]["imu"]
     assert (counts["strange"], counts["bytes_in_no_line"], counts["bytes_of_unfinished_lines"]) == (0, 0, 2)
-    assert "the line has hung up" in counts["trouble"]
+    # The line is back.
+    assert counts["trouble"] is None

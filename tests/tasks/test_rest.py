@@ -84,7 +84,7 @@ def test_where_nothing_is_quiet_it_is_refused_with_what_to_give(tmp_path: Path) 
     rule.save(tmp_path / "rule.json")
     refused = run("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json")
     assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
-    assert "give --tare SECONDS|FILE" in refused.stderr
+    assert "give --tare SECONDS or FILE" in refused.stderr
     assert run("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json", "--tare", "0.04").returncode == 0
     # One with its own tare, and one that reads none, need no quiet stretch.
     tared = PlainRule(

@@ -156,6 +156,11 @@ impl BoardClock {
 
     fn end_stretch(&mut self) {
         let stretch = std::mem::take(&mut self.running);
+        if let Some(low) = stretch.lowest().filter(|low| self.arrivals.had_waited(*low)) {
+            // What waited until it was read says nothing of the clock.
+            let offset = Some(Offset { board_us: low.0, host_ns: low.1 + low.0 * 1000, drift_ppm: 0.0 });
+            *self = Self { offset, arrivals: self.arrivals.caught_up(), ..Self::default() };
+        }
         self.arrivals.end_stretch(stretch.lowest());
         if let (Some(low), Some(offset), Some(last)) = (stretch.lowest(), self.offset, self.stretches.back()) {
             #[allow(clippy::cast_precision_loss)]
@@ -466,6 +471,24 @@ mod tests {
         }
         let why = clock.pace().and_then(|pace| pace.doubt).expect("a doubt");
         assert!(why.contains("a delay of 1.5 s"), "{why}");
+    }
+
+    #[test]
+    fn lines_that_waited_before_they_were_read_cause_no_doubt() {
+        for waited_us in [100_000, 580_000, 714_000, 3_000_000] {
+            let mut clock = BoardClock::default();
+            for k in 0..2400_i64 {
+                // What waited comes at once, within a few ms.
+                let arrived_us = (k * 13_333).max(waited_us + k * 20);
+                clock.note(k * 13_333, arrived_us * 1000);
+                let pace = clock.pace().expect("something came");
+                let late = k * 13_333 > waited_us + 500_000;
+                assert!(!late || (pace.doubt.is_none() && pace.drift_ppm.abs() < 7000.0), "{waited_us}, {k}: {pace:?}");
+            }
+            let (pace, offset) = (clock.pace().expect("some"), clock.offset().expect("some"));
+            assert!(pace.drift_ppm.abs() < 1.0 && pace.delay.p50_us.expect("some").abs() < 100.0, "{pace:?}");
+            assert!((offset.host_ns(0) / 1000).abs() < 100, "{offset:?}");
+        }
     }
 
     #[test]

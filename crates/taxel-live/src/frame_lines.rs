@@ -25,6 +25,8 @@ pub struct FrameLayout {
     pub turned: Option<f64>,
     /// Unit of the values.
     pub unit: String,
+    /// Whether the source states it.
+    pub unit_is_stated: bool,
     /// The names of the columns, if each is a quantity of its own.
     pub names: Vec<String>,
     /// Time from one frame to the next, us.
@@ -41,6 +43,13 @@ pub enum FrameEnd {
 }
 
 impl FrameLayout {
+    /// Takes the unit of a readout, if the source states none.
+    pub fn assume_unit(&mut self, unit: Option<&str>) {
+        if let Some(unit) = unit.filter(|_| !self.unit_is_stated) {
+            unit.clone_into(&mut self.unit);
+        }
+    }
+
     /// The properties that a recording states.
     #[must_use]
     pub fn properties(&self) -> FrameProperties {
@@ -83,7 +92,7 @@ impl FrameLayout {
     }
 }
 
-/// Lines that are no part of a frame, by kind, with the first of each.
+/// Lines that are no part of a frame, by kind, with the first of each, and frames whose time is wrong.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct UnreadLines {
     /// Lines of text.
@@ -94,6 +103,8 @@ pub struct UnreadLines {
     pub no_text: UnreadKind,
     /// Lines of frames that lack lines, or of which the time is none.
     pub unfinished_frames: UnreadKind,
+    /// Frames whose stamp is not after the one before, with the column of the first such stamp.
+    pub repeated_stamps: UnreadKind,
 }
 
 /// Lines of a kind.
@@ -130,13 +141,19 @@ pub struct FrameAssembler {
     /// The values of the frame so far, its first stamp and the arrival of its first line, ns since 1970.
     values: Vec<f32>,
     begun: Option<(Option<f64>, i64)>,
-    /// Number of lines of the frame so far.
+    /// Number of lines of the frame so far, and of their bytes.
     rows: u64,
-    /// Time of the last frame, us.
+    bytes: u64,
+    /// Whether the end of a frame was seen since reading began, so that the next one has its beginning.
+    is_whole: bool,
+    /// Stamp of the last frame, and its time, us.
+    stamp: Option<f64>,
     last: Option<i64>,
     /// When the last frame arrived, ns since 1970.
     arrived_ns: Option<i64>,
     silences: Silences,
+    /// When the last line was read that can come, ns since 1970.
+    ended_ns: Option<i64>,
 }
 
 /// Silences between frames that arrive.
@@ -171,9 +188,13 @@ impl FrameAssembler {
             layout,
             begun: None,
             rows: 0,
+            bytes: 0,
+            is_whole: false,
+            stamp: None,
             last: None,
             arrived_ns: None,
             silences: Silences::default(),
+            ended_ns: None,
         }
     }
 
@@ -195,10 +216,11 @@ impl FrameAssembler {
         }
         self.lines += 1;
         let mut numbers = std::mem::take(&mut self.numbers);
-        let is_whole = self.read(text, &mut numbers) && !line.cut;
-        let ends = is_whole && self.push_numbers(&numbers, arrived_ns);
+        let is_read = self.read(text, &mut numbers) && !line.cut;
+        let ends = is_read && self.push_numbers(&numbers, arrived_ns);
         self.numbers = numbers;
-        if !is_whole {
+        self.bytes += line.bytes;
+        if !is_read {
             self.count_unread(text);
             self.discard();
         }
@@ -289,16 +311,25 @@ impl FrameAssembler {
             return self.end_frame();
         }
         self.discard();
+        self.is_whole = true;
         None
     }
 
     fn end_frame(&mut self) -> Option<(i64, &[f32])> {
         let (stamp, arrived_ns) = self.begun.take()?;
         let rows = std::mem::take(&mut self.rows);
+        (self.bytes, self.is_whole) = (0, true);
         let Some(t) = self.faults.time(stamp, arrived_ns) else {
             self.count_unfinished(rows);
             return None;
         };
+        if let Some(stamp) = stamp {
+            if self.stamp.is_some_and(|before| stamp <= before) {
+                let columns: Vec<String> = self.layout.time.iter().map(|(field, _)| (field + 1).to_string()).collect();
+                self.unread.repeated_stamps.count(1, &format!("{stamp} in column {}", columns.join("+")));
+            }
+            self.stamp = Some(stamp);
+        }
         self.faults.missing(self.values.iter().copied().map(f64::from));
         // Lines that came in one packet have one arrival time.
         let t = self.last.map_or(t, |last| t.max(last + 1));
@@ -308,12 +339,16 @@ impl FrameAssembler {
         Some((t, &self.values))
     }
 
-    /// Leaves out an unfinished frame.
+    /// Leaves out an unfinished frame. One that was under way when reading began lost nothing.
     fn discard(&mut self) {
         self.begun = None;
         self.values.clear();
-        let rows = std::mem::take(&mut self.rows);
-        self.count_unfinished(rows);
+        let (rows, bytes) = (std::mem::take(&mut self.rows), std::mem::take(&mut self.bytes));
+        if self.is_whole {
+            self.count_unfinished(rows);
+        } else if rows > 0 {
+            self.faults.count_left_out(LeftOut { unfinished: bytes, ..LeftOut::default() });
+        }
     }
 
     fn count_unfinished(&mut self, rows: u64) {
@@ -337,6 +372,12 @@ impl FrameAssembler {
     /// Handles an interruption: the next line begins a frame.
     pub fn restart(&mut self) {
         self.discard();
+        self.is_whole = false;
+    }
+
+    /// Ends at this time, ns since 1970: no line can come, so that what follows is no silence.
+    pub fn end(&mut self, at_ns: i64) {
+        self.ended_ns = Some(at_ns);
     }
 
     /// Counts bytes that are in no line.
@@ -352,6 +393,7 @@ impl FrameAssembler {
 
     /// The silences so far, with that which lasts until `now_ns` since 1970.
     fn silences_until(&self, now_ns: i64) -> Silences {
+        let now_ns = self.ended_ns.unwrap_or(now_ns);
         let Silences { count, ns } = self.silences;
         #[allow(clippy::cast_possible_truncation)]
         let least = SILENT_NS.max((SILENT_FRAMES * 1000.0 * self.layout.frame_us) as i64);
@@ -407,4 +449,80 @@ pub fn read_message(message: &[u8]) -> (i64, impl Iterator<Item = f32> + '_) {
     let (t, values) = message.split_first_chunk().expect("a message begins with its time");
     let value = |four: &[u8]| f32::from_le_bytes([four[0], four[1], four[2], four[3]]);
     (i64::from_le_bytes(*t), values.chunks_exact(4).map(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Lines of so many values, and of a clock before them, that are frames of one row.
+    fn layout(values: usize, time: &[(usize, f64)]) -> FrameLayout {
+        let fields = values + time.len();
+        FrameLayout {
+            array: Array::unmeasured(1, u16::try_from(values).unwrap(), "row"),
+            fields,
+            time: time.to_vec(),
+            values: (time.len()..fields).collect(),
+            end: FrameEnd::Lines(1),
+            turned: None,
+            unit: "counts".to_owned(),
+            unit_is_stated: false,
+            names: vec![],
+            frame_us: 10_000.0,
+        }
+    }
+
+    fn line(text: &str) -> TextLine {
+        TextLine { text: text.to_owned(), bytes: text.len() as u64, cut: false }
+    }
+
+    #[test]
+    fn what_follows_the_end_is_no_silence() {
+        let mut frames = FrameAssembler::new(layout(2, &[]));
+        let silent_ms = |frames: &FrameAssembler, now_ns| frames.found(now_ns).damage[SILENT_MS];
+        frames.push(&line("1,2"), 0);
+        frames.push(&line("1,2"), 3_000_000_000);
+        assert_eq!(silent_ms(&frames, 8_000_000_000), 8_000);
+        frames.end(3_500_000_000);
+        assert_eq!(silent_ms(&frames, 600_000_000_000), 3_000);
+    }
+
+    #[test]
+    fn a_frame_that_was_under_way_when_reading_began_is_no_loss_and_a_later_one_is() {
+        let end = FrameEnd::EmptyLine;
+        let mut frames =
+            FrameAssembler::new(FrameLayout { array: Array::unmeasured(2, 2, "square"), end, ..layout(2, &[]) });
+        let mut push = |text: &str| frames.push(&line(text), 0).is_some();
+        assert!(!["1,2", "", "1,2", "3,4"].into_iter().any(&mut push));
+        assert!(push(""));
+        let lost = |frames: &FrameAssembler| frames.unread().unfinished_frames.lines;
+        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (0, 0, 3));
+        for text in ["5,6", "", "7,8"] {
+            frames.push(&line(text), 0);
+        }
+        assert_eq!(lost(&frames), 1);
+        frames.restart();
+        assert_eq!(lost(&frames), 2);
+        frames.push(&line("9,9"), 0);
+        frames.push(&line(""), 0);
+        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (2, 2, 6));
+    }
+
+    #[test]
+    fn stamps_that_repeat_or_step_back_are_counted_with_their_column() {
+        let repeated = |stamps: &[&str], time: &[(usize, f64)]| {
+            let mut frames = FrameAssembler::new(layout(1, time));
+            for stamp in stamps {
+                frames.push(&line(&format!("{stamp},5")), 0);
+            }
+            let UnreadKind { lines, first } = &frames.unread().repeated_stamps;
+            (*lines, first.clone())
+        };
+        assert_eq!(repeated(&["17", "17", "17", "18", "16", "19"], &[(0, 1e6)]), (3, "17 in column 1".to_owned()));
+        assert_eq!(repeated(&["17", "18", "19"], &[(0, 1e6)]), (0, String::new()));
+        assert_eq!(
+            repeated(&["1,0", "1,1000", "1,1000"], &[(0, 1e6), (1, 1e-3)]),
+            (1, "1000001 in column 1+2".to_owned())
+        );
+    }
 }

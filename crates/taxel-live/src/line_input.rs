@@ -54,6 +54,12 @@ impl LineReader {
         Ok(Self { place: place.clone(), input, lines, came_ns: 0, is_cut, piece: vec![0; bytes] })
     }
 
+    /// What is read.
+    #[must_use]
+    pub fn place(&self) -> &LinePlace {
+        &self.place
+    }
+
     /// The next line and when it arrived, ns since 1970, if one waits; the last one may lack its end where no more can
     /// arrive (`ended`).
     pub fn next(&mut self, ended: bool) -> Option<(TextLine, i64)> {

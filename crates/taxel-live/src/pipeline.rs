@@ -45,6 +45,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
+use taxel_core::detect::Detector;
 use taxel_core::encode::Tare;
 use taxel_core::wire;
 use taxel_core::{Marker, Stop, problem};
@@ -70,7 +71,7 @@ use sending::Sending;
 pub use sending::{Destination, Sent};
 use shared::{PipelineShared, PublishedState, RecordingSlot, frame_time, header_of};
 pub use sink::{LineSink, OutputDetection, Sink};
-pub use source::{NamedSource, SourceKind, SourceText};
+pub use source::{FirstLineWait, NamedSource, SourceKind, SourceText};
 pub use source_preview::SourcePreview;
 use sources::{Others, PipelineInput};
 use stages::Stages;
@@ -98,11 +99,18 @@ impl Live {
     ///
     /// # Errors
     ///
-    /// As [`Live::start`]; those of [`SourceText::open`] and [`ReadoutSetup::from_options`].
-    pub fn open(options: LiveOptions, fed: Option<Receiver>, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
+    /// As [`Live::start`]; those of [`SourceText::open`] and [`ReadoutSetup::new`]; of a readout that cannot be read, or is of another unit.
+    pub fn open(
+        options: LiveOptions,
+        fed: Option<Receiver>,
+        sinks: Vec<Box<dyn Sink>>,
+        stop: Stop<'_>,
+    ) -> Result<Self> {
         let mut texts = options.source_texts()?;
         let is_stated = options.port.is_some() || options.host.is_some() || texts.is_empty();
         let mut options = options;
+        let readout = options.readout.as_deref().map(Detector::from_json).transpose()?;
+        let unit = readout.as_ref().and_then(Detector::unit);
         let mut input = match fed {
             Some(receiver) => Some(PipelineInput::Fed(receiver)),
             None if is_stated => Some(PipelineInput::Board(options.address()?)),
@@ -111,25 +119,32 @@ impl Live {
         if input.is_none() {
             let text = texts.remove(texts.iter().position(SourceText::is_board).unwrap_or(0));
             options.name = text.name();
-            input = Some(match text.open(Some(&Some(options.array.clone())))? {
+            input = Some(match text.open(Some(&Some(options.array.clone())), options.first_line_wait(stop)?)? {
                 SourceKind::Board(address, array, registers) => {
                     if text.states_array() {
                         (options.array, options.registers) = (*array, registers);
                     }
                     PipelineInput::Board(address)
                 }
-                SourceKind::Frames(place, layout, opened) => {
+                SourceKind::Frames(place, mut layout, opened) => {
                     options.array = layout.array.clone();
+                    layout.assume_unit(unit);
                     PipelineInput::frames(&place, &layout, &opened)?
                 }
                 SourceKind::Numbers(..) => return Err(problem!("source {:?}: is not read out", text.text).into()),
             });
         }
         let input = input.unwrap_or(PipelineInput::Board(options.address()?));
-        let readout = {
-            let (layout, frames) = (input.layout(), frame_time(&options, input.layout()));
-            ReadoutSetup::from_options(&options, frames, layout.map_or("ticks", |layout| &*layout.unit))?
-        };
+        if let Some(readout) = &readout {
+            match input.layout() {
+                None => readout.check_unit("ticks")?,
+                Some(layout) => readout.check_unit(&layout.unit).map_err(|error| {
+                    problem!("{error}; if they are in {}, state unit={0} in --source", unit.unwrap_or_default())
+                })?,
+            }
+        }
+        let frames = frame_time(&options, input.layout());
+        let readout = ReadoutSetup::new(readout, &options, frames)?;
         Self::start_from(input, options, texts, readout, sinks)
     }
 
@@ -178,7 +193,9 @@ impl Live {
         if let (None, false, Some(source)) = (&options.record, options.record_later, texts.first()) {
             return Err(problem!("source {} without a recording: nothing would keep it", source.name()).into());
         }
-        let sources = texts.iter().map(|text| Ok(NamedSource { name: text.name(), kind: text.open(None)? }));
+        let sources = texts
+            .iter()
+            .map(|text| Ok(NamedSource { name: text.name(), kind: text.open(None, FirstLineWait::default())? }));
         let sources = sources.collect::<Result<_>>()?;
         Self::begin(input, options, sources, readout, sinks, None)
     }

@@ -128,7 +128,7 @@ impl Live {
             }));
         }
         let fed = feed.map(|feed| feed.receiver()).transpose().map_err(live)?;
-        let pipeline = enter(py, |_| Pipeline::open(options, fed, sinks))?;
+        let pipeline = enter(py, |stop| Pipeline::open(options, fed, sinks, stop))?;
         Ok(Self {
             pipeline: Threaded::new("live", "live: has been stopped; begin a new one", pipeline),
             summary: Mutex::default(),
@@ -191,9 +191,11 @@ impl Live {
         })
     }
 
-    /// Unit and length (us) of the frames of numbers that it receives; None of a board.
-    fn frame_layout(&self, py: Python<'_>) -> PyResult<Option<(String, f64)>> {
-        self.with(py, |pipeline| Ok(pipeline.layout().map(|layout| (layout.unit.clone(), layout.frame_us))))
+    /// Unit of the frames of numbers that it receives, whether the source states it, and their length, us; None of a board.
+    fn frame_layout(&self, py: Python<'_>) -> PyResult<Option<(String, bool, f64)>> {
+        self.with(py, |pipeline| {
+            Ok(pipeline.layout().map(|layout| (layout.unit.clone(), layout.unit_is_stated, layout.frame_us)))
+        })
     }
 
     /// The values of frames of numbers, by taxel index; none before the first frame.

@@ -75,7 +75,9 @@ class _Command(TyperCommand):
             return f"--set {argument}{'=VALUE' * with_value}" if takes_parameters else argument
         if found.param_type_name != "option":
             return argument.upper()
-        return str(max(found.opts, key=len)) + (f" {found.metavar}" if with_value and found.metavar else "")
+        # A bar would be a pipe of the shell.
+        value = f" {found.metavar}".replace("|", " or ") if with_value and found.metavar else ""
+        return str(max(found.opts, key=len)) + value
 
 
 class App(typer.Typer):

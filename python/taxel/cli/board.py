@@ -20,6 +20,7 @@ from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
 from taxel.cli._app import OUTSIDE, WRONG_INPUT, as_command
+from taxel.cli.console import Console
 from taxel.detect import load
 from taxel.live import RemoteBoard, Summary, delays
 from taxel.live._stated_options import StatedOptions
@@ -29,6 +30,10 @@ from taxel.wire import Registers
 
 __all__ = ["REDRAW_S", "counters_table", "exit_code", "for_live", "received", "with_live_options"]
 
+#: A first line may take so long, however short the command is to run, s.
+_FIRST_LINE_S = 3.0
+#: As long as it takes, s.
+_ALWAYS_S = 1e9
 #: Interval at which the display is redrawn and the end is checked, s.
 REDRAW_S = 0.1
 
@@ -104,8 +109,13 @@ def with_live_options(command: str, *names: str) -> Callable[[Callable[..., None
     return decorate
 
 
-def for_live(options: dict[str, Any], rate_hz: float | None = None, bits: int | None = None) -> dict[str, Any]:
-    """Return typed options as `Live` takes them: files are read; `remote` stays an address."""
+def for_live(
+    options: dict[str, Any], rate_hz: float | None = None, bits: int | None = None, seconds: float | None = None
+) -> dict[str, Any]:
+    """Return typed options as `Live` takes them: files are read; `remote` stays an address.
+
+    A source of lines may be silent before its first line for `seconds`, by default as long as it takes.
+    """
     readout, size = options.get("readout"), options["array"]
     trained = None if readout is None else load(readout)
     # The wire's pitch is that of the board; a sensor of one's own has the one that is stated, or none.
@@ -116,6 +126,7 @@ def for_live(options: dict[str, Any], rate_hz: float | None = None, bits: int | 
     given = {"send": options.get("send") or ()}
     if "sources" in options:
         given["sources"] = options["sources"] or None
+        given["first_line_s"] = _ALWAYS_S if seconds is None else max(_FIRST_LINE_S, seconds)
     return options | read | given
 
 
@@ -145,6 +156,12 @@ def remote(
         address, congestion=congestion or ("block" if lossless else "drop")
     )
     return received
+
+
+def say_waiting(options: dict[str, Any], console: Console) -> None:
+    """Say that a source of lines is opened, whose first lines show what is not stated."""
+    if options["sources"]:
+        console.print(f"waiting for the first line of {options['sources'][0]}; Ctrl-C ends")
 
 
 def _rest(value: str | None) -> Tare | float | None:
@@ -243,6 +260,8 @@ _UNREAD = {
     "other_length": "with another number of values",
     "no_text": "that are no text: is the speed of the line right?",
     "unfinished_frames": "of frames that lack lines",
+    "repeated_stamps": "with a time that is not after the one before: is a part of it in another column "
+    "(time=A+B for seconds and nanoseconds), or its unit another?",
 }
 
 
@@ -255,8 +274,9 @@ def unread(counters: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str
             found = kinds.get(kind, {"lines": 0})
             if found["lines"] and (source, kind) not in told:
                 told.add((source, kind))
+                noun = "frame" if kind == "repeated_stamps" else "line"
                 first = f", the first: {shown(found['first'])}" * bool(found["first"])
-                yield f"{source + ': ' * bool(source)}{counted(found['lines'], 'line')} {words}{first}"
+                yield f"{source + ': ' * bool(source)}{counted(found['lines'], noun)} {words}{first}"
 
 
 def _frames_table(now: dict[str, Any], frames: str, lines: str) -> Table:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,6 +24,7 @@ from taxel.array import Array
 from taxel.cli._app import App, SecondsOption
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import try_report
+from taxel.cli._rest_shift import RestShift
 from taxel.cli._say import say
 from taxel.cli.board import (
     REDRAW_S,
@@ -37,6 +38,7 @@ from taxel.cli.board import (
     outside,
     received,
     remote,
+    say_waiting,
     unread,
     with_live_options,
 )
@@ -46,6 +48,7 @@ from taxel.device import Cable
 from taxel.live import Live, Panel, Summary, delays
 from taxel.spikes import to_ms
 from taxel.tare import Tare
+from taxel.tasks.detect import noise_floors
 from taxel.wire import Registers
 
 app = App()
@@ -93,8 +96,9 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
     JSON, written by the thread that made it: label; t_us, known_us, reported_us by the board's clock; slope_mv_per_ms;
     reported_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
-    which are counted. --panel shows the board in a browser; a slow viewer loses frames, never data. Exit code 3:
-    nothing was received, or something was lost after it had arrived; 2: the board has more taxels than the array.
+    which are counted. --panel shows the board in a browser; a slow viewer loses frames, never data. The
+    end of the standard input, where that is the source, ends the command. Exit code 3: nothing was received, or
+    something was lost after it had arrived; 2: the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     Example: taxel live --readout ball.json --tare 0.05 --send lines+udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
@@ -104,7 +108,7 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     """
     _check_options(options, typed)
     given_tare = options["tare"]
-    options = for_live(options, typed.rate_hz, typed.bits)
+    options = for_live(options, typed.rate_hz, typed.bits, typed.seconds)
     trained, rest, record, address, lines = (options[name] for name in ("readout", "tare", "record", "remote", "lines"))
     _check_fresh_tare(typed, rest)
     if typed.report is not None:
@@ -125,8 +129,12 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
                 f"the readout assumes frames of {plain(frame_us)} us, as of a board at reset; state others by "
                 "--preset, or by --rate-hz and --bits"
             )
+        say_waiting(options, console)
         with Live(**options | {"remote": board}) as pipeline:
-            last = _show(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
+            if trained is not None and trained.unit is not None and not pipeline._states_unit:
+                console.print(f"values are taken in {pipeline.unit}, as of the readout: --source states no unit")
+            shift = None if trained is None else RestShift(max(noise_floors(trained), default=0.0))
+            last = _show(typed, pipeline, console, at_rest, shift, fresh=isinstance(rest, float))
             summary = last.stop()
             # Detections that the readout made while `stop` ran.
             _drain(last, console, say)
@@ -155,6 +163,7 @@ def _show(
     pipeline: Live,
     console: Console,
     at_rest: contextlib.ExitStack,
+    shift: RestShift | None,
     *,
     fresh: bool,
 ) -> Live:
@@ -171,7 +180,7 @@ def _show(
             )
             # Standard output has the lines of --json; whoever reads them needs the address too.
             announce(shows, typed.opens, Console(stderr=True))
-        _watch(pipeline, shows, typed.seconds, console, at_rest, fresh=fresh, control=later)
+        _watch(pipeline, shows, typed.seconds, console, at_rest, shift, fresh=fresh, control=later)
     return pipeline if shows is None or shows.live is None else shows.live
 
 
@@ -256,6 +265,7 @@ def _watch(
     seconds: float | None,
     console: Console,
     at_rest: contextlib.ExitStack,
+    shift: RestShift | None,
     *,
     fresh: bool,
     control: str | None,
@@ -270,9 +280,9 @@ def _watch(
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
     display = Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
     with asked_to_end() as end_request, display:
-        before, warned, silence = None, False, ""
+        before, silence = None, ""
         told: set[tuple[str, str]] = set()
-        while not (end_request.is_set() or (panel is None and pipeline.is_over)) and (
+        while not (end_request.is_set() or _has_ended(pipeline, panel)) and (
             before is None or seconds is None or before["seconds"] < seconds
         ):
             try:
@@ -300,14 +310,42 @@ def _watch(
                 if fresh and pipeline.tare is not None:
                     fresh = False
                     _warn_of_unknown(pipeline.tare)
-            for line in unread(now, told):
+            for line in _warnings(pipeline, now, told, shift):
                 say(f"taxel: {line}", err=True)
-            if not warned and (wrong := outside(now, pipeline.array)):
-                say(f"taxel: {wrong}", err=True)
-                warned = True
             if now["seconds"] - before["seconds"] >= REDRAW_S:
                 display.update(Group(counters_table(before, now), _state(now, pipeline.place)))
                 before = now
+        if not end_request.is_set() and _has_ended(pipeline, panel):
+            console.print(f"{pipeline.place} has ended")
+
+
+def _warnings(
+    pipeline: Live, now: dict[str, Any], told: set[tuple[str, str]], shift: RestShift | None
+) -> Iterator[str]:
+    """Yield what is wrong with what arrives, each once: `told` holds what was."""
+    yield from unread(now, told)
+    if shift is not None and (shifted := _shifted(shift, pipeline, now)):
+        yield shifted
+    if ("", "outside") not in told and (wrong := outside(now, pipeline.array)):
+        told.add(("", "outside"))
+        yield wrong
+
+
+def _shifted(shift: RestShift, pipeline: Live, now: dict[str, Any]) -> str | None:
+    """Return a warning, once, if the taxels of a source of frames rest elsewhere after a gap."""
+    tare = pipeline.tare or pipeline._options.tare
+    silent_s = now["arrival"]["silent_s"]
+    if pipeline.frame_us is None or not isinstance(tare, Tare) or silent_s is None:
+        return None
+    rest = tare.rest.copy()
+    for zeroing in pipeline.zeroed:
+        rest[zeroing.y, zeroing.x] = zeroing.rest
+    return shift.look(silent_s, pipeline.frame.astype(np.float64), rest, tare.noise, pipeline.unit)
+
+
+def _has_ended(pipeline: Live, panel: Panel | None) -> bool:
+    """Return whether the source has ended, as the standard input does; not where the panel begins another."""
+    return pipeline.is_over and (panel is None or panel.live is pipeline)
 
 
 def _drain(pipeline: Live, console: Console, echo: Callable[[str], None], wait_s: float = 0.0) -> None:

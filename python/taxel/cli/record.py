@@ -32,6 +32,7 @@ from taxel.cli.board import (
     outside,
     received,
     remote,
+    say_waiting,
     unread,
     with_live_options,
 )
@@ -96,8 +97,9 @@ def record(
         raise ProblemError("--trials without --length: automatic mode needs how long each trial is")
     if typed.length is not None and typed.seconds is not None:
         raise ProblemError("--seconds and --length: give --length for automatic mode, --seconds for one recording")
-    live = for_live(options, typed.rate_hz, typed.bits)
+    live = for_live(options, typed.rate_hz, typed.bits, typed.seconds)
     console = Console(stderr=True, quiet=typed.as_json)
+    say_waiting(live, console)
     if typed.length is None:
         summary, code = _one(file, live, typed, console)
         _print(summary, typed.as_json)

@@ -90,6 +90,9 @@ class Live:
         ``leave_out=A:B`` are those without values, ``unit=``, ``falls=`` (true, or the number that readings are
         subtracted from) and ``rate=`` (frames a second; default: measured). Lines without an array, as of an IMU, are
         recorded with the first source. "lsl:NAME" is a stream of the lab streaming layer.
+    first_line_s : float, 0 or more
+        How long the first source of lines may be silent before its first line, s. A source of which the array, the
+        columns and the rate are stated may be silent longer: it starts without a line.
     compression : str
         Compression of a .mcap: none, lz4 or zstd.
     overwrite : bool
@@ -174,7 +177,9 @@ class Live:
         #: The unit of the values.
         self.unit: str = "ticks" if layout is None else layout[0]
         #: The length of frames of numbers, us; None of a board.
-        self.frame_us: float | None = None if layout is None else layout[1]
+        self.frame_us: float | None = None if layout is None else layout[2]
+        #: Whether the source states that unit, as a board does; else it is the readout's.
+        self._states_unit = layout is None or layout[1]
         #: To begin another one on another address.
         self._options = replace(options, array=self.array)
         self._remote, self._place = remote, self._core.place()

@@ -297,14 +297,19 @@ def _naming(recording: str) -> Iterator[None]:
         raise
 
 
+def noise_floors(readout: Readout | PlainRule) -> list[float]:
+    """Return the noise floors above the tare of what a readout reads, in the sensor's unit."""
+    if isinstance(readout, PlainRule):
+        # The local load tracks the rest.
+        return [readout.noise_floor] if readout.quantity != "local_load" else []
+    return [float(part.noise_floor) for part in readout.encoder._each() if isinstance(part, ContactArea | Moments)]
+
+
 def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
     source, tare = recorded(outcome.example.source, hold=False), outcome.example.tare
     if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
         return f"rest: {quiet.text(getattr(outcome.example.source, 'path', None))}"
-    # The local load tracks the rest.
-    floors = [readout.noise_floor] if isinstance(readout, PlainRule) and readout.quantity != "local_load" else []
-    for part in readout.encoder._each() if isinstance(readout, Readout) else ():
-        floors += [float(part.noise_floor)] if isinstance(part, ContactArea | Moments) else []
+    floors = noise_floors(readout)
     if tare is None or not floors or isinstance(source, SpikeTrains):
         return None
     count = count_drifted(source, tare, max(floors))

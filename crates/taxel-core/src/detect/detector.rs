@@ -73,17 +73,26 @@ impl Detector {
         }
     }
 
+    /// The unit of the values that it was trained on, if it is known.
+    #[must_use]
+    pub fn unit(&self) -> Option<&str> {
+        match self {
+            Self::Readout(readout) => readout.unit.as_deref(),
+            Self::PlainRule(rule) => rule.unit.as_deref(),
+        }
+    }
+
     /// Checks that values in this unit are those that it was trained on.
     ///
     /// # Errors
     ///
     /// `Problem`, naming both units.
     pub fn check_unit(&self, unit: &str) -> Result<()> {
-        let (kind, trained) = match self {
-            Self::Readout(readout) => ("readout", &readout.unit),
-            Self::PlainRule(rule) => ("plain rule", &rule.unit),
+        let kind = match self {
+            Self::Readout(_) => "readout",
+            Self::PlainRule(_) => "plain rule",
         };
-        match trained.as_deref().filter(|&trained| trained != unit) {
+        match self.unit().filter(|&trained| trained != unit) {
             None => Ok(()),
             Some(trained) => Err(problem!(
                 "live values in {unit}, and the {kind} was trained on {trained}: must be in {trained}, or train anew on \

@@ -16,6 +16,10 @@ const MOST_DELAY_US: f64 = 1e6;
 const SIMULATED_PPM: f64 = 1e6;
 /// Host's time after which a simulated board is known by its pace, ns.
 const KNOWN_NS: i64 = 500_000_000;
+/// What waited is read at once: its delays shrink by more than one in so many parts of the time between, and by one of
+/// these parts in the stretch in which the last of it is read.
+const CATCHING_UP: i64 = 2;
+const STILL_CATCHING_UP: i64 = 20;
 /// Only by a drift beyond what is fitted does one in two arrive so much sooner than the soonest can, us.
 const SOON_US: f64 = 1e5;
 
@@ -65,6 +69,10 @@ pub(super) struct ArrivalDelays {
     fastest: VecDeque<ArrivalPoint>,
     /// The first arrival and the latest: the board's time, us, and the host's, ns.
     ends: Option<[(i64, i64); 2]>,
+    /// The board's time of the first stretch, us.
+    begun: Option<i64>,
+    /// Whether what came before the last stretch had waited.
+    catches_up: bool,
 }
 
 impl ArrivalDelays {
@@ -84,8 +92,23 @@ impl ArrivalDelays {
         (host_ns >= KNOWN_NS && drift > SIMULATED_PPM).then_some(drift)
     }
 
+    /// Whether this arrival, in the first seconds, shows that those before had waited until they were read: it comes so much
+    /// sooner behind them than the board's clock has it as no drift does.
+    pub(super) fn had_waited(&self, (board_us, late_ns): ArrivalPoint) -> bool {
+        let (Some(begun), Some(last)) = (self.begun, self.fastest.back()) else { return false };
+        let part = if self.catches_up { STILL_CATCHING_UP } else { CATCHING_UP };
+        board_us - begun < LONG_US && (last.1 - late_ns) * part > (board_us - last.0) * 1000
+    }
+
+    /// Forgets what had waited.
+    pub(super) fn caught_up(&self) -> Self {
+        Self { begun: self.begun, catches_up: true, ..Self::default() }
+    }
+
     /// Notes the fastest arrival of a stretch.
     pub(super) fn end_stretch(&mut self, fastest: Option<ArrivalPoint>) {
+        self.catches_up &= self.fastest.is_empty();
+        self.begun = self.begun.or(fastest.map(|(board_us, _)| board_us));
         if self.fastest.len() == STRETCHES {
             self.fastest.pop_front();
         }

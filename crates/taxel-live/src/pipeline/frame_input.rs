@@ -123,7 +123,7 @@ impl FrameInput {
 
     /// Reads until the input or the pipeline ends; a line that failed is opened again. `opened` has read up to a line's start.
     pub(super) fn read(&self, opened: OpenedLines) {
-        let OpenedLines { mut reader, begun } = opened;
+        let OpenedLines { mut reader, begun, .. } = opened;
         {
             let mut state = lock(&self.state);
             begun.iter().for_each(|(line, at_ns)| state.line(line, *at_ns));
@@ -155,6 +155,7 @@ impl FrameInput {
         let mut state = lock(&self.state);
         reader.lines.discard();
         state.frames.count_left_out(reader.lines.take_left_out());
+        state.frames.end(now_ns());
         state.feed.close(None);
     }
 

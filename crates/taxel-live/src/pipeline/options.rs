@@ -7,13 +7,14 @@
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize, Serializer};
 use taxel_core::detect::FrameTime;
 use taxel_core::wire::Registers;
-use taxel_core::{Array, problem};
+use taxel_core::{Array, Stop, problem};
 
-use super::source::SourceText;
+use super::source::{FirstLineWait, SourceText};
 use crate::address::of_host;
 use crate::capture::ReceiverOptions;
 use crate::recording::Compression;
@@ -111,6 +112,10 @@ options! {
         sources: Vec<String> = vec![], "commands" = "live record", "flag" = "--source",
             "metavar" = "[NAME=]KIND:PLACE", "python" = "Mapping[str, str] | str | Sequence[str] | None",
             "typed" = "May be repeated.";
+        /// How long the first source of lines may be silent before its first line, s.
+        ///
+        /// A source of which the array, the columns and the rate are stated may be silent longer: it starts without a line.
+        first_line_s: f64 = 3.0, "commands" = "", "minimum" = 0;
         /// Compression of a .mcap: none, lz4 or zstd.
         compression: String = "none".to_owned(), "commands" = "record";
         /// Replace the file if it exists.
@@ -195,6 +200,18 @@ impl LiveOptions {
             }
         }
         Ok(texts)
+    }
+
+    /// How long the first source of lines may be silent, unless asked to stop.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if that is no time.
+    pub(super) fn first_line_wait<'a>(&self, stop: Stop<'a>) -> taxel_core::Result<FirstLineWait<'a>> {
+        let seconds = self.first_line_s;
+        let most = Duration::try_from_secs_f64(seconds)
+            .map_err(|_| problem!("first_line_s"; " is {seconds} s: must be 0 or more"))?;
+        Ok(FirstLineWait { most, stop })
     }
 
     /// The socket and the queue behind it.

@@ -25,16 +25,14 @@ pub enum ReadoutSetup {
 }
 
 impl ReadoutSetup {
-    /// The setup of the options' readout, where there is one, for frames of this length and values in this unit: it measures a fresh tare where they say for how long, else it
-    /// reads at once, with the saved tare where its encoder needs one.
+    /// The setup of a readout, where there is one, for frames of this length: it measures a fresh tare where the options say for
+    /// how long, else it reads at once, with the saved tare where its encoder needs one.
     ///
     /// # Errors
     ///
-    /// `Format` for a text that is no readout or no tare, `Problem` for a time that no tare takes; as [`Detector::stream`].
-    pub fn from_options(options: &LiveOptions, frames: FrameTime, unit: &str) -> taxel_core::Result<Self> {
-        let Some(readout) = &options.readout else { return Ok(Self::None) };
-        let readout = Detector::from_json(readout)?;
-        readout.check_unit(unit)?;
+    /// `Format` for a text that is no tare, `Problem` for a time that no tare takes; as [`Detector::stream`].
+    pub fn new(readout: Option<Detector>, options: &LiveOptions, frames: FrameTime) -> taxel_core::Result<Self> {
+        let Some(readout) = readout else { return Ok(Self::None) };
         let tare = match &options.tare {
             Some(StatedTare::Seconds(seconds)) => return Ok(Self::Taring(tare_us(*seconds)?, Box::new(readout))),
             Some(StatedTare::Saved(text)) => Some(Tare::from_json(text)?),

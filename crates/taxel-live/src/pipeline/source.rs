@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use taxel_core::array::Pitch;
 use taxel_core::wire::Registers;
-use taxel_core::{Array, problem};
+use taxel_core::{Array, Stop, problem};
 
 use crate::frame_lines::{FrameAssembler, FrameEnd, FrameLayout, cells, number};
 use crate::line_input::LineReader;
@@ -99,6 +99,23 @@ pub struct Opened(Arc<Mutex<Option<OpenedLines>>>);
 pub struct OpenedLines {
     pub(super) reader: LineReader,
     pub(super) begun: Vec<(TextLine, i64)>,
+    /// Whether no more can arrive.
+    has_ended: bool,
+}
+
+/// How long a source of lines may be silent before its first line.
+#[derive(Clone, Copy)]
+pub struct FirstLineWait<'a> {
+    /// So long at most.
+    pub most: Duration,
+    /// What ends the wait.
+    pub stop: Stop<'a>,
+}
+
+impl Default for FirstLineWait<'_> {
+    fn default() -> Self {
+        Self { most: FIRST_LINE, stop: Stop::never() }
+    }
 }
 
 impl Opened {
@@ -283,9 +300,9 @@ impl SourceText {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` if what is stated does not fit the lines, or none arrives in 3 s although it must show the columns;
-    /// `File` or `Socket` if the place cannot be opened.
-    pub fn open(&self, readout_array: Option<&Option<Array>>) -> Result<SourceKind> {
+    /// `Core(Problem)` if what is stated does not fit the lines, or if what arrives does not show the columns or the rate that
+    /// are not stated; `File` or `Socket` if the place cannot be opened; `Core(Interrupted)` if asked to stop.
+    pub fn open(&self, readout_array: Option<&Option<Array>>, wait: FirstLineWait<'_>) -> Result<SourceKind> {
         let input = match &self.place {
             SourcePlace::Board(address, preset) => {
                 let array = self.array.clone().unwrap_or_else(Array::thesis);
@@ -298,23 +315,30 @@ impl SourceText {
         let in_text = |error: Error| error.in_part(&format!("source {:?}", self.text));
         if readout_array.is_some() || self.frames_are_stated() {
             let (layout, opened) =
-                self.frames(input.as_ref(), readout_array.and_then(Option::as_ref)).map_err(in_text)?;
+                self.frames(input.as_ref(), readout_array.and_then(Option::as_ref), wait).map_err(in_text)?;
             return Ok(SourceKind::Frames(input, Box::new(layout), opened));
         }
-        let (columns, opened) = self.columns_or_first_line(input.as_ref())?;
+        let (columns, opened) = self.columns_or_first_line(input.as_ref(), wait)?;
         let stream = self.stream(columns).map_err(in_text)?;
         Ok(SourceKind::Numbers(input, stream, opened))
     }
 
     /// The columns that are stated, or those of the first line.
-    fn columns_or_first_line(&self, input: Option<&LinePlace>) -> Result<(Vec<String>, Opened)> {
+    fn columns_or_first_line(
+        &self,
+        input: Option<&LinePlace>,
+        wait: FirstLineWait<'_>,
+    ) -> Result<(Vec<String>, Opened)> {
         match (&self.columns, input) {
             (Some(columns), _) => Ok((columns.clone(), Opened::default())),
             (None, None) => Err(problem!("source {:?}: needs columns=A:B:C", self.text).into()),
             (None, Some(input)) => {
                 let mut lines = OpenedLines::open(input)?;
-                let columns = lines.first(input, &self.leave_out)?;
-                Ok((columns, Opened::from_lines(lines)))
+                lines.wait(wait)?;
+                match lines.first(&self.leave_out)? {
+                    Some(columns) => Ok((columns, Opened::from_lines(lines))),
+                    None => Err(lines.nothing(self, 0, None)),
+                }
             }
         }
     }
@@ -346,7 +370,12 @@ impl SourceText {
     }
 
     /// How the lines make frames, with what was read to find it.
-    fn frames(&self, input: Option<&LinePlace>, readout_array: Option<&Array>) -> Result<(FrameLayout, Opened)> {
+    fn frames(
+        &self,
+        input: Option<&LinePlace>,
+        readout_array: Option<&Array>,
+        wait: FirstLineWait<'_>,
+    ) -> Result<(FrameLayout, Opened)> {
         let end = self.end.unwrap_or(FrameEnd::Lines(1));
         let mut opened = None;
         let columns = match (&self.columns, input) {
@@ -355,14 +384,22 @@ impl SourceText {
             (None, None) => self.columns_of_array(end)?,
             (None, Some(input)) => {
                 let mut lines = OpenedLines::open(input)?;
-                let columns = lines.first(input, &self.leave_out)?;
+                // A source of which all is stated need not have sent anything.
+                let stated = self.columns_of_array(end).ok().filter(|columns| {
+                    self.rate_hz.is_some() && self.clock(columns).is_ok() && self.left_out(columns).is_ok()
+                });
+                if stated.is_none() {
+                    lines.wait(wait)?;
+                }
+                let first = lines.first(&self.leave_out)?;
+                let stated = stated.filter(|_| !lines.has_ended && lines.reader.came_ns == 0);
+                let Some(columns) = first.or(stated) else { return Err(lines.nothing(self, 0, None)) };
                 opened = Some(lines);
                 columns
             }
         };
         let time = self.clock(&columns)?;
-        let left = self.leave_out.iter().map(|column| index_of("leave_out", column, &columns));
-        let left = left.collect::<taxel_core::Result<Vec<_>>>()?;
+        let left = self.left_out(&columns)?;
         let is_value = |field: &usize| !left.contains(field) && time.iter().all(|(clock, _)| clock != field);
         let values: Vec<usize> = (0..columns.len()).filter(is_value).collect();
         if values.is_empty() {
@@ -380,18 +417,26 @@ impl SourceText {
             end,
             turned: self.turned,
             unit: self.unit.clone().unwrap_or_else(|| "counts".to_owned()),
-            frame_us: self.rate_hz.map_or(0.0, |rate_hz| 1e6 / rate_hz),
+            unit_is_stated: self.unit.is_some(),
+            frame_us: self.rate_hz.map_or(1.0, |rate_hz| 1e6 / rate_hz),
         };
+        layout.check()?;
         if self.rate_hz.is_none() {
             let Some(input) = input else {
                 return Err(problem!("rate=HZ is not stated: how many frames a second the program passes").into());
             };
             let mut lines = opened.map_or_else(|| OpenedLines::open(input), Ok)?;
-            layout.frame_us = lines.frame_us(&layout, input)?;
+            lines.wait(wait)?;
+            layout.frame_us = lines.frame_us(&layout, self)?;
+            layout.check()?;
             opened = Some(lines);
         }
-        layout.check()?;
         Ok((layout, opened.map(Opened::from_lines).unwrap_or_default()))
+    }
+
+    /// The columns that are left out.
+    fn left_out(&self, columns: &[String]) -> taxel_core::Result<Vec<usize>> {
+        self.leave_out.iter().map(|column| index_of("leave_out", column, columns)).collect()
     }
 
     /// The columns of lines without names that fill the stated array.
@@ -486,13 +531,32 @@ fn array_of(text: &str, size: &str, is_board: bool) -> Result<Array> {
 
 impl OpenedLines {
     fn open(input: &LinePlace) -> Result<Self> {
-        Ok(Self { reader: LineReader::open(input)?, begun: vec![] })
+        Ok(Self { reader: LineReader::open(input)?, begun: vec![], has_ended: false })
+    }
+
+    /// Waits until something arrives, or the input ends.
+    fn wait(&mut self, wait: FirstLineWait<'_>) -> Result<()> {
+        let begun = Instant::now();
+        while self.reader.came_ns == 0 && !self.has_ended {
+            if begun.elapsed() >= wait.most {
+                let seconds = begun.elapsed().as_secs();
+                return Err(problem!("{}: no line came within {seconds} s", self.reader.place()).into());
+            }
+            wait.stop.check()?;
+            self.fill()?;
+        }
+        Ok(())
+    }
+
+    fn fill(&mut self) -> Result<()> {
+        self.has_ended |= self.reader.fill().map_err(|error| self.reader.broken(error))?;
+        Ok(())
     }
 
     /// The next line that is whole text, if one arrives until then.
     fn next(&mut self, until: Instant) -> Result<Option<(TextLine, i64)>> {
         loop {
-            while let Some((line, at_ns)) = self.reader.next(false) {
+            while let Some((line, at_ns)) = self.reader.next(self.has_ended) {
                 let text = &line.text;
                 if std::mem::take(&mut self.reader.is_cut) {
                     // The line may lack its beginning.
@@ -506,21 +570,19 @@ impl OpenedLines {
                     return Ok(Some((line, at_ns)));
                 }
             }
-            if Instant::now() >= until {
+            if self.has_ended || Instant::now() >= until {
                 return Ok(None);
             }
-            if self.reader.fill().map_err(|error| self.reader.broken(error))? {
-                let last = self.reader.next(true);
-                return Ok(last);
-            }
+            self.fill()?;
         }
     }
 
     /// Waits for the first line that defines the columns, and returns them: a line of names, or of numbers, whose columns are
-    /// then named `column_0` and so on. Text before it that is neither is skipped.
-    fn first(&mut self, input: &LinePlace, leave_out: &[String]) -> Result<Vec<String>> {
+    /// then named `column_0` and so on. Text before it that is neither is skipped. `None` if none arrives.
+    fn first(&mut self, leave_out: &[String]) -> Result<Option<Vec<String>>> {
         let until = Instant::now() + FIRST_LINE;
         let mut names: Option<Vec<String>> = None;
+        let mut are_names = false;
         while let Some((line, at_ns)) = self.next(until)? {
             let found: Vec<_> = cells(&line.text).collect();
             if found.is_empty() || line.text.starts_with('#') {
@@ -533,24 +595,25 @@ impl OpenedLines {
             let is_left = |k: usize| leave_out.iter().any(|left| index_of("", left, &columns) == Ok(k));
             if found.iter().enumerate().all(|(k, cell)| is_left(k) || number(cell).is_some()) {
                 self.begun.push((line, at_ns));
-                return Ok(columns);
+                return Ok(Some(columns));
             }
+            are_names = line.text.contains([',', ';', '\t']) && found.iter().all(|cell| number(cell).is_none());
             let words: Vec<String> = found.into_iter().map(Cow::into_owned).collect();
             // Text is counted, but for the names of the columns.
             self.begun.push((line, at_ns));
             if words.iter().any(|word| clock_unit_us(word).is_some()) {
-                return Ok(words);
+                return Ok(Some(words));
             }
             names = Some(words);
         }
-        // Only names have arrived.
-        names.ok_or_else(|| self.nothing(input, "columns=t_us:ax:ay:az"))
+        // Only names have arrived: a message of words with blanks between, or a line of numbers and text, is none.
+        Ok(names.filter(|_| are_names && !self.has_ended))
     }
 
     /// Measures the time from one frame to the next, us, from what arrives first.
     #[allow(clippy::cast_precision_loss)]
-    fn frame_us(&mut self, layout: &FrameLayout, input: &LinePlace) -> Result<f64> {
-        let mut frames = FrameAssembler::new(FrameLayout { frame_us: 1.0, ..layout.clone() });
+    fn frame_us(&mut self, layout: &FrameLayout, source: &SourceText) -> Result<f64> {
+        let mut frames = FrameAssembler::new(layout.clone());
         let mut times: Vec<i64> =
             self.begun.iter().filter_map(|(line, at_ns)| Some(frames.push(line, *at_ns)?.0)).collect();
         let mut until = Instant::now() + FIRST_LINE;
@@ -564,27 +627,103 @@ impl OpenedLines {
             }
             self.begun.push((line, at_ns));
         }
-        let (Some(first), Some(last), 2..) = (times.first(), times.last(), times.len()) else {
-            return Err(self.nothing(input, "rate=HZ, and the array or the columns"));
-        };
+        if times.len() < 2 {
+            return Err(self.nothing(source, times.len(), Some(layout.fields)));
+        }
         if layout.time.is_empty() {
-            // Lines arrive in packets.
-            return Ok(((last - first) as f64 / (times.len() - 1) as f64).max(1.0));
+            return Ok(arrival_period(&times));
         }
         let mut apart: Vec<i64> = times.windows(2).map(|two| two[1] - two[0]).collect();
         let middle = apart.len() / 2;
         Ok(*apart.select_nth_unstable(middle).1 as f64)
     }
 
-    /// The error if too little arrived.
-    fn nothing(&mut self, input: &LinePlace, remedy: &str) -> Error {
+    /// The error if no frame arrived, or only one, of lines with so many columns: what arrived, and what to state.
+    fn nothing(&mut self, source: &SourceText, frames: usize, fields: Option<usize>) -> Error {
         self.reader.lines.discard();
         let left_out = self.reader.lines.take_left_out();
-        let came = match left_out.in_no_line + left_out.unfinished {
-            0 => String::new(),
-            bytes => format!(" in the {bytes} bytes that came"),
+        let within = match self.has_ended {
+            true => "before the end".to_owned(),
+            false => format!("within {} s", FIRST_LINE.as_secs()),
         };
-        problem!("{input}: too few lines of numbers{came} within {} s; state {remedy}", FIRST_LINE.as_secs()).into()
+        let texts: Vec<&str> =
+            self.begun.iter().map(|(line, _)| line.text.trim()).filter(|text| !text.is_empty()).collect();
+        let came = match (&texts[..], frames) {
+            ([], _) => match left_out.in_no_line + left_out.unfinished {
+                0 => format!("no line came {within}"),
+                bytes => format!("no line of numbers in the {bytes} bytes that came {within}"),
+            },
+            (_, 0) => {
+                let lines = if texts.len() == 1 { "1 line".to_owned() } else { format!("{} lines", texts.len()) };
+                format!("{lines} came {within}, {}", unread(&texts, &source.leave_out, fields))
+            }
+            _ => format!("1 frame came {within}, which shows no rate: add rate=HZ"),
+        };
+        problem!("{}: {came}", self.reader.place()).into()
+    }
+}
+
+/// The time from one frame to the next, us, by their arrivals, two or more. Lines arrive in packets, and those that waited
+/// until they were read arrive at once: it is that from the second packet to the last.
+#[allow(clippy::cast_precision_loss)]
+fn arrival_period(times: &[i64]) -> f64 {
+    let mean = |first: usize, last: usize| (times[last] - times[first]) as f64 / (last - first) as f64;
+    let end = times.len() - 1;
+    let at_once = mean(0, end) / 10.0;
+    let is_with_next = |k: &usize| ((times[k + 1] - times[*k]) as f64) < at_once;
+    let first = (0..end).take_while(is_with_next).last().map_or(0, |k| k + 2);
+    let last = end - (0..end).rev().take_while(is_with_next).count();
+    if first < last { mean(first, last) } else { mean(0, end) }.max(1.0)
+}
+
+/// Length of a text that an error shows, characters.
+const SHOWN: usize = 60;
+
+/// Why lines are no frames of so many columns, in words that follow their number, and what to state.
+fn unread(texts: &[&str], leave_out: &[String], fields: Option<usize>) -> String {
+    let first: Vec<_> = cells(texts[0]).collect();
+    let columns: Vec<String> = (0..first.len()).map(numbered).collect();
+    let is_left = |k: usize| leave_out.iter().any(|left| index_of("", left, &columns) == Ok(k));
+    let mut are_text = vec![true; first.len()];
+    for text in texts {
+        let mut count = 0;
+        for (cell, is_text) in cells(text).zip(&mut are_text) {
+            *is_text &= number(&cell).is_none();
+            count += 1;
+        }
+        are_text[count..].fill(false);
+    }
+    let shared: Vec<usize> = (0..first.len()).filter(|&k| are_text[k] && !is_left(k)).collect();
+    let shown = |text: &str| text.chars().take(SHOWN).collect::<String>();
+    let listed = |separator: &str, word: &dyn Fn(usize) -> String| {
+        shared.iter().map(|&k| word(k)).collect::<Vec<_>>().join(separator)
+    };
+    if let Some(&cut) = shared.iter().find(|&&k| first[k].trim_matches(['\'', '"']) == "...") {
+        let column = cut + 1;
+        return format!(
+            "all cut by \"...\" in column {column}: the sender must print whole lines (ros2 topic echo: add --full-length)"
+        );
+    }
+    match (&shared[..], fields) {
+        ([], Some(fields)) if first.iter().all(|cell| number(cell).is_some()) && first.len() != fields => {
+            format!("the first with {} columns: must be {fields}", first.len())
+        }
+        ([], Some(_)) if first.iter().all(|cell| number(cell).is_some()) => {
+            "and no whole frame: are frame_lines= or frame_end= right?".to_owned()
+        }
+        (all, _) if all.is_empty() || all.len() == first.len() => {
+            format!("the first {:?}: none is of numbers", shown(texts[0]))
+        }
+        (several, _) => {
+            let column = if several.len() == 1 { "a text in column" } else { "texts in columns" };
+            let left: Vec<String> = leave_out.iter().cloned().chain([listed(":", &|k| (k + 1).to_string())]).collect();
+            format!(
+                "all with {column} {} ({}): add leave_out={}",
+                listed(", ", &|k| (k + 1).to_string()),
+                listed(", ", &|k| format!("{:?}", shown(&first[k]))),
+                left.join(":")
+            )
+        }
     }
 }
 
@@ -594,7 +733,7 @@ mod tests {
 
     #[test]
     fn sources_are_read_as_they_are_written() {
-        let open = |text: &str| text.parse::<SourceText>().unwrap().open(None).unwrap();
+        let open = |text: &str| text.parse::<SourceText>().unwrap().open(None, FirstLineWait::default()).unwrap();
         let board = open("board:127.0.0.1:5209,array=16x8,preset=2 kHz");
         let SourceKind::Board(address, array, _) = &board else { panic!("{board:?}") };
         assert_eq!((address.port(), array.rows, array.columns), (5209, 16, 8));
@@ -606,7 +745,11 @@ mod tests {
             .parse()
             .unwrap();
         assert_eq!(mat.name(), "mat");
-        let SourceKind::Frames(Some(LinePlace::File(path)), layout, _) = mat.open(None).unwrap() else { panic!() };
+        let SourceKind::Frames(Some(LinePlace::File(path)), layout, _) =
+            mat.open(None, FirstLineWait::default()).unwrap()
+        else {
+            panic!()
+        };
         assert_eq!(path.to_str(), Some("-"));
         assert_eq!((layout.fields, &layout.values[..], layout.frame_us), (6, &[3, 4, 5][..], 20_000.0));
         assert_eq!((&layout.time[..], layout.turned, &*layout.unit), (&[(0, 1e6), (1, 1e-3)][..], Some(1023.0), "kPa"));
@@ -649,7 +792,79 @@ mod tests {
             "lines:/nowhere",
         ] {
             let source: SourceText = text.parse().unwrap();
-            assert!(source.open(None).is_err(), "{text}");
+            assert!(source.open(None, FirstLineWait::default()).is_err(), "{text}");
+        }
+    }
+
+    /// The source of a file with this text, and what opening it returns.
+    fn opened(name: &str, text: &str, keys: &str, wait: FirstLineWait<'_>) -> Result<FrameLayout> {
+        let path = std::env::temp_dir().join(format!("taxel-{}-{name}", std::process::id()));
+        std::fs::write(&path, text).unwrap();
+        let source: SourceText = format!("lines:{},{keys}", path.display()).parse().unwrap();
+        let kind = source.open(Some(&None), wait);
+        std::fs::remove_file(&path).unwrap();
+        match kind? {
+            SourceKind::Frames(_, layout, _) => Ok(*layout),
+            kind => panic!("{kind:?}"),
+        }
+    }
+
+    #[test]
+    fn a_silent_source_starts_where_all_is_stated_and_is_waited_for_else() {
+        let layout = opened("stated", "", "array=2x3,time=1+2,leave_out=3,rate=75", FirstLineWait::default()).unwrap();
+        assert_eq!((layout.fields, &layout.values[..]), (9, &[3, 4, 5, 6, 7, 8][..]));
+        let asked = FirstLineWait { most: Duration::MAX, stop: Stop::when(&|| true) };
+        let error = opened("waits", "", "array=2x3,time=1+2,leave_out=3", asked).unwrap_err();
+        assert!(matches!(error, Error::Core(taxel_core::Error::Interrupted)), "{error}");
+        let none = FirstLineWait { most: Duration::ZERO, ..FirstLineWait::default() };
+        let error = opened("silent", "", "array=2x3", none).unwrap_err();
+        assert!(error.to_string().contains("no line came within 0 s"), "{error}");
+    }
+
+    #[test]
+    fn the_rate_by_arrival_does_not_count_the_frames_that_waited() {
+        let late = |waited: i64, packet: i64| {
+            (0..33).map(move |k| (k.max(waited) / packet) * packet * 13_333 + k.min(waited)).collect::<Vec<_>>()
+        };
+        for (waited, packet) in [(0, 1), (5, 1), (20, 1), (0, 4), (8, 4)] {
+            let period = arrival_period(&late(waited, packet));
+            assert!((period / 13_333.0 - 1.0).abs() < 0.001, "{waited}, {packet}: {period}");
+        }
+    }
+
+    #[test]
+    fn lines_that_make_no_frame_are_shown_with_what_to_state() {
+        let line = |k: usize| format!("{k},2,palm_link,0.5,1\n");
+        let lines: String = (0..40).map(line).collect();
+        let error = opened("text", &lines, "array=1x2,time=1+2,rate=75", FirstLineWait::default()).unwrap_err();
+        let said = "40 lines came within 3 s, all with a text in column 3 (\"palm_link\"): add leave_out=3";
+        assert!(error.to_string().contains(said), "{error}");
+        for (texts, leave_out, fields, said) in [
+            (
+                vec!["1,a,2,b", "2,a,3,b"],
+                vec![],
+                None,
+                "all with texts in columns 2, 4 (\"a\", \"b\"): add leave_out=2:4",
+            ),
+            (vec!["1,a,2,b"], vec!["2"], None, "all with a text in column 4 (\"b\"): add leave_out=2:4"),
+            (
+                vec!["1,a,2,'...'", "1,a,3,'...'"],
+                vec!["2"],
+                None,
+                "all cut by \"...\" in column 4: the sender must print",
+            ),
+            (
+                vec!["ros2: command not found"],
+                vec![],
+                None,
+                "the first \"ros2: command not found\": none is of numbers",
+            ),
+            (vec!["1,2", "1,2"], vec![], Some(5), "the first with 2 columns: must be 5"),
+            (vec!["1,2", "1,2"], vec![], Some(2), "and no whole frame: are frame_lines= or frame_end= right?"),
+        ] {
+            let leave_out: Vec<String> = leave_out.into_iter().map(str::to_owned).collect();
+            let found = unread(&texts, &leave_out, fields);
+            assert!(found.starts_with(said), "{found}");
         }
     }
 }

@@ -158,7 +158,7 @@ impl NumberStream {
 
     /// Reads lines until the end, in a separate thread; a failed line is opened again.
     pub(super) fn read(self: &Arc<Self>, opened: OpenedLines) -> Result<JoinHandle<()>> {
-        let (numbers, OpenedLines { mut reader, begun }) = (Arc::clone(self), opened);
+        let (numbers, OpenedLines { mut reader, begun, .. }) = (Arc::clone(self), opened);
         let thread = std::thread::Builder::new().name("taxel-lines".to_owned());
         let job = move || {
             let begun = begun.iter().try_for_each(|(line, at_ns)| numbers.line(*at_ns, line));

@@ -299,7 +299,7 @@ impl Reader {
             so_far: remarks.counts.clone(),
             converted: self.header().conversion.converted.clone().map(Box::new),
             decoded: None,
-            lines: data == Topic::Samples,
+            lines: data != Topic::Datagrams,
             origin_us: self.header().decoding.origin_us,
         }
     }

@@ -20,7 +20,7 @@ use crate::kernel_drops::KernelDrops;
 
 /// The wording of version 1 when nothing was dropped between the socket and the file.
 pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)";
-/// The same for a stream of numbers.
+/// The same for a stream of numbers, and for frames of them.
 const NO_LINE_LOST: &str = "nothing lost after arrival (lines without numbers cannot show what was lost before it)";
 
 /// The wording where a kernel does not count what it drops, and the board does not number what it sends.
@@ -209,7 +209,7 @@ pub struct Condition {
     pub converted: Option<Box<Verdict>>,
     /// What decoding found, if the file was decoded.
     pub decoded: Option<DamageCounts>,
-    /// Whether the source is a stream of numbers.
+    /// Whether the source is one of numbers, or of frames of them.
     pub lines: bool,
     /// The board's time at which the recording begins, us.
     pub origin_us: i64,
@@ -247,7 +247,7 @@ impl Verdict {
         Self { status: RecordingStatus::NothingArrived, text, ..Self::default() }
     }
 
-    /// The verdict on a stream of numbers.
+    /// The verdict on a stream of numbers, or on frames of them.
     pub(crate) fn of_lines(counts: &RecordingCounts) -> Self {
         Self::of_counts(counts, NO_LINE_LOST)
     }

@@ -15,7 +15,7 @@ use serde_json::json;
 use super::queue::MessageQueue;
 use super::record_file::RecordFile;
 use crate::recording::metadata::{BEGIN, CHECK, END, check};
-use crate::recording::{Compression, Header, OutputFile, RecordingCounts, Topic, now_ns};
+use crate::recording::{Compression, Header, OutputFile, RecordingCounts, Topic, Verdict, now_ns};
 
 /// Size at which a chunk is closed, bytes; it is closed earlier if the queue is empty.
 pub(super) const CHUNK_BYTES: usize = 1 << 20;
@@ -111,8 +111,10 @@ impl ChunkWriter {
         others: &BTreeMap<String, RecordingCounts>,
     ) -> std::result::Result<(), McapError> {
         if let Some(counts) = counts {
+            let is_board = self.header.stream.is_none() && self.header.frames.is_none();
+            let verdict = if is_board { counts.verdict() } else { Verdict::of_lines(counts) };
             let mut end = BTreeMap::from([
-                ("verdict".to_owned(), counts.verdict().text),
+                ("verdict".to_owned(), verdict.text),
                 ("counts".to_owned(), json!(counts).to_string()),
                 ("header".to_owned(), json!(self.header).to_string()),
                 ("stopped_ns".to_owned(), now_ns().to_string()),
