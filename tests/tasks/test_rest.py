@@ -12,12 +12,15 @@ from tests.shell import run
 
 import taxel
 from taxel import Array, Frames, ProblemError, Tare
+from taxel._base.messages import collected
 from taxel.detect import PlainRule
 from taxel.live._requests.training import TrainingRequests
 from taxel.live._shown_files import Opening, ShownFiles
 from taxel.tasks import detect, rest
+from taxel.tasks.rest import tare_before, tare_if_any
 
 from .recordings import board, mat, trials
+from .test_causes import pressed
 
 
 def test_forces_rest_at_0_and_other_values_at_their_first_quiet_stretch(tmp_path: Path) -> None:
@@ -43,6 +46,29 @@ def test_no_label_moves_the_rest_nor_a_detection(tmp_path: Path, label_us: int |
     truth = () if label_us is None else ("--truth", "notes")
     shown = json.loads(run("detect", place, "--readout", tmp_path / "rule.json", "--json", *truth).stdout)
     assert (shown["detections"], shown["rest"]) == (found, {"source": "quiet", "us": [0, 500_000]})
+
+
+@pytest.mark.parametrize("begin_us", [0, 1_795_000_000_000_000])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_training_takes_the_first_quiet_stretch_where_a_touch_comes_before_the_first_label(
+    seed: int, begin_us: int, tmp_path: Path
+) -> None:
+    frames, labels = pressed(seed)
+    later = Frames(frames.values, frames.t + begin_us, unit=frames.unit, array=frames.array)
+    taxel.convert(later, tmp_path / "a.npz")
+    recording = taxel.open(tmp_path / "a.npz")
+    for chosen in (tare_before, tare_if_any):
+        with collected() as warned:
+            quiet = chosen({"contact": labels["contact"] + begin_us}, recording)
+        assert (quiet.start_us, quiet.stop_us) == (begin_us, begin_us + labels["contact"][0] - 20_000)
+        assert warned == []
+        with collected() as warned:
+            quiet = chosen({"contact": labels["contact"][4:] + begin_us}, recording)
+        assert (quiet.start_us - begin_us, quiet.stop_us - begin_us) == (0, 500_000)
+        (line,) = warned
+        end = (labels["contact"][4] - 20_000) / 1e6
+        assert f"0.000 to {end:.3f} s, before the first label, holds a touch of " in line
+        assert line.endswith("so the tare is of the first quiet stretch, 0.000 to 0.500 s")
 
 
 def test_the_first_stretch_counts_wherever_it_is_and_nothing_before_it_is_left_out(tmp_path: Path) -> None:

@@ -42,6 +42,8 @@ KINDS = (
 
 #: What helps against labels that lie elsewhere.
 _FOREIGN = "labels of this recording, where it was touched"
+#: What makes a tare's file of a recording.
+_MAKES_TARE = "in Python taxel.Tare.take(taxel.open('RECORDING'), start_us=T, stop_us=T).save('FILE')"
 #: From which share of the events on missed or false ones are many.
 _MANY = 0.05
 #: Labels are a question before a training if at most this share of them lies near anything that was felt ...
@@ -328,7 +330,8 @@ class Evidence:
         because, option, arguments = self._of_tare
         if because:
             advice = option if arguments else "another tare, of the time just before (--tare FILE)"
-            yield Cause("tare", (label,), wrong, f"of the tare: {because}", advice, option, arguments)
+            measured = f"of the tare: {because}" + ("" if arguments else f"; {_MAKES_TARE} makes that file")
+            yield Cause("tare", (label,), wrong, measured, advice, option, arguments)
         yield from self._other_recipe(label, wrong)
 
     def _other_recipe(self, label: str, wrong: int) -> Iterator[Cause]:

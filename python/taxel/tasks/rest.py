@@ -117,18 +117,23 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
         return TakenRest("given" if seconds is None else "beginning", given_tare(tare, recording), begin_us)
     if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
         return TakenRest("unit", zero, begin_us)
-    found = of_quiet(source) if isinstance(source, Frames) else quiet_rest(recording)
-    if found is not None and found.preload_at:
-        span, warning = free_of_preload(recording, found)
+    span, warning = _quiet_us(recording, source)
+    if warning:
         warn(warning, stacklevel=2)
-    else:
-        span = None if found is None else found.quiet_us
     if span is None:
         error = ProblemError(
             f"{recording.path}: the rest of its taxels is not known, as no half second is quiet with nothing on it"
         )
         raise helped(error, "tare", "give")
     return TakenRest("quiet", _measured(recording, recorded(recording), span[1], span[0]), begin_us)
+
+
+def _quiet_us(recording: Recording, source: Events | Frames) -> tuple[tuple[int, int] | None, str]:
+    """Return the first quiet stretch with nothing on the array, us, if any, and the line on what lay on it, or ""."""
+    found = of_quiet(source) if isinstance(source, Frames) else quiet_rest(recording)
+    if found is None or not found.preload_at:
+        return None if found is None else found.quiet_us, ""
+    return free_of_preload(recording, found)
 
 
 def given_tare(tare: GivenTare, recording: Recording) -> Tare:
@@ -205,11 +210,36 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     The tare of frames in a unit of force or pressure is 0, as everywhere (`taxel.recording.analysis.rest`).
     A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 frames come before
     it, the tare is that of a quiet stretch, if there is one. Where something lay on the array before it and was taken
-    away, the tare is of the longest time without it, before the label if there is one; a warning says so.
+    away, the tare is of the longest time without it, before the label if there is one; a warning says so. So it does
+    where a tare would hold a touch, and is that of the first quiet stretch, as of a detection, instead.
     """
     source = recorded(recording)
     if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
         return zero
+    return _without_touch(_unloaded(labels, recording, source), recording, source)
+
+
+def _without_touch(tare: Tare, recording: Recording, source: Events | Frames) -> Tare:
+    """Return a tare of a recording; if it holds a touch, and the first quiet stretch none, that of this stretch."""
+    taxels = held_by_tare([Example(source, {}, tare)], NOISE_FLOOR)
+    span = _quiet_us(recording, source)[0] if taxels >= TOUCH else None
+    if span is None:
+        return tare
+    quiet = _measured(recording, source, span[1], span[0])
+    if held_by_tare([Example(source, {}, quiet)], NOISE_FLOOR) >= TOUCH:
+        return tare
+    begin_us = beginning_us(source.t[:1])
+    first, end, *stretch = ((t - begin_us) / 1e6 for t in (tare.start_us, tare.stop_us, *span))
+    warn(
+        f"{recording.path}: {first:.3f} to {end:.3f} s, before the first label, holds a touch of {taxels} taxels, so "
+        "the tare is of the first quiet stretch, {:.3f} to {:.3f} s".format(*stretch),
+        stacklevel=2,
+    )
+    return quiet
+
+
+def _unloaded(labels: Mapping[str, NDArray[np.int64]], recording: Recording, source: Events | Frames) -> Tare:
+    """Return the tare of the time before the first label without what lay on the array."""
     first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
     tare, warning = without_preload(recording, first)
     if warning:
@@ -242,7 +272,7 @@ def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
         return zero
     try:
-        return _before(labels, recording)
+        return _without_touch(_before(labels, recording), recording, source)
     except ProblemError:
         return None
 
