@@ -71,6 +71,39 @@ def test_a_training_takes_the_first_quiet_stretch_where_a_touch_comes_before_the
         assert line.endswith("so the tare is of the first quiet stretch, 0.000 to 0.500 s")
 
 
+@pytest.mark.parametrize("unit", ["N", "kPa"])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_forces_that_do_not_rest_near_0_are_said_with_the_tare_that_takes_that_off(
+    seed: int, unit: str, tmp_path: Path
+) -> None:
+    frames, labels = pressed(seed)
+    random = np.random.default_rng(seed)
+    drift = np.linspace(0, 1, len(frames))[:, None, None] * random.uniform(0, 2, (6, 6))
+    presses = np.maximum(frames.values - 50, 0) / 10
+
+    def warned(name: str, values: np.ndarray, tare: float | None = None) -> list[str]:
+        taxel.convert(Frames(values, frames.t, unit=unit, array=frames.array), tmp_path / f"{name}.npz")
+        recording = taxel.open(tmp_path / f"{name}.npz")
+        said = taxel.tasks.info(recording, tare).warnings
+        with collected() as of_training:
+            if tare is None:
+                tare_before(labels, recording)
+        assert tuple(of_training) == said
+        return list(said)
+
+    (line,) = warned("offset", presses + random.uniform(4, 8, (6, 6)) + drift)
+    assert "offset.npz: 36 of 36 taxels read 4." in line
+    assert f" {unit} in a quiet stretch, 0.000 to 0.500 s, and not 0; if nothing touches them then, --tare 0.5 " in line
+    (line,) = warned("below", presses - random.uniform(4, 8, (6, 6)))
+    assert "--tare 0.5 takes that off" in line
+    assert warned("tared", presses + 5.0, 0.5) == []
+    assert warned("noise", presses + random.normal(0, 0.05, presses.shape)) == []
+    # A foot that stands at first and is lifted later is a load.
+    standing = presses.copy()
+    standing[:80] += 30.0
+    assert warned("standing", standing) == []
+
+
 def test_the_first_stretch_counts_wherever_it_is_and_nothing_before_it_is_left_out(tmp_path: Path) -> None:
     values = np.full((300, 4, 4), 50.0)
     for begin in (5, 30, 55, 80, 200):
