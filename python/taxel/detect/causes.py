@@ -262,7 +262,7 @@ class Evidence:
     def _while_lasting(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield that most labels of a name lie within touches, where most labels of another name lie at their edges."""
         near, at_edge, total = self._near.get(label, (0, 0, 0))
-        fits = [name for name, (_, edge, of) in self._near.items() if name != label and 2 * edge > of]
+        fits = [name for name, (_, edges, count) in self._near.items() if name != label and 2 * edges > count]
         within = near - at_edge
         # A tare that does not fit lets touches seem to last.
         if recipes.knows("touch", label) or not fits or 2 * within <= total or self._loaded >= TOUCH:
@@ -457,8 +457,10 @@ class Mistakes:
     def _window(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the window that pairs what is missed with what is false, if most of it lies so near."""
         missed, false = (
-            np.sort([m.recording * APART_US + m.t for m in self.mistakes if (m.label, m.is_missed) == (label, missed)])
-            for missed in (True, False)
+            np.sort(
+                [m.recording * APART_US + m.t for m in self.mistakes if (m.label, m.is_missed) == (label, is_missed)]
+            )
+            for is_missed in (True, False)
         )
         reach_ms = 2 * self.window_ms
         pairs = score(Detections([label] * len(false), false, false), {label: missed}, reach_ms)
