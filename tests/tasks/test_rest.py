@@ -12,12 +12,15 @@ from tests.shell import run
 
 import taxel
 from taxel import Array, Frames, ProblemError, Tare
+from taxel._base.messages import collected
 from taxel.detect import PlainRule
 from taxel.live._requests.training import TrainingRequests
 from taxel.live._shown_files import Opening, ShownFiles
 from taxel.tasks import detect, rest
+from taxel.tasks.rest import tare_before, tare_if_any
 
 from .recordings import board, mat, trials
+from .test_causes import pressed
 
 
 def test_forces_rest_at_0_and_other_values_at_their_first_quiet_stretch(tmp_path: Path) -> None:
@@ -43,6 +46,62 @@ def test_no_label_moves_the_rest_nor_a_detection(tmp_path: Path, label_us: int |
     truth = () if label_us is None else ("--truth", "notes")
     shown = json.loads(run("detect", place, "--readout", tmp_path / "rule.json", "--json", *truth).stdout)
     assert (shown["detections"], shown["rest"]) == (found, {"source": "quiet", "us": [0, 500_000]})
+
+
+@pytest.mark.parametrize("begin_us", [0, 1_795_000_000_000_000])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_training_takes_the_first_quiet_stretch_where_a_touch_comes_before_the_first_label(
+    seed: int, begin_us: int, tmp_path: Path
+) -> None:
+    frames, labels = pressed(seed)
+    later = Frames(frames.values, frames.t + begin_us, unit=frames.unit, array=frames.array)
+    taxel.convert(later, tmp_path / "a.npz")
+    recording = taxel.open(tmp_path / "a.npz")
+    for chosen in (tare_before, tare_if_any):
+        with collected() as warned:
+            quiet = chosen({"contact": labels["contact"] + begin_us}, recording)
+        assert (quiet.start_us, quiet.stop_us) == (begin_us, begin_us + labels["contact"][0] - 20_000)
+        assert warned == []
+        with collected() as warned:
+            quiet = chosen({"contact": labels["contact"][4:] + begin_us}, recording)
+        assert (quiet.start_us - begin_us, quiet.stop_us - begin_us) == (0, 500_000)
+        (line,) = warned
+        end = (labels["contact"][4] - 20_000) / 1e6
+        assert f"0.000 to {end:.3f} s, before the first label, holds a touch of " in line
+        assert line.endswith("so the tare is of the first quiet stretch, 0.000 to 0.500 s")
+
+
+@pytest.mark.parametrize("unit", ["N", "kPa"])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_forces_that_do_not_rest_near_0_are_said_with_the_tare_that_takes_that_off(
+    seed: int, unit: str, tmp_path: Path
+) -> None:
+    frames, labels = pressed(seed)
+    random = np.random.default_rng(seed)
+    drift = np.linspace(0, 1, len(frames))[:, None, None] * random.uniform(0, 2, (6, 6))
+    presses = np.maximum(frames.values - 50, 0) / 10
+
+    def warned(name: str, values: np.ndarray, tare: float | None = None) -> list[str]:
+        taxel.convert(Frames(values, frames.t, unit=unit, array=frames.array), tmp_path / f"{name}.npz")
+        recording = taxel.open(tmp_path / f"{name}.npz")
+        said = taxel.tasks.info(recording, tare).warnings
+        with collected() as of_training:
+            if tare is None:
+                tare_before(labels, recording)
+        assert tuple(of_training) == said
+        return list(said)
+
+    (line,) = warned("offset", presses + random.uniform(4, 8, (6, 6)) + drift)
+    assert "offset.npz: 36 of 36 taxels read 4." in line
+    assert f" {unit} in a quiet stretch, 0.000 to 0.500 s, and not 0; if nothing touches them then, --tare 0.5 " in line
+    (line,) = warned("below", presses - random.uniform(4, 8, (6, 6)))
+    assert "--tare 0.5 takes that off" in line
+    assert warned("tared", presses + 5.0, 0.5) == []
+    assert warned("noise", presses + random.normal(0, 0.05, presses.shape)) == []
+    # A foot that stands at first and is lifted later is a load.
+    standing = presses.copy()
+    standing[:80] += 30.0
+    assert warned("standing", standing) == []
 
 
 def test_the_first_stretch_counts_wherever_it_is_and_nothing_before_it_is_left_out(tmp_path: Path) -> None:

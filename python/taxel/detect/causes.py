@@ -42,6 +42,8 @@ KINDS = (
 
 #: What helps against labels that lie elsewhere.
 _FOREIGN = "labels of this recording, where it was touched"
+#: What makes a tare's file of a recording.
+_MAKES_TARE = "in Python taxel.Tare.take(taxel.open('RECORDING'), start_us=T, stop_us=T).save('FILE')"
 #: From which share of the events on missed or false ones are many.
 _MANY = 0.05
 #: Labels are a question before a training if at most this share of them lies near anything that was felt ...
@@ -262,7 +264,7 @@ class Evidence:
     def _while_lasting(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield that most labels of a name lie within touches, where most labels of another name lie at their edges."""
         near, at_edge, total = self._near.get(label, (0, 0, 0))
-        fits = [name for name, (_, edge, of) in self._near.items() if name != label and 2 * edge > of]
+        fits = [name for name, (_, edges, count) in self._near.items() if name != label and 2 * edges > count]
         within = near - at_edge
         # A tare that does not fit lets touches seem to last.
         if recipes.knows("touch", label) or not fits or 2 * within <= total or self._loaded >= TOUCH:
@@ -330,7 +332,8 @@ class Evidence:
         because, option, arguments = self._of_tare
         if because:
             advice = option if arguments else "another tare, of the time just before (--tare FILE)"
-            yield Cause("tare", (label,), wrong, f"of the tare: {because}", advice, option, arguments)
+            measured = f"of the tare: {because}" + ("" if arguments else f"; {_MAKES_TARE} makes that file")
+            yield Cause("tare", (label,), wrong, measured, advice, option, arguments)
         yield from self._other_recipe(label, wrong)
 
     def _other_recipe(self, label: str, wrong: int) -> Iterator[Cause]:
@@ -456,8 +459,10 @@ class Mistakes:
     def _window(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the window that pairs what is missed with what is false, if most of it lies so near."""
         missed, false = (
-            np.sort([m.recording * APART_US + m.t for m in self.mistakes if (m.label, m.is_missed) == (label, missed)])
-            for missed in (True, False)
+            np.sort(
+                [m.recording * APART_US + m.t for m in self.mistakes if (m.label, m.is_missed) == (label, is_missed)]
+            )
+            for is_missed in (True, False)
         )
         reach_ms = 2 * self.window_ms
         pairs = score(Detections([label] * len(false), false, false), {label: missed}, reach_ms)

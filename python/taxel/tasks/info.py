@@ -11,7 +11,7 @@ from taxel.recording import Recording
 from taxel.recording.analysis.pressure import Series, series
 from taxel.recording.analysis.summary import summary
 from taxel.tare import Tare
-from taxel.tasks.rest import GivenTare, given_tare
+from taxel.tasks.rest import GivenTare, given_tare, zero_by_unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +70,19 @@ def info(recording: Recording, tare: GivenTare | None = None) -> Info:
         if len(recording.sources) > 1:
             found = Info(_sources(recording, tare), None, None)
         else:
-            rest = None if tare is None else given_tare(tare, recording)
+            rest = _rest(recording, tare)
             pressed = series(recording, rest)
             found = Info(summary(recording, pressed), pressed, rest)
     return Info(found.facts, found.pressed, found.tare, tuple(warnings))
+
+
+def _rest(recording: Recording, tare: GivenTare | None) -> Tare | None:
+    """Return the given tare, if any; without one warn of frames in a unit of force that do not rest near 0."""
+    if tare is not None:
+        return given_tare(tare, recording)
+    if not recording.has_events:
+        zero_by_unit(recording)
+    return None
 
 
 def _sources(recording: Recording, tare: GivenTare | None) -> dict[str, Any]:
@@ -81,7 +90,7 @@ def _sources(recording: Recording, tare: GivenTare | None) -> dict[str, Any]:
     name_of_first, first = next(iter(recording.sources.items()))
     ours, sources = first.clock, {}
     for name, source in recording.sources.items():
-        rest = None if tare is None or source.is_stream else given_tare(tare, source)
+        rest = None if source.is_stream else _rest(source, tare)
         facts = summary(source, None if source.is_stream else series(source, rest))
         if source.is_stream:
             facts["columns"] = source.columns

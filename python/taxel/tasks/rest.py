@@ -35,6 +35,10 @@ GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
 _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
 #: The noise is not known from fewer frames.
 _LEAST_FRAMES = 20
+#: A taxel in a unit of force or pressure reads more than its noise in a quiet stretch from so many times that on; more
+#: than this share of all are many. It has no load that stays for a while if it reads as much in all but this share of
+#: the frames, of so many.
+_TIMES, _MANY, _LOWEST, _FRAMES = 3.0, 0.25, 0.05, 2000
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
 
@@ -117,18 +121,23 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
         return TakenRest("given" if seconds is None else "beginning", given_tare(tare, recording), begin_us)
     if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
         return TakenRest("unit", zero, begin_us)
-    found = of_quiet(source) if isinstance(source, Frames) else quiet_rest(recording)
-    if found is not None and found.preload_at:
-        span, warning = free_of_preload(recording, found)
+    span, warning = _quiet_us(recording, source)
+    if warning:
         warn(warning, stacklevel=2)
-    else:
-        span = None if found is None else found.quiet_us
     if span is None:
         error = ProblemError(
             f"{recording.path}: the rest of its taxels is not known, as no half second is quiet with nothing on it"
         )
         raise helped(error, "tare", "give")
     return TakenRest("quiet", _measured(recording, recorded(recording), span[1], span[0]), begin_us)
+
+
+def _quiet_us(recording: Recording, source: Events | Frames) -> tuple[tuple[int, int] | None, str]:
+    """Return the first quiet stretch with nothing on the array, us, if any, and the line on what lay on it, or ""."""
+    found = of_quiet(source) if isinstance(source, Frames) else quiet_rest(recording)
+    if found is None or not found.preload_at:
+        return None if found is None else found.quiet_us, ""
+    return free_of_preload(recording, found)
 
 
 def given_tare(tare: GivenTare, recording: Recording) -> Tare:
@@ -188,6 +197,37 @@ def given_or_by_unit(tare: GivenTare | None, recording: Recording) -> Tare | Non
     return by_unit(source) if isinstance(source, Frames) else None
 
 
+def zero_by_unit(recording: Recording) -> Tare | None:
+    """Return 0 of frames in a unit of force or pressure, else none; warn of many taxels that do not rest near it."""
+    source = recorded(recording)
+    zero = by_unit(source) if isinstance(source, Frames) else None
+    if zero is None:
+        return None
+    assert isinstance(source, Frames)
+    found = of_quiet(source)
+    if found.quiet_us is None or found.preload_at:
+        return zero
+    middle = np.nan_to_num(np.nanmedian(source.between(*found.quiet_us).values, axis=0))
+    lowest = np.nan_to_num(np.nanquantile(source.values[:: 1 + len(source) // _FRAMES], _LOWEST, axis=0))
+    above = _TIMES * zero.noise
+    off = (middle < -above) | ((middle > above) & (lowest > above))
+    count = np.count_nonzero(off)
+    if count > _MANY * source.array.taxels:
+        first, end = found.quiet_us
+        stretch = "{:.3f} to {:.3f} s".format(*((t - beginning_us(source.t[:1])) / 1e6 for t in (first, end)))
+        taken = f"taxel.Tare.take(taxel.open('{recording.path}'), start_us={first}, stop_us={end})"
+        option = f"--tare {(end - first) / 1e6:g} takes that off"
+        if first > source.t[0]:
+            option = f"--tare FILE takes that off, a file that in Python {taken}.save('FILE') makes"
+        warn(
+            f"{recording.path}: {count} of {source.array.taxels} taxels read {middle[off].min():.3g} to "
+            f"{middle[off].max():.3g} {source.unit} in a quiet stretch, {stretch}, and not 0; if nothing touches them "
+            f"then, {option}",
+            stacklevel=3,
+        )
+    return zero
+
+
 def _warn_of_touch(tare: GivenTare, recording: Recording, source: Events | Frames, measured: Tare) -> None:
     """Warn of a tare in which something was touched, by which lifts are missed or false."""
     taxels = held_by_tare([Example(source, {}, measured)], NOISE_FLOOR)
@@ -205,11 +245,36 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     The tare of frames in a unit of force or pressure is 0, as everywhere (`taxel.recording.analysis.rest`).
     A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 frames come before
     it, the tare is that of a quiet stretch, if there is one. Where something lay on the array before it and was taken
-    away, the tare is of the longest time without it, before the label if there is one; a warning says so.
+    away, the tare is of the longest time without it, before the label if there is one; a warning says so. So it does
+    where a tare would hold a touch, and is that of the first quiet stretch, as of a detection, instead.
     """
-    source = recorded(recording)
-    if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
+    if (zero := zero_by_unit(recording)) is not None:
         return zero
+    source = recorded(recording)
+    return _without_touch(_unloaded(labels, recording, source), recording, source)
+
+
+def _without_touch(tare: Tare, recording: Recording, source: Events | Frames) -> Tare:
+    """Return a tare of a recording; if it holds a touch, and the first quiet stretch none, that of this stretch."""
+    taxels = held_by_tare([Example(source, {}, tare)], NOISE_FLOOR)
+    span = _quiet_us(recording, source)[0] if taxels >= TOUCH else None
+    if span is None:
+        return tare
+    quiet = _measured(recording, source, span[1], span[0])
+    if held_by_tare([Example(source, {}, quiet)], NOISE_FLOOR) >= TOUCH:
+        return tare
+    begin_us = beginning_us(source.t[:1])
+    first, end, *stretch = ((t - begin_us) / 1e6 for t in (tare.start_us, tare.stop_us, *span))
+    warn(
+        f"{recording.path}: {first:.3f} to {end:.3f} s, before the first label, holds a touch of {taxels} taxels, so "
+        "the tare is of the first quiet stretch, {:.3f} to {:.3f} s".format(*stretch),
+        stacklevel=2,
+    )
+    return quiet
+
+
+def _unloaded(labels: Mapping[str, NDArray[np.int64]], recording: Recording, source: Events | Frames) -> Tare:
+    """Return the tare of the time before the first label without what lay on the array."""
     first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
     tare, warning = without_preload(recording, first)
     if warning:
@@ -238,11 +303,11 @@ def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Ta
 
 def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare | None:
     """Return a recording's tare: 0 of force or pressure, else as `tare_before`, or None without such a time."""
-    source = recorded(recording)
-    if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
+    if (zero := zero_by_unit(recording)) is not None:
         return zero
+    source = recorded(recording)
     try:
-        return _before(labels, recording)
+        return _without_touch(_before(labels, recording), recording, source)
     except ProblemError:
         return None
 
