@@ -157,6 +157,29 @@ def in_pictures(folder: Path, seed: int) -> Situation:
     return Situation(saved(folder, frames, {label: t // 40_000 * 40_000 - 35_000 for label, t in labels.items()}))
 
 
+def begun(folder: Path, seed: int) -> Situation:
+    """Trials of a plate that begin with the contact."""
+    random, trials = np.random.default_rng(seed), []
+    for _ in range(10):
+        count = int(random.integers(120, 180))
+        rise = np.minimum(1.0, 0.2 + np.arange(count) / 40)[:, None, None]
+        values, (y, x) = np.zeros((count + 60, 6, 6)), random.integers(0, 3, 2)
+        values[:count, y : y + 4, x : x + 3] = np.rint(rise * random.uniform(300, 600, (1, 4, 3)))
+        trials.append(values)
+
+    def write(before: int) -> None:
+        for k, values in enumerate(trials):
+            led = np.concatenate([np.zeros((before, 6, 6)), values])
+            frames = taxel.Frames(led, 2000 * np.arange(len(led)), unit="counts", array=taxel.Array(6, 6))
+            taxel.convert(frames, folder / f"t{k}.npz", overwrite=True)
+        lines = [f"t{k},contact,{2000 * before}\n" for k in range(10)]
+        (folder / "labels.csv").write_text("recording,label,t_us\n" + "".join(lines))
+
+    write(0)
+    words = [*(folder / f"t{k}.npz" for k in range(10)), "--labels", folder / "labels.csv", "--recipe", "gait_plate"]
+    return Situation(words, lambda: write(100))
+
+
 def window(folder: Path, seed: int) -> Situation:
     """Some labels that are off by little more than the window."""
     frames, labels = pressed(seed, 20)
@@ -180,6 +203,7 @@ SITUATIONS = {
     "unlabelled_source": feet,
     "tare": tare,
     "few_labels": few,
+    "begun_loaded": begun,
     "recipe durations": durations,
     "shifted_labels": shifted,
     "shifted_labels early": early,

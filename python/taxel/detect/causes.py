@@ -25,7 +25,7 @@ from taxel.detect.plain_score import PlainScore, floor_of
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import APART_US, Mistake, Score, score
 from taxel.detections import Detections
-from taxel.encode import ContactArea, Encoder, Moments
+from taxel.encode import ContactArea, Encoder, LevelCrossing, Moments, ThresholdIzhikevich
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
@@ -36,7 +36,7 @@ from taxel.tare import Tare
 #: The kinds of causes. Where two concern equally many mistakes the earlier comes first: the later may follow from it.
 KINDS = (
     "falling_values", "shifted_labels", "few_labels", "unlabelled_source", "levels", "foreign_labels", "tare",
-    "durations", "recipe", "window", "unlabelled_time", "label_name", "plain_rule", "no_neighbours",
+    "begun_loaded", "durations", "recipe", "window", "unlabelled_time", "label_name", "plain_rule", "no_neighbours",
     "indistinct_kinds", "overfitting", "parameters",
 )  # fmt: skip
 
@@ -44,6 +44,8 @@ KINDS = (
 _FOREIGN = "labels of this recording, where it was touched"
 #: What makes a tare's file of a recording.
 _MAKES_TARE = "in Python taxel.Tare.take(taxel.open('RECORDING'), start_us=T, stop_us=T).save('FILE')"
+#: What helps against recordings that begin with what is to be learnt.
+_BEGUN = "recordings that begin before, at rest (0.2 s of zeros before the first frame, and labels as much later)"
 #: From which share of the events on missed or false ones are many.
 _MANY = 0.05
 #: Labels are a question before a training if at most this share of them lies near anything that was felt ...
@@ -78,8 +80,8 @@ class Cause:
     ----------
     kind : str
         "falling_values", "shifted_labels", "few_labels", "unlabelled_source", "levels", "foreign_labels", "tare",
-        "durations", "recipe", "window", "unlabelled_time", "label_name", "plain_rule", "no_neighbours",
-        "indistinct_kinds", "overfitting" or "parameters"; the page on training explains each.
+        "begun_loaded", "durations", "recipe", "window", "unlabelled_time", "label_name", "plain_rule",
+        "no_neighbours", "indistinct_kinds", "overfitting" or "parameters"; the page on training explains each.
     labels : tuple of str
         The labels that it concerns.
     mistakes : int, 0 or more
@@ -334,7 +336,25 @@ class Evidence:
             advice = option if arguments else "another tare, of the time just before (--tare FILE)"
             measured = f"of the tare: {because}" + ("" if arguments else f"; {_MAKES_TARE} makes that file")
             yield Cause("tare", (label,), wrong, measured, advice, option, arguments)
+        yield from self._begun_loaded(label, wrong)
         yield from self._other_recipe(label, wrong)
+
+    def _begun_loaded(self, label: str, wrong: int) -> Iterator[Cause]:
+        """Yield how many labels lie where a recording begins loaded, of which encoders of levels see no begin."""
+        encoder = self.plan.encoder
+        if not isinstance(encoder, LevelCrossing | ThresholdIzhikevich):
+            return
+        count = 0
+        for example in self.sound:
+            source = example.source
+            if isinstance(source, Frames) and len(source) > 1 and (source.values[0] >= min(encoder.levels)).any():
+                count += int(np.count_nonzero(example.labels.get(label, np.empty(0)) <= source.t[1]))
+        if count:
+            measured = (
+                f"{count} of {counted(self._counts[label], 'label')} {_lie(count)} in the first two frames of "
+                "recordings that begin loaded, where no load begins"
+            )
+            yield Cause("begun_loaded", (label,), min(count, wrong), measured, _BEGUN)
 
     def _other_recipe(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the recipe that fits recording and labels, if another named one is trained by."""
