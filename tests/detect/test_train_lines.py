@@ -59,7 +59,8 @@ def test_a_label_of_which_nothing_was_felt_is_named_by_recording_and_time(tmp_pa
     arguments = ("train", first, second, "--labels", labels, "--tare", 0.03, "--overwrite", "-o", tmp_path / "r.json")
     code, out, _ = call(capsys, *arguments)
     assert (code, out.splitlines()[0]) == (0, "held out: whole recordings, 2 folds (window 50 ms)")
-    assert f"contact: nothing that contact is known by was felt within 50 ms of 1 label, not learnt: {second} at {alone / 1e6:.3f} s" in out
+    unpaired = "nothing that contact is known by was felt within 50 ms of 1 label, not learnt"
+    assert f"contact: {unpaired}: {second} at {alone / 1e6:.3f} s" in out
     assert "contact, neuron: 12 of 13 found, 1 missed, 0 false" in out, "it counts as missed"
     result = json.loads(call(capsys, *arguments, "--json")[1])
     assert result["alignment"]["contact"]["unpaired"] == [{"recording": str(second), "t_us": alone}]
