@@ -310,6 +310,27 @@ def test_a_label_left_out_is_not_detected():
     ]
 
 
+@pytest.mark.parametrize(
+    ("arguments", "options", "said"),
+    [
+        (
+            ("total", 110.841, 0.5, 2),
+            {"labels": (None, "end")},
+            "total (N) falls below 55.4 after 111 or more, 2 frames",
+        ),
+        (("peak", 48, 1.0, 10), {"labels": ("begin", None)}, "peak (units of noise) >= 48, release 1, 10 frames"),
+        (("area", 4, 0.5), {}, "area >= 4, release 0.5, 1 frame"),
+        (
+            ("duration", 300, 1.0, 1, "end"),
+            {"labels": ("tap", "press")},
+            "one rule for both kinds, the duration (ms) of the touch, when it ends: below 300 tap, from there on press",
+        ),
+    ],
+)
+def test_what_it_compares_is_said_with_its_unit(arguments, options, said):
+    assert PlainRule(*arguments, **options, unit="N")._compared() == said
+
+
 def test_what_rests_on_repaired_values_is_marked():
     source = press()
     for marked, expected_ in (([True, False, False, False], [True, False]), ([False] * 3 + [True], [False, True])):

@@ -142,12 +142,12 @@ def test_a_table_named_dat_is_a_table(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("kind", "change", "said"),
     [
-        ("evt3", lambda data: data[:-1], "ends within a word, 1 of 2 bytes from byte"),
+        ("evt3", lambda data: data[:-1], r"ends within a word, 1 of 2 bytes from byte (\d+) on: .* head -c \1 "),
         ("evt2", lambda data: data[:-3], "ends within a word, 1 of 4 bytes from byte"),
         ("dat", lambda data: data[:-5], "ends within a word, 3 of 8 bytes from byte"),
         ("evt3", lambda data: data[data.index(b"% end\n") + 6 :], r"byte 0: starts with .*, not with a header"),
         ("dat", lambda data: data[data.index(b"\x0c\x08") + 2 :], r"byte 0: starts with .*, not with a header"),
-        ("evt3", lambda data: b"", "byte 0: starts with nothing, not with a header"),
+        ("evt3", lambda data: b"", "empty; must have a header"),
         ("evt3", lambda data: data[: data.index(b"% end\n") + 6], "ends after its header, byte .*: damaged"),
         ("evt3", lambda data: data[: data.index(b"% end\n") + 6] + b"\x00\x80\x01\x60", "holds no event: damaged, or"),
         (
@@ -172,12 +172,15 @@ def test_damage_is_named(kind: str, change, said: str, tmp_path: Path) -> None:
 def test_an_aedat_that_ends_anywhere_is_named(tmp_path: Path) -> None:
     path = by_faery(tmp_path / "a.aedat4", some_rows(9000))
     data = path.read_bytes()
-    for end in (0, 10, 16, 200, 700, 1000, len(data) // 2):
+    for end in (10, 16, 200, 700, 1000, len(data) // 2):
         path.write_bytes(data[:end])
         with pytest.raises(FormatError, match="damaged"):
             taxel.open(path)
+    path.write_bytes(b"")
+    with pytest.raises(FormatError, match="empty; must be AEDAT 4"):
+        taxel.open(path)
     path.write_bytes(b"#!AER-DAT2.0\r\n" + data[14:])
-    with pytest.raises(FormatError, match=r"starts with b'#!AER-DAT2\.0"):
+    with pytest.raises(FormatError, match=r"its header states AEDAT 2; AEDAT 4 is read"):
         taxel.open(path)
 
 
@@ -274,7 +277,8 @@ def test_strong_bursts_are_told_from_weaker_ones(tmp_path: Path) -> None:
     ("options", "said"),
     [
         ({"region": "0:65,0:48"}, "region '0:65,0:48': must lie within the sensor's 64 columns and 48 rows"),
-        ({"region": "9:9,0:48"}, "must lie within"),
+        ({"region": "9:9,0:48"}, "region '9:9,0:48': columns 9:9 holds none"),
+        ({"region": "0:9,40:4"}, "region '0:9,40:4': rows 40:4: the first must be below the last"),
         ({"region": "1,2"}, "region is '1,2': must be columns and rows A:B,C:D"),
         ({"region": 3}, "region is 3"),
         ({"bin": 0}, "bin is 0"),
@@ -326,3 +330,32 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: 
         assert (frames.values == counts.values).all()
         assert (frames.t == counts.t).all()
         assert frames.unit == counts.unit
+
+
+@pytest.mark.parametrize(
+    ("name", "begins", "said"),
+    [
+        (
+            "a.aedat",
+            b"#!AER-DAT2.0\r\n",
+            r"\(AEDAT 2\), not with a recording; of event cameras .raw, .dat, .aedat4 are read",
+        ),
+        ("a.aedat", b"#!AER-DAT4.0\r\n", r"AEDAT 4\), .*; name it .aedat4"),
+        ("a.dat", b"", "starts with nothing: no recording; there are .*, and of event cameras .raw, .dat, .aedat4;"),
+    ],
+)
+def test_what_is_no_file_of_a_camera_names_those(name: str, begins: bytes, said: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(begins)
+    with pytest.raises(FormatError, match=said):
+        taxel.open(tmp_path / name)
+
+
+def test_too_many_frames_name_a_larger_window(tmp_path: Path) -> None:
+    with refused(r"frames of 48 x 64 taxels \(less by --region, by a larger --bin, or by a larger window", FormatError):
+        taxel.open(write(tmp_path / "a.raw", some_rows()), window_ms=0.001, limit=10_000)
+
+
+def test_the_pitch_of_a_camera_stays_unknown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        main(["info", str(write(tmp_path / "a.raw", some_rows())), "--array", "48x64"])
+    assert "48 x 64 taxels, of unknown pitch" in capsys.readouterr().out

@@ -425,3 +425,26 @@ def test_a_pixel_that_counts_between_touches_is_not_dead(unit: str) -> None:
     values[::10, 2, 2] = 20
     as_counts = [taxel.health(taxel.Frames(values, np.arange(80) * 50_000, unit=name)).named() for name in (unit, "N")]
     assert as_counts[0]["dead"] == []
+
+
+@pytest.mark.parametrize("is_counts", [False, True])
+def test_pixels_of_a_camera_that_have_events_all_the_time_are_noisy(is_counts: bool) -> None:
+    rng, rates = np.random.default_rng(3), np.full((20, 24), 20.0)
+    # A place that is touched often has many too, but so have those around it.
+    rates[3:9, 3:9] = 120
+    rates[15, 20], rates[12, 2], rates[6, 6] = 5000, 200, 10_000
+    counts = rng.poisson(rates)
+    index = rng.permutation(np.repeat(np.arange(counts.size), counts.ravel()))
+    t = np.arange(len(index)) * 60_000_000 // len(index)
+    y, x = np.divmod(index, 24)
+    events = taxel.Events(t, x, y, rng.random(len(t)) < 0.5, array=taxel.Array(20, 24))
+    values = np.zeros((12_000, counts.size))
+    np.add.at(values, (t // 5000, index), 1)
+    frames = taxel.Frames(values.reshape(-1, 20, 24), np.arange(12_000) * 5000, unit="events/5 ms")
+    assert sorted(taxel.health(frames if is_counts else events).named()["noisy"]) == [(2, 12), (6, 6), (20, 15)]
+
+
+def test_a_single_taxel_of_a_board_that_is_touched_is_not_hot() -> None:
+    t = np.arange(400) * 1000
+    pressed = taxel.Events(t, np.full(400, 4), np.full(400, 4), t // 1000 % 40 < 20, array=taxel.Array(9, 9))
+    assert taxel.health(pressed).named()["noisy"] == []

@@ -186,14 +186,26 @@ class PlainRule(_Detector):
         found = ", ".join(f"{name} {label}" for name, label in (("onset", first), ("end", second)) if label is not None)
         return escaped(f"PlainRule({self.quantity} >= {self.threshold:g}, release {self.release:g}, {frames}: {found})")
 
+    @property
+    def _named_quantity(self) -> str:
+        """The quantity, with the unit of its threshold where that is not a number of taxels."""
+        noise = "units of noise"
+        units = {"area": None, "total": self.unit, "local_load": noise, "peak": noise, "duration": "ms"}
+        unit = units[self.quantity]
+        return self.quantity if unit is None else f"{self.quantity} ({escaped(unit)})"
+
     def _compared(self) -> str:
         """Return what the rule compares, without its labels; with both of kinds, which one of them lies below."""
         if self.age_ms is not None:
             below, above = (label or "nothing" for label in self._parts["labels"])
             kinds = f"below {self.threshold:.3g} {below}, from there on {above}"
             when = "of the touch, when it ends" if self.age_ms == "end" else f"{self.age_ms:g} ms after the onset"
-            return f"one rule for both kinds, the {self.quantity} {when}: {kinds}"
-        return repr(self).removeprefix("PlainRule(").rpartition(": ")[0]
+            return f"one rule for both kinds, the {self._named_quantity} {when}: {kinds}"
+        frames = "1 frame" if self.frames == 1 else f"{self.frames} frames"
+        if self._parts["labels"][0] is None:
+            below = f"below {self.release * self.threshold:.3g} after {self.threshold:.3g} or more"
+            return f"{self._named_quantity} falls {below}, {frames}"
+        return f"{self._named_quantity} >= {self.threshold:g}, release {self.release:g}, {frames}"
 
 
 def _labels(labels: object, age: float | str | None) -> list[str | None]:

@@ -17,6 +17,7 @@ from taxel._base.encodings import as_utf_8
 from taxel._base.files import open_file
 from taxel._core import FormatError
 from taxel.event_table import are_of_events
+from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.layout import Layout, advice
 from taxel.formats.ros import is_bag
 from taxel.recording.kinds import ENDINGS, LABELS
@@ -45,6 +46,11 @@ _STRANGERS = {
     b"\xfd7zXZ": "xz; unpack it first",
     b"\x89PNG": "a PNG picture, no recording",
     b"%PDF": "a PDF document, no recording",
+    **{
+        b"#!AER-DAT%d" % k: f"AEDAT {k}; of event cameras {', '.join(CAMERA)} are read: save it as one"
+        for k in (1, 2, 3)
+    },
+    b"#!AER-DAT4": "AEDAT 4; name it .aedat4",
     b"\x93NUMPY": "a single NumPy array; say in NAME.layout.toml what it holds",
 }
 
@@ -346,7 +352,8 @@ def _by_first_bytes(path: Path) -> TaxelFile | Refusal:
         return Refusal(FormatError(f"{starts} ({kind}), not with {right}" + f"; {then}" * bool(then)))
     if ending is None:
         describes = advice(path, "describes a table or an array of another program")
-        return Refusal(FormatError(f"{starts}: no recording; there are {', '.join(ENDINGS)}; {describes}"))
+        known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
+        return Refusal(FormatError(f"{starts}: no recording; there are {known}; {describes}"))
     if ending in {"npz", "h5"}:
         magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]
         return Refusal(FormatError(f"{starts}, not with {expected[ending]} ({magic})"))

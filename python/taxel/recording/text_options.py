@@ -100,8 +100,8 @@ class TextOptions(SharedOptions):
         if stated.shape != array.shape or differs:
             sizes = ", ".join(self.array)
             raise refused("array", f" is {sizes}: {recording.path} holds its own sensor, {stated!r}; leave it out")
-        # A .mcap holds its sensor, whose pitch may be unknown.
-        if not recording.has_events or stated._is_measured or recording.kind == "mcap":
+        # A .mcap holds its sensor, whose pitch may be unknown, and a camera's file its pixels.
+        if not recording.has_events or stated._is_measured or recording.kind in ("mcap", "event_camera"):
             return recording
         # A size without a pitch says nothing of it, and events without one are of the board's wire.
         wire = of_size(self.array[0])

@@ -15,7 +15,7 @@ from taxel.formats.event_camera.reading import read
 from taxel.formats.event_camera.reduction import Reduction, are_counts
 from taxel.formats.trial import Trial
 
-__all__ = ["Reduction", "are_counts", "files", "reduced", "trials"]
+__all__ = ["ENDINGS", "Reduction", "are_counts", "files", "reduced", "trials"]
 
 
 def files(path: Path) -> list[Path]:

@@ -41,7 +41,8 @@ class Counts:
         self._begin = first // self._window_us
         count = last // self._window_us - self._begin + 1
         size = f"{count} frames of {array.rows} x {array.columns} taxels"
-        unpacked(f"{name}, {size} (fewer by region, bin or window_ms)", count * (4 * array.rows * array.columns + 8))
+        fewer = "less by --region, by a larger --bin, or by a larger window, --count-ms (window_ms in Python)"
+        unpacked(f"{name}, {size} ({fewer})", count * (4 * array.rows * array.columns + 8))
         self._values = np.zeros((count, *array.shape), np.float32)
 
     def add(self, t: NDArray[np.int64], x: NDArray[np.uint16], y: NDArray[np.uint16]) -> bool:

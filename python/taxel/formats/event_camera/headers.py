@@ -6,18 +6,20 @@ Sources: Prophesee's descriptions of EVT 2.0, EVT 3.0 and DAT; iniVation's of AE
 from __future__ import annotations
 
 import re
+import shlex
 import struct
 from pathlib import Path
 from typing import BinaryIO
 
 from taxel._base.files import open_file
+from taxel._base.messages import escaped
 from taxel._core import FormatError
 from taxel.formats import text
 
 __all__ = ["ENDINGS", "check", "is_dat"]
 
 #: The endings of these files, and how faery names what is in them.
-ENDINGS = {".raw": "evt", ".dat": "dat", ".aedat4": "aedat"}
+ENDINGS: dict[str, str] = {".raw": "evt", ".dat": "dat", ".aedat4": "aedat"}
 #: Bytes of a word of an encoding, by the version that a header states.
 _WORDS = {"evt": {"2": 4, "3": 2}, "dat": {"1": 8, "2": 8}}
 _VERSION = {
@@ -61,7 +63,9 @@ def _check_words(path: Path, file: BinaryIO, size: int, kind: str) -> None:
     head = file.read(_HEADER)
     end = _end_of_lines(head)
     if not end:
-        begins = " ".join(f"{byte:02X}" for byte in head[:4]) or "nothing"
+        if not size:
+            raise FormatError(f"{path}: empty; must have a header (lines of %), and events below it")
+        begins = " ".join(f"{byte:02X}" for byte in head[:4])
         raise FormatError(f"{path}, byte 0: starts with {begins}, not with a header (lines of %): damaged")
     found = _VERSION[kind].search(head[:end])
     version, known = ("" if found is None else found[1].decode()), _WORDS[kind]
@@ -76,7 +80,11 @@ def _check_words(path: Path, file: BinaryIO, size: int, kind: str) -> None:
         raise FormatError(f"{path}: ends after its header, byte {size}: damaged, as it holds no event")
     if (size - begin) % word:
         over = (size - begin) % word
-        raise FormatError(f"{path}: ends within a word, {over} of {word} bytes from byte {size - over} on: damaged")
+        whole = size - over
+        raise FormatError(
+            f"{path}: ends within a word, {over} of {word} bytes from byte {whole} on: damaged; without them, as "
+            f"head -c {whole} {escaped(shlex.quote(str(path)))} > whole{path.suffix} writes it, it is read"
+        )
 
 
 def _end_of_lines(head: bytes) -> int:
@@ -92,8 +100,13 @@ def _end_of_lines(head: bytes) -> int:
 def _check_packets(path: Path, file: BinaryIO, size: int) -> None:
     """Refuse an AEDAT 4.0 whose packets do not end where its header, or the file, does."""
     magic = file.read(len(_AEDAT))
+    if not magic:
+        raise FormatError(f"{path}: empty; must be AEDAT 4")
+    if (other := re.match(rb"#!AER-DAT([0-3])", magic)) is not None:
+        raise FormatError(f"{path}: its header states AEDAT {other[1].decode()}; AEDAT 4 is read: save it as that")
     if magic != _AEDAT:
-        raise FormatError(f"{path}, byte 0: starts with {magic[:14]!r}, not with {_AEDAT!r}: damaged, or another AEDAT")
+        begins = " ".join(f"{byte:02X}" for byte in magic[:4])
+        raise FormatError(f"{path}, byte 0: starts with {begins}, not with #!AER-DAT4.0: damaged, or no AEDAT")
     try:
         (length,) = struct.unpack("<I", file.read(4))
         if length > min(size, _HEADER):

@@ -104,7 +104,11 @@ class Reduction:
         """
         left, right, top, bottom = _ends(self.region or ":,:")
         right, bottom = columns if right is None else right, rows if bottom is None else bottom
-        if not (left < right <= columns and top < bottom <= rows):
+        for name, first, end in (("columns", left, right), ("rows", top, bottom)):
+            if first >= end:
+                order = ": the first must be below the last" if first > end else " holds none: the last is not included"
+                raise ProblemError(f"region {shown(self.region)}: {name} {first}:{end}{order}")
+        if not (right <= columns and bottom <= rows):
             size = f"{columns} columns and {rows} rows"
             raise ProblemError(
                 f"region {shown(self.region)}: must lie within the sensor's {size}, as 0:{columns},0:{rows}"

@@ -45,6 +45,12 @@ MOVES_FROM = 8
 #: goes on, noise turns back.
 NOISY_FROM, NOISY_SHARE, NOISY_ON = 10, 0.5, 0.45
 
+#: A pixel of a camera is noisy too, "hot", if it has at least this number of events, so many spreads (as of normal
+#: noise) more than the median of all pixels, and so many times those of all but one of the 24 around it.
+HOT_FROM, HOT_SPREADS, HOT_TIMES = 50, 10, 4
+#: The standard deviation of normal noise is this many times the median distance from its median.
+_DEVIATION = 1.4826
+
 #: A taxel that was not touched enough works if it had at least this number of events, or was once pressed itself.
 WORKS_FROM = 10
 
@@ -133,7 +139,8 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     3 changes or more, and more than 8 times those of all but one of the 24 taxels around it; and at most 45 % of its
     changes go on in the direction of the one before. Of frames, too, one that jumps for less than two frames at a time,
     10 times or more, more than half as far from its median as ever, while all but one of its neighbours move less than
-    an eighth as much.
+    an eighth as much. Of a camera's events or counts, too, a pixel with 50 events or more, with more than the median of
+    all by 10 times their spread, and with more than 4 times those of all but one of the 24 around it.
 
     Examples
     --------
@@ -146,7 +153,10 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     # A missing value is no reading that could show what a taxel does.
     table = held_by(recorded, hold=False)
     if isinstance(table, Events):
-        return judge(table.array, _statistics_of_events(table))
+        result = judge(table.array, _statistics_of_events(table))
+        # On a board at rest most taxels have no event, and a touch of one of them is no noise.
+        of_camera = table.intensity is None and result.activity.size and np.median(result.activity) > 0
+        return _with_hot(result, result.activity) if of_camera else result
     if not isinstance(table, Frames):
         raise refused("recorded", f" is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
     activity, moved = (
@@ -175,7 +185,10 @@ def health(recorded: Events | Frames | Recorded) -> Health:
         # Of counts a touch may leave out a taxel that works: a pixel has an event only where brightness changes.
         dead &= ~table.values.any(axis=0)
     result = replace(result, untested=result.untested & ~at_top)
-    return replace(result, dead=dead, stuck=stuck, noisy=noisy, untested=result.untested & ~noisy)
+    result = replace(result, dead=dead, stuck=stuck, noisy=noisy, untested=result.untested & ~noisy)
+    if not are_counts(table.unit):
+        return result
+    return _with_hot(result, np.asarray(np.nansum(table.values, axis=0, dtype=np.float64)))
 
 
 class Touches(NamedTuple):
@@ -255,6 +268,23 @@ def judge(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> He
     works = enough | where(touches.pressed > 0) | (activity >= WORKS_FROM)
     untested = exists & ~dead & ~stuck & ~noisy & ~works
     return Health(array, activity, dead, stuck, noisy, untested)
+
+
+def _with_hot(result: Health, counts: NDArray[Any]) -> Health:
+    """Return the same with taxels as noisy that have far more events than all others, and than those around them."""
+    exists = np.ones(counts.shape, bool) if result.array.exists is None else result.array.exists.reshape(counts.shape)
+    if min(counts.shape) == 1:
+        return result
+    median = float(np.median(counts[exists]))
+    spread = max(float(np.median(np.abs(counts[exists] - median))) * _DEVIATION, median**0.5)
+    far = exists & (counts >= max(HOT_FROM, median + HOT_SPREADS * spread))
+    padded, places = np.pad(np.where(exists, counts, 0), 2), np.argwhere(far)
+    noisy = result.noisy.copy()
+    for row, column in places.tolist():
+        around = np.partition(padded[row : row + 5, column : column + 5].ravel(), -3)
+        # The largest is its own.
+        noisy[row, column] |= bool(counts[row, column] > HOT_TIMES * around[-3])
+    return replace(result, noisy=noisy, untested=result.untested & ~noisy, dead=result.dead & ~noisy)
 
 
 def _at_top(array: Array, least: NDArray[Any], greatest: NDArray[Any]) -> NDArray[np.bool_]:
