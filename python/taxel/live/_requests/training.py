@@ -92,7 +92,7 @@ class TrainingRequests:
             self._closed = True
         self.end()
 
-    def train(self, recording: Path, out: Path, labels_as_given: bool) -> TrainedReadout | str:
+    def train(self, recording: Path, out: Path, labels_as_given: bool = False) -> TrainedReadout | str:
         """Train on the labels of a recording; return a question instead where someone must confirm the labels first."""
         request = {
             "recordings": [str(recording)],
