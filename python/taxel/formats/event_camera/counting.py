@@ -13,10 +13,10 @@ from taxel.formats.checks import sensor
 from taxel.formats.event_camera.reduction import Reduction
 from taxel.frames import Frames
 
-__all__ = ["Counts", "reduced"]
+__all__ = ["CountWindows", "reduced"]
 
 
-class Counts:
+class CountWindows:
     """Frames of counts of events, which are added some at a time.
 
     Parameters
@@ -68,18 +68,20 @@ def reduced(name: str, events: Events, reduction: Reduction) -> Events | Frames:
     FormatError : more frames than may be read
     ProblemError : a region beyond the sensor
     """
-    whole = events.array
-    left, right, top, bottom = reduction.bounds(whole.columns, whole.rows)
+    sensor_array = events.array
+    left, right, top, bottom = reduction.bounds(sensor_array.columns, sensor_array.rows)
     kept = events.region(slice(left, right), slice(top, bottom))
     if reduction.polarity not in (None, "both"):
         kept = kept[kept.p == (reduction.polarity == "on")]
-    side, pitch = reduction.side, whole.pitch_mm
+    side, pitch = reduction.side, sensor_array.pitch_mm
     wider = pitch and ((pitch[0] * side, pitch[1] * side) if isinstance(pitch, tuple) else pitch * side)
-    array = sensor(name, Array(*reduction.shape(whole.columns, whole.rows), wider, name=whole.name))
+    array = sensor(
+        name, Array(*reduction.shape(sensor_array.columns, sensor_array.rows), wider, name=sensor_array.name)
+    )
     x, y = ((at - at.dtype.type(begin)) // at.dtype.type(side) for at, begin in ((kept.x, left), (kept.y, top)))
     if reduction.window_us is None:
         return Events(kept.t, x, y, kept.p, markers=kept.markers, array=array)
     ends = (int(events.t.min()), int(events.t.max())) if len(events) else (0, -1)
-    counts = Counts(name, array, *ends, reduction)
+    counts = CountWindows(name, array, *ends, reduction)
     counts.add(kept.t, x, y)
     return counts.frames()

@@ -80,10 +80,10 @@ def _check_words(path: Path, file: BinaryIO, size: int, kind: str) -> None:
         raise FormatError(f"{path}: ends after its header, byte {size}: damaged, as it holds no event")
     if (size - begin) % word:
         over = (size - begin) % word
-        whole = size - over
+        at_word = size - over
         raise FormatError(
-            f"{path}: ends within a word, {over} of {word} bytes from byte {whole} on: damaged; without them, as "
-            f"head -c {whole} {escaped(shlex.quote(str(path)))} > whole{path.suffix} writes it, it is read"
+            f"{path}: ends within a word, {over} of {word} bytes from byte {at_word} on: damaged; without them, as "
+            f"head -c {at_word} {escaped(shlex.quote(str(path)))} > whole{path.suffix} writes it, it is read"
         )
 
 
@@ -102,8 +102,8 @@ def _check_packets(path: Path, file: BinaryIO, size: int) -> None:
     magic = file.read(len(_AEDAT))
     if not magic:
         raise FormatError(f"{path}: empty; must be AEDAT 4")
-    if (other := re.match(rb"#!AER-DAT([0-3])", magic)) is not None:
-        raise FormatError(f"{path}: its header states AEDAT {other[1].decode()}; AEDAT 4 is read: save it as that")
+    if (older := re.match(rb"#!AER-DAT([0-3])", magic)) is not None:
+        raise FormatError(f"{path}: its header states AEDAT {older[1].decode()}; AEDAT 4 is read: save it as that")
     if magic != _AEDAT:
         begins = " ".join(f"{byte:02X}" for byte in magic[:4])
         raise FormatError(f"{path}, byte 0: starts with {begins}, not with #!AER-DAT4.0: damaged, or no AEDAT")

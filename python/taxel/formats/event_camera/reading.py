@@ -18,7 +18,7 @@ from taxel._core import FormatError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import sensor
-from taxel.formats.event_camera.counting import Counts
+from taxel.formats.event_camera.counting import CountWindows
 from taxel.formats.event_camera.headers import check
 from taxel.formats.event_camera.reduction import Reduction
 from taxel.frames import Frames
@@ -111,7 +111,7 @@ class _EventFile(ReadingChild):
         return Events(t, x, y, p, array=array)
 
     def _counts(self, array: Array, first: int, last: int, reduction: Reduction) -> Frames:
-        counts = Counts(str(self.path), array, first, last, reduction)
+        counts = CountWindows(str(self.path), array, first, last, reduction)
         for piece in self._pieces():
             if not counts.add(piece["t"], piece["x"], piece["y"]):
                 raise FormatError(f"{self.path}: was changed while it was read")
