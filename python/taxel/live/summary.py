@@ -51,10 +51,10 @@ class Summary:
         """
         boards = [self.counters, *(source for source in self.counters["sources"].values() if "capture" in source)]
         lost = sum(
-            (board["capture"]["dropped_by_kernel"] or 0) + board["capture"]["dropped_by_queue"] for board in boards
+            int((board["capture"]["dropped_by_kernel"] or 0) + board["capture"]["dropped_by_queue"]) for board in boards
         )
         bridged = self.counters["bridged"] or {}
-        return lost + sum(bridged.get(cause) or 0 for cause in ("missing", "dropped", "dropped_by_kernel"))
+        return lost + sum(int(bridged.get(cause) or 0) for cause in ("missing", "dropped", "dropped_by_kernel"))
 
     @property
     def nothing_came(self) -> bool:
