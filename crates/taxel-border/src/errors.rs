@@ -55,13 +55,14 @@ pub fn live(error: LiveError) -> PyErr {
 }
 
 fn os_error(source: std::io::Error, place: String) -> PyErr {
-    use std::io::ErrorKind::{AlreadyExists, NotFound, PermissionDenied, ResourceBusy};
+    use std::io::ErrorKind::{AlreadyExists, IsADirectory, NotFound, PermissionDenied, ResourceBusy};
     // An error that the system's code did not make has none: the codes of Python's classes by kind, the same in every system.
     let code = source.raw_os_error().or(match source.kind() {
         NotFound => Some(2),
         PermissionDenied => Some(13),
         ResourceBusy => Some(16),
         AlreadyExists => Some(17),
+        IsADirectory => Some(21),
         _ => None,
     });
     let message = source.to_string();

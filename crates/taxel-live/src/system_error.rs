@@ -7,13 +7,11 @@ use std::io::Error;
 mod codes {
     pub(super) const EXISTS: i32 = libc::EEXIST;
     pub(super) const DENIED: i32 = libc::EACCES;
-    pub(super) const FOLDER: i32 = libc::EISDIR;
 }
 #[cfg(windows)]
 mod codes {
     pub(super) const EXISTS: i32 = 80;
     pub(super) const DENIED: i32 = 5;
-    pub(super) const FOLDER: i32 = 336;
 }
 
 /// The file exists.
@@ -26,7 +24,10 @@ pub fn denied() -> Error {
     Error::from_raw_os_error(codes::DENIED)
 }
 
-/// The file is a folder.
+/// The file is a folder, for which Windows has no code of its own.
 pub fn is_folder() -> Error {
-    Error::from_raw_os_error(codes::FOLDER)
+    #[cfg(unix)]
+    return Error::from_raw_os_error(libc::EISDIR);
+    #[cfg(windows)]
+    return std::io::ErrorKind::IsADirectory.into();
 }

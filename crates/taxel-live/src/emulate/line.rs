@@ -104,10 +104,9 @@ impl Drop for PseudoTerminal {
     }
 }
 
+#[cfg(target_os = "linux")]
 #[cfg(test)]
 mod tests {
-    #![cfg(target_os = "linux")]
-
     use std::time::Duration;
 
     use super::*;
