@@ -80,7 +80,7 @@ def _rest(recording: Recording, tare: GivenTare | None) -> Tare | None:
     """Return the given tare, if any; without one warn of frames in a unit of force that do not rest near 0."""
     if tare is not None:
         return given_tare(tare, recording)
-    if not recording.has_events:
+    if recording.timed and not recording.has_events:
         zero_by_unit(recording)
     return None
 
