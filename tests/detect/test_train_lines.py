@@ -66,8 +66,8 @@ def test_a_label_of_which_nothing_was_felt_is_named_by_recording_and_time(tmp_pa
     assert result["alignment"]["contact"]["unpaired"] == [{"recording": str(second), "t_us": alone}]
     assert result["alignment"]["lift"]["unpaired"] == []
     assert (result["held_out"], result["score"]["missed"]) == (True, 1)
-    helps = "contact: what may help is labels of this recording, where it was touched: nothing that contact is known by"
-    assert f"{helps} was felt within 50 ms of 1 label\n" in out
+    helps = "contact: what may help is labels of this recording, where it was touched: no input that contact is learnt"
+    assert f"{helps} from lies within 50 ms of 1 label\n" in out
 
 
 @pytest.mark.parametrize(("folds", "which"), [(2, "held-out labels"), (0, "labels that it was trained on")])
