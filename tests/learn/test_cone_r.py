@@ -397,7 +397,7 @@ def test_a_target_out_of_reach_is_named_and_the_rest_is_fitted():
 def test_a_neuron_that_refires_on_its_training_data_warns_once_and_names_the_option():
     trains = SpikeTrains.from_lists([[20.0 + n] for n in range(20)], stop=150.0)
     options = {"tau": 30.0, "theta_plus": 0.0, "lambdas": (0, 1, 0, 1000, 0)}
-    with pytest.warns(UserWarning, match='after_spike is "keep"; "reset", a longer refractory') as said:
+    with pytest.warns(UserWarning, match='after_spike "reset", a refractory above 3 ms') as said:
         cone = made(ConeR, **options).fit([trains], [[45.0]])
     assert len(said) == 1
     assert cone.refires_ == len(cone.neuron_.run(cone.weights_, trains)) - 1 > 0

@@ -56,9 +56,9 @@ def test_frames_have_no_arrivals(tmp_path: Path) -> None:
 def test_a_board_that_lags_behind_its_own_clock_is_said_to_be_wrong_live(live: Any, panel: Any) -> None:
     with Client(panel) as page:
         assert page.until("counters")["pace"] is None
-        # 14 s of the board's clock pass in three seconds and less.
+        # 28 s of the board's clock pass in six seconds and less: what comes too soon in the first ten may have waited.
         begun = time.monotonic()
-        for k in range(2800):
+        for k in range(5600):
             say(live, word(5_000 * k, 3, 4, 60 + k % 2))
             time.sleep(max(0.0, begun + k * 0.001 - time.monotonic()))
         while True:
