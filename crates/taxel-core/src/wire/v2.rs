@@ -235,6 +235,7 @@ impl DatagramHeader {
     /// The part of a datagram that is equal for all plain changes of one kind, board, session and stride: its first
     /// four bytes and the header's last four, without the line and frame sync.
     #[inline(always)]
+    #[cfg(target_arch = "x86_64")]
     fn common(datagram: &[u8]) -> u64 {
         let four = |at: usize| {
             let mut word = [0; 4];
@@ -247,6 +248,7 @@ impl DatagramHeader {
 
     /// The value of [`Self::common`] for plain changes with this header.
     #[inline(always)]
+    #[cfg(target_arch = "x86_64")]
     fn common_of(kind: BodyKind, board: u16, session: u16, stride: u8) -> u64 {
         let [board, session, stride] = [u64::from(board), u64::from(session), u64::from(stride)];
         u64::from(MAGIC) | u64::from(2 << 4 | kind.number()) << 8 | board << 16 | session << 32 | stride << 48
