@@ -394,7 +394,7 @@ def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name in always:
         if counts.get(name) is not None:
             yield name.replace("_", " "), str(counts[name])
-        elif name == "dropped_by_kernel" and counts.get("received") is not None:
+        elif name == "dropped_by_kernel" and name in counts:
             yield name.replace("_", " "), "unknown: the system does not count them"
     no_loss = {"bytes", "words", "changes", "intensities", "markers", "datagrams", "intact", "events", "states"}
     no_loss |= {"messages", "frames", "samples"}
