@@ -61,6 +61,7 @@ SOUND: dict[str, Sound] = {
         record_later=False,
         name="board",
         sources={"imu": "given,columns=a"},
+        first_line_s=1.0,
         send=[],
         compression="none",
         overwrite=True,
