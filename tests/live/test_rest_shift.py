@@ -34,7 +34,7 @@ def test_nothing_is_told_without_a_gap_a_shift_or_rest() -> None:
     assert told(everywhere, gap_s=0.5) == []
     assert told(np.zeros(SHAPE)) == []
     assert told(press) == []
-    # Values that do not hold still are those of somebody who presses.
+    # Values that do not hold still are those of a press.
     rng, watch = np.random.default_rng(3), RestShift(10.0)
     watch.look(2.0, REST, REST, NOISE, "counts")
     assert not any(watch.look(0.0, REST + rng.uniform(0, 99, SHAPE), REST, NOISE, "counts") for _ in range(50))

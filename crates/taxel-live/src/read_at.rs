@@ -13,7 +13,7 @@ pub fn read_exact_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<(
     std::os::unix::fs::FileExt::read_exact_at(file, bytes, offset)
 }
 
-/// Fills `bytes` from the offset on. Windows moves the position of the file too, which nobody uses beside this function.
+/// Fills `bytes` from the offset on. Windows moves the position of the file too, which no other function uses.
 ///
 /// # Errors
 ///

@@ -136,7 +136,7 @@ fn assert_closed(summary: &LiveSummary, report: &Report) {
     assert_eq!(c.decoding.wire.bytes, c.capture.bytes - c.capture.bytes_dropped_by_queue);
     assert_eq!(c.capture.messages + c.capture.dropped_by_kernel.known(), report.sent.messages);
     assert_eq!(c.capture.dropped_by_kernel.are_known(), !ways::is_portable());
-    // Without the kernel's stamps nobody knows how long a datagram waited.
+    // Without the kernel's stamps it is not known how long a datagram waited.
     assert_eq!(c.decode_latency.count > 0, !ways::is_portable());
 }
 

@@ -45,7 +45,7 @@ _TIMES, _OF_FLOOR = 3.0, 6.0
 class Off(NamedTuple):
     """By how much labels of one name lie after what was felt, ms; how many lie there, how many of them too far, of all.
 
-    Of marks that a hand set live also within how many ms of that distance these lie; else 0.
+    `within_ms` is how far marks that a hand set live spread around that distance; 0 of other labels.
     """
 
     ms: float

@@ -57,7 +57,7 @@ impl FileReader {
     }
 }
 
-/// Reads until nobody receives, or reading fails; an empty piece is the end of the file.
+/// Reads until the receiver is gone, or reading fails; an empty piece is the end of the file.
 fn read_ahead(mut file: File, sender: &Sender<io::Result<Vec<u8>>>) {
     let mut piece = vec![0; 1 << 16];
     loop {

@@ -11,7 +11,7 @@ use std::time::Duration;
 pub(super) struct FileReader(File);
 
 pub(super) fn open(path: &Path) -> io::Result<File> {
-    // Without O_NONBLOCK a named pipe blocks until somebody writes.
+    // Without O_NONBLOCK a named pipe blocks until a program writes.
     File::options().read(true).custom_flags(libc::O_NONBLOCK).open(path)
 }
 

@@ -10,7 +10,7 @@ use crate::{Error, Result};
 
 /// Opens whatever it is, without waiting.
 pub(super) fn open(path: &Path) -> Result<File> {
-    // Without O_NONBLOCK a named pipe blocks until somebody writes; a terminal must not become this process's own.
+    // Without O_NONBLOCK a named pipe blocks until a program writes; a terminal must not become this process's own.
     let opened = File::options().read(true).custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY).open(path);
     opened.map_err(|error| {
         // A socket, or a device that nothing drives, cannot be opened at all.

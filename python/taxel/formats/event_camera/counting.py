@@ -22,11 +22,11 @@ class CountWindows:
     Parameters
     ----------
     name : str
-        Of the file, for the error.
+        The name of the file in errors.
     array : Array
         The taxels of the events.
     first, last : int, us
-        Of all events of the file, also of those that are not counted.
+        The times of the first and the last event of the file, also where these are not counted.
     reduction : Reduction
         With a window.
 

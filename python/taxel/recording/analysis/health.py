@@ -132,15 +132,15 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     touches or more and no change in any of them, with 5 neighbours or more; or no event and known to hold 0, while the
     median of the least values of its neighbours is 10 ticks or more and a fifth of the array's largest value; or no
     event in noise so strong that, over half of the array or more, the taxels with 1 to 9 events are at most a tenth as
-    many as the silent ones. Of counts of events a taxel is dead only without any event. Stuck: like a dead one, but
+    many as the silent ones. A taxel of counts of events is dead only without any event. Stuck: like a dead one, but
     known to hold a value other than 0; or 3 events or more, all with one intensity, while its neighbours show more than
     one; or known to hold the greatest value of the recording, and no other, while the values of its neighbours (median)
     move by 8 ticks or more, touched or not. Noisy: in 10 bins of 50 ms or more, half of all in which it changes, it has
     3 changes or more, and more than 8 times those of all but one of the 24 taxels around it; and at most 45 % of its
     changes go on in the direction of the one before. Of frames, too, one that jumps for less than two frames at a time,
     10 times or more, more than half as far from its median as ever, while all but one of its neighbours move less than
-    an eighth as much. Of a camera's events or counts, too, a pixel with 50 events or more, with more than the median of
-    all by 10 times their spread, and with more than 4 times those of all but one of the 24 around it.
+    an eighth as much. A pixel of a camera's events or counts is noisy too if it has 50 events or more, more than the
+    median of all by 10 times their spread, and more than 4 times those of all but one of the 24 around it.
 
     Examples
     --------
@@ -182,7 +182,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     at_top = _at_top(table.array, *bounds)
     dead, stuck, noisy = dead & ~at_top, stuck | at_top, noisy & ~at_top
     if are_counts(table.unit):
-        # Of counts a touch may leave out a taxel that works: a pixel has an event only where brightness changes.
+        # A touch may leave out a taxel that works: a pixel has an event only where brightness changes.
         dead &= ~table.values.any(axis=0)
     result = replace(result, untested=result.untested & ~at_top)
     result = replace(result, dead=dead, stuck=stuck, noisy=noisy, untested=result.untested & ~noisy)

@@ -1,4 +1,4 @@
-//! A recording's file in Windows: while it is open, others can read it, and nobody can write, rename or remove it.
+//! A recording's file in Windows: while it is open, other programs can read it, and cannot write, rename or remove it.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Error, ErrorKind, Result};
@@ -27,7 +27,7 @@ pub(super) fn lock(_: &File) -> Result<bool> {
     Ok(true)
 }
 
-/// Nobody can move an open file that others may only read.
+/// No program can move an open file that others may only read.
 #[allow(clippy::unnecessary_wraps)]
 pub(super) fn is_in_place(_: &File, _: &Path) -> Result<bool> {
     Ok(true)
