@@ -115,7 +115,7 @@ def examples(*seeds: int, jitter_ms: float = 0.0) -> list[Example]:
     return made
 
 
-@pytest.mark.filterwarnings("ignore:.* cannot be learnt")
+@pytest.mark.filterwarnings("ignore:.* (cannot be learnt|come too late)")
 def test_labels_that_are_off_teach_what_exact_ones_do() -> None:
     plan = dataclasses.replace(recipe(), align=True)
     exact, off = examples(1, 2, 3), examples(1, 2, 3, jitter_ms=20.0)
@@ -150,7 +150,7 @@ def test_scores_are_against_the_labels_as_they_were_given() -> None:
     assert judged.together["contact"].error.sd > 5.0
 
 
-@pytest.mark.filterwarnings("ignore:.* cannot be learnt")
+@pytest.mark.filterwarnings("ignore:.* (cannot be learnt|come too late)")
 def test_without_align_labels_are_learnt_as_they_are_given() -> None:
     """And with it, exactly so where each lies where it was felt."""
     spikes = [taxel.SpikeTrains.from_lists([[20.0, 120.0], [60.0]], stop=200.0)]

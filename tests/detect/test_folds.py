@@ -119,6 +119,35 @@ def test_events_that_cannot_be_learnt_are_named_by_label_time_and_example() -> N
         assert "pattern" not in said
 
 
+@pytest.mark.parametrize(("unit", "noise"), [("counts", 0.0), ("N", 2.0)])
+@settings(max_examples=settings.default.max_examples // 5, deadline=None)
+@given(st.integers(0, 1000))
+def test_no_label_that_the_neuron_finds_is_called_one_that_cannot_be_learnt(unit: str, noise: float, seed: int) -> None:
+    """Steps as half sines, whose true onsets come before any input: the neuron waits, or fires later."""
+    random = np.random.default_rng(seed)
+    begins = 60 + 110 * np.arange(12)
+    values = random.normal(0.0, noise, (1400, 8, 1))
+    for k in begins:
+        load = np.sin(np.pi * np.arange(65) / 65)[:, None, None] * random.uniform(0.7, 1.3, (1, 8, 1))
+        values[k : k + 65] += np.rint(10 * load) if unit == "counts" else 100 * load
+    frames = taxel.Frames(values, 10_000 * np.arange(1400), unit=unit)
+    labels = {"contact": 10_000 * begins}
+    plan = taxel.detect.Recipe.load("gait_plate" if unit == "counts" else "gait_insole", labels=["contact"])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        readout = fit([Example(frames, labels)], plan)
+    found = score(run(readout, frames), labels, 50.0).found
+    said = [str(warning.message) for warning in caught]
+    assert found > 6
+    assert said
+    waits = r"\d+ of 12 labels comes? before the first input, for which the neuron waits: it is known [\d.]+ ms later"
+    later = (
+        rf"the inputs of \d+ of 12 labels come too late to fire by them .*; the neuron fires later, and finds {found}"
+    )
+    for text in said:
+        assert re.match(rf"contact: ({waits}|{later} of 12)$", text)
+
+
 def test_events_that_cannot_be_learnt_are_named_from_the_beginning_of_a_recording_since_1970() -> None:
     begin_us = 1_795_000_000_000_000
     frames = taxel.Frames([[[v]] for v in (0.0, 9.0, 9.0, 0.0)], begin_us + 10_000 * np.arange(4), unit="N")

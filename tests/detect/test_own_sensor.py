@@ -495,7 +495,7 @@ def test_where_the_first_inputs_feel_nothing_others_are_tried() -> None:
     assert {label: one.missed for label, one in judged.together.by_label.items()} == dict.fromkeys(LABELS, 0)
 
 
-@pytest.mark.filterwarnings("ignore:.* cannot be learnt")
+@pytest.mark.filterwarnings("ignore:.* (cannot be learnt|come too late)")
 @settings(max_examples=settings.default.max_examples // 6)
 @given(st.integers(0, 1000))
 def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed: int) -> None:

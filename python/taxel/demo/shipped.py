@@ -36,7 +36,7 @@ def trained(*, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Progre
     labelled = examples(boards=boards, scenes=scenes, draw=draw, progress=progress)
     with warnings.catch_warnings():
         # The base of the foam loses the ball long before a slow lift ends: such events cannot be learnt.
-        warnings.filterwarnings("ignore", ".* cannot be learnt")
+        warnings.filterwarnings("ignore", ".* (cannot be learnt|come too late)")
         return fit(labelled, recipe(), progress=progress)
 
 

@@ -288,7 +288,7 @@ def _best(examples: EncodedExamples, recipe: Recipe, label: str, array: Array | 
                 by_later = later.fit(plan)
             found_later = later.score(by_later, plan.run_threshold)
             if found_later.rank < found.rank:
-                caught = [_waits(label, fitting, later), *caught_later]
+                caught = [_waits(label, fitting, learner, later), *caught_later]
                 found, fitting, learner = found_later, later, by_later
         return _FittedPoint(found.rank[0], fitting, learner, point, caught)
 
@@ -323,10 +323,13 @@ def _best(examples: EncodedExamples, recipe: Recipe, label: str, array: Array | 
     return best
 
 
-def _waits(label: str, planned: Fitting, later: Fitting) -> str:
-    """Return the warning that a neuron waits for its inputs."""
-    more = later.delay_ms - planned.delay_ms
-    return f"{label}: labels come up to {more:.3g} ms before the first input; it is known that much later"
+def _waits(label: str, planned: Fitting, early: ConeR, later: Fitting) -> str:
+    """Return the warning that a neuron waits for its inputs, as those of a learner come behind its targets."""
+    count, more_ms = len(early.unreachable_), later.delay_ms - planned.delay_ms
+    return (
+        f"{label}: {count} of {counted(planned.count, 'label')} {'comes' if count == 1 else 'come'} before the first "
+        f"input, for which the neuron waits: it is known {more_ms:.3g} ms later"
+    )
 
 
 def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
@@ -552,7 +555,8 @@ class Fitting:
                 ),
             )
         begins = [_begin_ms(source) for source in self._sources]
-        for text_of in _remarks(cone, self._targets, self._names, self._shift_ms, begins, caught):
+        found = self.score(cone, recipe.run_threshold).found if cone.unreachable_ else 0
+        for text_of in _remarks(cone, self._targets, self._names, self._shift_ms, begins, found, caught):
             warn(f"{self._label}: {text_of}", stacklevel=5)
         return cone
 
@@ -625,16 +629,22 @@ def _remarks(
     names: Sequence[str],
     shift_ms: float,
     begins_ms: Sequence[float],
+    found: int,
     caught: Sequence[str],
 ) -> Iterator[str]:
-    """Yield the warnings of a fit, which name events and examples."""
+    """Yield the warnings of a fit, which name events and examples; `found`: how many of the events it finds."""
     missed, count = cone.unreachable_, sum(map(len, targets))
     if missed:
         at = [(targets[p][k] - shift_ms - begins_ms[p], f" of {names[p]}" * (len(targets) > 1)) for p, k in missed]
         times_and_names = [f"{ms:.10g} ms{name}" for ms, name in at]
         listed = ", ".join(times_and_names[:3]) + f" and {len(times_and_names) - 3} more" * (len(times_and_names) > 3)
         why = f"cannot be learnt, as too few input spikes come before them ({listed})"
-        if count < TWO_FOLDS:
+        if found > count - len(missed):
+            yield (
+                f"the inputs of {len(missed)} of {counted(count, 'label')} come too late to fire by them ({listed}); "
+                f"the neuron fires later, and finds {found} of {count}"
+            )
+        elif count < TWO_FOLDS:
             there = f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from"
             yield f"{there}; {len(missed)} {why}"
         else:
