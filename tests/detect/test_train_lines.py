@@ -300,8 +300,8 @@ def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
     (cause, *_) = causes(readout, [stale], scored(9, 1, 0), scored(9, 1, 0))
     assert (cause.kind, cause.advice) == ("tare", "another tare, of the time just before (--tare FILE)")
     assert cause.measured == (
-        "of the tare: 64 taxels read above theirs while nothing touches them; in Python taxel.Tare.take("
-        "taxel.open('RECORDING'), start_us=T, stop_us=T).save('FILE') makes that file"
+        "of the tare: 64 taxels read above theirs while nothing touches them; taxel cut RECORDING FILE "
+        "--from S --to S makes that file, a .npz"
     )
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -166,3 +168,48 @@ def test_what_lay_on_the_array_in_its_first_quiet_stretch_is_no_rest(tmp_path: P
     assert np.nanmax(np.abs(taken.tare.rest - 50)) < 2.5
     rule = PlainRule("area", 2, noise_floor=6.0)
     assert any("something lay on" in text for text in detect(rule, taxel.open(tmp_path / "a.npz")).warnings)
+
+
+@pytest.mark.parametrize("begin_us", [0, 1_795_000_000_000_000])
+def test_a_recording_at_rest_is_a_tare(tmp_path: Path, begin_us: int) -> None:
+    """That which `taxel cut` makes of a stretch is the tare of this stretch, for each command."""
+    frames, _ = pressed(1)
+    later = Frames(frames.values, frames.t + begin_us, unit=frames.unit, array=frames.array)
+    taxel.convert(later, tmp_path / "a.npz")
+    assert run("cut", tmp_path / "a.npz", tmp_path / "rest.npz", "--from", 0.1, "--to", 0.6).returncode == 0
+    recording = taxel.open(tmp_path / "a.npz")
+    taken = rest(recording, tmp_path / "rest.npz").tare
+    expected = Tare.take(recording.frames().between(begin_us + 100_000, begin_us + 600_000))
+    assert np.array_equal(taken.rest, expected.rest)
+    assert np.array_equal(taken.noise, expected.noise)
+    saved = taken.save(tmp_path / "tare.txt")
+    PlainRule("area", 2, noise_floor=20.0).save(tmp_path / "rule.json")
+    command = ("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json", "--json", "--tare")
+    by_recording, by_tare = (json.loads(run(*command, file).stdout) for file in (tmp_path / "rest.npz", saved))
+    assert by_recording["detections"] == by_tare["detections"] != []
+    with collected() as warned:
+        rest(recording, tmp_path / "a.npz")
+    assert len(warned) == 1
+    assert "a.npz: it is not quiet but holds a touch of " in warned[0]
+    taxel.convert(Frames(later.values, later.t, unit="N", array=frames.array), tmp_path / "force.npz")
+    with pytest.raises(ProblemError, match=r"force\.npz: a recording in N; must be in counts, as .*a\.npz is"):
+        rest(recording, tmp_path / "force.npz")
+    refused = run("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json", "--tare", tmp_path / "rule.json")
+    assert "rule.json: is a taxel plain rule, not a tare" in refused.stderr
+
+
+def test_a_warning_about_the_rest_names_a_command_that_takes_it(tmp_path: Path) -> None:
+    """Forces that do not rest near 0 in a quiet stretch behind the recording's beginning."""
+    frames, _ = pressed(1)
+    values = np.maximum(frames.values - 50, 0) / 10 + np.random.default_rng(1).uniform(4, 8, (6, 6))
+    values[:3, 1:3, 1:3] += 40.0
+    place = tmp_path / "a walk.npz"
+    taxel.convert(Frames(values, frames.t, unit="N", array=frames.array), place)
+    (line,) = taxel.tasks.info(taxel.open(place), None).warnings
+    found = re.search(r"--tare rest\.npz takes that off, which (taxel cut .*) makes$", line)
+    assert found is not None
+    _, *words = shlex.split(found[1])
+    words[2] = str(tmp_path / "rest.npz")
+    assert run(*words).returncode == 0
+    tare = rest(taxel.open(place), tmp_path / "rest.npz").tare
+    assert np.abs(tare.rest).min() > 4.0

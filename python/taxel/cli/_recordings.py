@@ -37,7 +37,10 @@ ReportOption = Annotated[
 
 def tare_option(default: str = "") -> Any:
     """Return the option ``--tare``, with what is taken without it."""
-    about = "Rest of the taxels: a file that Tare.save wrote, or seconds at rest at the beginning of the recording."
+    about = (
+        "Rest of the taxels: a recording of them at rest (taxel cut), a saved tare, or seconds at rest at the "
+        "beginning of the recording."
+    )
     return typer.Option(metavar="SECONDS|FILE", help=f"{about} {default}".rstrip())
 
 

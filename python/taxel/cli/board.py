@@ -171,7 +171,9 @@ def _rest(value: str | None) -> Tare | float | None:
     try:
         seconds = float_of(value)
     except ValueError:
-        return Tare.load(value)
+        from taxel.tasks.rest import tare_of  # noqa: PLC0415  the command line starts quickly
+
+        return tare_of(Path(value))
     if not 1e-6 <= seconds <= 3600:
         raise ProblemError(f"--tare {value}: must be seconds from 1e-6 to 3600, or a file")
     return seconds

@@ -43,7 +43,7 @@ KINDS = (
 #: What helps against labels that lie elsewhere.
 _FOREIGN = "labels of this recording, where it was touched"
 #: What makes a tare's file of a recording.
-_MAKES_TARE = "in Python taxel.Tare.take(taxel.open('RECORDING'), start_us=T, stop_us=T).save('FILE')"
+_MAKES_TARE = "taxel cut RECORDING FILE --from S --to S"
 #: What helps against recordings that begin with what is to be learnt.
 _BEGUN = "recordings that begin before, at rest (0.2 s of zeros before the first frame, and labels as much later)"
 #: From which share of the events on missed or false ones are many.
@@ -334,7 +334,9 @@ class Evidence:
         because, option, arguments = self._of_tare
         if because:
             advice = option if arguments else "another tare, of the time just before (--tare FILE)"
-            measured = f"of the tare: {because}" + ("" if arguments else f"; {_MAKES_TARE} makes that file")
+            measured = f"of the tare: {because}" + (
+                "" if arguments else f"; {_MAKES_TARE} makes that file, as rest.npz"
+            )
             yield Cause("tare", (label,), wrong, measured, advice, option, arguments)
         yield from self._begun_loaded(label, wrong)
         yield from self._other_recipe(label, wrong)

@@ -93,7 +93,7 @@ class Question:
             if lasts < STEP_US:
                 raise ProblemError(
                     f"{self.trials[0].name}: its frames all lie within {lasts} us, so they have no times; "
-                    "give them some (taxel.Frames)"
+                    "give them some (rate_hz in a layout file, t of taxel.Frames)"
                 )
             raise refused("trials", f": no event in any of them by {self.encoder!r}; a lower noise_floor may help")
         ends = np.array([np.inf if trial.stop_us is None else trial.stop_us for trial in self.trials])

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from shlex import quote
 from typing import NoReturn
 
 import numpy as np
@@ -171,11 +172,14 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     """
     file = Path(arguments.checked_path("path", path))
     if recognition.is_folder(file):
-        raise ProblemError(f"{file}: a folder; taxel.open_all opens its recordings")
+        raise ProblemError(f"{file}: a folder; name one of its recordings (in Python taxel.open_all opens all)")
     recordings = _open(file, options)
     if len(recordings) != 1:
         names = ", ".join(recording.name for recording in recordings[:3]) + ", ..." * (len(recordings) > 3)
-        raise ProblemError(f"{file}: holds {len(recordings)} recordings ({names}); taxel.open_all opens each")
+        raise ProblemError(
+            f"{file}: holds {len(recordings)} recordings ({names}); taxel convert {quote(str(file))} FOLDER writes "
+            "them as files of taxel (in Python taxel.open_all opens all)"
+        )
     return recordings[0]
 
 

@@ -87,8 +87,8 @@ class CalibrateOptions:
     exponent : float, above 0, optional
         The exponent, given instead of fitted.
     tare : Tare, path or float (s), optional
-        The rest of the taxels: a tare, its file, or the seconds at rest at the beginning. Default: that of a quiet
-        stretch.
+        The rest of the taxels: a tare, its file, a recording at rest, or the seconds at rest at the beginning.
+        Default: that of a quiet stretch.
     date, note : str
         Date of the calibration (default: today), and which sensor and weights.
 

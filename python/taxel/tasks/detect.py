@@ -41,8 +41,8 @@ class DetectOptions:
     Parameters
     ----------
     tare : Tare, path or float (s), optional
-        The rest of the taxels: a tare, its file, or the seconds at rest at the beginning of each recording. Default: as
-        of `taxel.tasks.rest`.
+        The rest of the taxels: a tare, its file, a recording at rest, or the seconds at rest at the beginning of
+        each recording. Default: as of `taxel.tasks.rest`.
     frame_us : float, us, optional
         Length of the board's frame. Default: by the registers or the frames, else 192.
     window_ms : float, ms

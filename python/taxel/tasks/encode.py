@@ -35,8 +35,8 @@ class EncodeOptions:
         The encoder's name, as "fa1".
     parameters : mapping of str to value
     tare : Tare, path or float (s), optional
-        The rest of the taxels: a tare, its file, or the seconds at rest at the beginning of the recording. Default: 0
-        of frames in a unit of force or pressure, else none.
+        The rest of the taxels: a tare, its file, a recording at rest, or the seconds at rest at the beginning of
+        the recording. Default: 0 of frames in a unit of force or pressure, else none.
 
     Raises
     ------

@@ -48,8 +48,8 @@ def info(recording: Recording, tare: GivenTare | None = None) -> Info:
     ----------
     recording : Recording
     tare : Tare, path or float (s), optional
-        The rest of the taxels: a tare, its file, or the seconds at rest at the beginning. Default: that of a quiet
-        stretch.
+        The rest of the taxels: a tare, its file, a recording at rest, or the seconds at rest at the beginning.
+        Default: that of a quiet stretch.
 
     Raises
     ------

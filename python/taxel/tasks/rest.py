@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from shlex import quote
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -21,14 +23,14 @@ from taxel.detect.label_times import TOUCH, held_by_tare
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording import Recording
+from taxel.recording import Recording, open_one
 from taxel.recording.analysis.preload import free_of_preload, without_preload
 from taxel.recording.analysis.pressure import quiet_rest
 from taxel.recording.analysis.rest import NOISE_FLOOR, by_unit, of_quiet
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
-#: A tare, the file of one, or how many seconds at the beginning of a recording are at rest.
+#: A tare, the file of one, a recording at rest, or how many seconds at the beginning of a recording are at rest.
 GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
 
 #: How long before the first label the rest ends, and how long it must last at least, us.
@@ -93,12 +95,12 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     recording : Recording
         Of one sensor.
     tare : Tare, path or float (s), optional
-        A tare, its file, or the seconds at rest at the recording's beginning.
+        A tare, its file, a recording at rest, or the seconds at rest at the recording's beginning.
 
     Raises
     ------
     ProblemError : nothing is quiet, so that a tare must be given; a given one is invalid
-    FormatError : the file is not a tare
+    FormatError : the file is neither a tare nor a recording
 
     Examples
     --------
@@ -141,7 +143,7 @@ def _quiet_us(recording: Recording, source: Events | Frames) -> tuple[tuple[int,
 
 
 def given_tare(tare: GivenTare, recording: Recording) -> Tare:
-    """Return the tare that is given: itself, that of a file, or of seconds at the beginning of the recording.
+    """Return the tare that is given: itself, that of a file or of a recording at rest, or of seconds at the beginning.
 
     The rest ends early where the board marked the start of the recording, as a board that was tared does. A rest
     longer than half of the recording is refused, because the sensor was hardly at rest for all of it.
@@ -150,7 +152,7 @@ def given_tare(tare: GivenTare, recording: Recording) -> Tare:
         return tare
     seconds = seconds_of(tare)
     if seconds is None:
-        return Tare.load(checked_path("tare", tare))
+        return tare_of(Path(checked_path("tare", tare)), recording)
     check_tare(tare)
     source = recorded(recording)
     if not len(source):
@@ -166,8 +168,45 @@ def given_tare(tare: GivenTare, recording: Recording) -> Tare:
     if isinstance(source, Events):
         stop = min([stop, *(t for t, start in source.markers if start and t > first)])
     measured = _measured(recording, source, stop)
-    _warn_of_touch(tare, recording, source, measured)
+    what, remedy = f"the beginning of {recording.title}", "give the seconds before it, or a file"
+    _warn_of_touch(f"tare is {tare}: {what}", remedy, source, measured)
     return measured
+
+
+def tare_of(path: Path, recording: Recording | None = None) -> Tare:
+    """Return the tare that a file holds, or the rest of the taxels in a recording in which nothing is touched.
+
+    Parameters
+    ----------
+    path : Path
+        A file that `Tare.save` or ``taxel live --save-tare`` wrote, which is JSON; else what `taxel.open` opens.
+    recording : Recording, optional
+        What the tare is for.
+
+    Raises
+    ------
+    ProblemError : a recording in another unit than the one that the tare is for
+    FormatError : neither a tare nor a recording
+    FileNotFoundError : no such file
+    """
+    if path.suffix == ".json" or (path.is_file() and _is_json(path)):
+        return Tare.load(path)
+    resting = open_one(path)
+    source = recorded(resting)
+    expected = None if recording is None else recorded(recording)
+    if isinstance(source, Frames) and isinstance(expected, Frames) and source.unit != expected.unit:
+        assert recording is not None
+        raise refused(
+            "tare", f" is {path}: a recording in {source.unit}; must be in {expected.unit}, as {recording.title} is"
+        )
+    measured = Tare.take(source, note=str(path))
+    _warn_of_touch(f"tare is {path}: it", "cut it (taxel cut) to what is quiet", source, measured)
+    return measured
+
+
+def _is_json(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(64).lstrip().startswith(b"{")
 
 
 def check_tare(tare: GivenTare | None) -> None:
@@ -214,11 +253,12 @@ def zero_by_unit(recording: Recording) -> Tare | None:
     count = np.count_nonzero(off)
     if count > _MANY * source.array.taxels:
         first, end = found.quiet_us
-        stretch = "{:.3f} to {:.3f} s".format(*((t - beginning_us(source.t[:1])) / 1e6 for t in (first, end)))
-        taken = f"taxel.Tare.take(taxel.open('{recording.path}'), start_us={first}, stop_us={end})"
+        stretch_s = [(t - beginning_us(source.t[:1])) / 1e6 for t in (first, end)]
+        stretch = "{:.3f} to {:.3f} s".format(*stretch_s)
         option = f"--tare {(end - first) / 1e6:g} takes that off"
         if first > source.t[0]:
-            option = f"--tare FILE takes that off, a file that in Python {taken}.save('FILE') makes"
+            cut = "taxel cut {} rest.npz --from {:.3f} --to {:.3f}".format(quote(str(recording.path)), *stretch_s)
+            option = f"--tare rest.npz takes that off, which {cut} makes"
         warn(
             f"{recording.path}: {count} of {source.array.taxels} taxels read {middle[off].min():.3g} to "
             f"{middle[off].max():.3g} {source.unit} in a quiet stretch, {stretch}, and not 0; if nothing touches them "
@@ -228,15 +268,11 @@ def zero_by_unit(recording: Recording) -> Tare | None:
     return zero
 
 
-def _warn_of_touch(tare: GivenTare, recording: Recording, source: Events | Frames, measured: Tare) -> None:
+def _warn_of_touch(what: str, remedy: str, source: Events | Frames, measured: Tare) -> None:
     """Warn of a tare in which something was touched, by which lifts are missed or false."""
     taxels = held_by_tare([Example(source, {}, measured)], NOISE_FLOOR)
     if taxels >= TOUCH:
-        warn(
-            f"tare is {tare}: the beginning of {recording.title} is not quiet but holds a touch of {taxels} taxels; "
-            "give the seconds before it, or a file",
-            stacklevel=3,
-        )
+        warn(f"{what} is not quiet but holds a touch of {taxels} taxels; {remedy}", stacklevel=3)
 
 
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:

@@ -38,8 +38,8 @@ class TrainOptions:
     changes : mapping of str to value
         What differs from the recipe, by dotted keys, as "neurons.contact.kappa", "encoder.name" or "align".
     tare : Tare, path or float (s), optional
-        The rest of the taxels: a tare, its file, or the seconds at rest at the beginning of each recording. Default:
-        the time before the first label of each.
+        The rest of the taxels: a tare, its file, a recording at rest, or the seconds at rest at the beginning of
+        each recording. Default: the time before the first label of each.
     folds : int, optional
         In how many folds it is scored on held-out data; 0: on the training data. Default: at most 5, as many as the
         recordings and the rarest label allow.

@@ -85,7 +85,8 @@ options! {
         /// on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
         #[serde(skip_serializing)]
-        tare: Option<StatedTare> = None, "python" = "Tare | float | None", "metavar" = "FILE|SECONDS";
+        tare: Option<StatedTare> = None, "python" = "Tare | float | None", "metavar" = "FILE|SECONDS",
+            "typed" = "A recording of them at rest (taxel cut) is a tare too.";
         /// Record in a new file (.mcap or .lsa).
         ///
         /// `.mcap` holds all data, `.lsa` the raw bytes of the manual.
