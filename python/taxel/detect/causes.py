@@ -335,7 +335,7 @@ class Evidence:
         if because:
             advice = option if arguments else "another tare, of the time just before (--tare FILE)"
             measured = f"of the tare: {because}" + (
-                "" if arguments else f"; {_MAKES_TARE} makes that file, as rest.npz"
+                "" if arguments else f"; {_MAKES_TARE} makes that file, a .npz"
             )
             yield Cause("tare", (label,), wrong, measured, advice, option, arguments)
         yield from self._begun_loaded(label, wrong)
