@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from draws import mixed
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 import taxel
@@ -349,6 +351,7 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
         ("rate_hz = 0", r"rate_hz is 0: must be from 1e-09 to 1e\+06"),
         ("rate_hz = 1e-300", "rate_hz is 1e-300: must be from 1e-09"),
         ("rate_hz = nan", "rate_hz is nan"),
+        ("zeros_before_s = 0", "zeros_before_s is 0: must be from 1e-06 to 60"),
         ("table = 3", "table"),
         ("[table]\nseparator = ', '", "separator is ', ': must be one character"),
         ("[table]\nskip_lines = 40", "no line after 40 skipped ones"),
@@ -549,3 +552,36 @@ def test_arrays_that_a_layout_names_are_read_also_where_they_have_names_of_taxel
     events = taxel.Events([0], [1], [1], [True], array=taxel.Array(2, 2))
     taxel.convert(events, tmp_path / "b.npz")
     assert taxel.open(tmp_path / "b.npz").events == events
+
+
+@pytest.mark.parametrize("begin_us", [0, 1_795_000_000_000_000])
+@settings(max_examples=settings.default.max_examples // 2, deadline=None)
+@given(step=st.integers(100, 50_000), count=st.integers(2, 20), seconds=st.floats(1e-3, 0.2))
+def test_zeros_come_before_a_first_frame_that_is_loaded_and_once(
+    begin_us: int, step: int, count: int, seconds: float, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.mktemp("trials")
+    (folder / "layout.toml").write_text(f"zeros_before_s = {seconds!r}\n")
+    loaded = Frames(1.0 + np.arange(count)[:, None, None], begin_us + step * np.arange(count), unit="counts")
+    unloaded = Frames(np.arange(count, dtype=float)[:, None, None], loaded.t, unit="counts")
+    for name, frames in (("loaded", loaded), ("unloaded", unloaded)):
+        taxel.convert(frames, folder / f"{name}.npz")
+    assert taxel.open(folder / "unloaded.npz").frames() == unloaded
+    led = taxel.open(folder / "loaded.npz")
+    before = len(led.frames()) - count
+    assert before == max(1, round(seconds * 1e6 / step))
+    assert led.frames()[before:] == loaded
+    assert not led.frames().values[:before].any()
+    assert set(np.diff(led.frames().t).tolist()) == {step}
+    taxel.convert(led, folder / "again.npz")
+    assert taxel.open(folder / "again.npz").frames() == led.frames()
+
+
+def test_zeros_before_frames_without_times_or_before_events_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"zeros_before_s: \S+ has no times; rate_hz gives them"):
+        table(tmp_path, lines(np.ones((5, 6))), "zeros_before_s = 0.5")
+    events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+    taxel.convert(events, tmp_path / "board.mcap")
+    (tmp_path / "given.toml").write_text("zeros_before_s = 0.5")
+    with pytest.raises(FormatError, match=r"holds events; .* and zeros_before_s are of frames"):
+        taxel.open(tmp_path / "board.mcap", layout=tmp_path / "given.toml")

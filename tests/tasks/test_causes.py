@@ -167,17 +167,12 @@ def begun(folder: Path, seed: int) -> Situation:
         values[:count, y : y + 4, x : x + 3] = np.rint(rise * random.uniform(300, 600, (1, 4, 3)))
         trials.append(values)
 
-    def write(before: int) -> None:
-        for k, values in enumerate(trials):
-            led = np.concatenate([np.zeros((before, 6, 6)), values])
-            frames = taxel.Frames(led, 2000 * np.arange(len(led)), unit="counts", array=taxel.Array(6, 6))
-            taxel.convert(frames, folder / f"t{k}.npz", overwrite=True)
-        lines = [f"t{k},contact,{2000 * before}\n" for k in range(10)]
-        (folder / "labels.csv").write_text("recording,label,t_us\n" + "".join(lines))
-
-    write(0)
+    for k, values in enumerate(trials):
+        frames = taxel.Frames(values, 2000 * np.arange(len(values)), unit="counts", array=taxel.Array(6, 6))
+        taxel.convert(frames, folder / f"t{k}.npz")
+    (folder / "labels.csv").write_text("recording,label,t_us\n" + "".join(f"t{k},contact,0\n" for k in range(10)))
     words = [*(folder / f"t{k}.npz" for k in range(10)), "--labels", folder / "labels.csv", "--recipe", "gait_plate"]
-    return Situation(words, lambda: write(100))
+    return Situation(words, lambda: (folder / "layout.toml").write_text("zeros_before_s = 0.6\n"))
 
 
 def window(folder: Path, seed: int) -> Situation:

@@ -29,7 +29,7 @@ from taxel.encode import ContactArea, Encoder, LevelCrossing, Moments, Threshold
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.analysis.rest import of_frames
+from taxel.recording.analysis.rest import ZEROS_BEFORE, of_frames
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
@@ -44,8 +44,6 @@ KINDS = (
 _FOREIGN = "labels of this recording, where it was touched"
 #: What makes a tare's file of a recording.
 _MAKES_TARE = "taxel cut RECORDING FILE --from S --to S"
-#: What helps against recordings that begin with what is to be learnt.
-_BEGUN = "recordings that begin before, at rest (0.2 s of zeros before the first frame, and labels as much later)"
 #: From which share of the events on missed or false ones are many.
 _MANY = 0.05
 #: Labels are a question before a training if at most this share of them lies near anything that was felt ...
@@ -334,9 +332,7 @@ class Evidence:
         because, option, arguments = self._of_tare
         if because:
             advice = option if arguments else "another tare, of the time just before (--tare FILE)"
-            measured = f"of the tare: {because}" + (
-                "" if arguments else f"; {_MAKES_TARE} makes that file, a .npz"
-            )
+            measured = f"of the tare: {because}" + ("" if arguments else f"; {_MAKES_TARE} makes that file, a .npz")
             yield Cause("tare", (label,), wrong, measured, advice, option, arguments)
         yield from self._begun_loaded(label, wrong)
         yield from self._other_recipe(label, wrong)
@@ -356,7 +352,7 @@ class Evidence:
                 f"{count} of {counted(self._counts[label], 'label')} {_lie(count)} in the first two frames of "
                 "recordings that begin loaded, where no load begins"
             )
-            yield Cause("begun_loaded", (label,), min(count, wrong), measured, _BEGUN)
+            yield Cause("begun_loaded", (label,), min(count, wrong), measured, ZEROS_BEFORE)
 
     def _other_recipe(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the recipe that fits recording and labels, if another named one is trained by."""

@@ -1,8 +1,8 @@
 """Layout files: what a recording lacks, in one TOML file beside it.
 
 A layout says of a sensor its rows, columns, pitch or places, side and heel; of readings whether they fall with
-pressure, their unit and their rate; and how to read a table or an array of another program. The keys are listed in
-docs/files.md.
+pressure, their unit, their rate and what came before the first; and how to read a table or an array of another program.
+The keys are listed in docs/files.md.
 """
 
 from __future__ import annotations
@@ -227,6 +227,9 @@ class Layout:
         Of the readings, turned or not.
     rate_hz : float, Hz, above 0, optional
         Frames a second, where the recording has no times.
+    zeros_before_s : float, s, above 0, at most 60, optional
+        Of recordings whose first frame is loaded, as trials that a contact starts: for how long the sensor is said to
+        have read 0 before.
     table : Table, optional
     data : Data, optional
     source : PrintedFrames, optional
@@ -251,6 +254,7 @@ class Layout:
     falls: bool | float | None = None
     unit: str | None = None
     rate_hz: float | None = None
+    zeros_before_s: float | None = None
     table: Table | None = None
     data: Data | None = None
     source: PrintedFrames | None = None
@@ -271,6 +275,8 @@ class Layout:
             raise refused("unit", " is '': must say what the readings are in")
         if self.rate_hz is not None:
             finite("rate_hz", self.rate_hz, "Hz", least=1e-9, most=1e6)
+        if self.zeros_before_s is not None:
+            finite("zeros_before_s", self.zeros_before_s, "s", least=1e-6, most=60.0)
         # Refuses a pitch beside places, and places of another number than rows x columns.
         self.array(self.places.x.size if self.places is not None else 1)
 

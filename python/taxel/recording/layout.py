@@ -1,4 +1,4 @@
-"""Applies a layout file to a recording: its sensor, its unit, its times, and readings that fall with pressure."""
+"""Applies a layout file to a recording: its sensor, its unit, its times, readings that fall, and rest before them."""
 
 from __future__ import annotations
 
@@ -105,8 +105,9 @@ def _apply_layout(source: RecordedSource, layout: Layout, *, given: bool) -> Rec
     same = source if array == sensor.array else on_array(source, array)
     same = replace(same, sensor=replace(same.sensor, side=sensor.side or layout.side, heel=sensor.heel or layout.heel))
     if not isinstance(same, FrameSource):
-        if strict and (layout.turned is not None or layout.unit or layout.rate_hz):
-            raise FormatError(f"{layout.path}: {name} holds events; falls, unit and rate_hz are of frames")
+        if strict and (layout.turned is not None or layout.unit or layout.rate_hz or layout.zeros_before_s):
+            of_frames = "falls, unit, rate_hz and zeros_before_s are of frames"
+            raise FormatError(f"{layout.path}: {name} holds events; {of_frames}")
         return same
     was = same.frame_table.turned
     if strict and was is not None and layout.falls is not None and layout.turned != was:
@@ -116,6 +117,10 @@ def _apply_layout(source: RecordedSource, layout: Layout, *, given: bool) -> Rec
     # Read at once, so that a layout that contradicts the file is refused where the file is opened.
     frames = _read(same.table, layout, full, name, is_alone=kind in _ALONE, strict=strict)
     untimed = same.untimed and layout.rate_hz is None
+    if layout.zeros_before_s is not None:
+        if untimed:
+            raise FormatError(f"{layout.path}: zeros_before_s: {name} has no times; rate_hz gives them")
+        frames = _after_zeros(frames, layout.zeros_before_s)
     return replace(same, frame_table=FrameTable(known(frames), untimed, was if full is None else full))
 
 
@@ -193,6 +198,17 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_al
     return Frames(values, t, unit=unit, array=table.array)
 
 
+def _after_zeros(frames: Frames, seconds: float) -> Frames:
+    """Return frames with frames of 0 before the first, so long, where the first is loaded; later times stay."""
+    if len(frames) < _LEAST or not np.any(frames.values[0]):
+        return frames
+    step = max(1, round(_median_step(frames.t)))
+    count = max(1, round(seconds * 1e6 / step))
+    t = frames.t[0] + step * np.arange(-count, 0)
+    values = np.concatenate([np.zeros((count, *frames.array.shape), np.float32), frames.values])
+    return Frames(values, np.concatenate([t, frames.t]), unit=frames.unit, array=frames.array)
+
+
 def _blocks(length: int) -> Iterator[slice]:
     """Yield the blocks of a column that are computed one after the other, beside which little memory is taken."""
     return (slice(begin, min(begin + _PIECE, length)) for begin in range(0, length, _PIECE))
@@ -235,5 +251,7 @@ def _writable(array: NDArray[Any]) -> NDArray[Any]:
 
 #: Values, or times, that are computed at once.
 _PIECE = 1 << 17
+#: So many frames show how far apart they are.
+_LEAST = 2
 #: The share by which a rate that a layout says may differ from that of a file's own times.
 _SLACK = 0.05

@@ -26,7 +26,7 @@ from taxel.recorded import recorded
 from taxel.recording import Recording, open_one
 from taxel.recording.analysis.preload import free_of_preload, without_preload
 from taxel.recording.analysis.pressure import quiet_rest
-from taxel.recording.analysis.rest import NOISE_FLOOR, by_unit, of_quiet
+from taxel.recording.analysis.rest import NOISE_FLOOR, ZEROS_BEFORE, by_unit, of_quiet
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
@@ -129,6 +129,7 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     if span is None:
         error = ProblemError(
             f"{recording.path}: the rest of its taxels is not known, as no half second is quiet with nothing on it"
+            + _begun_loaded(source)
         )
         raise helped(error, "tare", "give")
     return TakenRest("quiet", _measured(recording, recorded(recording), span[1], span[0]), begin_us)
@@ -332,9 +333,18 @@ def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Ta
         ends += [t for t, start in source.markers if start and t > first]
     if not ends or min(ends) - first < _LEAST_REST_US:
         content = f"only {to_ms(max(0, min(ends) - first)):g} ms before its first label" if ends else "no label"
-        error = ProblemError(f"{recording.path}: holds {content}, from which to take the taxels' rest")
+        error = ProblemError(
+            f"{recording.path}: holds {content}, from which to take the taxels' rest{_begun_loaded(source)}"
+        )
         raise helped(error, "tare", "give")
     return _measured(recording, source, min(ends))
+
+
+def _begun_loaded(source: Events | Frames) -> str:
+    """Return what helps if a recording may begin loaded, whose taxels all read 0 at some time; else ""."""
+    if not isinstance(source, Frames) or not source.values[:1].any() or source.values.min(axis=0).any():
+        return ""
+    return f"; where trials begin loaded, {ZEROS_BEFORE} helps"
 
 
 def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare | None:
