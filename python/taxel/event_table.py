@@ -19,6 +19,8 @@ _LABELS = ("label", "event", "ereignis", "name", "marker", "annotation")
 #: Columns that hold neither times of events nor labels.
 _OTHERS = ("recording", "source", "host_ns", "replaces_us")
 _US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
+#: Names of columns that number frames.
+_FRAMES = ("frame", "picture", "bild")
 _RIGHT = "must be label,t_us ..., or a column of texts and times with their unit, as label,time [s]"
 
 
@@ -80,7 +82,9 @@ def _time(table: HeaderTable) -> int:
             f"{table.location}, line 1: {names} are times; name that of the labels t_us, or leave one out"
         )
     missing = "t_us" if any(name.lower() in _LABELS for name in table.header) else "label"
-    raise FormatError(f"{table.location}, line 1: no column {missing!r}; there are {there}; {_RIGHT}")
+    frames = next((name for name in table.header if name.lower().rstrip("s") in _FRAMES), None)
+    counts = "" if frames is None else f"; {shown(frames)} holds no times: that of a frame is its number / rate"
+    raise FormatError(f"{table.location}, line 1: no column {missing!r}; there are {there}{counts}; {_RIGHT}")
 
 
 def _label(table: HeaderTable, header: Sequence[str], rows: Sequence[Sequence[str]], separator: str) -> int:

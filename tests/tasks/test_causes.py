@@ -364,3 +364,34 @@ def test_a_long_training_says_how_long_before_its_folds(tmp_path: Path, monkeypa
         r"about \d+ min from here on: one training on all data took [\d.]+ s, and the folds .* 4 of them", said
     )
     assert steps.index(said) < steps.index("fold 1 of 5")
+
+
+@pytest.mark.parametrize("us_by_unit", [1000, 10_000])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_labels_in_another_unit_of_time_are_asked_for_their_unit(
+    seed: int, us_by_unit: int, tmp_path: Path, capsys: Any
+) -> None:
+    """In ms, or as numbers of frames of 100 Hz: all lie near the first touch, and no shift mends that."""
+    frames, labels = pressed(seed, begin_s=0.7)
+    words = saved(tmp_path, frames, {label: t // us_by_unit for label, t in labels.items()})
+    code, _, error = call(capsys, "train", *words, "-o", tmp_path / "r.json")
+    assert code == 2
+    assert "what may help is labels with times in us: the labels lie in the first 0.0" in error
+    assert "--shift-ms" not in error
+    table(tmp_path / "right.csv", labels)
+    assert call(capsys, "train", words[0], "--labels", tmp_path / "right.csv", "-o", tmp_path / "r.json")[0] == 0
+    score = ("detect", words[0], "--readout", tmp_path / "r.json", "--truth")
+    assert ": are their times in us?" in call(capsys, *score, tmp_path / "a.csv")[2]
+    assert "in us?" not in call(capsys, *score, tmp_path / "right.csv")[2]
+
+
+def test_a_label_that_the_readout_spells_otherwise_is_said(tmp_path: Path, capsys: Any) -> None:
+    frames, labels = pressed(1)
+    words = saved(tmp_path, frames, labels)
+    assert call(capsys, "train", *words, "-o", tmp_path / "r.json")[0] == 0
+    table(tmp_path / "capitals.csv", {label.capitalize(): t for label, t in labels.items()})
+    score = ("detect", words[0], "--readout", tmp_path / "r.json", "--truth")
+    assert "must be spelt alike" not in call(capsys, *score, tmp_path / "a.csv")[2]
+    said = call(capsys, *score, tmp_path / "capitals.csv")[2]
+    for label in labels:
+        assert f"truth has {label.capitalize()!r}, the readout {label!r}: must be spelt alike to be scored" in said

@@ -213,3 +213,10 @@ def test_a_warning_about_the_rest_names_a_command_that_takes_it(tmp_path: Path) 
     assert run(*words).returncode == 0
     tare = rest(taxel.open(place), tmp_path / "rest.npz").tare
     assert np.abs(tare.rest).min() > 4.0
+
+
+def test_frames_too_far_apart_for_a_quiet_half_second_are_said(tmp_path: Path) -> None:
+    values = np.random.default_rng(1).normal(12.5, 0.1, (60, 1, 1))
+    taxel.convert(Frames(values, 1_000_000 * np.arange(60), unit="mV"), tmp_path / "a.npz")
+    with pytest.raises(ProblemError, match="quiet with nothing on it: its frames are 1 s apart; give tare"):
+        rest(taxel.open(tmp_path / "a.npz"))

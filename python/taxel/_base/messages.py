@@ -75,6 +75,17 @@ def counted(count: int, noun: str, plural: str | None = None) -> str:
     return f"{count} {noun if count == 1 else plural or f'{noun}s'}"
 
 
+def three_digits(value: float, sign: str = "") -> str:
+    """Return a number with three digits, from 1000 to a million as a whole one; `sign`: "+" shows that of all.
+
+    Examples
+    --------
+    >>> three_digits(0.12345), three_digits(999.6, "+"), three_digits(1004.2), three_digits(-2e6)
+    ('0.123', '+1000', '1004', '-2e+06')
+    """
+    return f"{value:{sign}.0f}" if 999.5 <= abs(value) < 1e6 else f"{value:{sign}.3g}"
+
+
 def first_line(error: BaseException) -> str:
     """Return the first line of another library's error, at most 200 characters; its class if it has no text."""
     line = str(error).split("\n", maxsplit=1)[0] or type(error).__name__

@@ -18,7 +18,7 @@ from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example
 from taxel.detect.fitting import TWO_FOLDS, Trained
-from taxel.detect.label_times import TOUCH, FeltLoads, held_by_tare, quiet_s, unlabelled_us
+from taxel.detect.label_times import TOUCH, FeltLoads, early, held_by_tare, quiet_s, unlabelled_us
 from taxel.detect.levels import LEAST_LEVELS, loaded_levels
 from taxel.detect.loads import lacks_neighbours
 from taxel.detect.plain_score import PlainScore, floor_of
@@ -214,6 +214,18 @@ class Evidence:
         return "", ""
 
     @cached_property
+    def _early(self) -> str:
+        """That the labels of each recording lie at its very beginning; empty where they do not."""
+        texts = [
+            early(example.labels, int(source.t[0]), int(source.t[-1]))
+            for example in self.sound
+            if isinstance(source := example.source, Events | Frames)
+            and len(source)
+            and any(map(len, example.labels.values()))
+        ]
+        return texts[0] if texts and all(texts) else ""
+
+    @cached_property
     def _loaded(self) -> int:
         """How many taxels read above their tare while nothing touches them."""
         return loaded_at_rest(self.examples, self.plan.encoder)
@@ -277,6 +289,9 @@ class Evidence:
 
     def _foreign(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield at how many labels no load begins or ends; all mistakes may be by them if that is most."""
+        if self._early:
+            yield Cause("foreign_labels", (label,), wrong, f"the labels {self._early}", "labels with times in us")
+            return
         _, at_edge, total = self._near.get(label, (0, 0, 0))
         # A tare that does not fit tells nothing.
         if at_edge == total or self._loaded >= TOUCH:

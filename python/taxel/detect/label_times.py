@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import comb
 from typing import NamedTuple
 
@@ -34,6 +34,8 @@ _NORMAL = 1.4826
 _CHANCE = 0.01
 #: Touches that are so many times as many as the labels are at some distance of them by chance.
 _MOST_A_LABEL = 4
+#: So many labels that all lie in the first such share of a recording may be in another unit of time.
+_SEVERAL, _FIRST = 4, 0.01
 #: This share of a tare, at its beginning, holds no touch.
 _EARLY = 0.25
 #: These shares of a tare are looked at for a touch, to say how much of it is quiet.
@@ -138,10 +140,20 @@ def _apart(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[NDArray[n
     return apart[order], label_index[order]
 
 
+def _reached(times: NDArray[np.int64], felt: NDArray[np.int64]) -> int:
+    """Return how many of these times lie up to the farthest from a label, at most as many as there are labels.
+
+    Labels in another unit of time, which lie close together, all have the same distance from one of them.
+    """
+    far, ordered = round(to_us(_FARTHEST_MS)), np.sort(times)
+    first, last = np.searchsorted(ordered, [felt - far, felt + far])
+    return min(len(times), int(np.count_nonzero(last > first)))
+
+
 def _by_hand(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple[Off, float]]:
     """Yield the distance around which most labels lie from these times as a hand sets them, with its spread, ms."""
     least = int(np.ceil(max(_LEAST, _SHARE * len(times))))
-    if len(times) < least or len(felt) > _MOST_A_LABEL * len(times):
+    if _reached(times, felt) < least or len(felt) > _MOST_A_LABEL * len(times):
         return
     apart, label_index = _apart(times, felt)
     counts, begin, narrowest = np.zeros(len(times), np.int64), 0, (np.inf, 0, 0)
@@ -186,13 +198,29 @@ def _by_chance(least: int, labels: int, pairs: int, spread_ms: float) -> float:
 def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple[Off, float]]:
     """Yield the distances that most labels have from one of these times, each with its spread, ms."""
     least = max(_LEAST, _SHARE * len(times))
-    if len(times) < least or len(felt) > _MOST_A_LABEL * len(times):
+    if _reached(times, felt) < least or len(felt) > _MOST_A_LABEL * len(times):
         return
     apart, label_index = _apart(times, felt)
     for k, end in enumerate(np.searchsorted(apart, apart + _SAME_MS, side="right")):
         if end - k >= least and len(np.unique(label_index[k:end])) >= least:
             off = _off(float(np.median(apart[k:end])), apart, label_index, slice(k, end), len(times))
             yield off, float(apart[end - 1] - apart[k])
+
+
+def early(labels: Mapping[str, NDArray[np.int64]], first_us: int, last_us: int) -> str:
+    """Return that all labels of a recording lie in its first hundredth, as times in another unit do; else "".
+
+    Examples
+    --------
+    >>> early({"contact": np.array([1200, 2400, 3100, 4000])}, 0, 5_000_000)
+    'lie in the first 0.004 s of 5 s: are their times in us?'
+    """
+    times = np.concatenate([*labels.values(), np.empty(0, np.int64)])
+    lasts = last_us - first_us
+    latest = int(times.max(initial=first_us)) - first_us
+    if len(times) < _SEVERAL or not 0 < latest < _FIRST * lasts:
+        return ""
+    return f"lie in the first {latest / 1e6:.3g} s of {lasts / 1e6:.3g} s: are their times in us?"
 
 
 def unlabelled_us(examples: Sequence[Example], label: str) -> tuple[int, int]:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import column, finite_numbers, instance, numbers, shown
 from taxel._base.errors import refused
-from taxel._base.messages import counted, escaped, plain
+from taxel._base.messages import counted, escaped, plain, three_digits
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.spikes import to_us
@@ -71,8 +71,9 @@ class Spread(NamedTuple):
     def __repr__(self) -> str:
         if np.isnan(self.mean):
             return "none"
-        sd = "" if np.isnan(self.sd) else f" ± {self.sd:.3g}"
-        return f"{self.mean:.3g}{sd} (median {self.median:.3g}, 95 % in {self.low:.3g} to {self.high:.3g})"
+        mean, sd, median, low, high = map(three_digits, (self.mean, self.sd, self.median, self.low, self.high))
+        spread = "" if np.isnan(self.sd) else f" ± {sd}"
+        return f"{mean}{spread} (median {median}, 95 % in {low} to {high})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import finite, instance
+from taxel._base.arguments import finite, instance, shown
 from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
-from taxel.detect import Example, Outcome, PlainRule, Readout, Score, score
+from taxel.detect import Example, Outcome, PlainRule, Readout, Score, recipes, score
 from taxel.detect.causes import count_drifted
 from taxel.detect.detector import detector
 from taxel.detect.readout import run_counting
@@ -231,6 +231,11 @@ def detect(
     unknown = sorted(
         {label for labels_of in events if labels_of is not None for label in labels_of} - set(readout.labels)
     )
+    for label in unknown:
+        if alike := [name for name in readout.labels if recipes.spelling(name) == recipes.spelling(label)]:
+            warnings.append(
+                f"truth has {shown(label)}, the readout {shown(alike[0])}: must be spelt alike to be scored"
+            )
     names = tuple(recording.title for recording in left_out)
     return Detecting(tuple(each), together, tuple(unknown), unlabelled, options.window_ms, tuple(warnings), names)
 

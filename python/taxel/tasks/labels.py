@@ -15,6 +15,7 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted, warn
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
+from taxel.detect.label_times import early
 from taxel.labels import Labels, beside, trial_of
 from taxel.recording import Recording, kind_of_file
 from taxel.recording.cut import span_us
@@ -249,6 +250,8 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
         end = last + (int(np.median(np.diff(frames))) if len(frames) > 1 else 0)
         near_us, late_us = 0, 0
     inside = {label: t[(t >= first) & (t <= end + late_us)] for label, t in events.items()}
+    if where_early := early(inside, first, last):
+        warn(f"the {total} events of {where} {where_early}", stacklevel=2)
     behind = sorted((int(time), label) for label, t in inside.items() for time in t[t > end + near_us])
     if behind:
         (at, label), begin = behind[0], beginning_us(np.array([first]))

@@ -35,6 +35,8 @@ GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
 
 #: How long before the first label the rest ends, and how long it must last at least, us.
 _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
+#: So long a stretch must be quiet, us.
+_QUIET_US = 500_000
 #: The noise is not known from fewer frames.
 _LEAST_FRAMES = 20
 #: A taxel in a unit of force or pressure reads more than its noise in a quiet stretch from so many times that on; more
@@ -129,7 +131,7 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     if span is None:
         error = ProblemError(
             f"{recording.path}: the rest of its taxels is not known, as no half second is quiet with nothing on it"
-            + _begun_loaded(source)
+            + (_slow(source) or _begun_loaded(source))
         )
         raise helped(error, "tare", "give")
     return TakenRest("quiet", _measured(recording, recorded(recording), span[1], span[0]), begin_us)
@@ -338,6 +340,12 @@ def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Ta
         )
         raise helped(error, "tare", "give")
     return _measured(recording, source, min(ends))
+
+
+def _slow(source: Events | Frames) -> str:
+    """Return that frames come so slowly that half a second holds none or one; else ""."""
+    apart_us = float(np.median(np.diff(source.t))) if isinstance(source, Frames) and len(source) > 1 else 0.0
+    return f": its frames are {apart_us / 1e6:.3g} s apart" if apart_us > _QUIET_US / 2 else ""
 
 
 def _begun_loaded(source: Events | Frames) -> str:

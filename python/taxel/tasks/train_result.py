@@ -8,7 +8,7 @@ from typing import Any
 
 from taxel._base.arguments import finite, flag, integer, mapping
 from taxel._base.errors import refused
-from taxel._base.messages import counted
+from taxel._base.messages import counted, three_digits
 from taxel._base.times import beginning_us
 from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained
 from taxel.detect.causes import Cause
@@ -286,15 +286,15 @@ class Training:
             if rule_score.found and score.found:
                 later = rule_score.delay.median > score.delay.median
                 when = " but knows later" if later else " and knows no later"
-                rule += f", known {rule_score.delay.median:+.3g} ms after the label (median)"
-                neuron += f", {score.delay.median:+.3g} ms"
+                rule += f", known {three_digits(rule_score.delay.median, '+')} ms after the label (median)"
+                neuron += f", {three_digits(score.delay.median, '+')} ms"
             yield f"{label}: the plain rule is better{when}: {rule}; the neuron: {neuron}; {_RULE_FILE}"
         for label in plain.sooner(self.scored.together):
             rule_score, score = (scores[label] for scores in (plain.together, self.scored.together))
             yield (
                 f"{label}: the plain rule is as good and knows sooner: {rule_score.rank[0]} missed and false, as the "
-                f"neuron, known {rule_score.delay.median:+.3g} ms after the label (median), the neuron "
-                f"{score.delay.median:+.3g} ms; {_RULE_FILE}"
+                f"neuron, known {three_digits(rule_score.delay.median, '+')} ms after the label (median), the neuron "
+                f"{three_digits(score.delay.median, '+')} ms; {_RULE_FILE}"
             )
         if plain.lacks:
             yield plain.lacks
@@ -334,8 +334,8 @@ class Training:
                 yield f"{label}: no input follows the labels, so they were learnt as given"
                 continue
             yield (
-                f"{label}: labels moved to what the sensor felt: median {alignment.median_ms:+.3g} ms, largest "
-                f"{alignment.largest_ms:+.3g} ms"
+                f"{label}: labels moved to what the sensor felt: median {three_digits(alignment.median_ms, '+')} ms, "
+                f"largest {three_digits(alignment.largest_ms, '+')} ms"
             )
             unpaired = ((self.recordings[k], t) for k, t in alignment.to_dict()["unpaired"])
             events = [
@@ -352,5 +352,9 @@ class Training:
 
 
 def _line(label: str, by: str, score: Score) -> str:
-    known = "never known" if not score.found else f"known {score.delay.median:+.3g} ms after the label (median)"
+    known = (
+        "never known"
+        if not score.found
+        else f"known {three_digits(score.delay.median, '+')} ms after the label (median)"
+    )
     return f"{label}, {by}: {score.found} of {score.events} found, {score.missed} missed, {score.false} false, {known}"

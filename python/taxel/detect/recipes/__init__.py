@@ -24,7 +24,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["chosen", "fitting", "for_labels", "knows", "names", "read"]
+__all__ = ["chosen", "fitting", "for_labels", "knows", "names", "read", "spelling"]
 
 #: The recipe of recordings that no other fits: its levels are shares of the running range, of any unit.
 _ANY = "gait_channel"
@@ -98,7 +98,7 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
         sensor = f"a grid of {array.rows} x {array.columns} taxels"
         others = [label for label in labels if _own(recipes[grids], label) is None]
         known = any(_own(values, label) for label in others for values in recipes.values())
-        if not known and not any(_OF_STEPS & set(_plain(label).split("_")) for label in others):
+        if not known and not any(_OF_STEPS & set(spelling(label).split("_")) for label in others):
             return grids, f"{'kinds of touch' if others else ' and '.join(labels)} on {sensor}"
     many = array.taxels > _MOST_CHANNELS
     for unit in (f"many {source.unit}",) * (many or not array.is_channels) + (source.unit,):
@@ -162,7 +162,7 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
     if rest is not None and not isinstance(rest, Mapping):
         rest = listed[text("recipe: other", rest, listed)]
     named = {label: _own(values, text("label", label)) for label in labels}
-    last = {label: _own(values, _plain(label).rpartition("_")[2]) for label in labels}
+    last = {label: _own(values, spelling(label).rpartition("_")[2]) for label in labels}
     neurons = {}
     for label in labels:
         alone = sum(last[label] in (named[kind], last[kind]) for kind in labels) == 1
@@ -189,10 +189,17 @@ def knows(recipe: str, label: str) -> bool:
 
 def _own(values: Mapping[str, Any], label: str) -> str | None:
     """Return the name of the recipe's own neuron for a label, or None."""
-    plain = _plain(label)
+    plain = spelling(label)
     name = values.get("also", {}).get(plain, plain)
     return name if name in values.get("neurons", {}) else None
 
 
-def _plain(label: str) -> str:
+def spelling(label: str) -> str:
+    """Return a label as recipes spell it: without capitals, blanks and hyphens.
+
+    Examples
+    --------
+    >>> spelling("Foot off")
+    'foot_off'
+    """
     return label.lower().replace(" ", "_").replace("-", "_")
