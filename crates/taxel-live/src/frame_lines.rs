@@ -146,6 +146,8 @@ pub struct FrameAssembler {
     bytes: u64,
     /// Whether the end of a frame was seen since reading began, so that the next one has its beginning.
     is_whole: bool,
+    /// Whether the lines were interrupted, so that a frame that lacks its beginning is a loss.
+    was_interrupted: bool,
     /// Stamp of the last frame, and its time, us.
     stamp: Option<f64>,
     last: Option<i64>,
@@ -190,6 +192,7 @@ impl FrameAssembler {
             rows: 0,
             bytes: 0,
             is_whole: false,
+            was_interrupted: false,
             stamp: None,
             last: None,
             arrived_ns: None,
@@ -346,7 +349,7 @@ impl FrameAssembler {
         let (rows, bytes) = (std::mem::take(&mut self.rows), std::mem::take(&mut self.bytes));
         if self.is_whole {
             self.count_unfinished(rows);
-        } else if rows > 0 {
+        } else if rows > 0 && self.was_interrupted {
             self.faults.count_left_out(LeftOut { unfinished: bytes, ..LeftOut::default() });
         }
     }
@@ -372,7 +375,7 @@ impl FrameAssembler {
     /// Handles an interruption: the next line begins a frame.
     pub fn restart(&mut self) {
         self.discard();
-        self.is_whole = false;
+        (self.is_whole, self.was_interrupted) = (false, true);
     }
 
     /// Ends at this time, ns since 1970: no line can come, so that what follows is no silence.
@@ -496,7 +499,7 @@ mod tests {
         assert!(!["1,2", "", "1,2", "3,4"].into_iter().any(&mut push));
         assert!(push(""));
         let lost = |frames: &FrameAssembler| frames.unread().unfinished_frames.lines;
-        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (0, 0, 3));
+        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (0, 0, 0));
         for text in ["5,6", "", "7,8"] {
             frames.push(&line(text), 0);
         }
@@ -505,7 +508,7 @@ mod tests {
         assert_eq!(lost(&frames), 2);
         frames.push(&line("9,9"), 0);
         frames.push(&line(""), 0);
-        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (2, 2, 6));
+        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (2, 2, 3));
     }
 
     #[test]

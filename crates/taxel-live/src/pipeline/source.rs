@@ -553,15 +553,12 @@ impl OpenedLines {
         Ok(())
     }
 
-    /// The next line that is whole text, if one arrives until then.
-    fn next(&mut self, until: Instant) -> Result<Option<(TextLine, i64)>> {
+    /// The next line that is whole text, if one arrives until then; the first one, which may lack its beginning, if it fits.
+    fn next(&mut self, until: Instant, fits: impl Fn(&TextLine) -> bool) -> Result<Option<(TextLine, i64)>> {
         loop {
-            while let Some((line, at_ns)) = self.reader.next(self.has_ended) {
+            while let Some((line, at_ns)) = self.reader.next_whole(self.has_ended, &fits) {
                 let text = &line.text;
-                if std::mem::take(&mut self.reader.is_cut) {
-                    // The line may lack its beginning.
-                    self.reader.lines.left_out.unfinished += line.bytes;
-                } else if line.cut
+                if line.cut
                     || text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t'))
                 {
                     // Neither numbers nor names.
@@ -583,7 +580,11 @@ impl OpenedLines {
         let until = Instant::now() + FIRST_LINE;
         let mut names: Option<Vec<String>> = None;
         let mut are_names = false;
-        while let Some((line, at_ns)) = self.next(until)? {
+        // The first line of a serial line is left out, as a part of a number is a number too.
+        let is_serial = matches!(self.reader.place(), LinePlace::Serial(_));
+        let mut may_be_cut = self.reader.is_cut;
+        while let Some((line, at_ns)) = self.next(until, |_| !is_serial)? {
+            let is_first = std::mem::take(&mut may_be_cut);
             let found: Vec<_> = cells(&line.text).collect();
             if found.is_empty() || line.text.starts_with('#') {
                 continue;
@@ -595,6 +596,7 @@ impl OpenedLines {
             let is_left = |k: usize| leave_out.iter().any(|left| index_of("", left, &columns) == Ok(k));
             if found.iter().enumerate().all(|(k, cell)| is_left(k) || number(cell).is_some()) {
                 self.begun.push((line, at_ns));
+                let columns = if is_first && !is_serial { self.columns_of_second(columns, until)? } else { columns };
                 return Ok(Some(columns));
             }
             are_names = line.text.contains([',', ';', '\t']) && found.iter().all(|cell| number(cell).is_none());
@@ -610,6 +612,21 @@ impl OpenedLines {
         Ok(names.filter(|_| are_names && !self.has_ended))
     }
 
+    /// The columns by the second line, where it has more numbers than the first one, which then lacks its beginning and is left
+    /// out.
+    fn columns_of_second(&mut self, columns: Vec<String>, until: Instant) -> Result<Vec<String>> {
+        let Some((second, at_ns)) = self.next(until, |_| true)? else { return Ok(columns) };
+        let numbers = cells(&second.text).map(|cell| number(&cell)).collect::<Option<Vec<_>>>();
+        self.begun.push((second, at_ns));
+        Ok(match numbers.filter(|numbers| numbers.len() > columns.len()) {
+            Some(numbers) => {
+                self.begun.remove(0);
+                (0..numbers.len()).map(numbered).collect()
+            }
+            None => columns,
+        })
+    }
+
     /// Measures the time from one frame to the next, us, from what arrives first.
     #[allow(clippy::cast_precision_loss)]
     fn frame_us(&mut self, layout: &FrameLayout, source: &SourceText) -> Result<f64> {
@@ -618,7 +635,7 @@ impl OpenedLines {
             self.begun.iter().filter_map(|(line, at_ns)| Some(frames.push(line, *at_ns)?.0)).collect();
         let mut until = Instant::now() + FIRST_LINE;
         while times.len() <= MEASURED_FRAMES {
-            let Some((line, at_ns)) = self.next(until)? else { break };
+            let Some((line, at_ns)) = self.next(until, |line| frames.fits(line))? else { break };
             if let Some((t, _)) = frames.push(&line, at_ns) {
                 times.push(t);
                 if times.len() == 2 {

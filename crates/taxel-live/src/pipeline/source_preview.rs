@@ -8,6 +8,7 @@ use super::source::{SourcePlace, SourceText};
 use crate::Result;
 use crate::frame_lines::{cells, number};
 use crate::line_input::LineReader;
+use crate::line_place::LinePlace;
 
 /// Number of lines that are shown, the last ones.
 const SHOWN: usize = 12;
@@ -50,14 +51,12 @@ impl SourcePreview {
             return Err(problem!("source {:?}: sends no lines that could be shown", source.text).into());
         };
         let mut reader = LineReader::open(place)?;
+        let is_serial = matches!(place, LinePlace::Serial(_));
         let (until, mut shown, mut found) = (Instant::now() + most, vec![], vec![]);
         let mut ended = false;
         while !ended && Instant::now() < until && found.len() < ENOUGH {
             ended = reader.fill().map_err(|error| reader.broken(error))?;
-            while let Some((line, at_ns)) = reader.next(ended) {
-                if std::mem::take(&mut reader.is_cut) {
-                    continue;
-                }
+            while let Some((line, at_ns)) = reader.next_whole(ended, |_| !is_serial) {
                 let cells: Vec<_> = cells(&line.text).collect();
                 let numbers: Option<Vec<f64>> = cells.iter().map(|cell| number(cell)).collect();
                 let is_empty = cells.is_empty();

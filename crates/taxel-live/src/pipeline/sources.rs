@@ -185,12 +185,8 @@ impl NumberStream {
                     continue;
                 }
             };
-            while let Some((line, at_ns)) = reader.next(ended) {
-                if std::mem::take(&mut reader.is_cut) && self.stream.parse(&line.text).is_none() {
-                    self.count_left_out(LeftOut { unfinished: line.bytes, ..LeftOut::default() })?;
-                } else {
-                    self.line(at_ns, &line)?;
-                }
+            while let Some((line, at_ns)) = reader.next_whole(ended, |line| self.stream.parse(&line.text).is_some()) {
+                self.line(at_ns, &line)?;
                 if std::mem::take(&mut failed) {
                     *lock(&self.trouble) = None;
                 }
