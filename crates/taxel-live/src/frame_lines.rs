@@ -31,6 +31,8 @@ pub struct FrameLayout {
     pub names: Vec<String>,
     /// Time from one frame to the next, us.
     pub frame_us: f64,
+    /// Whether the lines waited in a file until they were read, so that their arrival is no clock to compare with.
+    pub waited: bool,
 }
 
 /// Where a frame of several lines ends.
@@ -173,10 +175,11 @@ impl FrameAssembler {
     /// Begins without any line.
     #[must_use]
     pub fn new(layout: FrameLayout) -> Self {
-        let faults = StreamFaults::by_clock(match layout.time[..] {
+        let unit_us = match layout.time[..] {
             [(_, unit_us)] => unit_us,
             _ => 1.0,
-        });
+        };
+        let faults = StreamFaults::by_clock(unit_us, layout.waited);
         let mut is_read = vec![false; layout.fields];
         let clocks = layout.time.iter().map(|(field, _)| field);
         layout.values.iter().chain(clocks).for_each(|&field| is_read[field] = true);
@@ -472,6 +475,7 @@ mod tests {
             unit_is_stated: false,
             names: vec![],
             frame_us: 10_000.0,
+            waited: false,
         }
     }
 

@@ -12,7 +12,7 @@ use super::frame_block::FrameBlock;
 use super::readout_queue::QuietUntil;
 use crate::capture::Batch;
 use crate::clock::{BoardClock, Pace};
-use crate::frame_lines::read_message;
+use crate::frame_lines::{FrameLayout, read_message};
 
 /// Shortest interval at which the readout's time is advanced while no frames arrive.
 const TICK: Duration = Duration::from_micros(500);
@@ -22,6 +22,8 @@ const NOISE_FRAMES: usize = 32;
 
 pub(super) struct FrameStage {
     frame_us: f64,
+    /// Whether the lines waited in a file, so that their arrival shows no pace of a clock.
+    waited: bool,
     guard_frames: f64,
     taxels: usize,
     columns: usize,
@@ -44,9 +46,11 @@ pub(super) struct FrameStage {
 }
 
 impl FrameStage {
-    pub(super) fn new(array: &Array, frame_us: f64, guard_frames: f64) -> Self {
+    pub(super) fn new(layout: &FrameLayout, guard_frames: f64) -> Self {
+        let array = &layout.array;
         Self {
-            frame_us,
+            frame_us: layout.frame_us,
+            waited: layout.waited,
             guard_frames,
             taxels: array.len(),
             columns: array.columns.into(),
@@ -78,7 +82,7 @@ impl FrameStage {
             self.first.get_or_insert(t);
             self.latest = Some((t, message.arrived_ns));
             self.count += 1;
-            if self.clock.note(t, message.arrived_ns) {
+            if self.clock.note(t, message.arrived_ns) && !self.waited {
                 self.pace = self.clock.pace();
             }
             is_new |= self.fit_steps();

@@ -319,7 +319,8 @@ impl SourceText {
             return Ok(SourceKind::Frames(input, Box::new(layout), opened));
         }
         let (columns, opened) = self.columns_or_first_line(input.as_ref(), wait)?;
-        let stream = self.stream(columns).map_err(in_text)?;
+        let waited = input.as_ref().is_some_and(LinePlace::is_regular_file);
+        let stream = StreamColumns { waited, ..self.stream(columns).map_err(in_text)? };
         Ok(SourceKind::Numbers(input, stream, opened))
     }
 
@@ -419,6 +420,7 @@ impl SourceText {
             unit: self.unit.clone().unwrap_or_else(|| "counts".to_owned()),
             unit_is_stated: self.unit.is_some(),
             frame_us: self.rate_hz.map_or(1.0, |rate_hz| 1e6 / rate_hz),
+            waited: input.is_some_and(LinePlace::is_regular_file),
         };
         layout.check()?;
         if self.rate_hz.is_none() {

@@ -102,7 +102,7 @@ impl Stages {
         let source = match &shared.frames {
             None => SourceStage::Board(Box::new(DecodeStage::new(options))),
             Some(input) => {
-                let stage = FrameStage::new(&options.array, input.layout.frame_us, options.guard_frames);
+                let stage = FrameStage::new(&input.layout, options.guard_frames);
                 SourceStage::Frames(Box::new(stage))
             }
         };

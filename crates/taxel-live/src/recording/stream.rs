@@ -22,6 +22,9 @@ pub struct StreamColumns {
     /// Unit of that clock, us.
     #[serde(default = "default_unit")]
     pub unit_us: f64,
+    /// Whether the lines waited in a file until they were read, so that their arrival is no clock to compare with.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub waited: bool,
 }
 
 fn default_unit() -> f64 {
@@ -35,7 +38,7 @@ impl StreamColumns {
     pub fn of_columns(columns: Vec<String>) -> Self {
         let time = columns.iter().find_map(|name| Some((name.clone(), clock_unit_us(name)?)));
         let (time, unit_us) = time.map_or((None, 1.0), |(name, unit_us)| (Some(name), unit_us));
-        Self { columns, time, unit_us }
+        Self { columns, time, unit_us, waited: false }
     }
 
     /// The names of the columns of values, without the clock.
@@ -191,13 +194,13 @@ impl StreamFaults {
     /// None so far.
     #[must_use]
     pub fn new(stream: &StreamColumns) -> Self {
-        Self::by_clock(stream.unit_us)
+        Self::by_clock(stream.unit_us, stream.waited)
     }
 
-    /// None so far, of lines with stamps in this unit, us.
+    /// None so far, of lines with stamps in this unit, us, that may have `waited` in a file.
     #[must_use]
-    pub fn by_clock(unit_us: f64) -> Self {
-        let clock = StreamClock::new(unit_us);
+    pub fn by_clock(unit_us: f64, waited: bool) -> Self {
+        let clock = StreamClock::new(unit_us, waited);
         Self { strange: 0, missing: 0, left_out: LeftOut::default(), clock }
     }
 
@@ -406,6 +409,18 @@ mod tests {
             // In packets of 5 s a clock that is off by 3 % agrees with one arrival or other for 170 s.
             let latest = if seed % 3 == 1 { 170_000_000 } else { 60_000_000 };
             assert!(told.after.is_some_and(|after| after <= latest), "seed {seed}, rate {rate}: {told:?}");
+        }
+    }
+
+    #[test]
+    fn lines_that_waited_in_a_file_have_no_clock_to_compare_with_and_step_back_as_others_do() {
+        let stream = StreamColumns { waited: true, ..stream(&["t_us", "a"]) };
+        for (rate, period_us) in [(1.0, 1e4), (300.0, 1e4), (0.1, 1e5), (1.0, 3e6)] {
+            let mut stamps = running(rate, period_us, 200.0, |_| 0.0);
+            assert_eq!(times(&stream, &stamps).1, Counted::default(), "rate {rate}");
+            let (last, at_ns) = *stamps.last().unwrap();
+            stamps.push((last - 1000.0, at_ns));
+            assert_eq!(times(&stream, &stamps).1.back, 1, "rate {rate}");
         }
     }
 
