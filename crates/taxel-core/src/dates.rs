@@ -16,7 +16,7 @@ pub fn seconds_of(text: &str) -> Option<f64> {
         let of_day = day_of_iso(text).and_then(|(days, rest)| Some(days * DAY_US + time_behind(rest)?));
         of_day.or_else(|| time_of_day(text))?
     };
-    // So many us since 1970 are exact, years from 1 to 9999.
+    // So many us are exact from 1685 to 2255.
     Some(us as f64 / 1e6)
 }
 
@@ -131,8 +131,26 @@ mod tests {
             assert_eq!(seconds_of(text), Some(seconds), "{text}");
         }
         for text in [
-            "", "-", "nan", "12.5", "1", "01/02/1970 00:00", "2023-02-29", "31.04.2024", "24:00:00", "10:60", "10:15:",
-            "10:15.5", "10:15:02.", "2024-05-01T", "2024-05-01x10:15", "+1.5.2024", "2024-5-1", "1e5", "\u{663}0:15", "é",
+            "",
+            "-",
+            "nan",
+            "12.5",
+            "1",
+            "01/02/1970 00:00",
+            "2023-02-29",
+            "31.04.2024",
+            "24:00:00",
+            "10:60",
+            "10:15:",
+            "10:15.5",
+            "10:15:02.",
+            "2024-05-01T",
+            "2024-05-01x10:15",
+            "+1.5.2024",
+            "2024-5-1",
+            "1e5",
+            "\u{663}0:15",
+            "é",
         ] {
             assert_eq!(seconds_of(text), None, "{text:?}");
         }

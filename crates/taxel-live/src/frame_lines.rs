@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use serde::Serialize;
 use taxel_core::{Array, problem};
 
-use crate::recording::{DamageCounts, FrameProperties, SILENCES, SILENT_MS, StreamFaults, is_held};
+use crate::recording::{DamageCounts, FrameProperties, SILENCES, SILENT_MS, StreamFaults, cells, date, number};
 use crate::text_lines::{LeftOut, TextLine};
 
 /// How lines of numbers make frames.
@@ -17,6 +17,8 @@ pub struct FrameLayout {
     pub fields: usize,
     /// The fields whose sum is the time of the frame, each with its unit, us; without any it is the time of arrival.
     pub time: Vec<(usize, f64)>,
+    /// Whether the field of the time holds dates, or times of a day, as texts, which count as seconds.
+    pub dates: bool,
     /// The fields with values, in the order of the taxels.
     pub values: Vec<usize>,
     /// Where a frame ends.
@@ -257,7 +259,9 @@ impl FrameAssembler {
     fn read(&self, text: &str, numbers: &mut Vec<f64>) -> bool {
         numbers.clear();
         for cell in cells(text) {
-            let value = match self.is_read.get(numbers.len()) {
+            let field = numbers.len();
+            let value = match self.is_read.get(field) {
+                Some(true) if self.holds_date(field) => date(&cell),
                 Some(true) => number(&cell),
                 Some(false) => Some(f64::NAN),
                 None => None,
@@ -268,11 +272,20 @@ impl FrameAssembler {
         numbers.len() == self.layout.fields
     }
 
+    fn holds_date(&self, field: usize) -> bool {
+        self.layout.dates && self.layout.time.iter().any(|(clock, _)| *clock == field)
+    }
+
     /// Counts a line that is no part of a frame.
     fn count_unread(&mut self, text: &str) {
         self.faults.strange();
         let is_text = !text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t'));
-        let kind = match cells(text).all(|cell| number(&cell).is_some()) {
+        let is_number = |(k, cell): (usize, Cow<'_, str>)| match self.holds_date(k) {
+            true => date(&cell).is_some(),
+            false => number(&cell).is_some(),
+        };
+        let are_numbers = cells(text).enumerate().all(is_number);
+        let kind = match are_numbers {
             _ if !is_text => &mut self.unread.no_text,
             true => &mut self.unread.other_length,
             false => &mut self.unread.text,
@@ -419,26 +432,6 @@ impl FrameAssembler {
     }
 }
 
-/// The cells of a line, which semicolons (then a comma may be a decimal one), commas, tabs or blanks separate; a separator may
-/// end the line.
-pub(crate) fn cells(text: &str) -> impl Iterator<Item = Cow<'_, str>> {
-    let text = text.trim();
-    let separator = [';', ',', '\t'].into_iter().find(|&separator| text.contains(separator));
-    let text = separator.and_then(|separator| text.strip_suffix(separator)).unwrap_or(text);
-    let split =
-        text.split(move |c: char| if let Some(separator) = separator { c == separator } else { c.is_whitespace() });
-    let cells = split.map(str::trim).filter(move |cell| separator.is_some() || !cell.is_empty());
-    cells.map(move |cell| {
-        let is_decimal = separator == Some(';') && cell.contains(',');
-        if is_decimal { Cow::Owned(cell.replace(',', ".")) } else { Cow::Borrowed(cell) }
-    })
-}
-
-/// The number in a cell, if it is one that frames hold.
-pub(crate) fn number(cell: &str) -> Option<f64> {
-    cell.parse().ok().filter(|&value| is_held(value))
-}
-
 /// A frame as a message: its time, us, and its values.
 pub fn write_message(t: i64, values: &[f32], out: &mut Vec<u8>) {
     out.clear();
@@ -476,6 +469,7 @@ mod tests {
             names: vec![],
             frame_us: 10_000.0,
             waited: false,
+            dates: false,
         }
     }
 

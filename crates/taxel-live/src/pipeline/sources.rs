@@ -24,7 +24,7 @@ use crate::frame_lines::FrameLayout;
 use crate::line_input::LineReader;
 use crate::line_place::LinePlace;
 use crate::locked::lock;
-use crate::recording::{self, DamageCounts, SourceWriter, StreamColumns, StreamFaults, fields, now_ns};
+use crate::recording::{self, DamageCounts, SourceWriter, StreamColumns, StreamFaults, cells, now_ns};
 use crate::text_lines::{LeftOut, TextLine};
 use crate::{Error, Result};
 
@@ -94,7 +94,7 @@ impl NumberStream {
             Some(values) if !line.cut => self.sample(arrived_ns, &values),
             // A repeated line of column names contains no numbers.
             None if !line.cut
-                && (fields(text).eq(self.stream.columns.iter().map(String::as_str)) || text.trim().is_empty()) =>
+                && (cells(text).eq(self.stream.columns.iter().map(String::as_str)) || text.trim().is_empty()) =>
             {
                 Ok(())
             }

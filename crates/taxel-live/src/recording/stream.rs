@@ -2,8 +2,11 @@
 
 mod clock;
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use taxel_core::dates::seconds_of;
 use taxel_core::problem;
 
 use super::damage::{DamageCounts, IN_NO_LINE, MISSING, STRANGE, UNFINISHED_LINES};
@@ -25,6 +28,9 @@ pub struct StreamColumns {
     /// Whether the lines waited in a file until they were read, so that their arrival is no clock to compare with.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub waited: bool,
+    /// Whether the clock's column holds dates, or times of a day, as texts; they are recorded as seconds.
+    #[serde(skip)]
+    pub dates: bool,
 }
 
 fn default_unit() -> f64 {
@@ -38,7 +44,7 @@ impl StreamColumns {
     pub fn of_columns(columns: Vec<String>) -> Self {
         let time = columns.iter().find_map(|name| Some((name.clone(), clock_unit_us(name)?)));
         let (time, unit_us) = time.map_or((None, 1.0), |(name, unit_us)| (Some(name), unit_us));
-        Self { columns, time, unit_us, waited: false }
+        Self { columns, time, unit_us, waited: false, dates: false }
     }
 
     /// The names of the columns of values, without the clock.
@@ -78,12 +84,13 @@ impl StreamColumns {
         values.len() == self.columns.len()
     }
 
-    /// Parses a line of numbers separated by commas, semicolons, tabs or blanks; `None` if a field is not a number that
-    /// is held, or if the number of fields differs from that of columns.
+    /// Parses a line of numbers ([`cells`]); `None` if a cell is not a number that is held, or if the number of cells differs
+    /// from that of columns.
     #[must_use]
     pub fn parse(&self, line: &str) -> Option<Vec<f64>> {
-        let number = |field: &str| field.parse().ok().filter(|&value| is_held(value));
-        let values = fields(line).map(number).collect::<Option<Vec<f64>>>()?;
+        let dated = self.columns.iter().position(|name| self.dates && Some(name) == self.time.as_ref());
+        let number = |(k, cell): (usize, Cow<'_, str>)| if Some(k) == dated { date(&cell) } else { number(&cell) };
+        let values = cells(line).enumerate().map(number).collect::<Option<Vec<f64>>>()?;
         self.fits(&values).then_some(values)
     }
 
@@ -111,9 +118,29 @@ pub(crate) fn is_held(value: f64) -> bool {
     value.is_nan() || value.abs() <= f64::from(f32::MAX)
 }
 
-/// The fields of a line of text.
-pub fn fields(line: &str) -> impl Iterator<Item = &str> {
-    line.split([',', ';', '\t', ' ']).filter(|field| !field.is_empty())
+/// The cells of a line, which semicolons (then a comma may be a decimal one), commas, tabs or blanks separate; a separator may
+/// end the line.
+pub(crate) fn cells(text: &str) -> impl Iterator<Item = Cow<'_, str>> {
+    let text = text.trim();
+    let separator = [';', ',', '\t'].into_iter().find(|&separator| text.contains(separator));
+    let text = separator.and_then(|separator| text.strip_suffix(separator)).unwrap_or(text);
+    let split =
+        text.split(move |c: char| if let Some(separator) = separator { c == separator } else { c.is_whitespace() });
+    let cells = split.map(str::trim).filter(move |cell| separator.is_some() || !cell.is_empty());
+    cells.map(move |cell| {
+        let is_decimal = separator == Some(';') && cell.contains(',');
+        if is_decimal { Cow::Owned(cell.replace(',', ".")) } else { Cow::Borrowed(cell) }
+    })
+}
+
+/// The number in a cell, if it is one that frames hold.
+pub(crate) fn number(cell: &str) -> Option<f64> {
+    cell.parse().ok().filter(|&value| is_held(value))
+}
+
+/// The seconds of a date, or of a time of a day, in a cell with or without quotes.
+pub(crate) fn date(cell: &str) -> Option<f64> {
+    seconds_of(cell.trim_matches(['"', '\'']))
 }
 
 /// The samples of a stream, as they arrived.
