@@ -135,6 +135,7 @@ function showUnits() {
   const live = opened ? null : hello?.frames;
   const { unit, step, zero } = frames ?? live ?? { unit: "ticks", step: 1, zero: 0 };
   maps.values = { unit, step, zero, frames: frames !== null && frames !== undefined };
+  maps.name();
   numbering.number_us = frames?.number_us ?? null;
   numbering.begin_us = beginning(opened?.start_us ?? live?.begin_us ?? null);
   write(part("begun", HTMLElement), begun() && `0 s: ${begun()}`);
