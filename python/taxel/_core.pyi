@@ -207,6 +207,7 @@ def pairwise(
 
 UNKNOWN: Final = 65_535
 LOADED_TICKS: Final = 8.0
+FORCE_UNITS: Final[tuple[str, ...]]
 
 @final
 class HeldValues:

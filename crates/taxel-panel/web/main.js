@@ -67,6 +67,10 @@ const description = new Description(server, (name) => {
   reread = name;
   ask(name);
 }, (name) => labels.count(name), () => showTab("view"));
+part("turn-values", HTMLButtonElement).onclick = () => {
+  if (opened) return void description.write({ falls: true });
+  if (hello?.source) board.connection.turn(hello.source).catch(failed);
+};
 const recorder = new Recorder(server, failed, () => showTab("record"));
 const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, mistakes: mistakes.shown, notes: notes.withTime, cut: view.cut }));
 

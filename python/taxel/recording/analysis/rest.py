@@ -19,7 +19,7 @@ from taxel.frames import Frames
 from taxel.tare import Tare
 
 #: Units of force and pressure: an unloaded taxel reads 0 in them.
-FORCE_UNITS = ("N", "mN", "kPa", "Pa", "N/cm2")
+FORCE_UNITS = _core.FORCE_UNITS
 #: The note of a tare that was not measured.
 BY_UNIT = "0, by the unit"
 #: Reading: a noise floor is so many standard deviations of the noise, so that two neighbours rarely exceed it together,
