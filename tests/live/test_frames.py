@@ -162,6 +162,18 @@ def test_lines_that_are_no_frame_are_counted_and_the_next_frame_is_whole(tmp_pat
     assert taxel.open(tmp_path / "a.mcap").verdict.damaged == summary.verdict.damaged
 
 
+@pytest.mark.parametrize("keys", [",array=1x3", ",columns=a:b:c", ""])
+def test_a_frame_amid_which_reading_began_is_no_fault(tmp_path: Path, keys: str) -> None:
+    with (
+        served("2,3\n1,2,3\n4,5,6\n") as address,
+        Live(sources=f"lines+tcp:{address}{keys},rate=10", record=tmp_path / "a.mcap") as live,
+    ):
+        until(lambda: live.counters["frames"] == 2)
+        summary = live.stop()
+    assert (dict(summary.verdict.damaged), dict(summary.verdict.noted)) == ({}, {})
+    assert taxel.open(tmp_path / "a.mcap").frames().values[:, 0].tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
 def test_kinds_of_lines_that_are_no_frame_are_named_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = "Mat 1.0 ready\n1,2\n3\n4,5\nERR 7\n6,7\n8,9\n"
     with served(text) as address:

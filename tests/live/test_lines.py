@@ -196,3 +196,21 @@ def test_a_serial_line_is_read_again_after_it_was_unplugged(tmp_path: Path, kind
     assert (counts["strange"], counts["bytes_in_no_line"], counts["bytes_of_unfinished_lines"]) == (0, 0, 2)
     # The line is back.
     assert counts["trouble"] is None
+
+
+@pytest.mark.parametrize("keys", [",columns=a:b:c", ""])
+def test_the_rest_of_a_line_amid_which_reading_began_is_no_fault(tmp_path: Path, keys: str) -> None:
+    place = tmp_path / "pipe"
+    sources = {"imu": f"lines:{place}{keys}"}
+    with (
+        writing(place, [b"5,6\n1,2,3\n4,5,6\n7,8,9\n"]) as written,
+        Live(0, host=LOOPBACK, record=tmp_path / "a.mcap", sources=sources) as live,
+    ):
+        assert written.wait(20)
+        until(lambda: counts_of(live)["lines"] == 3)
+        summary = live.stop()
+    counts, verdict = summary.counters["sources"]["imu"], summary.verdict.parts["imu"]
+    assert (counts["lines"], counts["strange"], counts["bytes_of_unfinished_lines"]) == (3, 0, 0)
+    assert (dict(verdict.damaged), dict(verdict.noted)) == ({}, {})
+    recording = taxel.open(tmp_path / "a.mcap").sources["imu"]
+    assert recording.frames().values[:, 0].tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9]]

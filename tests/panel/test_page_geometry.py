@@ -113,3 +113,16 @@ def test_channels_are_called_as_the_columns_of_their_table(count: int, chromium:
         shows(page, "taxel-name", "^Daumen$")
         ends = "Daumen\nZeigefinger\n2" if count == 3 else "Daumen\ns19"
         assert page.locator("#channel-names").all_inner_texts() == [ends]
+
+
+@pytest.mark.parametrize(
+    ("unit", "title"),
+    [("N", "Force"), ("N/cm2", "Pressure"), ("counts", "Counts"), ("events/5 ms", "Events"), ("mV", "Values")],
+)
+def test_the_map_is_headed_with_the_quantity_of_its_unit(chromium: Any, tmp_path: Path, unit: str, title: str) -> None:
+    values = np.zeros((60, 4, 5))
+    values[20:, 1, 1] = 10
+    taxel.convert(Frames(values, np.arange(60) * 20_000, unit=unit, array=SENSORS["grid"]), tmp_path / "a.npz")
+    with shown(chromium, tmp_path / "a.npz") as page:
+        shows(page, "pressure-title", f"^{title}$")
+        assert page.locator("#pressure-frame").get_attribute("aria-label").startswith(f"{title}: ")

@@ -140,6 +140,16 @@ impl Encoder {
         }
     }
 
+    /// The noise floor above its tare, in the sensor's unit, of a composite the largest; 0 of an encoder without one.
+    pub(crate) fn noise_floor(&self) -> f64 {
+        match self {
+            Self::ContactArea(encoder) => encoder.noise_floor,
+            Self::Moments(encoder) => encoder.noise_floor,
+            Self::Composite(encoder) => encoder.parts.values().map(Self::noise_floor).fold(0.0, f64::max),
+            _ => 0.0,
+        }
+    }
+
     /// Parses an encoder from JSON and checks every parameter; missing parameters have their defaults.
     ///
     /// # Errors

@@ -13,4 +13,4 @@ pub use preload::{LOADED_TICKS, preload, preload_text};
 pub use steps::ValueSteps;
 pub(crate) use tracked::TaxelGrid;
 pub use tracked::{QUIET_US, TOUCHED_TOGETHER, TrackedRest};
-pub use value::{NOISE_FLOOR, Rest, Value, above_noise, step_of, touched_from};
+pub use value::{FORCE_UNITS, NOISE_FLOOR, Rest, Value, above_noise, step_of, touched_from};

@@ -15,7 +15,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
         &[
             &["error"],
             &["reading"],
-            &["allowed", "vectors"],
+            &["allowed", "dates", "vectors"],
             &["parameters", "array"],
             &["events", "frames", "spikes"],
             &["held"],

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use serde::Serialize;
 use taxel_core::{Array, problem};
 
-use crate::recording::{DamageCounts, FrameProperties, SILENCES, SILENT_MS, StreamFaults, is_held};
+use crate::recording::{DamageCounts, FrameProperties, SILENCES, SILENT_MS, StreamFaults, cells, date, number};
 use crate::text_lines::{LeftOut, TextLine};
 
 /// How lines of numbers make frames.
@@ -17,6 +17,8 @@ pub struct FrameLayout {
     pub fields: usize,
     /// The fields whose sum is the time of the frame, each with its unit, us; without any it is the time of arrival.
     pub time: Vec<(usize, f64)>,
+    /// Whether the field of the time holds dates, or times of a day, as texts, which count as seconds.
+    pub dates: bool,
     /// The fields with values, in the order of the taxels.
     pub values: Vec<usize>,
     /// Where a frame ends.
@@ -31,6 +33,8 @@ pub struct FrameLayout {
     pub names: Vec<String>,
     /// Time from one frame to the next, us.
     pub frame_us: f64,
+    /// Whether the lines waited in a file until they were read, so that their arrival is no clock to compare with.
+    pub waited: bool,
 }
 
 /// Where a frame of several lines ends.
@@ -146,6 +150,8 @@ pub struct FrameAssembler {
     bytes: u64,
     /// Whether the end of a frame was seen since reading began, so that the next one has its beginning.
     is_whole: bool,
+    /// Whether the lines were interrupted, so that a frame that lacks its beginning is a loss.
+    was_interrupted: bool,
     /// Stamp of the last frame, and its time, us.
     stamp: Option<f64>,
     last: Option<i64>,
@@ -171,10 +177,11 @@ impl FrameAssembler {
     /// Begins without any line.
     #[must_use]
     pub fn new(layout: FrameLayout) -> Self {
-        let faults = StreamFaults::by_clock(match layout.time[..] {
+        let unit_us = match layout.time[..] {
             [(_, unit_us)] => unit_us,
             _ => 1.0,
-        });
+        };
+        let faults = StreamFaults::by_clock(unit_us, layout.waited);
         let mut is_read = vec![false; layout.fields];
         let clocks = layout.time.iter().map(|(field, _)| field);
         layout.values.iter().chain(clocks).for_each(|&field| is_read[field] = true);
@@ -190,6 +197,7 @@ impl FrameAssembler {
             rows: 0,
             bytes: 0,
             is_whole: false,
+            was_interrupted: false,
             stamp: None,
             last: None,
             arrived_ns: None,
@@ -251,7 +259,9 @@ impl FrameAssembler {
     fn read(&self, text: &str, numbers: &mut Vec<f64>) -> bool {
         numbers.clear();
         for cell in cells(text) {
-            let value = match self.is_read.get(numbers.len()) {
+            let field = numbers.len();
+            let value = match self.is_read.get(field) {
+                Some(true) if self.holds_date(field) => date(&cell),
                 Some(true) => number(&cell),
                 Some(false) => Some(f64::NAN),
                 None => None,
@@ -262,11 +272,20 @@ impl FrameAssembler {
         numbers.len() == self.layout.fields
     }
 
+    fn holds_date(&self, field: usize) -> bool {
+        self.layout.dates && self.layout.time.iter().any(|(clock, _)| *clock == field)
+    }
+
     /// Counts a line that is no part of a frame.
     fn count_unread(&mut self, text: &str) {
         self.faults.strange();
         let is_text = !text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t'));
-        let kind = match cells(text).all(|cell| number(&cell).is_some()) {
+        let is_number = |(k, cell): (usize, Cow<'_, str>)| match self.holds_date(k) {
+            true => date(&cell).is_some(),
+            false => number(&cell).is_some(),
+        };
+        let are_numbers = cells(text).enumerate().all(is_number);
+        let kind = match are_numbers {
             _ if !is_text => &mut self.unread.no_text,
             true => &mut self.unread.other_length,
             false => &mut self.unread.text,
@@ -346,7 +365,7 @@ impl FrameAssembler {
         let (rows, bytes) = (std::mem::take(&mut self.rows), std::mem::take(&mut self.bytes));
         if self.is_whole {
             self.count_unfinished(rows);
-        } else if rows > 0 {
+        } else if rows > 0 && self.was_interrupted {
             self.faults.count_left_out(LeftOut { unfinished: bytes, ..LeftOut::default() });
         }
     }
@@ -372,7 +391,7 @@ impl FrameAssembler {
     /// Handles an interruption: the next line begins a frame.
     pub fn restart(&mut self) {
         self.discard();
-        self.is_whole = false;
+        (self.is_whole, self.was_interrupted) = (false, true);
     }
 
     /// Ends at this time, ns since 1970: no line can come, so that what follows is no silence.
@@ -413,26 +432,6 @@ impl FrameAssembler {
     }
 }
 
-/// The cells of a line, which semicolons (then a comma may be a decimal one), commas, tabs or blanks separate; a separator may
-/// end the line.
-pub(crate) fn cells(text: &str) -> impl Iterator<Item = Cow<'_, str>> {
-    let text = text.trim();
-    let separator = [';', ',', '\t'].into_iter().find(|&separator| text.contains(separator));
-    let text = separator.and_then(|separator| text.strip_suffix(separator)).unwrap_or(text);
-    let split =
-        text.split(move |c: char| if let Some(separator) = separator { c == separator } else { c.is_whitespace() });
-    let cells = split.map(str::trim).filter(move |cell| separator.is_some() || !cell.is_empty());
-    cells.map(move |cell| {
-        let is_decimal = separator == Some(';') && cell.contains(',');
-        if is_decimal { Cow::Owned(cell.replace(',', ".")) } else { Cow::Borrowed(cell) }
-    })
-}
-
-/// The number in a cell, if it is one that frames hold.
-pub(crate) fn number(cell: &str) -> Option<f64> {
-    cell.parse().ok().filter(|&value| is_held(value))
-}
-
 /// A frame as a message: its time, us, and its values.
 pub fn write_message(t: i64, values: &[f32], out: &mut Vec<u8>) {
     out.clear();
@@ -469,6 +468,8 @@ mod tests {
             unit_is_stated: false,
             names: vec![],
             frame_us: 10_000.0,
+            waited: false,
+            dates: false,
         }
     }
 
@@ -496,7 +497,7 @@ mod tests {
         assert!(!["1,2", "", "1,2", "3,4"].into_iter().any(&mut push));
         assert!(push(""));
         let lost = |frames: &FrameAssembler| frames.unread().unfinished_frames.lines;
-        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (0, 0, 3));
+        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (0, 0, 0));
         for text in ["5,6", "", "7,8"] {
             frames.push(&line(text), 0);
         }
@@ -505,7 +506,7 @@ mod tests {
         assert_eq!(lost(&frames), 2);
         frames.push(&line("9,9"), 0);
         frames.push(&line(""), 0);
-        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (2, 2, 6));
+        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (2, 2, 3));
     }
 
     #[test]

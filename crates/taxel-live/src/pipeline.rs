@@ -10,6 +10,7 @@
 mod copies;
 mod counters;
 mod decode_stage;
+mod falling_values;
 mod frame_block;
 mod frame_input;
 mod frame_stage;
@@ -23,6 +24,7 @@ mod readout_stage;
 mod receive_stage;
 mod record_stage;
 mod recording_switch;
+mod rest_shift;
 mod running_readout;
 mod running_recording;
 mod sending;

@@ -37,8 +37,8 @@ pub use mcap_reader::{
 };
 pub use mcap_writer::{SourceWriter, Writer};
 pub use output::OutputFile;
-pub use stream::{Samples, StreamColumns, StreamFaults, fields};
-pub(crate) use stream::{UNITS_US, clock_unit_us, is_held};
+pub use stream::{Samples, StreamColumns, StreamFaults};
+pub(crate) use stream::{UNITS_US, cells, clock_unit_us, date, number};
 pub use topic::Topic;
 pub(crate) use verdict::JUMPED_BEFORE;
 pub use verdict::{Basis, Condition, FileEnding, NOTHING_LOST, Rebuilt, RecordingCounts, RecordingStatus, Verdict};

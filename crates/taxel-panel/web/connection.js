@@ -120,11 +120,7 @@ export class Connection {
       });
     };
     const falls = part("numbers-falls", HTMLInputElement);
-    falls.onchange = () => {
-      const others = this.source.input.value.split(",").filter((key) => !key.startsWith("falls="));
-      this.source.input.value = [...others, ...(falls.checked ? ["falls=true"] : [])].join(",");
-      this.showSource();
-    };
+    falls.onchange = () => this.state(this.source.input.value, falls.checked);
     this.source.input.oninput = () => this.showSource();
     const name = part("layout-name", HTMLInputElement);
     part("layout-save", HTMLButtonElement).onclick = () => {
@@ -142,6 +138,19 @@ export class Connection {
         delta.checked = !delta.checked;
         failed(error);
       });
+  }
+
+  /** States whether the values of a source are turned. @param {string} source @param {boolean} falls */
+  state(source, falls) {
+    const others = source.split(",").filter((key) => !key.startsWith("falls="));
+    this.source.input.value = [...others, ...(falls ? ["falls=true"] : [])].join(",");
+    this.showSource();
+  }
+
+  /** Reads the source that runs anew with turned values. @param {string} source */
+  turn(source) {
+    this.state(source, true);
+    return this.server.request({ type: "read_source", source: this.source.address });
   }
 
   /** Ticks "Turn values" as the source says, and shows the command that reads the same. */

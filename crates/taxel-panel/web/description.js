@@ -35,7 +35,6 @@ export class Description {
     this.columns = part("reading-columns", HTMLInputElement);
     this.rate = part("rate", HTMLInputElement);
     this.falls = part("falls", HTMLInputElement);
-    part("turn-values", HTMLButtonElement).onclick = () => this.write({ falls: true });
     part("reading-form", HTMLFormElement).onsubmit = (event) => {
       event.preventDefault();
       this.write(this.stated());

@@ -67,6 +67,10 @@ const description = new Description(server, (name) => {
   reread = name;
   ask(name);
 }, (name) => labels.count(name), () => showTab("view"));
+part("turn-values", HTMLButtonElement).onclick = () => {
+  if (opened) return void description.write({ falls: true });
+  if (hello?.source) board.connection.turn(hello.source).catch(failed);
+};
 const recorder = new Recorder(server, failed, () => showTab("record"));
 const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, mistakes: mistakes.shown, notes: notes.withTime, cut: view.cut }));
 
@@ -135,6 +139,7 @@ function showUnits() {
   const live = opened ? null : hello?.frames;
   const { unit, step, zero } = frames ?? live ?? { unit: "ticks", step: 1, zero: 0 };
   maps.values = { unit, step, zero, frames: frames !== null && frames !== undefined };
+  maps.name();
   numbering.number_us = frames?.number_us ?? null;
   numbering.begin_us = beginning(opened?.start_us ?? live?.begin_us ?? null);
   write(part("begun", HTMLElement), begun() && `0 s: ${begun()}`);

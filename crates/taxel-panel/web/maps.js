@@ -1,10 +1,10 @@
 // Two maps side by side: pressure above rest, and change; of channels, which have no map, a bar each.
 
 import { MAPS, UNKNOWN, changeWords, pressureWords, word } from "./colours.js";
-import { ground, make, part, themed, write } from "./dom.js";
+import { entitle, ground, make, part, themed, write } from "./dom.js";
 import { geometry } from "./geometry.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
-import { counted, rounded } from "./words.js";
+import { counted, quantity, rounded } from "./words.js";
 
 /** @typedef {import("./protocol.js").Frame} Frame */
 /** @typedef {import("./geometry.js").Geometry} Geometry */
@@ -152,8 +152,7 @@ export class Maps {
     this.geometry = geometry(array, sources);
     this.sources = sources;
     for (const map of [this.pressure, this.change]) map.size(this.geometry);
-    const channels = this.geometry.kind === "channels";
-    write(part("pressure-title", HTMLElement), channels ? "Channels" : "Pressure");
+    this.name();
     if (rows !== this.rows || columns !== this.columns) {
       this.levels = new Float32Array(this.rows * this.columns);
       this.rest = new Uint16Array(this.rows * this.columns).fill(UNKNOWN_VALUE);
@@ -162,6 +161,14 @@ export class Maps {
     this.health = null;
     if (!this.taxel || !this.geometry.has(...this.taxel)) this.point(null);
     this.mark();
+  }
+
+  /** Heads the map with the quantity that its unit has. */
+  name() {
+    const title = this.geometry.kind === "channels" ? "Channels" : quantity(this.values.unit);
+    write(part("pressure-title", HTMLElement), title);
+    entitle(part("pressure-frame", HTMLElement), "aria-label", `${title}: arrow keys move the crosshair, Escape takes it away`);
+    entitle(part("pressure-alone", HTMLElement), "aria-label", `${title} alone, larger`);
   }
 
   get rows() {

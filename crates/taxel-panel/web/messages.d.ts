@@ -382,6 +382,10 @@ export interface Counters {
   arrival: Arrival;
   /** Null in the first quarter of a second. */
   pace: Pace | null;
+  /** What is wrong, where the taxels of frames rest elsewhere after a gap than by the tare. */
+  rest_shift: string | null;
+  /** Whether the values of frames fall under touch, so that no pressure is shown. */
+  falls: boolean;
   lost: Lost;
   /** Datagrams that wait. */
   queue: number;

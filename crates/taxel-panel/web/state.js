@@ -35,6 +35,9 @@ function silence(counters, address, isBoard) {
   return arrival.state === "quiet" ? { word: "Quiet", text: `Quiet: nothing ${since}.` } : null;
 }
 
+/** @param {string} text @returns {string} with a capital and a full stop; empty if there is none */
+const sentence = (text) => text && `${text[0].toUpperCase()}${text.slice(1)}.`;
+
 /** Values that fall from their rest show nothing. @param {Opened | null} opened @returns {string} what to do about it */
 function fall(opened) {
   const sources = opened?.frames?.sources ?? [];
@@ -43,6 +46,12 @@ function fall(opened) {
   const names = falling.length < sources.length ? ` of ${falling.join(", ")}` : "";
   const file = `${opened.name.replace(/\.[^.]+$/, "")}.layout.toml`;
   return `The values${names} fall from their rest, so that no pressure is shown. If less means more pressure, turn them: “falls = true” is written into ${file} beside the recording, which every command reads too.`;
+}
+
+/** The same of the live source. @param {Hello | null} hello @param {Counters | null} counters @returns {string} */
+function liveFall(hello, counters) {
+  if (!counters?.falls || !hello?.lines) return "";
+  return "The values fall from their rest, so that no pressure is shown. If less means more pressure, turn them: the source is read anew with “falls=true”.";
 }
 
 /** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */
@@ -90,8 +99,10 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const doubt = (connected && (opened ? opened.pace : counters?.pace)?.doubt) || "";
   const nothing = connected && source === null && !hello?.live;
   const banner = part("silence", HTMLElement);
-  const falling = connected && fall(opened);
-  const text = [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`, nothing && refused, connected && preload(opened), falling].filter(Boolean).join(" ");
+  const isLive = connected && source === null && opened === null;
+  const falling = isLive ? liveFall(hello, counters) : connected && fall(opened);
+  const shift = (isLive && counters?.rest_shift) || "";
+  const text = [silent?.text, sentence(doubt), nothing && refused, connected && preload(opened), falling, sentence(shift)].filter(Boolean).join(" ");
   write(part("silence-text", HTMLElement), text);
   part("turn-values", HTMLButtonElement).hidden = !falling;
   banner.hidden = !text;

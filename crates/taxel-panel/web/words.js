@@ -48,6 +48,15 @@ export const integer = (value) => (Math.round(value) || 0).toLocaleString("en");
  */
 export const counted = (count, singular, plural = `${singular}s`) => `${integer(count)} ${count === 1 ? singular : plural}`;
 
+/** @param {string} unit @returns {string} the quantity that is measured in a unit; the ticks of a board are pressure */
+export function quantity(unit) {
+  if (unit === "counts") return "Counts";
+  if (unit.includes("events")) return "Events";
+  if (/^(m|k)?N$|^k?gf?$/.test(unit)) return "Force";
+  if (/^(ticks|[hkM]?Pa|m?bar|psi|mmHg|N\/(cm|mm|m)[²2])$/.test(unit)) return "Pressure";
+  return "Values";
+}
+
 /** @param {number} us @returns {string} a short time in the unit that suits */
 export function short(us) {
   if (numbering.number_us) return counted(us / numbering.number_us, "frame");

@@ -33,8 +33,9 @@ mod wire_v2;
 #[pyo3::pymodule]
 mod _core {
     use pyo3::prelude::*;
+    use pyo3::types::PyTuple;
     use taxel_core::held::UNKNOWN;
-    use taxel_core::rest::LOADED_TICKS;
+    use taxel_core::rest::{FORCE_UNITS, LOADED_TICKS};
     use taxel_live::serial_line::BAUDS;
 
     #[pymodule_export]
@@ -85,7 +86,8 @@ mod _core {
     #[pymodule_export]
     use crate::recording::{
         DecodedDatagrams, DecodedLsa, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines,
-        numbered_path, open_regular, read_lsa, recording_damage, recording_verdict, whole_frames, write_lsa,
+        numbered_path, open_regular, read_lsa, recording_damage, recording_verdict, seconds_of, whole_frames,
+        write_lsa,
     };
     #[pymodule_export]
     use crate::simulate::{
@@ -111,6 +113,7 @@ mod _core {
         taxel_border::instructions::cap()?;
         module.add("BAUDS", (*BAUDS.start(), *BAUDS.end()))?;
         module.add("UNKNOWN", UNKNOWN)?;
+        module.add("FORCE_UNITS", PyTuple::new(module.py(), FORCE_UNITS)?)?;
         module.add("LOADED_TICKS", LOADED_TICKS)
     }
 }

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import csv
-import math
 import re
 from collections.abc import Sequence
 from contextlib import suppress
-from datetime import UTC, datetime
+
+from taxel import _core
 
 #: A cell that says a unit, as N, [kPa] or (m/s^2).
 _UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
 #: Cells that tables hold where a value is missing.
 MISSING = ("", "nan", "NaN", "NA", "-", "null")
-
-#: A day as German and other European tables write it: 01.05.2024, with or without leading zeros.
-_DAY_WITH_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?=[T ]|$)")
 
 #: Units of time as people write them.
 _UNITS_OF_TIME = {
@@ -104,14 +101,4 @@ def seconds_of(cell: str) -> float:
     >>> seconds_of("02.01.1970 00:00:00,5"), seconds_of("01/02/1970 00:00")
     (86400.5, nan)
     """
-    with_points = _DAY_WITH_POINTS.match(cell)
-    if with_points:
-        day, month, year = with_points.groups()
-        cell = f"{year}-{month:0>2}-{day:0>2} {cell[with_points.end() :].lstrip(' T')}".strip()
-    for text in (cell, f"1970-01-01T{cell}"):
-        try:
-            at = datetime.fromisoformat(text)
-        except ValueError:
-            continue
-        return (at if at.tzinfo else at.replace(tzinfo=UTC)).timestamp()
-    return math.nan
+    return _core.seconds_of(cell)

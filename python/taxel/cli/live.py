@@ -24,7 +24,6 @@ from taxel.array import Array
 from taxel.cli._app import App, SecondsOption
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import try_report
-from taxel.cli._rest_shift import RestShift
 from taxel.cli._say import say
 from taxel.cli.board import (
     REDRAW_S,
@@ -48,7 +47,6 @@ from taxel.device import Cable
 from taxel.live import Live, Panel, Summary, delays
 from taxel.spikes import to_ms
 from taxel.tare import Tare
-from taxel.tasks.detect import noise_floors
 from taxel.wire import Registers
 
 app = App()
@@ -133,8 +131,7 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
         with Live(**options | {"remote": board}) as pipeline:
             if trained is not None and trained.unit is not None and not pipeline._states_unit:
                 console.print(f"values are taken in {pipeline.unit}, as of the readout: --source states no unit")
-            shift = None if trained is None else RestShift(max(noise_floors(trained), default=0.0))
-            last = _show(typed, pipeline, console, at_rest, shift, fresh=isinstance(rest, float))
+            last = _show(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
             summary = last.stop()
             # Detections that the readout made while `stop` ran.
             _drain(last, console, say)
@@ -163,7 +160,6 @@ def _show(
     pipeline: Live,
     console: Console,
     at_rest: contextlib.ExitStack,
-    shift: RestShift | None,
     *,
     fresh: bool,
 ) -> Live:
@@ -180,7 +176,7 @@ def _show(
             )
             # Standard output has the lines of --json; whoever reads them needs the address too.
             announce(shows, typed.opens, Console(stderr=True))
-        _watch(pipeline, shows, typed.seconds, console, at_rest, shift, fresh=fresh, control=later)
+        _watch(pipeline, shows, typed.seconds, console, at_rest, fresh=fresh, control=later)
     return pipeline if shows is None or shows.live is None else shows.live
 
 
@@ -265,7 +261,6 @@ def _watch(
     seconds: float | None,
     console: Console,
     at_rest: contextlib.ExitStack,
-    shift: RestShift | None,
     *,
     fresh: bool,
     control: str | None,
@@ -310,7 +305,7 @@ def _watch(
                 if fresh and pipeline.tare is not None:
                     fresh = False
                     _warn_of_unknown(pipeline.tare)
-            for line in _warnings(pipeline, now, told, shift):
+            for line in _warnings(pipeline, now, told):
                 say(f"taxel: {line}", err=True)
             if now["seconds"] - before["seconds"] >= REDRAW_S:
                 display.update(Group(counters_table(before, now), _state(now, pipeline.place)))
@@ -319,28 +314,15 @@ def _watch(
             console.print(f"{pipeline.place} has ended")
 
 
-def _warnings(
-    pipeline: Live, now: dict[str, Any], told: set[tuple[str, str]], shift: RestShift | None
-) -> Iterator[str]:
+def _warnings(pipeline: Live, now: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str]:
     """Yield what is wrong with what arrives, each once: `told` holds what was."""
     yield from unread(now, told)
-    if shift is not None and (shifted := _shifted(shift, pipeline, now)):
+    if (shifted := now["rest_shift"]) and ("rest_shift", shifted) not in told:
+        told.add(("rest_shift", shifted))
         yield shifted
     if ("", "outside") not in told and (wrong := outside(now, pipeline.array)):
         told.add(("", "outside"))
         yield wrong
-
-
-def _shifted(shift: RestShift, pipeline: Live, now: dict[str, Any]) -> str | None:
-    """Return a warning, once, if the taxels of a source of frames rest elsewhere after a gap."""
-    tare = pipeline.tare or pipeline._options.tare
-    silent_s = now["arrival"]["silent_s"]
-    if pipeline.frame_us is None or not isinstance(tare, Tare) or silent_s is None:
-        return None
-    rest = tare.rest.copy()
-    for zeroing in pipeline.zeroed:
-        rest[zeroing.y, zeroing.x] = zeroing.rest
-    return shift.look(silent_s, pipeline.frame.astype(np.float64), rest, tare.noise, pipeline.unit)
 
 
 def _has_ended(pipeline: Live, panel: Panel | None) -> bool:

@@ -1,7 +1,7 @@
 //! What makes detections: a readout or a plain rule, whichever a file holds.
 
 use crate::detect::{Detection, FrameTime, PlainRule, Readout, ReadoutStream, file};
-use crate::encode::{Tare, Zeroing};
+use crate::encode::{Quantity, Tare, Zeroing};
 use crate::{Array, EventsView, FramesView, Result, Stop, problem};
 
 /// The time that a recording is continued after its last event or frame, us: longer than any input can keep a
@@ -79,6 +79,17 @@ impl Detector {
         match self {
             Self::Readout(readout) => readout.unit.as_deref(),
             Self::PlainRule(rule) => rule.unit.as_deref(),
+        }
+    }
+
+    /// The largest noise floor above the tare of what it reads, in the sensor's unit; 0 without one. The local load
+    /// tracks the rest.
+    #[must_use]
+    pub fn noise_floor(&self) -> f64 {
+        match self {
+            Self::Readout(readout) => readout.encoder.noise_floor(),
+            Self::PlainRule(rule) if rule.quantity == Quantity::LocalLoad => 0.0,
+            Self::PlainRule(rule) => rule.noise_floor,
         }
     }
 

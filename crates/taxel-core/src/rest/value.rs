@@ -5,6 +5,9 @@ use std::collections::BTreeSet;
 /// The noise floor of the board's fast presets, ticks: by it a rest is found that was not measured.
 pub const NOISE_FLOOR: f64 = 3.0;
 
+/// Units of force and pressure, in which the rest of a taxel is 0.
+pub const FORCE_UNITS: [&str; 5] = ["N", "mN", "kPa", "Pa", "N/cm2"];
+
 /// Half a tick, which is added to the noise floor as a threshold: the rest is a mean, and values are whole ticks.
 const HALF_TICK: f64 = 0.5;
 

@@ -161,12 +161,8 @@ impl FrameInput {
 
     fn take_lines(&self, reader: &mut LineReader, ended: bool) {
         let mut state = lock(&self.state);
-        while let Some((line, at_ns)) = reader.next(ended) {
-            if std::mem::take(&mut reader.is_cut) && !state.frames.fits(&line) {
-                state.frames.count_left_out(LeftOut { unfinished: line.bytes, ..LeftOut::default() });
-            } else {
-                state.line(&line, at_ns);
-            }
+        while let Some((line, at_ns)) = reader.next_whole(ended, |line| state.frames.fits(line)) {
+            state.line(&line, at_ns);
         }
         state.frames.count_left_out(reader.lines.take_left_out());
         if ended {

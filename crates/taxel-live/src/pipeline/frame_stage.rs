@@ -4,24 +4,31 @@
 use std::time::Duration;
 
 use taxel_core::held::{Held, UNKNOWN};
-use taxel_core::rest::ValueSteps;
+use taxel_core::rest::{FORCE_UNITS, ValueSteps};
 use taxel_core::{Array, Events, Intensities};
 
 use super::counters::Counters;
+use super::falling_values::FallingValues;
 use super::frame_block::FrameBlock;
 use super::readout_queue::QuietUntil;
+use super::rest_shift::RestShift;
 use crate::capture::Batch;
 use crate::clock::{BoardClock, Pace};
-use crate::frame_lines::read_message;
+use crate::frame_lines::{FrameLayout, read_message};
 
 /// Shortest interval at which the readout's time is advanced while no frames arrive.
 const TICK: Duration = Duration::from_micros(500);
+
+/// Whether values fall is looked at once in so many frames.
+const LOOK_FRAMES: u64 = 32;
 
 /// Number of differences between frames from which the noise is measured.
 const NOISE_FRAMES: usize = 32;
 
 pub(super) struct FrameStage {
     frame_us: f64,
+    /// Whether the lines waited in a file, so that their arrival shows no pace of a clock.
+    waited: bool,
     guard_frames: f64,
     taxels: usize,
     columns: usize,
@@ -31,6 +38,15 @@ pub(super) struct FrameStage {
     before: Vec<f32>,
     steps: Option<ValueSteps>,
     noise: FirstNoise,
+    /// The noise of the first frames, once it is measured.
+    measured_noise: Option<f64>,
+    shift: RestShift,
+    /// Whether the taxels hold still after a gap since [`FrameStage::holds_still`].
+    is_still: bool,
+    /// None of values that cannot fall, or are turned.
+    falling: Option<FallingValues>,
+    falls: bool,
+    unit: String,
     held: Held,
     /// The changes of `held` with these frames.
     changes: Events,
@@ -44,9 +60,13 @@ pub(super) struct FrameStage {
 }
 
 impl FrameStage {
-    pub(super) fn new(array: &Array, frame_us: f64, guard_frames: f64) -> Self {
+    /// `noise_floor` is that of the readout.
+    pub(super) fn new(layout: &FrameLayout, guard_frames: f64, noise_floor: f64) -> Self {
+        let array = &layout.array;
+        let may_fall = layout.turned.is_none() && !FORCE_UNITS.contains(&&*layout.unit);
         Self {
-            frame_us,
+            frame_us: layout.frame_us,
+            waited: layout.waited,
             guard_frames,
             taxels: array.len(),
             columns: array.columns.into(),
@@ -55,6 +75,12 @@ impl FrameStage {
             before: vec![],
             steps: None,
             noise: FirstNoise::new(array.len()),
+            measured_noise: None,
+            shift: RestShift::new(noise_floor, layout.frame_us),
+            is_still: false,
+            falling: may_fall.then(|| FallingValues::new(array.columns.into())),
+            falls: false,
+            unit: layout.unit.clone(),
             held: Held::unknown(array.len()),
             changes: no_changes(array),
             clock: BoardClock::default(),
@@ -78,11 +104,20 @@ impl FrameStage {
             self.first.get_or_insert(t);
             self.latest = Some((t, message.arrived_ns));
             self.count += 1;
-            if self.clock.note(t, message.arrived_ns) {
+            if self.clock.note(t, message.arrived_ns) && !self.waited {
                 self.pace = self.clock.pace();
             }
             is_new |= self.fit_steps();
             self.change(t);
+            if let Some(noise) = self.measured_noise {
+                self.is_still |= self.shift.take(message.arrived_ns, &self.last, noise);
+            }
+            if let Some(falling) = &mut self.falling {
+                falling.take(t, &self.last, self.measured_noise);
+                if self.count.is_multiple_of(LOOK_FRAMES) {
+                    self.falls = falling.are_found();
+                }
+            }
         }
         is_new
     }
@@ -96,6 +131,7 @@ impl FrameStage {
             }
         }
         if let Some(noise) = self.noise.take(&self.before, &self.last) {
+            self.measured_noise = Some(noise);
             steps = steps.above_noise(noise);
         }
         let is_new = self.steps.is_some_and(|before| before != steps);
@@ -158,6 +194,16 @@ impl FrameStage {
         self.last.get(taxel).copied().filter(|value| !value.is_nan())
     }
 
+    /// Whether the taxels hold still after a gap, once.
+    pub(super) fn holds_still(&mut self) -> bool {
+        std::mem::take(&mut self.is_still)
+    }
+
+    /// What is wrong, where the taxels rest elsewhere than this after a gap.
+    pub(super) fn rest_shift(&self, rest: &[Option<f64>]) -> Option<String> {
+        self.shift.found(rest, &self.unit)
+    }
+
     /// Number of frames.
     pub(super) fn count(&self) -> u64 {
         self.count
@@ -167,6 +213,7 @@ impl FrameStage {
     pub(super) fn publish(&self, counters: &mut Counters) {
         counters.decoding.decoded = self.count;
         counters.decoding.frames = self.count;
+        counters.falls = self.falls;
         counters.board.arrived_ns = self.latest.map(|(_, arrived_ns)| arrived_ns);
         counters.board.offset = self.clock.offset();
         counters.board.pace.clone_from(&self.pace);

@@ -12,11 +12,11 @@ use taxel_core::array::Pitch;
 use taxel_core::wire::Registers;
 use taxel_core::{Array, Stop, problem};
 
-use crate::frame_lines::{FrameAssembler, FrameEnd, FrameLayout, cells, number};
+use crate::frame_lines::{FrameAssembler, FrameEnd, FrameLayout};
 use crate::line_input::LineReader;
 use crate::line_place::LinePlace;
 use crate::locked::lock;
-use crate::recording::{Header, StreamColumns, UNITS_US, clock_unit_us, now_ns};
+use crate::recording::{Header, StreamColumns, UNITS_US, cells, clock_unit_us, date, now_ns, number};
 use crate::text_lines::TextLine;
 use crate::{Error, Result, address};
 
@@ -26,6 +26,9 @@ const FIRST_LINE: Duration = Duration::from_secs(3);
 /// The time from one frame to the next is measured until so many arrived, or for so long from the first one.
 const MEASURED_FRAMES: usize = 32;
 const MEASURE: Duration = Duration::from_secs(1);
+
+/// The unit of a column of dates.
+pub(super) const DATES: &str = "iso";
 
 /// How a source is written, for errors.
 const FORMS: &str = "[NAME=]board:HOST:PORT, serial:PLACE, lines:PATH (- is the standard input), lines+tcp:HOST:PORT, \
@@ -66,6 +69,8 @@ pub enum SourcePlace {
 enum StatedTime {
     /// A column, and its unit, us; by its name where none is stated.
     Column(String, Option<f64>),
+    /// A column of dates, or of times of a day.
+    Dates(String),
     /// A column of seconds and one of nanoseconds, which are added.
     Sum(String, String),
 }
@@ -101,6 +106,13 @@ pub struct OpenedLines {
     pub(super) begun: Vec<(TextLine, i64)>,
     /// Whether no more can arrive.
     has_ended: bool,
+}
+
+/// What the first line of a source shows.
+struct FirstLine {
+    columns: Vec<String>,
+    /// The columns that hold dates, or times of a day.
+    dated: Vec<usize>,
 }
 
 /// How long a source of lines may be silent before its first line.
@@ -262,7 +274,8 @@ impl StatedTime {
         let Some((column, unit)) = text.split_once(':') else { return Ok(Self::Column(text.to_owned(), None)) };
         match UNITS_US.into_iter().find(|(known, _)| *known == unit) {
             Some((_, unit_us)) => Ok(Self::Column(column.to_owned(), Some(unit_us))),
-            None => Err(problem!("source {source:?}: unit {unit:?} must be ns, us, ms or s").into()),
+            None if unit == DATES => Ok(Self::Dates(column.to_owned())),
+            None => Err(problem!("source {source:?}: unit {unit:?} must be ns, us, ms, s or {DATES}").into()),
         }
     }
 }
@@ -318,25 +331,22 @@ impl SourceText {
                 self.frames(input.as_ref(), readout_array.and_then(Option::as_ref), wait).map_err(in_text)?;
             return Ok(SourceKind::Frames(input, Box::new(layout), opened));
         }
-        let (columns, opened) = self.columns_or_first_line(input.as_ref(), wait)?;
-        let stream = self.stream(columns).map_err(in_text)?;
+        let (first, opened) = self.columns_or_first_line(input.as_ref(), wait)?;
+        let waited = input.as_ref().is_some_and(LinePlace::is_regular_file);
+        let stream = StreamColumns { waited, ..self.stream(first).map_err(in_text)? };
         Ok(SourceKind::Numbers(input, stream, opened))
     }
 
     /// The columns that are stated, or those of the first line.
-    fn columns_or_first_line(
-        &self,
-        input: Option<&LinePlace>,
-        wait: FirstLineWait<'_>,
-    ) -> Result<(Vec<String>, Opened)> {
+    fn columns_or_first_line(&self, input: Option<&LinePlace>, wait: FirstLineWait<'_>) -> Result<(FirstLine, Opened)> {
         match (&self.columns, input) {
-            (Some(columns), _) => Ok((columns.clone(), Opened::default())),
+            (Some(columns), _) => Ok((FirstLine { columns: columns.clone(), dated: vec![] }, Opened::default())),
             (None, None) => Err(problem!("source {:?}: needs columns=A:B:C", self.text).into()),
             (None, Some(input)) => {
                 let mut lines = OpenedLines::open(input)?;
                 lines.wait(wait)?;
-                match lines.first(&self.leave_out)? {
-                    Some(columns) => Ok((columns, Opened::from_lines(lines))),
+                match lines.first(self)? {
+                    Some(first) => Ok((first, Opened::from_lines(lines))),
                     None => Err(lines.nothing(self, 0, None)),
                 }
             }
@@ -344,7 +354,7 @@ impl SourceText {
     }
 
     /// The columns of lines of numbers that are no frames.
-    fn stream(&self, columns: Vec<String>) -> Result<StreamColumns> {
+    fn stream(&self, first: FirstLine) -> Result<StreamColumns> {
         for (is_stated, key) in [
             (!self.leave_out.is_empty(), "leave_out"),
             (self.unit.is_some(), "unit"),
@@ -355,7 +365,16 @@ impl SourceText {
                 return Err(problem!("{key} is of frames: state array=ROWSxCOLUMNS too").into());
             }
         }
-        let stream = StreamColumns::of_columns(columns);
+        let stream = StreamColumns::of_columns(first.columns);
+        let of_dates = |column: usize| {
+            let time = Some(stream.columns[column].clone());
+            StreamColumns { time, unit_us: 1e6, dates: true, ..stream.clone() }
+        };
+        match first.dated[..] {
+            [] => {}
+            [column] => return Ok(of_dates(column)),
+            _ => return Err(problem!("dates in several columns are of frames: state array=ROWSxCOLUMNS too").into()),
+        }
         Ok(match &self.time {
             None => stream,
             Some(StatedTime::Column(column, unit_us)) => {
@@ -363,6 +382,7 @@ impl SourceText {
                 let unit_us = unit_us.or_else(|| clock_unit_us(&name)).unwrap_or(1.0);
                 StreamColumns { time: Some(name), unit_us, ..stream }
             }
+            Some(StatedTime::Dates(column)) => of_dates(index_of("time", column, &stream.columns)?),
             Some(StatedTime::Sum(..)) => {
                 return Err(problem!("time=A+B is of frames: state array=ROWSxCOLUMNS too").into());
             }
@@ -378,27 +398,28 @@ impl SourceText {
     ) -> Result<(FrameLayout, Opened)> {
         let end = self.end.unwrap_or(FrameEnd::Lines(1));
         let mut opened = None;
-        let columns = match (&self.columns, input) {
-            (Some(columns), _) => columns.clone(),
+        let without_dates = |columns: Vec<String>| FirstLine { columns, dated: vec![] };
+        let FirstLine { columns, dated } = match (&self.columns, input) {
+            (Some(columns), _) => without_dates(columns.clone()),
             // What is stated says how many numbers a line has, if all of them are values of one row.
-            (None, None) => self.columns_of_array(end)?,
+            (None, None) => without_dates(self.columns_of_array(end)?),
             (None, Some(input)) => {
                 let mut lines = OpenedLines::open(input)?;
                 // A source of which all is stated need not have sent anything.
                 let stated = self.columns_of_array(end).ok().filter(|columns| {
-                    self.rate_hz.is_some() && self.clock(columns).is_ok() && self.left_out(columns).is_ok()
+                    self.rate_hz.is_some() && self.clock(columns, &[]).is_ok() && self.left_out(columns).is_ok()
                 });
                 if stated.is_none() {
                     lines.wait(wait)?;
                 }
-                let first = lines.first(&self.leave_out)?;
-                let stated = stated.filter(|_| !lines.has_ended && lines.reader.came_ns == 0);
+                let first = lines.first(self)?;
+                let stated = stated.filter(|_| !lines.has_ended && lines.reader.came_ns == 0).map(without_dates);
                 let Some(columns) = first.or(stated) else { return Err(lines.nothing(self, 0, None)) };
                 opened = Some(lines);
                 columns
             }
         };
-        let time = self.clock(&columns)?;
+        let (time, dates) = self.clock(&columns, &dated)?;
         let left = self.left_out(&columns)?;
         let is_value = |field: &usize| !left.contains(field) && time.iter().all(|(clock, _)| clock != field);
         let values: Vec<usize> = (0..columns.len()).filter(is_value).collect();
@@ -413,12 +434,14 @@ impl SourceText {
             names: if has_quantities { values.iter().map(|&k| columns[k].clone()).collect() } else { vec![] },
             array,
             time,
+            dates,
             values,
             end,
             turned: self.turned,
             unit: self.unit.clone().unwrap_or_else(|| "counts".to_owned()),
             unit_is_stated: self.unit.is_some(),
             frame_us: self.rate_hz.map_or(1.0, |rate_hz| 1e6 / rate_hz),
+            waited: input.is_some_and(LinePlace::is_regular_file),
         };
         layout.check()?;
         if self.rate_hz.is_none() {
@@ -446,20 +469,38 @@ impl SourceText {
         };
         let clocks = match &self.time {
             None => 0,
-            Some(StatedTime::Column(..)) => 1,
+            Some(StatedTime::Column(..) | StatedTime::Dates(_)) => 1,
             Some(StatedTime::Sum(..)) => 2,
         };
         let columns = array.len() / lines + clocks + self.leave_out.len();
         Ok((0..columns).map(numbered).collect())
     }
 
-    /// The fields of the clock, each with its unit, us.
-    fn clock(&self, columns: &[String]) -> taxel_core::Result<Vec<(usize, f64)>> {
-        Ok(match &self.time {
+    /// Whether a column may hold dates: one of the stated clock without a unit, or any where no clock is stated.
+    fn may_be_dated(&self, column: usize, columns: &[String]) -> bool {
+        let is = |stated: &String| index_of("", stated, columns) == Ok(column);
+        match &self.time {
+            None => columns.iter().all(|name| clock_unit_us(name).is_none()),
+            Some(StatedTime::Column(stated, unit_us)) => unit_us.is_none() && is(stated),
+            Some(StatedTime::Dates(stated)) => is(stated),
+            Some(StatedTime::Sum(a, b)) => is(a) || is(b),
+        }
+    }
+
+    /// The fields of the clock, each with its unit, us, and whether they hold dates, as the fields do that the first line shows
+    /// to be `dated`; a date and a time of the day in two fields are added.
+    fn clock(&self, columns: &[String], dated: &[usize]) -> taxel_core::Result<(Vec<(usize, f64)>, bool)> {
+        if !dated.is_empty() {
+            return Ok((dated.iter().map(|&field| (field, 1e6)).collect(), true));
+        }
+        let time = match &self.time {
+            Some(StatedTime::Dates(column)) => return Ok((vec![(index_of("time", column, columns)?, 1e6)], true)),
             Some(StatedTime::Column(column, unit_us)) => {
                 let field = index_of("time", column, columns)?;
                 let Some(unit_us) = unit_us.or_else(|| clock_unit_us(&columns[field])) else {
-                    return Err(problem!("time={column}: state its unit, as time={column}:ms"));
+                    return Err(problem!(
+                        "time={column}: state its unit, as time={column}:ms, or time={column}:{DATES} of dates"
+                    ));
                 };
                 vec![(field, unit_us)]
             }
@@ -470,7 +511,8 @@ impl SourceText {
                 let found = columns.iter().enumerate().find_map(|(field, name)| Some((field, clock_unit_us(name)?)));
                 found.into_iter().collect()
             }
-        })
+        };
+        Ok((time, false))
     }
 
     /// The stated array, or the one that lines of so many values fill.
@@ -553,15 +595,12 @@ impl OpenedLines {
         Ok(())
     }
 
-    /// The next line that is whole text, if one arrives until then.
-    fn next(&mut self, until: Instant) -> Result<Option<(TextLine, i64)>> {
+    /// The next line that is whole text, if one arrives until then; the first one, which may lack its beginning, if it fits.
+    fn next(&mut self, until: Instant, fits: impl Fn(&TextLine) -> bool) -> Result<Option<(TextLine, i64)>> {
         loop {
-            while let Some((line, at_ns)) = self.reader.next(self.has_ended) {
+            while let Some((line, at_ns)) = self.reader.next_whole(self.has_ended, &fits) {
                 let text = &line.text;
-                if std::mem::take(&mut self.reader.is_cut) {
-                    // The line may lack its beginning.
-                    self.reader.lines.left_out.unfinished += line.bytes;
-                } else if line.cut
+                if line.cut
                     || text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t'))
                 {
                     // Neither numbers nor names.
@@ -579,35 +618,58 @@ impl OpenedLines {
 
     /// Waits for the first line that defines the columns, and returns them: a line of names, or of numbers, whose columns are
     /// then named `column_0` and so on. Text before it that is neither is skipped. `None` if none arrives.
-    fn first(&mut self, leave_out: &[String]) -> Result<Option<Vec<String>>> {
+    fn first(&mut self, source: &SourceText) -> Result<Option<FirstLine>> {
         let until = Instant::now() + FIRST_LINE;
         let mut names: Option<Vec<String>> = None;
         let mut are_names = false;
-        while let Some((line, at_ns)) = self.next(until)? {
+        // The first line of a serial line is left out, as a part of a number is a number too.
+        let is_serial = matches!(self.reader.place(), LinePlace::Serial(_));
+        let mut may_be_cut = self.reader.is_cut;
+        while let Some((line, at_ns)) = self.next(until, |_| !is_serial)? {
+            let is_first = std::mem::take(&mut may_be_cut);
             let found: Vec<_> = cells(&line.text).collect();
             if found.is_empty() || line.text.starts_with('#') {
                 continue;
             }
             let count = found.len();
+            let begins_with_letter = line.text.trim_start().starts_with(char::is_alphabetic);
             // Text before the numbers names their columns if it has as many words.
             let named = names.take().filter(|names| names.len() == count);
             let columns = named.unwrap_or_else(|| (0..count).map(numbered).collect());
-            let is_left = |k: usize| leave_out.iter().any(|left| index_of("", left, &columns) == Ok(k));
-            if found.iter().enumerate().all(|(k, cell)| is_left(k) || number(cell).is_some()) {
+            let is_left = |k: usize| source.leave_out.iter().any(|left| index_of("", left, &columns) == Ok(k));
+            let texts: Vec<usize> = (0..count).filter(|&k| !is_left(k) && number(&found[k]).is_none()).collect();
+            if texts.iter().all(|&k| date(&found[k]).is_some() && source.may_be_dated(k, &columns)) {
+                if is_first && !is_serial && self.next_is_longer(count, until)? {
+                    // This was the rest of a line.
+                    continue;
+                }
                 self.begun.push((line, at_ns));
-                return Ok(Some(columns));
+                return Ok(Some(FirstLine { columns, dated: texts }));
+            }
+            if is_first && !is_serial && found.last().is_some_and(|cell| number(cell).is_some()) && !begins_with_letter
+            {
+                continue;
             }
             are_names = line.text.contains([',', ';', '\t']) && found.iter().all(|cell| number(cell).is_none());
             let words: Vec<String> = found.into_iter().map(Cow::into_owned).collect();
             // Text is counted, but for the names of the columns.
             self.begun.push((line, at_ns));
             if words.iter().any(|word| clock_unit_us(word).is_some()) {
-                return Ok(Some(words));
+                return Ok(Some(FirstLine { columns: words, dated: vec![] }));
             }
             names = Some(words);
         }
         // Only names have arrived: a message of words with blanks between, or a line of numbers and text, is none.
-        Ok(names.filter(|_| are_names && !self.has_ended))
+        let names = names.filter(|_| are_names && !self.has_ended);
+        Ok(names.map(|columns| FirstLine { columns, dated: vec![] }))
+    }
+
+    /// Whether the next line is of more numbers than so many, so that the one before it lacks its beginning.
+    fn next_is_longer(&mut self, count: usize, until: Instant) -> Result<bool> {
+        let Some((next, _)) = self.next(until, |_| true)? else { return Ok(false) };
+        self.reader.lines.put_back(&next);
+        let are_numbers = cells(&next.text).all(|cell| number(&cell).or_else(|| date(&cell)).is_some());
+        Ok(are_numbers && cells(&next.text).count() > count)
     }
 
     /// Measures the time from one frame to the next, us, from what arrives first.
@@ -618,7 +680,7 @@ impl OpenedLines {
             self.begun.iter().filter_map(|(line, at_ns)| Some(frames.push(line, *at_ns)?.0)).collect();
         let mut until = Instant::now() + FIRST_LINE;
         while times.len() <= MEASURED_FRAMES {
-            let Some((line, at_ns)) = self.next(until)? else { break };
+            let Some((line, at_ns)) = self.next(until, |line| frames.fits(line))? else { break };
             if let Some((t, _)) = frames.push(&line, at_ns) {
                 times.push(t);
                 if times.len() == 2 {
@@ -703,6 +765,10 @@ fn unread(texts: &[&str], leave_out: &[String], fields: Option<usize>) -> String
         return format!(
             "all cut by \"...\" in column {column}: the sender must print whole lines (ros2 topic echo: add --full-length)"
         );
+    }
+    if let Some(&dated) = shared.iter().find(|&&k| date(&first[k]).is_some()) {
+        let column = dated + 1;
+        return format!("all with a date in column {column} ({:?}): add time={column}:{DATES}", shown(&first[dated]));
     }
     match (&shared[..], fields) {
         ([], Some(fields)) if first.iter().all(|cell| number(cell).is_some()) && first.len() != fields => {

@@ -1,13 +1,15 @@
 //! What arrives from a source of lines, for people, and how the lines seem to make frames.
 
+use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 use taxel_core::problem;
 
-use super::source::{SourcePlace, SourceText};
+use super::source::{DATES, SourcePlace, SourceText};
 use crate::Result;
-use crate::frame_lines::{cells, number};
 use crate::line_input::LineReader;
+use crate::line_place::LinePlace;
+use crate::recording::{cells, date, number};
 
 /// Number of lines that are shown, the last ones.
 const SHOWN: usize = 12;
@@ -35,8 +37,20 @@ pub struct SourcePreview {
 /// A line that arrived.
 struct PreviewLine {
     numbers: Option<Vec<f64>>,
+    /// Whether the first of them is a date.
+    is_dated: bool,
     is_empty: bool,
     at_ns: i64,
+}
+
+impl PreviewLine {
+    fn new(text: &str, at_ns: i64) -> Self {
+        let cells: Vec<_> = cells(text).collect();
+        let is_dated = cells.first().is_some_and(|cell| number(cell).is_none() && date(cell).is_some());
+        let value = |(k, cell): (usize, &Cow<'_, str>)| if k == 0 && is_dated { date(cell) } else { number(cell) };
+        let (numbers, is_empty) = (cells.iter().enumerate().map(value).collect::<Option<Vec<f64>>>(), cells.is_empty());
+        Self { numbers: numbers.filter(|_| !is_empty), is_dated, is_empty, at_ns }
+    }
 }
 
 impl SourcePreview {
@@ -50,18 +64,13 @@ impl SourcePreview {
             return Err(problem!("source {:?}: sends no lines that could be shown", source.text).into());
         };
         let mut reader = LineReader::open(place)?;
+        let is_serial = matches!(place, LinePlace::Serial(_));
         let (until, mut shown, mut found) = (Instant::now() + most, vec![], vec![]);
         let mut ended = false;
         while !ended && Instant::now() < until && found.len() < ENOUGH {
             ended = reader.fill().map_err(|error| reader.broken(error))?;
-            while let Some((line, at_ns)) = reader.next(ended) {
-                if std::mem::take(&mut reader.is_cut) {
-                    continue;
-                }
-                let cells: Vec<_> = cells(&line.text).collect();
-                let numbers: Option<Vec<f64>> = cells.iter().map(|cell| number(cell)).collect();
-                let is_empty = cells.is_empty();
-                found.push(PreviewLine { numbers: numbers.filter(|_| !is_empty), is_empty, at_ns });
+            while let Some((line, at_ns)) = reader.next_whole(ended, |_| !is_serial) {
+                found.push(PreviewLine::new(&line.text, at_ns));
                 shown.push(line.text.chars().take(LONGEST).collect::<String>());
             }
         }
@@ -97,10 +106,16 @@ fn guess(lines: &[PreviewLine], array_is_stated: bool) -> (String, String) {
         let keys = format!("array={rows}x{width},frame_end=blank");
         return (keys, format!("{rows} lines of {width} numbers and an empty one: {rows} x {width}{beside}"));
     }
-    let clock = clock_unit(&usual_lines).filter(|_| width > 1 && (is_square(width - 1) || !is_square(width)));
+    let are_dated = lines.iter().filter(|line| line.numbers.is_some()).all(|line| line.is_dated);
+    let by_arrival = || clock_unit(&usual_lines).filter(|_| is_square(width - 1) || !is_square(width));
+    let clock = if are_dated { Some(DATES) } else { by_arrival() }.filter(|_| width > 1);
     let (values, time) = clock.map_or((width, String::new()), |unit| (width - 1, format!(",time=1:{unit}")));
     let (rows, columns) = sides(values);
-    let first = clock.map_or_else(String::new, |unit| format!(" after a time in {unit}"));
+    let first = match clock {
+        None => String::new(),
+        Some(DATES) => " after a date".to_owned(),
+        Some(unit) => format!(" after a time in {unit}"),
+    };
     (format!("array={rows}x{columns}{time}"), format!("{values} numbers a line{first}: {rows} x {columns}{beside}"))
 }
 
@@ -142,11 +157,7 @@ mod tests {
 
     /// Lines that arrive every 10 ms.
     fn lines(text: &str) -> Vec<PreviewLine> {
-        let line = |(k, text): (usize, &str)| PreviewLine {
-            numbers: cells(text).map(|cell| number(&cell)).collect::<Option<Vec<f64>>>().filter(|n| !n.is_empty()),
-            is_empty: text.is_empty(),
-            at_ns: 10_000_000 * i64::try_from(k).unwrap(),
-        };
+        let line = |(k, text): (usize, &str)| PreviewLine::new(text, 10_000_000 * i64::try_from(k).unwrap());
         text.split('\n').enumerate().map(line).collect()
     }
 
@@ -162,6 +173,7 @@ mod tests {
             (repeated(&|k| format!("{},{}", 500 + 10 * k, row(256))), "array=16x16,time=1:ms"),
             (repeated(&|k| format!("{},{}", 10_000 * k, row(5))), "array=1x5,time=1:us"),
             (repeated(&|k| if k % 5 == 3 { String::new() } else { row(6) }), "array=4x6,frame_end=blank"),
+            (repeated(&|k| format!("2024-05-01 10:15:02.{k:02}0;{}", row(7))), "array=1x7,time=1:iso"),
             (format!("Mat 1.0\n{}", repeated(&|_| row(64))), "array=8x8"),
             (repeated(&|_| "hello".to_owned()), ""),
             (String::new(), ""),

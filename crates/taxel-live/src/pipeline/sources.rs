@@ -24,7 +24,7 @@ use crate::frame_lines::FrameLayout;
 use crate::line_input::LineReader;
 use crate::line_place::LinePlace;
 use crate::locked::lock;
-use crate::recording::{self, DamageCounts, SourceWriter, StreamColumns, StreamFaults, fields, now_ns};
+use crate::recording::{self, DamageCounts, SourceWriter, StreamColumns, StreamFaults, cells, now_ns};
 use crate::text_lines::{LeftOut, TextLine};
 use crate::{Error, Result};
 
@@ -94,7 +94,7 @@ impl NumberStream {
             Some(values) if !line.cut => self.sample(arrived_ns, &values),
             // A repeated line of column names contains no numbers.
             None if !line.cut
-                && (fields(text).eq(self.stream.columns.iter().map(String::as_str)) || text.trim().is_empty()) =>
+                && (cells(text).eq(self.stream.columns.iter().map(String::as_str)) || text.trim().is_empty()) =>
             {
                 Ok(())
             }
@@ -185,12 +185,8 @@ impl NumberStream {
                     continue;
                 }
             };
-            while let Some((line, at_ns)) = reader.next(ended) {
-                if std::mem::take(&mut reader.is_cut) && self.stream.parse(&line.text).is_none() {
-                    self.count_left_out(LeftOut { unfinished: line.bytes, ..LeftOut::default() })?;
-                } else {
-                    self.line(at_ns, &line)?;
-                }
+            while let Some((line, at_ns)) = reader.next_whole(ended, |line| self.stream.parse(&line.text).is_some()) {
+                self.line(at_ns, &line)?;
                 if std::mem::take(&mut failed) {
                     *lock(&self.trouble) = None;
                 }

@@ -2,8 +2,11 @@
 
 mod clock;
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use taxel_core::dates::seconds_of;
 use taxel_core::problem;
 
 use super::damage::{DamageCounts, IN_NO_LINE, MISSING, STRANGE, UNFINISHED_LINES};
@@ -22,6 +25,12 @@ pub struct StreamColumns {
     /// Unit of that clock, us.
     #[serde(default = "default_unit")]
     pub unit_us: f64,
+    /// Whether the lines waited in a file until they were read, so that their arrival is no clock to compare with.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub waited: bool,
+    /// Whether the clock's column holds dates, or times of a day, as texts; they are recorded as seconds.
+    #[serde(skip)]
+    pub dates: bool,
 }
 
 fn default_unit() -> f64 {
@@ -35,7 +44,7 @@ impl StreamColumns {
     pub fn of_columns(columns: Vec<String>) -> Self {
         let time = columns.iter().find_map(|name| Some((name.clone(), clock_unit_us(name)?)));
         let (time, unit_us) = time.map_or((None, 1.0), |(name, unit_us)| (Some(name), unit_us));
-        Self { columns, time, unit_us }
+        Self { columns, time, unit_us, waited: false, dates: false }
     }
 
     /// The names of the columns of values, without the clock.
@@ -75,12 +84,13 @@ impl StreamColumns {
         values.len() == self.columns.len()
     }
 
-    /// Parses a line of numbers separated by commas, semicolons, tabs or blanks; `None` if a field is not a number that
-    /// is held, or if the number of fields differs from that of columns.
+    /// Parses a line of numbers ([`cells`]); `None` if a cell is not a number that is held, or if the number of cells differs
+    /// from that of columns.
     #[must_use]
     pub fn parse(&self, line: &str) -> Option<Vec<f64>> {
-        let number = |field: &str| field.parse().ok().filter(|&value| is_held(value));
-        let values = fields(line).map(number).collect::<Option<Vec<f64>>>()?;
+        let dated = self.columns.iter().position(|name| self.dates && Some(name) == self.time.as_ref());
+        let number = |(k, cell): (usize, Cow<'_, str>)| if Some(k) == dated { date(&cell) } else { number(&cell) };
+        let values = cells(line).enumerate().map(number).collect::<Option<Vec<f64>>>()?;
         self.fits(&values).then_some(values)
     }
 
@@ -108,9 +118,29 @@ pub(crate) fn is_held(value: f64) -> bool {
     value.is_nan() || value.abs() <= f64::from(f32::MAX)
 }
 
-/// The fields of a line of text.
-pub fn fields(line: &str) -> impl Iterator<Item = &str> {
-    line.split([',', ';', '\t', ' ']).filter(|field| !field.is_empty())
+/// The cells of a line, which semicolons (then a comma may be a decimal one), commas, tabs or blanks separate; a separator may
+/// end the line.
+pub(crate) fn cells(text: &str) -> impl Iterator<Item = Cow<'_, str>> {
+    let text = text.trim();
+    let separator = [';', ',', '\t'].into_iter().find(|&separator| text.contains(separator));
+    let text = separator.and_then(|separator| text.strip_suffix(separator)).unwrap_or(text);
+    let split =
+        text.split(move |c: char| if let Some(separator) = separator { c == separator } else { c.is_whitespace() });
+    let cells = split.map(str::trim).filter(move |cell| separator.is_some() || !cell.is_empty());
+    cells.map(move |cell| {
+        let is_decimal = separator == Some(';') && cell.contains(',');
+        if is_decimal { Cow::Owned(cell.replace(',', ".")) } else { Cow::Borrowed(cell) }
+    })
+}
+
+/// The number in a cell, if it is one that frames hold.
+pub(crate) fn number(cell: &str) -> Option<f64> {
+    cell.parse().ok().filter(|&value| is_held(value))
+}
+
+/// The seconds of a date, or of a time of a day, in a cell with or without quotes.
+pub(crate) fn date(cell: &str) -> Option<f64> {
+    seconds_of(cell.trim_matches(['"', '\'']))
 }
 
 /// The samples of a stream, as they arrived.
@@ -191,13 +221,13 @@ impl StreamFaults {
     /// None so far.
     #[must_use]
     pub fn new(stream: &StreamColumns) -> Self {
-        Self::by_clock(stream.unit_us)
+        Self::by_clock(stream.unit_us, stream.waited)
     }
 
-    /// None so far, of lines with stamps in this unit, us.
+    /// None so far, of lines with stamps in this unit, us, that may have `waited` in a file.
     #[must_use]
-    pub fn by_clock(unit_us: f64) -> Self {
-        let clock = StreamClock::new(unit_us);
+    pub fn by_clock(unit_us: f64, waited: bool) -> Self {
+        let clock = StreamClock::new(unit_us, waited);
         Self { strange: 0, missing: 0, left_out: LeftOut::default(), clock }
     }
 
@@ -406,6 +436,18 @@ mod tests {
             // In packets of 5 s a clock that is off by 3 % agrees with one arrival or other for 170 s.
             let latest = if seed % 3 == 1 { 170_000_000 } else { 60_000_000 };
             assert!(told.after.is_some_and(|after| after <= latest), "seed {seed}, rate {rate}: {told:?}");
+        }
+    }
+
+    #[test]
+    fn lines_that_waited_in_a_file_have_no_clock_to_compare_with_and_step_back_as_others_do() {
+        let stream = StreamColumns { waited: true, ..stream(&["t_us", "a"]) };
+        for (rate, period_us) in [(1.0, 1e4), (300.0, 1e4), (0.1, 1e5), (1.0, 3e6)] {
+            let mut stamps = running(rate, period_us, 200.0, |_| 0.0);
+            assert_eq!(times(&stream, &stamps).1, Counted::default(), "rate {rate}");
+            let (last, at_ns) = *stamps.last().unwrap();
+            stamps.push((last - 1000.0, at_ns));
+            assert_eq!(times(&stream, &stamps).1.back, 1, "rate {rate}");
         }
     }
 

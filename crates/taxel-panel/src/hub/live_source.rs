@@ -180,6 +180,8 @@ impl LiveSource {
             },
             arrival: now.arrival(now_ns()),
             pace: now.board.pace.clone(),
+            rest_shift: now.rest_shift.clone(),
+            falls: now.falls,
             lost: Lost {
                 kernel: now.capture.dropped_by_kernel.0,
                 queue: now.capture.dropped_by_queue,

@@ -111,6 +111,10 @@ pub(crate) enum Message {
         arrival: Arrival,
         /// Null in the first quarter of a second.
         pace: Option<Pace>,
+        /// What is wrong, where the taxels of frames rest elsewhere after a gap than by the tare.
+        rest_shift: Option<String>,
+        /// Whether the values of frames fall under touch, so that no pressure is shown.
+        falls: bool,
         lost: Lost,
         /// Datagrams that wait.
         queue: u64,

@@ -186,7 +186,10 @@ class _Source:
             self.sensor,
             sections.FrameTable(Once(frames)),
             sections.SampleColumns(names, Once(samples, lambda: self.remarks().samples > 0)),
-            timing=sections.Timing(Once(lambda: Clock(read().t, read().arrived_ns))),
+            # The arrival of lines that waited in a file is none of their clock.
+            timing=sections.Timing()
+            if stream.get("waited")
+            else sections.Timing(Once(lambda: Clock(read().t, read().arrived_ns))),
             losses=self.losses(lambda: self.counts_of_stream(read()), lambda: read().found),
             marks=self.marks(),
         )

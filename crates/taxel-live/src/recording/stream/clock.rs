@@ -20,6 +20,8 @@ const FARTHEST_US: f64 = 4_503_599_627_370_496.0;
 #[derive(Debug, Clone)]
 pub struct StreamClock {
     unit_us: f64,
+    /// Whether lines waited in a file until they were read, so that their arrival is no clock to compare with.
+    waited: bool,
     state: State,
     /// The state before a restart or a jump that the next stamp may show to have been one damaged stamp, and whether it
     /// was a restart.
@@ -132,10 +134,10 @@ impl State {
 }
 
 impl StreamClock {
-    /// The clock of stamps in this unit, us.
-    pub fn new(unit_us: f64) -> Self {
+    /// The clock of stamps in this unit, us, of lines that may have `waited` in a file.
+    pub fn new(unit_us: f64, waited: bool) -> Self {
         let state = State { integers: true, added: 0.0, last: None, anchor: None };
-        Self { unit_us, state, before: None, resets: 0, back: 0, jumps: 0, drifts: 0, after: None }
+        Self { unit_us, waited, state, before: None, resets: 0, back: 0, jumps: 0, drifts: 0, after: None }
     }
 
     /// Converts a stamp to a time, us; none if it is no time.
@@ -145,7 +147,12 @@ impl StreamClock {
         if stamp_us.is_nan() || stamp_us.abs() > FARTHEST_US {
             return None;
         }
+        // What waited is as if it had arrived at once.
+        let at_ns = if self.waited { 0 } else { at_ns };
         let mut step = self.state.step(stamp_us, at_ns, self.unit_us);
+        if self.waited && matches!(step, StampStep::Ahead) {
+            step = StampStep::Fits(0.0);
+        }
         let unlike = !matches!(step, StampStep::Fits(turns) if turns == 0.0);
         if let Some((state, anew)) = self.before.take()
             && unlike

@@ -1,0 +1,167 @@
+//! Whether the taxels of a source of frames rest elsewhere after a gap than their tare has it, as those of a sensor do that
+//! was unplugged.
+
+use std::collections::VecDeque;
+
+/// A gap lasts so long, ns, and so many frames.
+const GAP_NS: i64 = 1_000_000_000;
+const GAP_FRAMES: f64 = 3.0;
+
+/// The taxels must hold still over so many frames, so far apart, ns.
+const LOOKS: usize = 10;
+const LOOK_EVERY_NS: i64 = 100_000_000;
+
+/// Of so many times its noise a taxel has left its rest, where the readout has no noise floor.
+const NOISE: f64 = 6.0;
+
+/// One in so many taxels must have left it: what lies on a sensor covers fewer.
+const PART: usize = 4;
+
+/// Looks at the frames after a gap until the taxels hold still.
+#[derive(Debug, Default)]
+pub(super) struct RestShift {
+    gap_ns: i64,
+    /// The noise floor of the readout, in the unit of the values; 0 if it has none.
+    noise_floor: f64,
+    last_ns: Option<i64>,
+    longest_ns: i64,
+    /// The frames since a gap, each with its arrival, ns since 1970.
+    looks: Option<VecDeque<(i64, Vec<f32>)>>,
+    still: Option<StillTaxels>,
+}
+
+/// Taxels that hold still after a gap.
+#[derive(Debug, Clone)]
+struct StillTaxels {
+    values: Vec<f64>,
+    floor: f64,
+}
+
+impl RestShift {
+    pub(super) fn new(noise_floor: f64, frame_us: f64) -> Self {
+        #[allow(clippy::cast_possible_truncation)]
+        let gap_ns = GAP_NS.max((GAP_FRAMES * 1000.0 * frame_us) as i64);
+        Self { gap_ns, noise_floor, ..Self::default() }
+    }
+
+    /// Takes a frame that arrived at `at_ns`, whose values have this noise; returns whether the taxels hold still for the
+    /// first time after a gap.
+    pub(super) fn take(&mut self, at_ns: i64, values: &[f32], noise: f64) -> bool {
+        let silent_ns = self.last_ns.replace(at_ns).map_or(0, |last| at_ns - last);
+        if silent_ns >= self.gap_ns {
+            self.longest_ns = self.longest_ns.max(silent_ns);
+            self.looks = Some(VecDeque::new());
+        }
+        let Some(looks) = &mut self.looks else { return false };
+        if looks.back().is_some_and(|(last_ns, _)| at_ns - last_ns < LOOK_EVERY_NS) {
+            return false;
+        }
+        looks.push_back((at_ns, values.to_vec()));
+        if looks.len() > LOOKS {
+            looks.pop_front();
+        }
+        let floor = if self.noise_floor > 0.0 { self.noise_floor } else { NOISE * noise };
+        if looks.len() < LOOKS {
+            return false;
+        }
+        let mut middles = vec![];
+        for taxel in 0..values.len() {
+            let mut seen: Vec<f64> = looks.iter().map(|(_, frame)| f64::from(frame[taxel])).collect();
+            seen.sort_by(f64::total_cmp);
+            if seen[LOOKS - 1] - seen[0] > 2.0 * floor {
+                return false;
+            }
+            middles.push(f64::midpoint(seen[LOOKS / 2 - 1], seen[LOOKS / 2]));
+        }
+        self.looks = None;
+        self.still = Some(StillTaxels { values: middles, floor });
+        true
+    }
+
+    /// What is wrong, if a part of the taxels that hold still lies elsewhere than their rest, in this unit.
+    pub(super) fn found(&self, rest: &[Option<f64>], unit: &str) -> Option<String> {
+        let StillTaxels { values, floor } = self.still.as_ref()?;
+        let shifts = values.iter().zip(rest).filter_map(|(value, rest)| Some((value - (*rest)?).abs()));
+        let shifted: Vec<f64> = shifts.filter(|shift| shift > floor).collect();
+        if PART * shifted.len() <= values.len() {
+            return None;
+        }
+        let farthest = (shifted.iter().copied().fold(0.0, f64::max) * 1e3).round() / 1e3;
+        #[allow(clippy::cast_precision_loss)]
+        let gap_s = self.longest_ns as f64 / 1e9;
+        Some(format!(
+            "after a gap of {gap_s:.1} s {} of {} taxels rest elsewhere than by the tare, by up to {farthest} {unit}, so that \
+             presses are missed: with nothing on the sensor, zero it on the page, or start anew with --tare SECONDS",
+            shifted.len(),
+            values.len()
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::rngs::StdRng;
+    use rand::{Rng, SeedableRng};
+
+    use super::*;
+
+    const TAXELS: usize = 144;
+    const REST: f64 = 500.0;
+
+    /// What is told of taxels that rest, are silent for a while, and then rest this much elsewhere.
+    fn told(shift: impl Fn(usize) -> f64, gap_s: f64, noise_floor: f64) -> Option<String> {
+        let (mut random, mut watch) = (StdRng::seed_from_u64(3), RestShift::new(noise_floor, 1e4));
+        let mut found = None;
+        for k in 0..400_u32 {
+            let at_s = f64::from(k) * 0.01 + if k < 100 { 0.0 } else { gap_s };
+            let moved = |taxel: usize| if k < 100 { 0.0 } else { shift(taxel) };
+            let values: Vec<f32> =
+                (0..TAXELS).map(|taxel| (REST + moved(taxel) + random.random_range(-1.7..1.7)) as f32).collect();
+            if watch.take((at_s * 1e9) as i64, &values, 1.0) {
+                assert!(found.is_none(), "told twice");
+                found = Some(watch.found(&[Some(REST); TAXELS], "counts"));
+            }
+        }
+        found.flatten()
+    }
+
+    #[test]
+    fn a_rest_that_shifted_in_a_gap_is_told_with_how_many_taxels_and_how_far() {
+        for noise_floor in [10.0, 0.0] {
+            let line = told(|taxel| if taxel < 76 { 32.0 - 64.0 * (taxel % 2) as f64 } else { 0.0 }, 2.4, noise_floor);
+            let line = line.expect("a line");
+            assert!(
+                line.starts_with("after a gap of 2.4 s 76 of 144 taxels rest elsewhere than by the tare, by up to 3"),
+                "{line}"
+            );
+            assert!(line.contains("start anew with --tare SECONDS"), "{line}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_told_without_a_gap_or_a_shift_or_of_a_press() {
+        assert_eq!(told(|_| 32.0, 0.5, 10.0), None);
+        assert_eq!(told(|_| 0.0, 2.4, 10.0), None);
+        assert_eq!(told(|taxel| if taxel < 9 { 200.0 } else { 0.0 }, 2.4, 10.0), None);
+    }
+
+    #[test]
+    fn values_that_do_not_hold_still_are_those_of_a_press() {
+        let (mut random, mut watch) = (StdRng::seed_from_u64(3), RestShift::new(10.0, 1e4));
+        for k in 0..300_i64 {
+            let values: Vec<f32> = (0..TAXELS).map(|_| 500.0 + random.random_range(0.0..99.0)).collect();
+            assert!(!watch.take(k * 10_000_000 + if k > 0 { 2_000_000_000 } else { 0 }, &values, 1.0));
+        }
+    }
+
+    #[test]
+    fn a_taxel_that_is_zeroed_is_compared_with_its_new_rest() {
+        let mut watch = RestShift::new(10.0, 1e4);
+        for k in 0..200_i64 {
+            watch.take(k * 10_000_000 + if k > 0 { 2_000_000_000 } else { 0 }, &[532.0; TAXELS], 1.0);
+        }
+        assert!(watch.found(&[Some(500.0); TAXELS], "counts").is_some());
+        assert_eq!(watch.found(&[Some(532.0); TAXELS], "counts"), None);
+        assert_eq!(watch.found(&[], "counts"), None);
+    }
+}

@@ -1,0 +1,124 @@
+"""Dates as the times of lines: live they are those of the same file."""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime, timedelta, timezone
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from loopback import until
+
+import taxel
+from taxel import ProblemError
+from taxel._base.cells import seconds_of
+from taxel.live import Live
+
+#: How a logger prints a time, with the separator of its cells.
+FORMS = {
+    "with T": (lambda at: at.isoformat(timespec="milliseconds"), ","),
+    "with a blank": (lambda at: at.isoformat(" ", "milliseconds"), ","),
+    "quoted": (lambda at: f'"{at.isoformat(" ", "milliseconds")}"', ","),
+    "with a zone": (lambda at: at.isoformat(timespec="milliseconds") + "+02:00", "\t"),
+    "with points": (lambda at: f"{at:%d.%m.%Y %H:%M:%S},{at.microsecond // 1000:03}", ";"),
+    "with points and few digits": (lambda at: f"{at.day}.{at.month}.{at.year} {at:%H:%M:%S}", ";"),
+    "of a day": (lambda at: f"{at:%H:%M:%S}.{at.microsecond // 1000:03}", ","),
+}
+
+
+@given(
+    st.datetimes(datetime(1700, 1, 1), datetime(2250, 1, 1)),
+    st.integers(-1439, 1439),
+    st.sampled_from(["T", " "]),
+    st.sampled_from(".,"),
+)
+def test_drawn_dates_are_those_of_the_standard_library(at: datetime, minutes: int, between: str, point: str) -> None:
+    zone = timezone(timedelta(minutes=minutes))
+    texts = {
+        at.isoformat(between, "microseconds").replace(".", point): at.replace(tzinfo=UTC),
+        at.isoformat(between, "seconds"): at.replace(microsecond=0, tzinfo=UTC),
+        at.replace(tzinfo=zone).isoformat(between, "microseconds"): at.replace(tzinfo=zone),
+        f"{at.day}.{at.month}.{at.year:04}{between}{at:%H:%M}": at.replace(second=0, microsecond=0, tzinfo=UTC),
+        f"{at:%H%M%S}": at.replace(year=1970, month=1, day=1, microsecond=0, tzinfo=UTC),
+    }
+    for text, expected in texts.items():
+        since = expected - datetime(1970, 1, 1, tzinfo=UTC)
+        assert seconds_of(text) == since.total_seconds(), text
+
+
+@given(st.text("0123456789.:-+,TZ /", max_size=24))
+def test_no_text_is_a_date_that_is_none_by_the_standard_library(text: str) -> None:
+    seconds = seconds_of(text)
+    if math.isnan(seconds) or text.count(".") >= 2:
+        return
+    for whole in (text, f"1970-01-01T{text}"):
+        try:
+            at = datetime.fromisoformat(whole)
+        except ValueError:
+            continue
+        since = (at if at.tzinfo else at.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
+        assert seconds == pytest.approx(since.total_seconds(), rel=1e-12)
+        return
+    pytest.fail(f"{text!r} is {seconds}")
+
+
+@pytest.mark.parametrize("stated", ["time=1:iso", "time=1", ""])
+@pytest.mark.parametrize("form", FORMS)
+def test_times_live_are_those_of_the_file(tmp_path: Path, form: str, stated: str) -> None:
+    rng = np.random.default_rng(len(form))
+    write, separator = FORMS[form]
+    at = datetime(1975 + len(form), 2, 27, 10, 15, 2)
+    lines = []
+    for _ in range(40):
+        at += timedelta(milliseconds=int(rng.integers(1_000, 9_000)))
+        lines.append(separator.join([write(at), *map(str, rng.integers(0, 99, 3))]))
+    file = tmp_path / "a.csv"
+    file.write_text("\n".join(lines) + "\n")
+    (tmp_path / "a.layout.toml").write_text(
+        f"rows = 1\ncolumns = 3\n\n[table]\nseparator = {separator!r}\ntime_column = 1\ntime_unit = 'iso'\n".replace(
+            "'", '"'
+        )
+    )
+    keys = ",".join(key for key in (f"lines:{file}", "array=1x3", "rate=1", stated) if key)
+    with Live(sources=keys, record=tmp_path / "a.mcap") as live:
+        until(lambda: live.counters["frames"] == len(lines))
+        summary = live.stop()
+    expected, frames = taxel.open(file).frames(), taxel.open(tmp_path / "a.mcap").frames()
+    assert np.array_equal(frames.t, expected.t)
+    assert np.array_equal(frames.values, expected.values)
+    # What waited in a file has no clock to compare with.
+    assert summary.verdict.damaged == {}
+
+
+def test_numbers_that_are_no_frames_have_dates_too(tmp_path: Path) -> None:
+    file = tmp_path / "imu.txt"
+    file.write_text("".join(f"2024-05-01 10:15:{k:02}.010, {k}, 0.5\n" for k in range(0, 60, 5)))
+    for name, source in {"a": f"lines:{file}", "b": f"lines:{file},columns=at:x:y,time=at:iso"}.items():
+        path = tmp_path / f"{name}.mcap"
+        with Live(0, host="127.0.0.1", record=path, sources={"imu": source}) as live:
+            until(lambda live=live: live.counters["sources"]["imu"]["lines"] == 12)  # type: ignore[misc]
+            summary = live.stop()
+        assert summary.verdict.parts["imu"].damaged == {}
+        imu = taxel.open(path).sources["imu"]
+        assert imu.frames().t.tolist() == [1_714_558_500_010_000 + 1_000_000 * k for k in range(0, 60, 5)]
+        assert imu.verdict.damaged == {}
+
+
+def test_a_day_and_a_time_in_two_columns_are_added(tmp_path: Path) -> None:
+    file = tmp_path / "a.txt"
+    file.write_text("".join(f"01.05.2024;10:15:02,{k:03};{k};7\n" for k in range(10, 30, 10)))
+    with Live(sources=f"lines:{file},array=1x2,rate=100", record=tmp_path / "a.mcap") as live:
+        until(lambda: live.counters["frames"] == 2)
+    assert taxel.open(tmp_path / "a.mcap").frames().t.tolist() == [1_714_558_502_010_000, 1_714_558_502_020_000]
+
+
+def test_a_date_that_the_keys_do_not_expect_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "a.txt"
+    file.write_text("2024-05-01T10:15:02,1,2\n2024-05-01T10:15:03,1,2\n")
+    with pytest.raises(ProblemError, match=r"all with a date in column 1 \(.*\): add time=1:iso"):
+        Live(sources=f"lines:{file},columns=at:a:b,array=1x2,leave_out=2", first_line_s=0.5)
+    with pytest.raises(ProblemError, match=r"state its unit, as time=at:ms, or time=at:iso of dates"):
+        Live(sources=f"lines:{file},columns=at:a:b,array=1x2,time=at")
