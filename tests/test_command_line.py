@@ -18,7 +18,7 @@ import taxel
 from taxel.cli._commands import OWN, plugins
 from taxel.cli._opening import FileOptions
 from taxel.live import send
-from taxel.recording.text_options import TextOptions
+from taxel.recording.text_options import TYPED, TextOptions
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -326,4 +326,5 @@ def test_labels_of_a_recording_that_is_not_there_are_left_out_with_one_warning(h
 
 
 def test_each_option_of_opening_is_typed_by_its_name() -> None:
-    assert {option.name for option in fields(FileOptions)} == {option.name for option in fields(TextOptions)}
+    typed = {TYPED.get(option.name, option.name) for option in fields(TextOptions)}
+    assert {option.name for option in fields(FileOptions)} == typed

@@ -67,29 +67,29 @@ def test_what_faery_writes_is_read_back(kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("region", "side", "count_ms", "polarity"),
+    ("region", "side", "window_ms", "polarity"),
     [
         *mixed((None, "3:50,7:41", "10:,:20"), (None, 1, 4, 7), (0.5, 5, 1000), (None, "both", "on", "off")),
     ],
 )
 def test_counts_are_those_of_events_one_after_the_other(
-    region: str | None, side: int | None, count_ms: float, polarity: str | None, tmp_path: Path
+    region: str | None, side: int | None, window_ms: float, polarity: str | None, tmp_path: Path
 ) -> None:
-    rows, reduction = some_rows(), Reduction(region, side, count_ms, polarity)
+    rows, reduction = some_rows(), Reduction(region, side, window_ms, polarity)
     path = write(tmp_path / "a.raw", rows)
-    frames = taxel.open(path, region=region, bin=side, count_ms=count_ms, polarity=polarity).frames()
+    frames = taxel.open(path, region=region, bin=side, window_ms=window_ms, polarity=polarity).frames()
     assert (frames.values == counted(rows, reduction)).all()
     first = rows[0, 0] // reduction.window_us
     # The time of a frame is its begin: what is detected in it is known at its end.
     assert (frames.t == (first + np.arange(len(frames))) * reduction.window_us).all()
     chosen = {"on": "on ", "off": "off "}.get(polarity or "", "")
-    assert frames.unit == f"{chosen}events/{count_ms:g} ms"
+    assert frames.unit == f"{chosen}events/{window_ms:g} ms"
     assert frames.values.sum() == len(rows) or (region, polarity or "both") != (None, "both")
 
 
 def test_both_polarities_are_the_sum_of_each(tmp_path: Path) -> None:
     path = write(tmp_path / "a.raw", some_rows())
-    both, on, off = (taxel.open(path, count_ms=2, polarity=name).frames() for name in ("both", "on", "off"))
+    both, on, off = (taxel.open(path, window_ms=2, polarity=name).frames() for name in ("both", "on", "off"))
     assert (both.values == on.values + off.values).all()
     assert on.values.any()
     assert off.values.any()
@@ -108,12 +108,12 @@ def test_a_region_and_larger_taxels_make_events_too(tmp_path: Path) -> None:
 
 def test_the_layout_and_the_command_line_say_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(tmp_path / "a.raw", some_rows())
-    given = taxel.open(path, region="0:32,0:32", bin=4, count_ms=5, polarity="on").frames()
+    given = taxel.open(path, region="0:32,0:32", bin=4, window_ms=5, polarity="on").frames()
     options = ["--region", "0:32,0:32", "--bin", "4", "--count-ms", "5", "--polarity", "on"]
     with pytest.raises(SystemExit, match="0"):
         main(["convert", str(path), str(tmp_path / "b.npz"), *options])
     (tmp_path / "a.layout.toml").write_text(
-        '[event_camera]\nregion = "0:32,0:32"\nbin = 4\ncount_ms = 5\npolarity = "on"\n'
+        '[event_camera]\nregion = "0:32,0:32"\nbin = 4\nwindow_ms = 5\npolarity = "on"\n'
     )
     assert given == taxel.open(path).frames() == taxel.open(tmp_path / "b.npz").frames()
     # What is given comes before what the layout says.
@@ -124,7 +124,7 @@ def test_the_layout_and_the_command_line_say_the_same(tmp_path: Path, capsys: py
 def test_a_folder_of_files_is_a_list_of_recordings(tmp_path: Path) -> None:
     for k in (10, 2):
         write(tmp_path / f"take{k}.raw", some_rows(seed=k))
-    (tmp_path / "layout.toml").write_text("[event_camera]\ncount_ms = 5\n")
+    (tmp_path / "layout.toml").write_text("[event_camera]\nwindow_ms = 5\n")
     (tmp_path / "labels.csv").write_text("recording,label,t_us\ntake2,contact,2000\ntake10,contact,3000\n")
     opened = taxel.open_all(tmp_path, bin=16)
     assert [recording.name for recording in opened] == ["take2.raw", "take10.raw"]
@@ -229,14 +229,14 @@ def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(t
     labels = [{"contact": begins.tolist()}]
     with refused("events without intensities, which the recipe touch and its encoders need: frames of an event camera"):
         taxel.train(taxel.open(path), labels)
-    training = taxel.train(taxel.open(path, bin=4, count_ms=5), labels)
+    training = taxel.train(taxel.open(path, bin=4, window_ms=5), labels)
     assert training.score["contact"].found == 12
     assert any("recipe event_counts" in line for line in training.lines())
-    frames = taxel.open(path, bin=4, count_ms=5).frames()
+    frames = taxel.open(path, bin=4, window_ms=5).frames()
     assert len(taxel.detect.run(training.readout, frames, tare=taxel.Tare.take(frames, stop_us=500_000))) == 12
     with refused("in events/2 ms, and the readout was trained on events/5 ms"):
-        taxel.detect.run(training.readout, taxel.open(path, bin=4, count_ms=2).frames())
-    on = taxel.open(path, bin=4, count_ms=5, polarity="on").frames()
+        taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=2).frames())
+    on = taxel.open(path, bin=4, window_ms=5, polarity="on").frames()
     for detector in (training.readout, taxel.detect.PlainRule("area", 2, unit="events/5 ms")):
         with refused("in on events/5 ms, and the .* was trained on events/5 ms"):
             taxel.detect.run(detector, on, tare=taxel.Tare.take(on, stop_us=500_000))
@@ -283,9 +283,9 @@ def test_strong_bursts_are_told_from_weaker_ones(tmp_path: Path) -> None:
         ({"region": 3}, "region is 3"),
         ({"bin": 0}, "bin is 0"),
         ({"bin": 1.5}, "bin is 1.5"),
-        ({"count_ms": 0.0015}, "count_ms is 0.0015: must be whole us"),
-        ({"count_ms": 0}, "count_ms is 0"),
-        ({"count_ms": float("nan")}, "count_ms is nan"),
+        ({"window_ms": 0.0015}, "window_ms is 0.0015: must be whole us"),
+        ({"window_ms": 0}, "window_ms is 0"),
+        ({"window_ms": float("nan")}, "window_ms is nan"),
         ({"polarity": "red"}, "polarity is 'red': must be one of 'both', 'on', 'off'"),
     ],
 )
@@ -299,14 +299,14 @@ def test_the_options_are_of_events_without_intensities_alone(tmp_path: Path) -> 
     one = {"array": taxel.Array(4, 4), "intensity": [7]}
     taxel.convert(Events([0], [0], [0], [True], **one), tmp_path / "b.npz")
     for place in (tmp_path / "a.npz", tmp_path, tmp_path / "b.npz"):
-        with refused("holds no events without intensities, as an event camera's file does; region, bin, count_ms and"):
+        with refused("holds no events without intensities, as an event camera's file does; region, bin, window_ms and"):
             taxel.open_all(place, bin=2)
 
 
 @pytest.mark.parametrize("kind", ["table", "csv", "npz", "mcap"])
-@pytest.mark.parametrize("count_ms", [None, 5])
-def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, count_ms: float | None, tmp_path: Path) -> None:
-    how = {"region": "3:50,7:41", "bin": 4, "count_ms": count_ms, "polarity": "on"}
+@pytest.mark.parametrize("window_ms", [None, 5])
+def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: float | None, tmp_path: Path) -> None:
+    how = {"region": "3:50,7:41", "bin": 4, "window_ms": window_ms, "polarity": "on"}
     by_camera = taxel.open(write(tmp_path / "a.raw", some_rows()), **how)
     events = taxel.open(tmp_path / "a.raw").events
     if kind == "table":
@@ -322,7 +322,7 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, count_ms: f
         taxel.convert(events, path)
         how["array"] = None if kind == "mcap" else taxel.Array(48, 64)
     read = taxel.open(path, **how)
-    if count_ms is None:
+    if window_ms is None:
         assert (rows_of(read.events) == rows_of(by_camera.events)).all()
         assert read.array.shape == by_camera.array.shape
     else:
@@ -352,7 +352,7 @@ def test_what_is_no_file_of_a_camera_names_those(name: str, begins: bytes, said:
 
 def test_too_many_frames_name_a_larger_window(tmp_path: Path) -> None:
     with refused(r"frames of 48 x 64 taxels \(less by --region, by a larger --bin, or by a larger window", FormatError):
-        taxel.open(write(tmp_path / "a.raw", some_rows()), count_ms=0.001, limit=10_000)
+        taxel.open(write(tmp_path / "a.raw", some_rows()), window_ms=0.001, limit=10_000)
 
 
 def test_the_pitch_of_a_camera_stays_unknown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -210,7 +210,7 @@ def event_camera(folder: Path, size: int) -> Path:
 
 
 def counted_events(folder: Path, size: int) -> Path:
-    (folder / "layout.toml").write_text("[event_camera]\ncount_ms = 10\n")
+    (folder / "layout.toml").write_text("[event_camera]\nwindow_ms = 10\n")
     from formats.event_files import some_rows, write
 
     # An event each 100 us.

@@ -71,7 +71,7 @@ class FileOptions:
             min=0.001,
             max=3.6e6,
             metavar="MS",
-            help="Read an event camera's file as frames of counts, one each so many ms; no --window-ms of a score.",
+            help="Read an event camera's file as frames of counts, one each so many ms (window_ms of taxel.open).",
         ),
     ] = None
     polarity: Annotated[
@@ -94,6 +94,7 @@ class FileOptions:
     @property
     def opener(self) -> TextOptions:
         """What opens files by these options."""
-        from taxel.recording.text_options import TextOptions  # noqa: PLC0415  the command line starts quickly
+        from taxel.recording.text_options import TYPED, TextOptions  # noqa: PLC0415  the command line starts quickly
 
-        return TextOptions(**vars(self))
+        names = {typed: name for name, typed in TYPED.items()}
+        return TextOptions(**{names.get(typed, typed): value for typed, value in vars(self).items()})

@@ -58,7 +58,7 @@ class SharedOptions:
     ros: str | None = None
     region: str | None = None
     bin: int | None = None
-    count_ms: float | None = None
+    window_ms: float | None = None
     polarity: str | None = None
     limit: int | None = None
 
@@ -83,7 +83,7 @@ class OpenOptions(SharedOptions):
     @property
     def reduction(self) -> Reduction:
         """What is read of the events of a camera."""
-        return Reduction(self.region, self.bin, self.count_ms, self.polarity)
+        return Reduction(self.region, self.bin, self.window_ms, self.polarity)
 
     def how(self, path: Path, name: str, layout: Layout | None) -> dict[str, Reduction]:
         """Return the arguments of a format's own with which a path of this format is read.
@@ -101,7 +101,7 @@ class OpenOptions(SharedOptions):
 
 def _no_camera(path: Path) -> ProblemError:
     return ProblemError(
-        f"{path}: holds no events without intensities, as an event camera's file does; region, bin, count_ms and "
+        f"{path}: holds no events without intensities, as an event camera's file does; region, bin, window_ms and "
         "polarity are of these"
     )
 
@@ -130,10 +130,10 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
         list too.
     types, ros : path and str, optional
         For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, as "humble".
-    region, bin, count_ms, polarity : str, int, float (ms) and str, optional
+    region, bin, window_ms, polarity : str, int, float (ms) and str, optional
         What is read of an event camera's file, or of other events without intensities: columns and rows as
         "100:420,60:300", of which the last are not included; the side of the square of pixels that becomes a taxel;
-        frames of counts, one each `count_ms`, at the window's begin; and "on" or "off" events alone, not "both".
+        frames of counts, one each `window_ms`, at the window's begin; and "on" or "off" events alone, not "both".
     limit : int, bytes, 1 or more, optional
         How much may be read into memory; default: three quarters of what is available, and at most the sizes of
         docs/files.md.
@@ -195,7 +195,7 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
         A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as of `taxel.open`.
     array, layout, topic, field, types, ros
         As of `taxel.open`.
-    region, bin, count_ms, polarity : str, int, float (ms) and str, optional
+    region, bin, window_ms, polarity : str, int, float (ms) and str, optional
         As of `taxel.open`.
     limit : int, bytes, 1 or more, optional
         As of `taxel.open`, for all recordings together.

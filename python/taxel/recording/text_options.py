@@ -20,6 +20,9 @@ from taxel.recording.readers.foreign import is_lone_array
 from taxel.recording.recognition import ForeignFile, files_in, is_folder, recognise
 from taxel.recording.recording import Recording
 
+#: How an option is typed of whose name a command may have another one.
+TYPED = {"window_ms": "count_ms"}
+
 
 @dataclass(frozen=True, kw_only=True)
 class TextOptions(SharedOptions):
@@ -29,7 +32,7 @@ class TextOptions(SharedOptions):
     ----------
     array : sequence of str, optional
         Rows, columns and pitch (mm) of the sensor, as "24x20x5"; of a ROS bag one for each topic, or one for all.
-    layout, topic, field, types, ros, region, bin, count_ms, polarity, limit
+    layout, topic, field, types, ros, region, bin, window_ms, polarity, limit
         As of `taxel.open`.
     rate_hz : float, Hz, optional
         Frames a second, for recordings without times.
@@ -69,7 +72,7 @@ class TextOptions(SharedOptions):
         words: list[str] = []
         for name, value in self.given().items():
             for entry in value if isinstance(value, list | tuple) else [value]:
-                words += [f"--{name.replace('_', '-')}", str(entry)]
+                words += [f"--{TYPED.get(name, name).replace('_', '-')}", str(entry)]
         return words
 
     def _names_topic(self, bag: Path) -> bool:

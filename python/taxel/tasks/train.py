@@ -111,7 +111,7 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
         if isinstance(table, Events) and table.intensity is None:
             raise ProblemError(
                 "events without intensities, which the recipe touch and its encoders need: frames of an event camera's "
-                "counts (count_ms=5, --count-ms 5) are trained by event_counts"
+                "counts (window_ms=5, --count-ms 5) are trained by event_counts"
             )
     unlabelled = sources_without(labels, opened, labelled)
     labelled = [_moved(events, each, options.shift_ms) for events, each in zip(labelled, opened, strict=True)]

@@ -27,7 +27,7 @@ class Reduction:
         Columns and rows as "A:B,C:D", of which B and D are not included; default: the whole sensor.
     bin : int, pixels, 1 or more, optional
         The side of the square of pixels that becomes a taxel; default: 1.
-    count_ms : float, ms, whole us, optional
+    window_ms : float, ms, whole us, optional
         Frames of counts, one a window; default: events.
     polarity : {"both", "on", "off"}, optional
         Which events are read; default: both.
@@ -38,13 +38,13 @@ class Reduction:
 
     Examples
     --------
-    >>> Reduction("100:420,60:300", bin=4).bounds(640, 480), Reduction(count_ms=2.5).window_us
+    >>> Reduction("100:420,60:300", bin=4).bounds(640, 480), Reduction(window_ms=2.5).window_us
     ((100, 420, 60, 300), 2500)
     """
 
     region: str | None = None
     bin: int | None = None
-    count_ms: float | None = None
+    window_ms: float | None = None
     polarity: str | None = None
 
     def __post_init__(self) -> None:
@@ -52,10 +52,10 @@ class Reduction:
             _ends(self.region)
         if self.bin is not None:
             integer("bin", self.bin, 1, 65_535)
-        if self.count_ms is not None:
-            window_us = to_us(finite("count_ms", self.count_ms, "ms", least=0.001, most=_LONGEST_MS))
+        if self.window_ms is not None:
+            window_us = to_us(finite("window_ms", self.window_ms, "ms", least=0.001, most=_LONGEST_MS))
             if round(window_us, 6) % 1:
-                raise refused("count_ms", f" is {shown(self.count_ms)}: must be whole us")
+                raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be whole us")
         if self.polarity is not None:
             text("polarity", self.polarity, POLARITIES)
 
@@ -77,13 +77,13 @@ class Reduction:
     @property
     def window_us(self) -> int | None:
         """The window, us; None for events."""
-        return None if self.count_ms is None else round(to_us(self.count_ms))
+        return None if self.window_ms is None else round(to_us(self.window_ms))
 
     @property
     def unit(self) -> str:
         """The unit of counts, which names a polarity that was chosen: what is trained on one does not fit the other."""
         chosen = "" if self.polarity in (None, "both") else f"{self.polarity} "
-        return f"{chosen}events/{self.count_ms:g} ms"
+        return f"{chosen}events/{self.window_ms:g} ms"
 
     def shape(self, columns: int, rows: int) -> tuple[int, int]:
         """Return the rows and columns of taxels on a sensor.
