@@ -71,7 +71,8 @@ class FileOptions:
             min=0.001,
             max=3.6e6,
             metavar="MS",
-            help="Read an event camera's file as frames of counts, one each so many ms (window_ms of taxel.open).",
+            help="Read an event camera's file as frames of counts, one each so many ms (window_ms of taxel.open and of "
+            "layout files; --window-ms is the tolerance of a score).",
         ),
     ] = None
     polarity: Annotated[
