@@ -171,8 +171,8 @@ def given_tare(tare: GivenTare, recording: Recording) -> Tare:
     if isinstance(source, Events):
         stop = min([stop, *(t for t, start in source.markers if start and t > first)])
     measured = _measured(recording, source, stop)
-    what, remedy = f"the beginning of {recording.title}", "give the seconds before it, or a file"
-    _warn_of_touch(f"tare is {tare}: {what}", remedy, source, measured)
+    subject, remedy = f"the beginning of {recording.title}", "give the seconds before it, or a file"
+    _warn_of_touch(f"tare is {tare}: {subject}", remedy, source, measured)
     return measured
 
 
@@ -271,11 +271,11 @@ def zero_by_unit(recording: Recording) -> Tare | None:
     return zero
 
 
-def _warn_of_touch(what: str, remedy: str, source: Events | Frames, measured: Tare) -> None:
+def _warn_of_touch(subject: str, remedy: str, source: Events | Frames, measured: Tare) -> None:
     """Warn of a tare in which something was touched, by which lifts are missed or false."""
     taxels = held_by_tare([Example(source, {}, measured)], NOISE_FLOOR)
     if taxels >= TOUCH:
-        warn(f"{what} is not quiet but holds a touch of {taxels} taxels; {remedy}", stacklevel=3)
+        warn(f"{subject} is not quiet but holds a touch of {taxels} taxels; {remedy}", stacklevel=3)
 
 
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
