@@ -173,7 +173,7 @@ mod tests {
             (repeated(&|k| format!("{},{}", 500 + 10 * k, row(256))), "array=16x16,time=1:ms"),
             (repeated(&|k| format!("{},{}", 10_000 * k, row(5))), "array=1x5,time=1:us"),
             (repeated(&|k| if k % 5 == 3 { String::new() } else { row(6) }), "array=4x6,frame_end=blank"),
-            (repeated(&|k| format!("2024-05-01 10:15:02.{k:02}0;{}", row(7))), "array=1x7,time=1:iso"),
+            (repeated(&|k| format!("2024-05-01 10:15:02.{k:02}0,{}", row(7))), "array=1x7,time=1:iso"),
             (format!("Mat 1.0\n{}", repeated(&|_| row(64))), "array=8x8"),
             (repeated(&|_| "hello".to_owned()), ""),
             (String::new(), ""),
