@@ -63,9 +63,9 @@ class StatedOptions:
     )
     tare: Tare | float | None = option(
         None,
-        "Rest of the taxels: a recording of them at rest, a saved tare, or how many seconds of rest to take a fresh "
-        "one from.",
+        "Rest of the taxels: a saved tare, or how many seconds of rest at the beginning to take a fresh one from.",
         metavar="FILE|SECONDS",
+        typed="A recording of them at rest (taxel cut) is a tare too.",
     )
     record: str | os.PathLike[str] | None = option(None, "Record in a new file (.mcap or .lsa).")
     record_later: bool = option(

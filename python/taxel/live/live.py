@@ -67,10 +67,10 @@ class Live:
     readout : Readout or PlainRule, optional
         A trained readout or a plain rule; without one nothing is detected.
     tare : Tare or float, optional
-        Rest of the taxels: a recording of them at rest, a saved tare, or how many seconds of rest to take a fresh one
-        from. For a plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the
-        first event on, s, which ends early where the board marks a start. The board must be at rest then, with its
-        noise floor at 0.
+        Rest of the taxels: a saved tare, or how many seconds of rest at the beginning to take a fresh one from. For a
+        plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event
+        on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at
+        0.
     record : path, optional
         Record in a new file (.mcap or .lsa). `.mcap` holds all data, `.lsa` the raw bytes of the manual.
     record_later : bool
