@@ -68,13 +68,15 @@ fn time_of_day(text: &str) -> Option<i64> {
 
 /// The us of `10`, `10:15`, `10:15:02`, `10:15:02.010` or `10:15:02,010`, also without colons.
 fn clock(text: &str) -> Option<i64> {
-    let (whole, fraction) = match text.split_once(['.', ',']) {
-        Some((whole, fraction)) => (whole, Some(fraction)),
+    let (main_part, fraction) = match text.split_once(['.', ',']) {
+        Some((main_part, fraction)) => (main_part, Some(fraction)),
         None => (text, None),
     };
-    let parts: Vec<&str> = match (whole.contains(':'), whole.len()) {
-        (true, _) => whole.split(':').collect(),
-        (false, 2 | 4 | 6) if whole.is_ascii() => (0..whole.len() / 2).map(|k| &whole[2 * k..2 * k + 2]).collect(),
+    let parts: Vec<&str> = match (main_part.contains(':'), main_part.len()) {
+        (true, _) => main_part.split(':').collect(),
+        (false, 2 | 4 | 6) if main_part.is_ascii() => {
+            (0..main_part.len() / 2).map(|k| &main_part[2 * k..2 * k + 2]).collect()
+        }
         _ => return None,
     };
     let mut us = 0;
