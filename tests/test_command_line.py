@@ -69,6 +69,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("emulate", "--baud", "9600"), "--baud without --line"),
         (("info", "nowhere/a.mcap"), "nowhere: no such folder"),
         (("info", "none.mcap"), "none.mcap: no such file or directory"),
+        (("info", "walk.npz", "--tare", "0,5"), "tare: 0,5: no such file; seconds are a number with a point, as 0.5"),
         (("record", "--compression", "x", "a.mcap"), '--compression is "x": must be none, lz4 or zstd'),
         (("record", "--host", "no such host", "a.mcap"), '--host is "no such host": must be an address or a name'),
         (("record", "--preset", "9 kHz", "a.mcap"), 'preset "9 kHz": there are "5.2 kHz"'),

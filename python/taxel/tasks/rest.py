@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from errno import ENOENT
 from pathlib import Path
 from shlex import quote
 from typing import Any, TypeAlias
@@ -192,6 +193,8 @@ def tare_of(path: Path, recording: Recording | None = None) -> Tare:
     FormatError : neither a tare nor a recording
     FileNotFoundError : no such file
     """
+    if not path.exists():
+        raise FileNotFoundError(ENOENT, "no such file; seconds are a number with a point, as 0.5", f"tare: {path}")
     if path.suffix == ".json" or (path.is_file() and _is_json(path)):
         return Tare.load(path)
     resting = open_one(path)
