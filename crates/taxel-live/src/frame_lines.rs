@@ -66,7 +66,7 @@ impl FrameLayout {
         }
     }
 
-    /// Checks that the values of a frame fill the array.
+    /// Checks that the values of a frame fill the array, and that a line holds a row of it, several, or an even part of one.
     ///
     /// # Errors
     ///
@@ -78,15 +78,28 @@ impl FrameLayout {
             FrameEnd::Lines(lines) => lines * n == self.array.len(),
             FrameEnd::EmptyLine => n > 0 && self.array.len().is_multiple_of(n),
         };
+        let lines = match self.end {
+            FrameEnd::Lines(1) => String::new(),
+            FrameEnd::Lines(lines) => format!(", {lines} lines a frame"),
+            FrameEnd::EmptyLine => ", an empty line after each frame".to_owned(),
+        };
+        let (frame, row) = (self.array.len(), usize::from(columns));
         if !fits {
-            let lines = match self.end {
-                FrameEnd::Lines(1) => String::new(),
-                FrameEnd::Lines(lines) => format!(", {lines} lines a frame"),
-                FrameEnd::EmptyLine => ", an empty line after each frame".to_owned(),
+            let several = match frame / n.max(1) {
+                several @ 2.. if self.end == FrameEnd::Lines(1) && several * n == frame => {
+                    format!(" (or add frame_lines={several}, or frame_end=blank where an empty line ends each frame)")
+                }
+                _ => String::new(),
             };
             return Err(problem!(
-                "array={rows}x{columns}: lines have {n} values{lines}: must be {} a frame",
-                self.array.len()
+                "array={rows}x{columns}: lines have {n} values{lines}: must be {frame} a frame{several}"
+            ));
+        }
+        if !n.is_multiple_of(row) && !row.is_multiple_of(n) {
+            let turned =
+                if n == usize::from(rows) { format!(": is it array={columns}x{rows}?") } else { String::new() };
+            return Err(problem!(
+                "array={rows}x{columns}: lines have {n} values{lines}: must be rows of {columns}{turned}"
             ));
         }
         if !(1.0..=3.6e9).contains(&self.frame_us) {
@@ -152,6 +165,8 @@ pub struct FrameAssembler {
     is_whole: bool,
     /// Whether the lines were interrupted, so that a frame that lacks its beginning is a loss.
     was_interrupted: bool,
+    /// Whether numbers came since the lines began or went on: text before them, as a board prints when it starts, is no fault.
+    has_begun: bool,
     /// Stamp of the last frame, and its time, us.
     stamp: Option<f64>,
     last: Option<i64>,
@@ -198,6 +213,7 @@ impl FrameAssembler {
             bytes: 0,
             is_whole: false,
             was_interrupted: false,
+            has_begun: false,
             stamp: None,
             last: None,
             arrived_ns: None,
@@ -229,7 +245,7 @@ impl FrameAssembler {
         self.numbers = numbers;
         self.bytes += line.bytes;
         if !is_read {
-            self.count_unread(text);
+            self.count_unread(line);
             self.discard();
         }
         if ends { self.end_frame() } else { None }
@@ -269,6 +285,10 @@ impl FrameAssembler {
             let Some(value) = value else { return false };
             numbers.push(value);
         }
+        // An empty last cell is one where the layout counts it.
+        if self.is_read.get(numbers.len()) == Some(&false) && text.trim().ends_with([';', ',']) {
+            numbers.push(f64::NAN);
+        }
         numbers.len() == self.layout.fields
     }
 
@@ -277,24 +297,27 @@ impl FrameAssembler {
     }
 
     /// Counts a line that is no part of a frame.
-    fn count_unread(&mut self, text: &str) {
-        self.faults.strange();
-        let is_text = !text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t'));
+    fn count_unread(&mut self, line: &TextLine) {
+        let text = line.text.trim();
         let is_number = |(k, cell): (usize, Cow<'_, str>)| match self.holds_date(k) {
             true => date(&cell).is_some(),
             false => number(&cell).is_some(),
         };
         let are_numbers = cells(text).enumerate().all(is_number);
         let kind = match are_numbers {
-            _ if !is_text => &mut self.unread.no_text,
+            _ if !line.is_text() => &mut self.unread.no_text,
             true => &mut self.unread.other_length,
             false => &mut self.unread.text,
         };
         kind.count(1, text);
+        if self.has_begun || are_numbers {
+            self.faults.strange();
+        }
     }
 
     /// Adds the numbers of a line; returns whether it ends a frame.
     fn push_numbers(&mut self, numbers: &[f64], arrived_ns: i64) -> bool {
+        self.has_begun = true;
         if self.begun.is_none() {
             let stamp = match self.layout.time[..] {
                 [] => None,
@@ -391,7 +414,7 @@ impl FrameAssembler {
     /// Handles an interruption: the next line begins a frame.
     pub fn restart(&mut self) {
         self.discard();
-        (self.is_whole, self.was_interrupted) = (false, true);
+        (self.is_whole, self.was_interrupted, self.has_begun) = (false, true, false);
     }
 
     /// Ends at this time, ns since 1970: no line can come, so that what follows is no silence.
@@ -507,6 +530,22 @@ mod tests {
         frames.push(&line("9,9"), 0);
         frames.push(&line(""), 0);
         assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (2, 2, 3));
+    }
+
+    #[test]
+    fn text_before_the_first_numbers_is_counted_and_is_no_fault() {
+        let mut frames = FrameAssembler::new(layout(2, &[]));
+        let mut push = |text: &str| {
+            frames.push(&line(text), 0);
+            (frames.found(0).strange(), frames.unread().text.lines, frames.unread().no_text.lines)
+        };
+        assert_eq!(
+            ["rst:0x1 (POWERON_RESET)", "\u{fffd}\u{1}", "1,2", "boot"].map(&mut push),
+            [(0, 1, 0), (0, 1, 1), (0, 1, 1), (1, 2, 1)]
+        );
+        frames.restart();
+        frames.push(&line("rst:0x1 (POWERON_RESET)"), 0);
+        assert_eq!((frames.found(0).strange(), frames.unread().text.lines), (1, 3));
     }
 
     #[test]

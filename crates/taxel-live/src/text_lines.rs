@@ -26,6 +26,14 @@ pub struct TextLine {
     pub cut: bool,
 }
 
+impl TextLine {
+    /// Whether its bytes are text, and no garbage as of another speed of a serial line.
+    #[must_use]
+    pub fn is_text(&self) -> bool {
+        !self.text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t'))
+    }
+}
+
 /// Number of bytes that arrived and that are in no line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LeftOut {

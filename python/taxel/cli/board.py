@@ -260,7 +260,7 @@ def left_out(lines: dict[str, Any]) -> str:
 _UNREAD = {
     "text": "of text",
     "other_length": "with another number of values",
-    "no_text": "that are no text: is the speed of the line right?",
+    "no_text": "with bytes that are no text: is the speed of the line right?",
     "unfinished_frames": "of frames that lack lines",
     "repeated_stamps": "with a time that is not after the one before: is a part of it in another column "
     "(time=A+B for seconds and nanoseconds), or its unit another?",

@@ -34,6 +34,10 @@ pub(super) const DATES: &str = "iso";
 const FORMS: &str = "[NAME=]board:HOST:PORT, serial:PLACE, lines:PATH (- is the standard input), lines+tcp:HOST:PORT, \
                      lines+udp:HOST:PORT or given, and KEY=VALUE after commas";
 
+/// The options of a source that is no board, for errors.
+const OPTIONS: &str =
+    "array=ROWSxCOLUMNS, time, columns, leave_out, frame_lines, frame_end, unit, falls and rate (baud of serial:)";
+
 /// A source as a text states it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceText {
@@ -206,6 +210,7 @@ impl FromStr for SourceText {
             None if head == "given" => SourcePlace::Given,
             _ => match LinePlace::parse(head, &mut options).map_err(in_text)? {
                 Some(place) => SourcePlace::Lines(place),
+                None if is_serial_port(head) => return Err(refused(format!("a serial port is serial:{head}"))),
                 None => return Err(refused(format!("must be {FORMS}"))),
             },
         };
@@ -239,7 +244,7 @@ impl FromStr for SourceText {
             source.turned = match take("falls") {
                 Some(falls) if falls == "true" => Some(0.0),
                 Some(falls) if falls == "false" => None,
-                falls => number("falls", falls)?,
+                falls => number("falls", falls).map_err(|error| problem!("{error}, true or false").into())?,
             };
             source.rate_hz = number("rate", take("rate"))?;
             source.end = match (take("frame_lines"), take("frame_end")) {
@@ -260,7 +265,7 @@ impl FromStr for SourceText {
             }
         }
         match options.keys().next() {
-            Some(key) => Err(refused(format!("has no option {key:?}"))),
+            Some(key) => Err(refused(format!("has no option {key:?}; there are {OPTIONS}"))),
             None => Ok(source),
         }
     }
@@ -524,12 +529,19 @@ impl SourceText {
             return Err(problem!("frame_end=blank: state array=ROWSxCOLUMNS too").into());
         };
         if let Some(array) = readout_array.filter(|array| array.len() == values * lines) {
-            return Ok(array.clone());
+            // Its name is that of the recording that the readout was trained on.
+            return Ok(Array { name: self.name(), ..array.clone() });
         }
         let side = |n: usize| u16::try_from(n).map_err(|_| problem!("a line has {n} values: at most 65535"));
         let (rows, columns) = (side(lines)?, side(values)?);
         Ok(Array::unmeasured(rows, columns, &self.name()))
     }
+}
+
+/// Whether a text is the name of a serial port without its kind.
+fn is_serial_port(text: &str) -> bool {
+    let number = text.strip_prefix("COM").or_else(|| text.strip_prefix("com"));
+    text.starts_with("/dev/") || number.is_some_and(|number| number.parse::<u16>().is_ok())
 }
 
 /// The name of a column without one.
@@ -599,12 +611,11 @@ impl OpenedLines {
     fn next(&mut self, until: Instant, fits: impl Fn(&TextLine) -> bool) -> Result<Option<(TextLine, i64)>> {
         loop {
             while let Some((line, at_ns)) = self.reader.next_whole(self.has_ended, &fits) {
-                let text = &line.text;
-                if line.cut
-                    || text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t'))
-                {
-                    // Neither numbers nor names.
+                if line.cut {
+                    // It is too long to be numbers or names.
                     self.reader.lines.left_out.in_no_line += line.bytes;
+                } else if !line.is_text() {
+                    self.begun.push((line, at_ns));
                 } else {
                     return Ok(Some((line, at_ns)));
                 }
@@ -631,15 +642,18 @@ impl OpenedLines {
             if found.is_empty() || line.text.starts_with('#') {
                 continue;
             }
-            let count = found.len();
+            let more = found.len() + 1;
+            let is_counted = names.as_ref().is_some_and(|names| names.len() == more)
+                || source.leave_out.iter().any(|left| *left == more.to_string());
+            let count = found.len() + usize::from(is_counted && line.text.trim().ends_with([';', ',']));
             let begins_with_letter = line.text.trim_start().starts_with(char::is_alphabetic);
             // Text before the numbers names their columns if it has as many words.
             let named = names.take().filter(|names| names.len() == count);
             let columns = named.unwrap_or_else(|| (0..count).map(numbered).collect());
             let is_left = |k: usize| source.leave_out.iter().any(|left| index_of("", left, &columns) == Ok(k));
-            let texts: Vec<usize> = (0..count).filter(|&k| !is_left(k) && number(&found[k]).is_none()).collect();
+            let texts: Vec<usize> = (0..found.len()).filter(|&k| !is_left(k) && number(&found[k]).is_none()).collect();
             if texts.iter().all(|&k| date(&found[k]).is_some() && source.may_be_dated(k, &columns)) {
-                if is_first && !is_serial && self.next_is_longer(count, until)? {
+                if is_first && !is_serial && self.next_is_longer(found.len(), until)? {
                     // This was the rest of a line.
                     continue;
                 }
@@ -708,10 +722,12 @@ impl OpenedLines {
             true => "before the end".to_owned(),
             false => format!("within {} s", FIRST_LINE.as_secs()),
         };
-        let texts: Vec<&str> =
-            self.begun.iter().map(|(line, _)| line.text.trim()).filter(|text| !text.is_empty()).collect();
+        let (lines, garbage): (Vec<_>, Vec<_>) =
+            self.begun.iter().map(|(line, _)| line).partition(|line| line.is_text());
+        let texts: Vec<&str> = lines.iter().map(|line| line.text.trim()).filter(|text| !text.is_empty()).collect();
+        let garbage: u64 = garbage.iter().map(|line| line.bytes).sum();
         let came = match (&texts[..], frames) {
-            ([], _) => match left_out.in_no_line + left_out.unfinished {
+            ([], _) => match left_out.in_no_line + left_out.unfinished + garbage {
                 0 => format!("no line came {within}"),
                 bytes => format!("no line of numbers in the {bytes} bytes that came {within}"),
             },
@@ -743,23 +759,27 @@ const SHOWN: usize = 60;
 
 /// Why lines are no frames of so many columns, in words that follow their number, and what to state.
 fn unread(texts: &[&str], leave_out: &[String], fields: Option<usize>) -> String {
-    let first: Vec<_> = cells(texts[0]).collect();
+    // Lines of a header stand before those that are all alike.
+    let width = texts.last().map_or(0, |last| cells(last).count());
+    let alike: Vec<&str> = texts.iter().copied().filter(|text| cells(text).count() == width).collect();
+    let first: Vec<_> = cells(alike[0]).collect();
     let columns: Vec<String> = (0..first.len()).map(numbered).collect();
     let is_left = |k: usize| leave_out.iter().any(|left| index_of("", left, &columns) == Ok(k));
     let mut are_text = vec![true; first.len()];
-    for text in texts {
-        let mut count = 0;
+    for text in &alike {
         for (cell, is_text) in cells(text).zip(&mut are_text) {
             *is_text &= number(&cell).is_none();
-            count += 1;
         }
-        are_text[count..].fill(false);
     }
     let shared: Vec<usize> = (0..first.len()).filter(|&k| are_text[k] && !is_left(k)).collect();
     let shown = |text: &str| text.chars().take(SHOWN).collect::<String>();
     let listed = |separator: &str, word: &dyn Fn(usize) -> String| {
         shared.iter().map(|&k| word(k)).collect::<Vec<_>>().join(separator)
     };
+    if fields == Some(width + 1) && alike.iter().all(|text| text.ends_with([';', ','])) {
+        let left: Vec<String> = leave_out.iter().cloned().chain([(width + 1).to_string()]).collect();
+        return format!("the last of {} columns is empty: add leave_out={}", width + 1, left.join(":"));
+    }
     if let Some(&cut) = shared.iter().find(|&&k| first[k].trim_matches(['\'', '"']) == "...") {
         let column = cut + 1;
         return format!(
@@ -778,7 +798,7 @@ fn unread(texts: &[&str], leave_out: &[String], fields: Option<usize>) -> String
             "and no whole frame: are frame_lines= or frame_end= right?".to_owned()
         }
         (all, _) if all.is_empty() || all.len() == first.len() => {
-            format!("the first {:?}: none is of numbers", shown(texts[0]))
+            format!("the first {:?}: none is of numbers", shown(alike[0]))
         }
         (several, _) => {
             let column = if several.len() == 1 { "a text in column" } else { "texts in columns" };
@@ -842,6 +862,8 @@ mod tests {
             "given,columns",
             "given,speed=4",
             "pipe:x",
+            "/dev/ttyACM0",
+            "COM3",
             "lines:",
             "lines+tcp:9000",
         ] {
@@ -888,6 +910,35 @@ mod tests {
     }
 
     #[test]
+    fn an_empty_last_cell_is_a_column_where_it_is_counted() {
+        let frames = "1;2;3;\n".repeat(9);
+        for (header, left_out) in [("a;b;c;note\n", "note"), ("a;b;c;note\n", "4"), ("", "4"), ("M\u{fc}ller\n", "4")] {
+            let keys = format!("array=1x3,rate=9,leave_out={left_out}");
+            let layout = opened("cells", &format!("{header}{frames}"), &keys, FirstLineWait::default()).unwrap();
+            assert_eq!((layout.fields, &layout.values[..]), (4, &[0, 1, 2][..]), "{header:?}, {left_out}");
+        }
+        let layout = opened("end", &frames, "array=1x3,rate=9", FirstLineWait::default()).unwrap();
+        assert_eq!(layout.fields, 3);
+    }
+
+    #[test]
+    fn an_array_that_the_rows_of_lines_cannot_fill_is_refused_with_the_one_that_they_fill() {
+        let frames = "1 2 3 4 5 6 7\n".repeat(64) + "\n";
+        for (keys, said) in [
+            ("array=7x8,frame_lines=8,rate=9", "must be rows of 8: is it array=8x7?"),
+            ("array=7x8,frame_end=blank,rate=9", "must be rows of 8: is it array=8x7?"),
+            ("array=8x7,rate=9", "must be 56 a frame (or add frame_lines=8, or frame_end=blank"),
+            ("array=8x9,rate=9", "must be 72 a frame"),
+        ] {
+            let error = opened("rows", &frames, keys, FirstLineWait::default()).unwrap_err().to_string();
+            assert!(error.contains(said), "{keys}: {error}");
+        }
+        for keys in ["array=8x7,frame_lines=8,rate=9", "array=4x14,frame_lines=8,rate=9", "array=1x7,rate=9"] {
+            opened("fits", &frames, keys, FirstLineWait::default()).unwrap();
+        }
+    }
+
+    #[test]
     fn the_rate_by_arrival_does_not_count_the_frames_that_waited() {
         let late = |waited: i64, packet: i64| {
             (0..33).map(move |k| (k.max(waited) / packet) * packet * 13_333 + k.min(waited)).collect::<Vec<_>>()
@@ -927,6 +978,13 @@ mod tests {
             ),
             (vec!["1,2", "1,2"], vec![], Some(5), "the first with 2 columns: must be 5"),
             (vec!["1,2", "1,2"], vec![], Some(2), "and no whole frame: are frame_lines= or frame_end= right?"),
+            (
+                vec!["InsoleLab", "1;a;2", "2;b;3"],
+                vec![],
+                Some(3),
+                "all with a text in column 2 (\"a\"): add leave_out=2",
+            ),
+            (vec!["1;2;", "1;2;"], vec!["1"], Some(3), "the last of 3 columns is empty: add leave_out=1:3"),
         ] {
             let leave_out: Vec<String> = leave_out.into_iter().map(str::to_owned).collect();
             let found = unread(&texts, &leave_out, fields);
