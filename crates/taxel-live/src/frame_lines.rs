@@ -435,6 +435,9 @@ impl FrameAssembler {
 
     /// The silences so far, with that which lasts until `now_ns` since 1970.
     fn silences_until(&self, now_ns: i64) -> Silences {
+        if self.layout.waited {
+            return self.silences;
+        }
         let now_ns = self.ended_ns.unwrap_or(now_ns);
         let Silences { count, ns } = self.silences;
         #[allow(clippy::cast_possible_truncation)]

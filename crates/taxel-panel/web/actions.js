@@ -53,6 +53,13 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
     if (!taxel) return notify("point at a taxel first: click a map, or use its arrow keys", true);
     server.request({ type: "zero", taxels: [taxel] }).then(() => notify(`zeroed row ${taxel[1]}, column ${taxel[0]}`), failed);
   };
+  /** Sets the rest of all taxels to their held values: nothing may touch the sensor. */
+  const zeroAll = () => {
+    const { rows, columns, geometry } = maps;
+    const all = Array.from({ length: rows * columns }, (_, k) => /** @type {[number, number]} */ ([k % columns, Math.floor(k / columns)]));
+    const taxels = all.filter((taxel) => geometry.has(...taxel));
+    server.request({ type: "zero", taxels }).then(() => notify(`zeroed ${taxels.length} taxels`), failed);
+  };
   view.cutHere = cutHere;
   bindKeys(
     {
@@ -102,6 +109,7 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
   onClick("picture", picture);
   onClick("health", health);
   onClick("zero", zero);
+  onClick("zero-all", zeroAll);
   onClick("zoom-in", () => window.halve());
   onClick("zoom-out", () => window.double());
   for (const name of /** @type {const} */ (["pressure", "change"])) {

@@ -92,7 +92,10 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
         : silent
           ? ["quiet", silent.word]
           : ["live", "Live"];
-  part("zero", HTMLButtonElement).hidden = source !== null || !hello?.live || state !== "following";
+  const cannotZero = source !== null || !hello?.live || state !== "following";
+  part("zero", HTMLButtonElement).hidden = cannotZero;
+  // A board sends what changes: before its first event the value of a taxel is not known.
+  part("zero-all", HTMLButtonElement).hidden = cannotZero || !hello.lines;
   const pill = part("state", HTMLElement);
   pill.dataset.kind = recording && kind !== "lost" ? "rec" : kind;
   write(part("state-word", HTMLElement), recording && kind !== "lost" ? `${word === "Live" ? "" : `${word}, `}Recording ${recording.file ?? ""}` : word);

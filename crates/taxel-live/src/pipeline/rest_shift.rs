@@ -91,7 +91,7 @@ impl RestShift {
         let gap_s = self.longest_ns as f64 / 1e9;
         Some(format!(
             "after a gap of {gap_s:.1} s {} of {} taxels rest elsewhere than by the tare, by up to {farthest} {unit}, so that \
-             presses are missed: with nothing on the sensor, zero it on the page, or start anew with --tare SECONDS",
+             presses are missed: with nothing on the sensor, zero all on the page, or start anew with --tare SECONDS",
             shifted.len(),
             values.len()
         ))
