@@ -244,7 +244,10 @@ impl FromStr for SourceText {
             source.turned = match take("falls") {
                 Some(falls) if falls == "true" => Some(0.0),
                 Some(falls) if falls == "false" => None,
-                falls => number("falls", falls).map_err(|error| problem!("{error}, true or false").into())?,
+                Some(falls) if falls.parse::<f64>().is_err() => {
+                    return Err(refused(format!("falls is {falls:?}: must be true, false or a number")));
+                }
+                falls => number("falls", falls)?,
             };
             source.rate_hz = number("rate", take("rate"))?;
             source.end = match (take("frame_lines"), take("frame_end")) {
