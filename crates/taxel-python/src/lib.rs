@@ -35,6 +35,7 @@ mod _core {
     use pyo3::prelude::*;
     use taxel_core::held::UNKNOWN;
     use taxel_core::rest::LOADED_TICKS;
+    use taxel_live::capture::FIREWALL;
     use taxel_live::serial_line::BAUDS;
 
     #[pymodule_export]
@@ -110,6 +111,7 @@ mod _core {
         taxel_border::errors::register(module)?;
         taxel_border::instructions::cap()?;
         module.add("BAUDS", (*BAUDS.start(), *BAUDS.end()))?;
+        module.add("FIREWALL", FIREWALL)?;
         module.add("UNKNOWN", UNKNOWN)?;
         module.add("LOADED_TICKS", LOADED_TICKS)
     }
