@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates rules -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help check setup build released aarch64 bridge demo test test-studies slow lint format registers messages bench docs dist clean
+.PHONY: help check setup build released aarch64 bridge demo test test-studies slow lint format registers messages bench docs dist platforms clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
@@ -16,6 +16,7 @@ help:
 	@echo "make aarch64 the extension for ARM computers, where a cross compiler is installed; says what is missing"
 	@echo "make build  .venv and the extension, after a change in crates/     make format  formats"
 	@echo "make dist   a wheel for machines without cargo, and the source package, to dist/"
+	@echo "make platforms  the wheels on emulated ARM and on Windows by wine, in trees of Debian: 90 minutes, as root"
 
 check:
 	@command -v $(PYTHON) >/dev/null || { echo "taxel needs Python 3.11 or later: install it, or say make PYTHON=/path/to/python3"; exit 1; }
@@ -45,6 +46,7 @@ EXTRAS_test := test beside foxglove neo nir nwb cluster bench
 EXTRAS_lint := lint
 EXTRAS_docs := docs
 EXTRAS_dist := dist
+EXTRAS_platforms := platforms
 $(VENV)/.for-%: $(PROJECTS) | $(VENV)/.installed
 	@echo "taxel: installing what make $* needs"
 	@$(wanted) $(EXTRAS_$*) > $(VENV)/wanted-$*.txt
@@ -218,5 +220,11 @@ dist: $(VENV)/.for-dist
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist $(BESIDE:%=./%)
 	@ls -l dist
 
+# The wheels of dist/ on other systems.
+platforms: $(VENV)/.for-test $(VENV)/.for-dist $(VENV)/.for-platforms
+	@test -n "$(wildcard dist/*.whl)" || $(MAKE) --no-print-directory dist
+	@$(BIN)/python tools/platforms.py
+
 clean:
-	rm -rf target $(VENV) $(PEERS) docs/_build dist
+	@! cat /proc/[0-9]*/mounts 2>/dev/null | grep -q " $(abspath target/platforms)/" || { echo "make clean: a program runs in target/platforms, where it has mounted /proc: end make platforms first"; exit 1; }
+	rm -rf --one-file-system target $(VENV) $(PEERS) docs/_build dist
