@@ -141,11 +141,13 @@ def make_tree(part: Part, folder: Path, *options: str) -> None:
     if (folder / ".made").exists():
         return
     part.run("rm", "-rf", "--one-file-system", folder)
-    asked = ["apt-get", "indextargets", "--format", "$(REPO_URI)", "Created-By: Packages", "Origin: Debian"]
-    mirror = part.run(*asked).split()[0].replace("debian-security", "debian")
+    asked = ("apt-get", "indextargets", "--format", "$(REPO_URI)", "Created-By: Packages", "Label: Debian")
+    mirrors = part.run(*asked).split()
+    if not mirrors:
+        raise PlatformError("apt names no mirror of Debian: its sources, or apt-get update, are missing")
     # A mirror's copy of sid may be older than its date of expiry.
     told = ("--components=main", '--aptopt=Acquire::Check-Valid-Until "false"', *options, "sid")
-    part.run("unshare", "--mount", "mmdebstrap", *told, folder, mirror)
+    part.run("unshare", "--mount", "mmdebstrap", *told, folder, mirrors[0])
     for name in ("bin", "sbin", "lib"):
         if not (folder / name).exists():
             (folder / name).symlink_to(f"usr/{name}")
