@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates rules -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help check setup build released aarch64 bridge demo test test-studies slow lint format registers messages bench docs dist clean
+.PHONY: help check setup build released bridge demo test test-studies slow lint format registers messages bench docs dist platforms clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
@@ -13,9 +13,9 @@ help:
 	@echo "make lint   format, lint, types, layers     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
 	@echo "make bridge what carries a board to other computers: six minutes of a core, for those who have several"
-	@echo "make aarch64 the extension for ARM computers, where a cross compiler is installed; says what is missing"
 	@echo "make build  .venv and the extension, after a change in crates/     make format  formats"
-	@echo "make dist   a wheel for machines without cargo, and the source package, to dist/"
+	@echo "make dist   wheels for machines without cargo (Linux on x86-64 and ARM, Windows), and the source package, to dist/"
+	@echo "make platforms  the wheels on emulated ARM and on Windows by wine, in trees of Debian: 90 minutes, as root"
 
 check:
 	@command -v $(PYTHON) >/dev/null || { echo "taxel needs Python 3.11 or later: install it, or say make PYTHON=/path/to/python3"; exit 1; }
@@ -45,6 +45,7 @@ EXTRAS_test := test beside foxglove neo nir nwb cluster bench
 EXTRAS_lint := lint
 EXTRAS_docs := docs
 EXTRAS_dist := dist
+EXTRAS_platforms := platforms
 $(VENV)/.for-%: $(PROJECTS) | $(VENV)/.installed
 	@echo "taxel: installing what make $* needs"
 	@$(wanted) $(EXTRAS_$*) > $(VENV)/wanted-$*.txt
@@ -75,20 +76,6 @@ $(VENV)/.bridge: $(VENV)/.installed $(shell find bridge/zenoh -type f)
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir target/bridge/wheels ./bridge
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_zenoh-*.whl
 	@touch $@
-
-# For boards like a Jetson or a Raspberry Pi: the extension for their processor, made on this machine. No test runs there.
-ARM := aarch64-unknown-linux-gnu
-aarch64:
-	@missing=; needs() { echo "make aarch64 needs $$1"; missing=1; }; \
-	command -v $${CARGO:-cargo} >/dev/null || needs "cargo 1.89 or later: install it from https://rustup.rs"; \
-	test -n "$$(ls "$$($${RUSTC:-rustc} --print target-libdir --target $(ARM) 2>/dev/null)" 2>/dev/null)" || needs "Rust's library for $(ARM): rustup target add $(ARM), or on Debian dpkg --add-architecture arm64, apt install libstd-rust-web-dev:arm64 and RUSTC=/usr/bin/rustc CARGO=/usr/bin/cargo"; \
-	if command -v aarch64-linux-gnu-gcc >/dev/null; \
-	then echo '#include <stdlib.h>' | aarch64-linux-gnu-gcc -E - >/dev/null 2>&1 || needs "the C library of $(ARM): on Debian, apt install libc6-dev-arm64-cross"; \
-	else needs "aarch64-linux-gnu-gcc: on Debian, apt install gcc-aarch64-linux-gnu libc6-dev-arm64-cross"; fi; \
-	test -z "$$missing"
-	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc PYO3_CROSS_PYTHON_VERSION=3.11 \
-		$${CARGO:-cargo} build --release --target $(ARM) -p taxel-core -p taxel-live -p taxel-python
-	@echo "taxel: built for $(ARM), not tested there: target/$(ARM)/release/lib_core.so"
 
 setup: $(VENV)/.installed
 build: $(VENV)/.built
@@ -208,15 +195,18 @@ bench: released bridge $(PEERS)/.installed
 docs: build $(VENV)/.for-docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
-# Zig links against the glibc of 2018 (2.28), whatever this machine has; auditwheel looks whether that is so.
 dist: $(VENV)/.for-dist
 	rm -rf dist
 	$(BIN)/maturin sdist --out dist
-	export PATH="$(abspath $(BIN)):$$PATH"; for crate in crates/taxel-python rules; do \
-	$(BIN)/maturin build --release --zig --compatibility manylinux_2_28 --out dist --manifest-path $$crate/Cargo.toml || exit 1; done
-	for wheel in dist/taxel-*.whl dist/taxel_rules-*.whl; do $(BIN)/auditwheel show $$wheel || exit 1; done
+	$(BIN)/python tools/wheels.py
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist $(BESIDE:%=./%)
 	@ls -l dist
 
+# The wheels of dist/ on other systems.
+platforms: $(VENV)/.for-test $(VENV)/.for-dist $(VENV)/.for-platforms
+	@test -n "$(wildcard dist/*.whl)" || $(MAKE) --no-print-directory dist
+	@$(BIN)/python tools/platforms.py
+
 clean:
-	rm -rf target $(VENV) $(PEERS) docs/_build dist
+	@! cat /proc/[0-9]*/mounts 2>/dev/null | grep -q " $(abspath target/platforms)/" || { echo "make clean: a program runs in target/platforms, where it has mounted /proc: end make platforms first"; exit 1; }
+	rm -rf --one-file-system target $(VENV) $(PEERS) docs/_build dist

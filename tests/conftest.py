@@ -1,6 +1,5 @@
 """Settings of the product's tests: which begin first, and what several of them share."""
 
-import fcntl
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -33,6 +32,8 @@ def full_device() -> Iterator[Path]:
     """Give a disk that is always full to one test at a time, as a recording locks its file."""
     if not Path("/dev/full").exists():
         pytest.skip("needs /dev/full, a disk that is always full")
+    import fcntl
+
     with (Path(tempfile.gettempdir()) / "taxel-tests-of-dev-full").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield Path("/dev/full")

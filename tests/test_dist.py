@@ -1,6 +1,7 @@
-"""`make dist` builds a complete source package, and a wheel that runs without cargo and without the checkout."""
+"""`make dist` builds a complete source package, and wheels that run without cargo and without the checkout."""
 
 import os
+import platform
 import re
 import subprocess
 import sys
@@ -23,23 +24,62 @@ def the(pattern: str) -> Path:
     return found[0]
 
 
-def test_the_wheel_is_for_any_python_from_3_11_and_any_glibc_from_2_28() -> None:
-    wheel = the("taxel-*.whl")
-    assert re.fullmatch(r"taxel-[\d.]+-cp311-abi3-manylinux_2_28_x86_64\.whl", wheel.name)
+#: The end of the name of a wheel that this machine can install.
+HERE = f"manylinux_2_28_{platform.machine()}.whl"
+#: Wheels with a compiled part: those of every target that `make dist` found a standard library for.
+COMPILED = sorted([*DIST.glob("taxel-*.whl"), *DIST.glob("taxel_rules-*.whl")])
+each_wheel = pytest.mark.parametrize("wheel", COMPILED, ids=lambda wheel: wheel.name)
+#: Libraries that every Windows since 10 has, and Python's.
+OF_WINDOWS = {
+    "advapi32", "bcrypt", "bcryptprimitives", "cfgmgr32", "crypt32", "iphlpapi", "kernel32", "msvcrt", "ntdll", "ole32",
+    "oleaut32", "python3", "secur32", "setupapi", "shell32", "ucrtbase", "user32", "userenv", "ws2_32",
+}  # fmt: skip
+
+
+def test_there_is_a_wheel_for_this_machine() -> None:
+    assert the(f"taxel-*{HERE}")
+    assert the(f"taxel_rules-*{HERE}")
+
+
+@each_wheel
+def test_a_wheel_is_for_any_python_from_3_11_and_for_a_system_that_is_tested(wheel: Path) -> None:
+    assert re.search(r"-cp311-abi3-(manylinux_2_28_(x86_64|aarch64)|win_amd64)\.whl$", wheel.name)
+
+
+@each_wheel
+def test_a_wheel_for_linux_is_for_any_glibc_from_2_28(wheel: Path) -> None:
+    if "manylinux" not in wheel.name:
+        pytest.skip("not for Linux")
     auditwheel = Path(sys.executable).with_name("auditwheel")
     said = subprocess.run([auditwheel, "show", str(wheel)], capture_output=True, text=True, check=True).stdout
     said = " ".join(said.split())
-    glibc = re.search(r'consistent with the following platform tag: "manylinux_2_(\d+)_x86_64"', said)
+    glibc = re.search(r'consistent with the following platform tag: "manylinux_2_(\d+)_(\w+)"', said)
     assert glibc, said
     assert int(glibc[1]) <= 28
+    assert wheel.name.endswith(f"{glibc[2]}.whl")
 
 
-def test_the_wheel_holds_all_that_is_no_python() -> None:
-    inside = zipfile.ZipFile(the("taxel-*.whl")).namelist()
-    data = [path.relative_to(ROOT / "python") for path in (ROOT / "python").rglob("*") if path.is_file()]
-    wanted = {str(path) for path in data if path.suffix not in (".pyc", ".so")}
+@each_wheel
+def test_a_wheel_for_windows_needs_no_library_that_windows_lacks(wheel: Path) -> None:
+    if "win_amd64" not in wheel.name:
+        pytest.skip("not for Windows")
+    archive = zipfile.ZipFile(wheel)
+    (extension,) = (name for name in archive.namelist() if name.endswith(".pyd"))
+    wanted = {name.decode().lower() for name in re.findall(rb"([\w-]+)\.dll\0", archive.read(extension), re.IGNORECASE)}
+    assert "python3" in wanted
+    assert {name for name in wanted if not name.startswith("api-ms-win-")} <= OF_WINDOWS
+
+
+@each_wheel
+def test_a_wheel_holds_all_that_is_no_python(wheel: Path) -> None:
+    package, module, root = (
+        ("taxel", "_core", "python") if wheel.name.startswith("taxel-") else ("taxel_rules", "_rules", "rules")
+    )
+    inside = zipfile.ZipFile(wheel).namelist()
+    data = [path.relative_to(ROOT / root) for path in (ROOT / root / package).rglob("*") if path.is_file()]
+    wanted = {path.as_posix() for path in data if path.suffix not in (".pyc", ".so", ".pyd")}
     assert wanted <= set(inside)
-    assert any(name.startswith("taxel/_core") and name.endswith(".so") for name in inside)
+    assert any(name.startswith(f"{package}/{module}") and name.endswith((".so", ".pyd")) for name in inside)
 
 
 def test_the_source_package_holds_what_a_build_needs_and_no_more() -> None:
@@ -86,7 +126,7 @@ class Bare:
 
 def test_the_wheel_runs_the_demo_in_a_bare_environment(tmp_path: Path) -> None:
     bare = Bare(tmp_path)
-    bare.install(str(the("taxel-*.whl")))
+    bare.install(str(the(f"taxel-*{HERE}")))
     ended = bare.run("taxel", "demo", "--no-clock", "--scenes", "2", "--seed", "1", "--folder", "report")
     assert ended.returncode == 0, ended.stderr
     assert (tmp_path / "report" / "report.html").stat().st_size > 100_000
@@ -104,7 +144,7 @@ def test_the_wheel_runs_the_demo_in_a_bare_environment(tmp_path: Path) -> None:
 def test_the_studies_install_beside_the_wheel(tmp_path: Path) -> None:
     bare = Bare(tmp_path)
     the("taxel_studies-*.whl")
-    the("taxel_rules-*.whl")
+    the(f"taxel_rules-*{HERE}")
     bare.install("--find-links", str(DIST), "taxel[studies]")
     ended = bare.run("taxel", "study", "fig6.1", "--size", "toy", "--report", "report")
     assert ended.returncode == 0, ended.stderr

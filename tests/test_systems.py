@@ -20,8 +20,7 @@ from recording.making import some_events
 from shell import run
 
 import taxel
-from taxel import Frames, Labels, Neuron, ProblemError, Readout
-from taxel._base import interfaces
+from taxel import Frames, Labels, Neuron, ProblemError, Readout, _core
 from taxel._base.arguments import checked_path
 from taxel._base.files import create, write_whole
 from taxel._base.stopping import asked_to_end
@@ -170,9 +169,11 @@ def test_a_new_file_never_replaces_another(tmp_path: Path, monkeypatch: pytest.M
     assert write_whole(tmp_path / "whole", lambda file: file.write(b"1")).read_bytes() == b"1"
 
 
-def test_windows_firewall_is_named_on_windows_alone() -> None:
-    assert "Windows' firewall" in interfaces.blocked("win32")
-    assert interfaces.blocked("linux") == ""
+def test_windows_firewall_is_named_on_windows_alone(tmp_path: Path) -> None:
+    assert ("Windows' firewall" in _core.FIREWALL) == (sys.platform == "win32")
+    with Live(0, host="127.0.0.1", record=tmp_path / "walk.mcap") as live:
+        said = str(live.stop().verdict)
+    assert said.endswith(f"and to port {live.address[1]}?{_core.FIREWALL}"), said
 
 
 def test_ctrl_break_stops_as_ctrl_c_does(monkeypatch: pytest.MonkeyPatch) -> None:

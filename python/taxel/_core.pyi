@@ -666,6 +666,8 @@ def serial_ports() -> list[_Port]: ...
 
 BAUDS: Final = (300, 4_000_000)
 
+FIREWALL: Final[str]
+
 @final
 class BoardLine:
     def __new__(cls, place: str, baud: int, timeout: float) -> BoardLine: ...

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
-import pty
 import select
 import signal
 import subprocess
@@ -14,6 +13,10 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
+
+import pytest
+
+pty = pytest.importorskip("pty", reason="needs terminals of its own, which Windows does not have")
 
 #: The command as a user types it.
 TAXEL = Path(sys.executable).with_name("taxel")

@@ -15,6 +15,7 @@ from panel.protocol import (
     word,
 )
 
+from taxel import _core
 from taxel.live import send
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
@@ -87,6 +88,7 @@ def test_differences_add_up_once_the_page_says_that_they_are_some(panel):
         said = page.ask("delta_intensity", on=True)
         assert said["type"] == "done", said
         told = next((m for m in page.said[1:] if m["type"] == "hello"), None) or page.until("hello")
+        assert told["firewall"] == _core.FIREWALL
         assert (told["delta_intensity"], told["udp"]) == (True, "{}:{}".format(*where))
         say(
             panel.live,

@@ -398,3 +398,19 @@ fn a_circle_and_a_wrong_floor_are_seen() {
         House([(vec![], Module::default()), (vec!["a".into()], parent), (vec!["a".into(), "b".into()], module)].into());
     assert_eq!(circles(&house.edges()), [vec!["a".to_owned(), "a::b".to_owned()]].into());
 }
+
+/// The standard library's functions differ between systems in the last place; those of `libm` do not.
+#[test]
+fn encoders_compute_the_same_bits_on_every_system() {
+    let names = ["exp", "exp_m1", "exp2", "ln", "ln_1p", "log", "log2", "log10", "powf", "sin", "cos", "tan", "tanh"];
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/encode");
+    let found: Vec<String> = files(&root)
+        .into_iter()
+        .flat_map(|file| {
+            let text = code(&fs::read_to_string(&file).unwrap());
+            let called = |name: &&&str| text.contains(&format!(".{name}(")) || text.contains(&format!("f64::{name}"));
+            names.iter().filter(called).map(|name| format!("{}: {name}", file.display())).collect::<Vec<_>>()
+        })
+        .collect();
+    assert!(found.is_empty(), "functions of libm instead: {found:#?}");
+}

@@ -55,6 +55,9 @@ const SENDERS_READ: u64 = 12;
 /// Largest amount received at a time, bytes.
 const AT_ONCE: usize = 4 * socket::LARGEST;
 
+/// What else may keep datagrams from a program of this system, to be added to why none arrived.
+pub const FIREWALL: &str = if cfg!(windows) { " (Windows' firewall may keep datagrams from Python)" } else { "" };
+
 /// Where datagrams come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use taxel_core::encode;
 use taxel_core::wire::Registers;
 use taxel_live::Result;
-use taxel_live::capture::Origin;
+use taxel_live::capture::{FIREWALL, Origin};
 use taxel_live::locked::lock;
 use taxel_live::pipeline::{Counters, Handle};
 use taxel_live::recording::now_ns;
@@ -246,6 +246,7 @@ impl Hub {
                 Origin::Udp(address) => Some(address.to_string()),
                 Origin::Bridge(_) | Origin::Frames(_) => None,
             }),
+            firewall: FIREWALL,
             lines: live.and_then(|live| match live.handle.origin() {
                 Origin::Frames(place) => Some(place.clone()),
                 Origin::Udp(_) | Origin::Bridge(_) => None,

@@ -307,6 +307,8 @@ export interface Hello {
   options: Record<string, unknown> | null;
   /** Where datagrams are received. */
   udp: string | null;
+  /** What else may keep datagrams from the server, in words that are added to why none arrived; empty if nothing. */
+  firewall: string;
   /** Where frames of numbers are read; null of a board. */
   lines: string | null;
   /** That source as a text states it, with all of its keys; null of a board. */

@@ -17,15 +17,16 @@ const FIRST_WITHIN_S = 1;
  * @param {Counters | null} counters
  * @param {string} address where it should arrive
  * @param {boolean} isBoard whether a board sends it, else a source of lines
+ * @param {string} firewall what else may keep a board's datagrams away
  * @returns {{ word: string, text: string } | null} null: it does
  */
-function silence(counters, address, isBoard) {
+function silence(counters, address, isBoard, firewall) {
   if (!counters) return null;
   const { arrival, board_us, seconds: elapsed_s, taring } = counters;
   const since = `since ${seconds(board_us)} of the ${isBoard ? "board" : "source"}, for ${short(1e6 * arrival.silent_s)}`;
   if (arrival.state === "nothing") {
     const text = isBoard
-      ? `Nothing has arrived at ${address} so far. Is the board on, and does it send to this address and port?`
+      ? `Nothing has arrived at ${address} so far. Is the board on, and does it send to this address and port?${firewall}`
       : `No frame has arrived from ${address} so far. Is it connected, and does it print lines of numbers?`;
     return elapsed_s < FIRST_WITHIN_S ? null : { word: "Nothing arrives", text };
   }
@@ -82,7 +83,7 @@ function shape(opened, hello) {
  */
 export function showState({ connected, why }, { source, state }, hello, opened, recorder, counters, opening, refused) {
   const recording = recorder?.state === "recording" ? recorder : null;
-  const silent = connected && source === null && hello?.live ? silence(counters, hello.lines ?? (hello.udp ? `UDP ${hello.udp}` : "the bridge's address"), hello.lines === null) : null;
+  const silent = connected && source === null && hello?.live ? silence(counters, hello.lines ?? (hello.udp ? `UDP ${hello.udp}` : "the bridge's address"), hello.lines === null, hello.udp ? hello.firewall : "") : null;
   const [kind, word] = !connected
     ? ["lost", why ? "No connection" : "Connecting"]
     : source !== null || !hello?.live

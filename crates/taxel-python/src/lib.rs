@@ -36,6 +36,7 @@ mod _core {
     use pyo3::types::PyTuple;
     use taxel_core::held::UNKNOWN;
     use taxel_core::rest::{FORCE_UNITS, LOADED_TICKS};
+    use taxel_live::capture::FIREWALL;
     use taxel_live::serial_line::BAUDS;
 
     #[pymodule_export]
@@ -112,6 +113,7 @@ mod _core {
         taxel_border::errors::register(module)?;
         taxel_border::instructions::cap()?;
         module.add("BAUDS", (*BAUDS.start(), *BAUDS.end()))?;
+        module.add("FIREWALL", FIREWALL)?;
         module.add("UNKNOWN", UNKNOWN)?;
         module.add("FORCE_UNITS", PyTuple::new(module.py(), FORCE_UNITS)?)?;
         module.add("LOADED_TICKS", LOADED_TICKS)

@@ -1,9 +1,8 @@
-"""The network interfaces of this machine, and what may keep datagrams from programs."""
+"""The network interfaces of this machine."""
 
 from __future__ import annotations
 
 import socket
-import sys
 from typing import NamedTuple
 
 import psutil
@@ -16,11 +15,6 @@ class Interface(NamedTuple):
     address: str
     up: bool
     speed: int
-
-
-def blocked(system: str = sys.platform) -> str:
-    """Return what else keeps datagrams from a program of this system, to be added to why none arrived."""
-    return " (Windows' firewall may keep them from Python)" if system == "win32" else ""
 
 
 def interfaces() -> list[Interface]:

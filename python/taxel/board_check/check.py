@@ -10,9 +10,9 @@ import numpy as np
 from taxel import _core
 from taxel._base.arguments import callback, integer, number, text
 from taxel._base.errors import refused
-from taxel._base.interfaces import blocked, interfaces
+from taxel._base.interfaces import interfaces
 from taxel._base.messages import counted
-from taxel._core import DeviceError, ProblemError
+from taxel._core import FIREWALL, DeviceError, ProblemError
 from taxel.array import Array
 from taxel.board_check.pattern import compared, numbered, period_of
 from taxel.board_check.received import DecodedValues, Receiver, decoded
@@ -37,7 +37,7 @@ def _nothing(port: int, seconds: float) -> str:
     """Return why no datagram may have come."""
     found = interfaces()
     there = ", ".join(f"{name} {address}" for name, address, _, _ in found)
-    begin = f"none came to port {port} within {seconds:g} s{blocked()}. "
+    begin = f"none came to port {port} within {seconds:g} s{FIREWALL}. "
     for name, address, up, speed in found:
         if address == HOST:
             if not up:

@@ -16,10 +16,9 @@ from rich.live import Live as Display
 from rich.text import Text
 
 from taxel._base.files import check_writable
-from taxel._base.interfaces import blocked
 from taxel._base.messages import counted, plain
 from taxel._base.stopping import asked_to_end
-from taxel._core import ProblemError
+from taxel._core import FIREWALL, ProblemError
 from taxel.array import Array
 from taxel.cli._app import App, SecondsOption
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
@@ -352,7 +351,7 @@ def _silence(now: dict[str, Any], place: str) -> str:
     if arrival["state"] == "nothing":
         if now["seconds"] < _FIRST_WITHIN_S:
             return ""
-        check = f"is the board on, and does it send to this address and port?{blocked()}"
+        check = f"is the board on, and does it send to this address and port?{FIREWALL}"
         if now["lines"] is not None:
             check = "is it connected, and does it print lines of numbers?"
         return f"nothing has arrived on {place} so far: {check}"

@@ -14,9 +14,8 @@ import typer
 from rich.live import Live as Display
 
 from taxel import _core
-from taxel._base.interfaces import blocked
 from taxel._base.messages import counted
-from taxel._core import ProblemError
+from taxel._core import FIREWALL, ProblemError
 from taxel.cli._app import OUTSIDE, App, SecondsOption, with_out
 from taxel.cli._noting import noting
 from taxel.cli._say import say
@@ -129,7 +128,7 @@ def _automatic(file: Path, live: dict[str, Any], typed: _RecordArguments, consol
             codes.append(exit_code(ended, receiver.array))
             empty = 0
         else:
-            say(f"taxel: {name}: nothing arrived at {receiver.place}{blocked()}; not saved", err=True)
+            say(f"taxel: {name}: nothing arrived at {receiver.place}{FIREWALL}; not saved", err=True)
             empty += 1
 
     name = following(0)

@@ -78,7 +78,7 @@ impl Fa1 {
     /// The baseline threshold, in compressed units.
     #[must_use]
     pub fn baseline(&self) -> f64 {
-        self.theta_0.unwrap_or_else(|| self.range.unwrap_or(RAMP).powf(self.alpha) / 1024.0)
+        self.theta_0.unwrap_or_else(|| libm::pow(self.range.unwrap_or(RAMP), self.alpha) / 1024.0)
     }
 }
 
@@ -162,7 +162,7 @@ impl Fa1Afferents {
             decay,
             theta_0,
             least,
-            lowest_pressure: if parameters.alpha > 1.0 { 0.0 } else { least.powf(1.0 / parameters.alpha) },
+            lowest_pressure: if parameters.alpha > 1.0 { 0.0 } else { libm::pow(least, 1.0 / parameters.alpha) },
             per_least: 1.0 / least,
             most: f64::from((1_u32 << parameters.bits) - 1),
             blocks: vec![],

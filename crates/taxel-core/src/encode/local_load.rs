@@ -313,7 +313,7 @@ impl LocalLoadRule {
         quantities.push(1.0);
         for (train, &quantity) in quantities.iter().enumerate() {
             let value = match self.emit {
-                Emit::Spikes => quantity.ln_1p() as f32,
+                Emit::Spikes => libm::log1p(quantity) as f32,
                 Emit::Values => quantity as f32,
             };
             if value != 0.0 || self.emit == Emit::Values {

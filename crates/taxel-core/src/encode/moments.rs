@@ -192,11 +192,11 @@ impl Encoding for Moments {
     }
 }
 
-/// `n` levels in a geometric series, rounded to 12 digits, so that differences between machines' `powf` do not move a
-/// level off a whole number.
+/// `n` levels in a geometric series, rounded to 12 digits, so that the rounding of powers does not move a level off
+/// a whole number.
 fn geometric_levels(least: f64, most: f64, n: usize) -> Vec<f64> {
     let level = |k: usize| {
-        let exact = least * (most / least).powf(k as f64 / (n.max(2) - 1) as f64);
+        let exact = least * libm::pow(most / least, k as f64 / (n.max(2) - 1) as f64);
         format!("{exact:.11e}").parse().unwrap_or(exact)
     };
     (0..n).map(level).collect()
@@ -307,7 +307,7 @@ impl LevelPass {
         };
         for (n, &moment) in self.graded.iter().enumerate() {
             let value = self.moments[moment];
-            emit(n, value.abs().ln_1p().copysign(value) as f32);
+            emit(n, libm::log1p(value.abs()).copysign(value) as f32);
         }
         let position = if self.centre.is_some() { &self.position[..] } else { &[] };
         for (n, &value) in position.iter().enumerate() {

@@ -26,8 +26,8 @@ pub(super) struct LowPass {
 
 impl LowPass {
     pub(super) fn new(tau_ms: f64, period_ms: f64) -> Self {
-        let keep = (-period_ms / tau_ms).exp();
-        let mean = -(-period_ms / tau_ms).exp_m1() * tau_ms / period_ms;
+        let keep = libm::exp(-period_ms / tau_ms);
+        let mean = -libm::expm1(-period_ms / tau_ms) * tau_ms / period_ms;
         Self { keep, before: mean - keep, now: 1.0 - mean }
     }
 
@@ -97,7 +97,7 @@ pub(super) struct FilterAfferents<F: Filter> {
 
 impl<F: Filter> FilterAfferents<F> {
     pub(super) fn new(filter: F, firing: Firing) -> Self {
-        Self { filter, firing, keep: (-firing.period_ms / firing.recovery_ms).exp(), blocks: vec![] }
+        Self { filter, firing, keep: libm::exp(-firing.period_ms / firing.recovery_ms), blocks: vec![] }
     }
 
     /// Sets the state after constant input of these pressures; afferents above their threshold fire at the next sample.
@@ -172,7 +172,7 @@ impl<F: Filter> FilterAfferents<F> {
             let above = afferent.u[lane] - threshold - afferent.raised[lane];
             let crossed = if below[lane] > 0.0 { period_ms * below[lane] / (below[lane] + above) } else { 0.0 };
             let since = period_ms - crossed.max(waited[lane]);
-            afferent.raised[lane] += jump * (-since / recovery_ms).exp();
+            afferent.raised[lane] += jump * libm::exp(-since / recovery_ms);
             afferent.wait[lane] = (refractory_ms - since).max(0.0);
             fired(lane);
         }
@@ -255,14 +255,14 @@ mod tests {
             for (t, frame) in (1..).zip(&frames[1..]) {
                 let (below, waited) = (threshold + raised - u, wait);
                 u = filter.step::<true>(&mut state, 0, frame[channel], u, &mut 0);
-                raised *= (-period_ms / recovery_ms).exp();
+                raised *= libm::exp(-period_ms / recovery_ms);
                 raised = if raised < RECOVERED { 0.0 } else { raised };
                 wait = f64::max(wait - period_ms, 0.0);
                 if u >= threshold + raised && waited < period_ms {
                     let above = u - threshold - raised;
                     let crossed = if below > 0.0 { period_ms * below / (below + above) } else { 0.0 };
                     let since = period_ms - crossed.max(waited);
-                    raised += jump * (-since / recovery_ms).exp();
+                    raised += jump * libm::exp(-since / recovery_ms);
                     wait = f64::max(refractory_ms - since, 0.0);
                     out.push(Spike { t: ms(t), train: channel as u32, value: 1.0 });
                 }

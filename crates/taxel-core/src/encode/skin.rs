@@ -222,7 +222,7 @@ fn fields_of(array: &Array, placed: &[&Placed], field_mm2: f64) -> Result<Vec<Ve
             let away = ((column - x).powi(2) + ((line - y) * down).powi(2)) * across * across;
             if away <= edge * edge {
                 // The edge is at the second standard deviation.
-                let weight = (-2.0 * away / (edge * edge)).exp();
+                let weight = libm::exp(-2.0 * away / (edge * edge));
                 field.push((channel as u32, weight as f32));
                 sum += weight;
             }

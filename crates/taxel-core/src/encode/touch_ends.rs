@@ -65,7 +65,7 @@ impl Encoding for TouchEnds {
 
 /// The duration of a touch, us, given the value of a spike of its train.
 pub(crate) fn duration_us(value: f32) -> f64 {
-    us(f64::from(value).exp_m1())
+    us(libm::expm1(f64::from(value)))
 }
 
 /// The touch that lasts: when it began, us, and its largest area, total and peak.
@@ -89,7 +89,7 @@ impl Measure for PresentTouch {
                 *largest = largest.max(now);
             }
         } else if let Some((begin, [area, total, peak])) = self.0.take() {
-            let values = [ms(t - begin), area, total, peak].map(f64::ln_1p);
+            let values = [ms(t - begin), area, total, peak].map(libm::log1p);
             for (train, value) in values.into_iter().chain([1.0]).enumerate() {
                 out.push(Spike { t: ms(t), train: train as u32, value: value as f32 });
             }

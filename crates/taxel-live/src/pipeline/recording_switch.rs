@@ -13,7 +13,7 @@ use super::options::Record;
 use super::running_recording::{Host, RecordingPart, RunningRecording, losses};
 use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
 use super::sources::{NumberStream, losses_of_lines};
-use crate::capture::Origin;
+use crate::capture::{FIREWALL, Origin};
 use crate::locked::lock;
 use crate::recording::{RecordingCounts, Verdict};
 use crate::{Error, Result};
@@ -152,7 +152,9 @@ pub(super) fn verdict(
 /// What a user should check if nothing arrived.
 fn nothing_arrived(origin: &Origin, seconds: f64) -> String {
     let ask = match origin {
-        Origin::Udp(address) => format!("does the board send to this machine, and to port {}?", address.port()),
+        Origin::Udp(address) => {
+            format!("does the board send to this machine, and to port {}?{FIREWALL}", address.port())
+        }
         Origin::Frames(_) => "is it connected, and does it send lines of numbers?".to_owned(),
         Origin::Bridge(_) => "does the board send to the computer that bridges it?".to_owned(),
     };

@@ -38,6 +38,8 @@ pub(crate) enum Message {
         options: Option<Box<LiveOptions>>,
         /// Where datagrams are received.
         udp: Option<String>,
+        /// What else may keep datagrams from the server, in words that are added to why none arrived; empty if nothing.
+        firewall: &'static str,
         /// Where frames of numbers are read; null of a board.
         lines: Option<String>,
         /// That source as a text states it, with all of its keys; null of a board.

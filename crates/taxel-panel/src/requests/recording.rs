@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use taxel_core::wire::Command;
+use taxel_live::capture::FIREWALL;
 use taxel_live::locked::lock;
 use taxel_live::pipeline::{LiveSummary, Record};
 use taxel_live::recording::Compression;
@@ -147,7 +148,7 @@ async fn record(hub: &Arc<Hub>, plan: &RecordingPlan) -> Result<String, String> 
     match ended.map_err(|error| error.to_string())? {
         LiveSummary { path: Some(_), verdict, .. } => Ok(verdict.text),
         LiveSummary { path: None, .. } => {
-            Err("no datagrams arrived during the recording: no file was written".to_owned())
+            Err(format!("no datagrams arrived during the recording{FIREWALL}: no file was written"))
         }
     }
 }
