@@ -410,10 +410,12 @@ def checked(
         depth += f"skip {proof.skip}\n"
     # What only helps an induction to close is no property: a fault must be found without.
     options = "-G LEMMAS=0 " if planted and "parameter bit LEMMAS" in files[-1].read_text() else ""
-    script = f"read_slang -j 1 --top {proof.name} {options}{' '.join(f.name for f in files)}\nprep -top {proof.name}\n"
+    script = f"read_slang -j 1 --top {proof.name} {options}{' '.join(f.name for f in files)}\n"
+    # What has no source may have any value in each clock, before anything is made simpler by a value that is chosen for it.
+    script += f"setundef -anyseq\nprep -top {proof.name}\n"
     if proof.gated:
         # What modules assert at an edge cannot be looked at where that is of a gate.
-        script += "flatten\nopt\ndelete t:$check r:TRG_ENABLE=1 %i\nformalff -declockgate\nsetundef -undriven -anyseq\nopt_clean\n"
+        script += "flatten\nopt -noff -keepdc\ndelete t:$check r:TRG_ENABLE=1 %i\nformalff -declockgate\nsetundef -undriven -anyseq\nopt_clean\n"
     listed = "\n".join(str(f.relative_to(ROOT)) for f in files)
     job = folder / f"{mode}.sby"
     job.write_text(f"[options]\nmode {mode}\n{depth}\n[engines]\n{engine}\n\n[script]\n{script}\n[files]\n{listed}\n")
