@@ -170,6 +170,7 @@ module crossing_proof #(
       cover (done_now && tripped && at == 15'd2 && length == 4'd5 && aligned);
       cover (done_now && tripped && at == 15'd2 && length == 4'd5 && !aligned);
       cover (done_now && sampled_before);
+      cover (up_fast && converter.begins && converter.open);
       cover (done_now && !sampled_before && reading && since_end != 4'd15 && tripped);
     end
   end

@@ -258,6 +258,10 @@ PROOFS = (
             (ARRAY, "if (step_end) ended <= began;", "if (step_end) ended <= !began;"),
             (ANNOUNCED, "if (announce) number <= !number;", "if (announce) number <= 1'b1;"),
             (ARRAY, "assign over = !copied &&", "assign over ="),
+            # What shows only where a read begins as the samples of the one before end.
+            (ARRAY, "&& !begun) || begins);", "&& !begun));"),
+            (ARRAY, "closing && (begins || !closes_here)", "closing && !closes_here"),
+            (ARRAY, "start ? inverted_held : senses[0]", "inverted_held"),
             (ARRAY, "begins_here <= nears", "begins_here <= begins"),
             (ARRAY, "copies_here <= over", "copies_here <= closing"),
             (ARRAY, "brought <= sampled ^", "brought <= comparators ^"),
@@ -269,7 +273,7 @@ PROOFS = (
         ),
         search="abc bmc3",
         induction=14,
-        depth=90,
+        depth=100,
         gated=True,
     ),
     Proof(
@@ -339,7 +343,7 @@ PROOFS = (
             (UART, "{line, data[7:1]}", "{data[6:0], line}"),
         ),
         search="abc bmc3",
-        induction=2,
+        induction=3,
         depth=190,
     ),
     Proof(
