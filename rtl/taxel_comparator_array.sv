@@ -100,14 +100,14 @@ module taxel_comparator_array #(
 
   // Channels lie far apart, so each bank of them has its own count of pairs, and its own registers for what all do at
   // once. That these wait for their own fall changes nothing, as they stand for one clock; it keeps synthesis from
-  // merging them.
+  // merging them. Only `closing` may stand for two: where a ramp's samples end as those of a ramp of one tick begin.
   for (genvar b = 0; b < CHANNELS / BANK; b++) begin : g_bank
     logic begins_here, closes_here, copies_here;
     logic [14:0] pair;
 
     always_ff @(posedge clk_fast) begin
       begins_here <= nears && !begins_here;
-      closes_here <= closing && !closes_here;
+      closes_here <= closing && (begins || !closes_here);
       copies_here <= over && !copies_here;
       pair        <= begins_here ? '0 : pair + 15'd1;
       if (reset_fast) {begins_here, closes_here, copies_here} <= '0;

@@ -25,11 +25,12 @@ module banks_proof (
   assign clk      = tick & open_core;
   assign clk_link = tick & open_link;
 
-  // Reset lasts for eight clocks of the link or more.
+  // Reset lasts for eight clocks of the link or more, of the scan's for one in the first half and three in the second: either
+  // side takes it, and then sees that no bank is handed over, or back.
   logic [3:0] warm = '0;
-  logic warm_core = 1'b0;
+  logic [2:0] warm_core = '0;
   logic reset, tready;
-  assign reset = warm < 4'd8 || !warm_core;
+  assign reset = warm < 4'd8 || warm_core != 3'd4;
 
   taxel_udp_sender #(.MOST(MOST)) sender (
       .clk, .reset, .tdata, .tvalid, .tready, .tlast, .clk_link, .txd(), .tx_enable()
@@ -47,8 +48,8 @@ module banks_proof (
 
   always_ff @(posedge tick) begin
     place <= place;
-    if (up_link && warm != 4'd8) warm <= warm + 4'd1;
-    if (up_core) warm_core <= 1'b1;
+    if (up_link && warm != 4'd8 && (warm != 4'd4 || warm_core != 3'd0)) warm <= warm + 4'd1;
+    if (up_core && warm_core != 3'd4 && (warm_core == 3'd0 || warm >= 4'd4)) warm_core <= warm_core + 3'd1;
     if (moves) begin
       open_now <= !tlast;
       bytes  <= tlast ? 2'd0 : bytes == 2'(MOST) ? bytes : bytes + 2'd1;
@@ -87,7 +88,7 @@ module banks_proof (
 
 endmodule
 
-// In place of the frame: it asks for any byte and takes a payload at any time.
+// In place of the frame: it asks for any byte and takes a payload at any time but in its reset.
 module taxel_ethernet_frame #(
     parameter logic [47:0] FROM_MAC  = '0,
     parameter logic [47:0] TO_MAC    = '0,
@@ -108,6 +109,6 @@ module taxel_ethernet_frame #(
     output logic            enable
 );
   assign at    = banks_proof.given_at;
-  assign taken = waits && banks_proof.given_taken;
+  assign taken = waits && banks_proof.given_taken && !reset;
   assign {txd, enable} = '0;
 endmodule

@@ -99,10 +99,12 @@ def sites(module: str) -> dict[str, list[Fault]]:
     """Return all faults of a module by their kinds: comments, parameters' checks and what is asserted have none."""
     found: dict[str, list[Fault]] = {kind: [] for kind in EDITS}
     body = False
-    for number, line in enumerate((RTL / f"{module}.sv").read_text().splitlines(), 1):
+    lines = (RTL / f"{module}.sv").read_text().splitlines()
+    for number, (line, next_line) in enumerate(zip(lines, [*lines[1:], ""], strict=True), 1):
         code = line.split("//")[0]
         body = body or code.startswith(");")
-        if not body or re.search(r"\$error|assert|localparam|genvar|parameter", code):
+        # What a build's parameters must obey stands over its $error.
+        if not body or "$error" in next_line or re.search(r"\$error|assert|localparam|genvar|parameter", code):
             continue
         for kind, edits in EDITS.items():
             if kind == "crossing" and module.removeprefix("taxel_") not in CROSSINGS:

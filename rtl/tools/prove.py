@@ -258,6 +258,10 @@ PROOFS = (
             (ARRAY, "if (step_end) ended <= began;", "if (step_end) ended <= !began;"),
             (ANNOUNCED, "if (announce) number <= !number;", "if (announce) number <= 1'b1;"),
             (ARRAY, "assign over = !copied &&", "assign over ="),
+            # What shows only where a read begins as the samples of the one before end.
+            (ARRAY, "&& !begun) || begins);", "&& !begun));"),
+            (ARRAY, "closing && (begins || !closes_here)", "closing && !closes_here"),
+            (ARRAY, "start ? inverted_held : senses[0]", "inverted_held"),
             (ARRAY, "begins_here <= nears", "begins_here <= begins"),
             (ARRAY, "copies_here <= over", "copies_here <= closing"),
             (ARRAY, "brought <= sampled ^", "brought <= comparators ^"),
@@ -269,7 +273,7 @@ PROOFS = (
         ),
         search="abc bmc3",
         induction=14,
-        depth=90,
+        depth=100,
         gated=True,
     ),
     Proof(
@@ -339,7 +343,7 @@ PROOFS = (
             (UART, "{line, data[7:1]}", "{data[6:0], line}"),
         ),
         search="abc bmc3",
-        induction=2,
+        induction=3,
         depth=190,
     ),
     Proof(
@@ -410,10 +414,12 @@ def checked(
         depth += f"skip {proof.skip}\n"
     # What only helps an induction to close is no property: a fault must be found without.
     options = "-G LEMMAS=0 " if planted and "parameter bit LEMMAS" in files[-1].read_text() else ""
-    script = f"read_slang -j 1 --top {proof.name} {options}{' '.join(f.name for f in files)}\nprep -top {proof.name}\n"
+    script = f"read_slang -j 1 --top {proof.name} {options}{' '.join(f.name for f in files)}\n"
+    # What has no source may have any value in each clock, before anything is made simpler by a value that is chosen for it.
+    script += f"setundef -anyseq\nprep -top {proof.name}\n"
     if proof.gated:
         # What modules assert at an edge cannot be looked at where that is of a gate.
-        script += "flatten\nopt\ndelete t:$check r:TRG_ENABLE=1 %i\nformalff -declockgate\nsetundef -undriven -anyseq\nopt_clean\n"
+        script += "flatten\nopt -noff -keepdc\ndelete t:$check r:TRG_ENABLE=1 %i\nformalff -declockgate\nsetundef -undriven -anyseq\nopt_clean\n"
     listed = "\n".join(str(f.relative_to(ROOT)) for f in files)
     job = folder / f"{mode}.sby"
     job.write_text(f"[options]\nmode {mode}\n{depth}\n[engines]\n{engine}\n\n[script]\n{script}\n[files]\n{listed}\n")

@@ -12,6 +12,8 @@ from structs import NUMBERS, pack, unpack
 EVENT, MARKER, FRAME, FLUSH = (NUMBERS[f"ENTRY_{name}"] for name in ("EVENT", "MARKER", "FRAME", "FLUSH"))
 MARKERS = NUMBERS["MARKERS"]
 
+#: The latest tick that a count can have.
+LATEST = 65_534
 #: Clocks from a read's report to its first taxel's event, and what may go ahead of a frame's first taxel.
 LATENCY, AHEAD = 7, 6
 
@@ -21,7 +23,7 @@ def drawn(frames, build):
     reads, ended, ticks, at = [], None, defaultdict(int), 0
     for frame in range(frames):
         if frame % 4 == 0:
-            ramp = random.choice([5, 150, 300])
+            ramp = random.choice([5, 150, 300, 65_000])
             now = {
                 "ramp": ramp, "noise_floor": random.choice([0, 3, 255]) if ramp > 5 else 0,
                 "lines": random.randrange(build["COLUMNS"]), "pattern": int(frame > 0 and random.random() < 0.3),
@@ -60,6 +62,7 @@ def drawn(frames, build):
                         # Just what gives no event, or what does.
                         moved = now["noise_floor"] + random.randrange(-1, 2)
                         ticks[taxel] = max(ticks[taxel] + random.choice([-moved, moved]), 0)
+                    ticks[taxel] = min(ticks[taxel], LATEST)
                     counts.append(NOT_RETURNED if random.random() < 0.05 else ticks[taxel])
                 reads.append((read, counts))
         ended = now
