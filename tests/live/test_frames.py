@@ -257,7 +257,9 @@ def test_lines_of_the_standard_input_are_read_to_their_end(tmp_path: Path, shown
         timeout=60,
         check=False,
     )
-    assert (done.returncode, done.stderr.startswith("panel: ")) == (0, bool(shown)), done.stderr
+    assert (done.returncode, "panel: http" in done.stderr) == (0, bool(shown)), done.stderr
+    assert "lines:- has ended" in done.stderr
+    assert done.stderr.rstrip().endswith(f"\n{taxel.open(path).verdict}"), "what is for people is on standard error"
     expected = run(Readout.load(detector), taxel.open(path))
     assert len(done.stdout.splitlines()) == len(expected) > 3
 

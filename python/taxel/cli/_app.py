@@ -53,7 +53,7 @@ class _Command(TyperCommand):
         return super().parse_args(ctx, args)
 
     def _check_repeated(self, ctx: Any, args: list[str]) -> None:
-        parser = self.make_parser(ctx)
+        parser: Any = self.make_parser(ctx)
         single = [o for o in {**parser._short_opt, **parser._long_opt}.values() if o.action == "store"]
         for option in single:
             option.action = "append"
