@@ -132,6 +132,9 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
         with Live(**options | {"remote": board}) as pipeline:
             if trained is not None and trained.unit is not None and not pipeline._states_unit:
                 console.print(f"values are taken in {pipeline.unit}, as of the readout: --source states no unit")
+            for name, counts in pipeline.counters["sources"].items():
+                if "capture" in counts:  # else lines that are no frames, as of an IMU
+                    console.print(f"{name}: recorded only, not read out or shown; a second taxel live reads it out")
             last = _show(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
             summary = last.stop()
             # Detections that the readout made while `stop` ran.
