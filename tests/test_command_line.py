@@ -7,14 +7,18 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import typer
 from shell import call
 
 import taxel
+from taxel.cli import app
 from taxel.cli._commands import OWN, plugins
 from taxel.cli._opening import FileOptions
 from taxel.live import send
@@ -78,6 +82,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("record",), "FILE is missing; see taxel record --help"),
         (("convert", "walk.npz"), "TARGET is missing; see taxel convert --help"),
         (("cut", "walk.npz", "a.npz", "-o", "b.npz"), "OUT is given twice: a.npz and b.npz"),
+        (("live", "--readout", "a.json", "--readout=b.json"), "--readout is given twice: a.json and b.json"),
         (("record", "a.mcap", "--bogus"), "No such option: --bogus"),
         (("bogus",), "No such command 'bogus'; see taxel --help"),
         (("trian",), "No such command 'trian'. Did you mean 'train'?; see taxel --help"),
@@ -329,3 +334,29 @@ def test_labels_of_a_recording_that_is_not_there_are_left_out_with_one_warning(h
 def test_each_option_of_opening_is_typed_by_its_name() -> None:
     typed = {TYPED.get(option.name, option.name) for option in fields(TextOptions)}
     assert {option.name for option in fields(FileOptions)} == typed
+
+
+def _commands(group: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield each command with the words that name it."""
+    context = typer.Context(group)
+    for name in group.list_commands(context):
+        _, command, _ = group.resolve_command(context, [name])
+        if hasattr(command, "list_commands"):
+            yield from _commands(command, (*path, name))
+        else:
+            yield (*path, name), command
+
+
+def test_an_option_of_one_value_is_refused_where_it_is_given_twice() -> None:
+    options = [
+        (words, command, option)
+        for words, command in _commands(typer.main.get_command(app))
+        for option in command.params
+        if option.param_type_name == "option" and not option.is_flag and not option.multiple
+    ]
+    assert len(options) > 100
+    for words, command, option in options:
+        for typed in option.opts:
+            with pytest.raises(taxel.ProblemError) as refused:
+                command.make_context(words[-1], [typed, "a", typed, "b"])
+            assert str(refused.value) == f"{max(option.opts, key=len)} is given twice: a and b", (words, typed)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loopback import until
 
 import taxel
 from taxel import Detection, Note, ProblemError
@@ -50,6 +51,19 @@ def test_a_recording_is_yielded_to_its_end(tmp_path: Path) -> None:
     assert sorted(spikes) == spikes_of(recorded)
     assert len([item for _, item in items if isinstance(item, Detection)]) == detections > 0
     assert [item.text for _, item in items if isinstance(item, Note)] == ["here"]
+
+
+def test_a_client_that_connects_later_gets_the_detections_before_it() -> None:
+    with Live(0, host=LOOPBACK, array=SMALL, readout=touch()) as live, Panel(live) as panel:
+        wait_for(live, play(presses(5), live.address[1]))
+        until(lambda: live.counters["detections"] == 5)
+        with PanelClient(panel.url) as client:
+            found: list[Detection] = []
+            for _, item in client:
+                found += [item] if isinstance(item, Detection) else []
+                if len(found) == 5:
+                    break
+        assert [item.t for item in found] == sorted(item.t for item in found)
 
 
 def test_a_board_is_yielded_until_the_server_ends() -> None:

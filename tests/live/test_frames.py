@@ -257,7 +257,9 @@ def test_lines_of_the_standard_input_are_read_to_their_end(tmp_path: Path, shown
         timeout=60,
         check=False,
     )
-    assert (done.returncode, done.stderr.startswith("panel: ")) == (0, bool(shown)), done.stderr
+    assert (done.returncode, "panel: http" in done.stderr) == (0, bool(shown)), done.stderr
+    assert "lines:- has ended" in done.stderr
+    assert done.stderr.rstrip().endswith(f"\n{taxel.open(path).verdict}"), "what is for people is on standard error"
     expected = run(Readout.load(detector), taxel.open(path))
     assert len(done.stdout.splitlines()) == len(expected) > 3
 
@@ -329,6 +331,11 @@ def test_a_source_that_states_no_unit_is_taken_in_that_of_the_readout(tmp_path: 
             assert live.unit == unit
             live.sample("frames", [1, 2, 3, 4])
         assert taxel.open(path).frames().unit == unit
+        both = ["left=given,array=2x2,rate=10", "right=given,array=2x2,rate=10"]
+        with Live(readout=readout_of(2, 2, unit), sources=both, record=path, overwrite=True) as live:
+            live.sample("left", [1, 2, 3, 4])
+            live.sample("right", [1, 2, 3, 4])
+        assert {source.frames().unit for source in taxel.open(path).sources.values()} == {unit}
     with Live(sources="given,array=2x2,rate=10") as live:
         assert live.unit == "counts"
 
@@ -343,3 +350,28 @@ def test_where_nothing_arrives_there_is_no_empty_board(tmp_path: Path, capsys: p
     assert (list(recording.sources), recording.frames().values[:, 0].tolist()) == (["imu"], [[2, 3], [4, 5], [6, 7]])
     assert recording.frames().t.tolist() == [1000, 11_000, 21_000]
     assert recording.columns == ["a", "b"]
+
+
+def test_all_sources_of_lines_may_be_silent_as_long(tmp_path: Path) -> None:
+    with served("") as left, served("") as right:
+        sources = [f"left=lines+tcp:{left},array=1x2,rate=100", f"right=lines+tcp:{right},array=1x2"]
+        with pytest.raises(taxel.ProblemError, match="no line came within 0 s"):
+            Live(sources=sources, record=tmp_path / "a.mcap", first_line_s=0.1)
+
+
+def test_the_command_says_which_sources_it_does_not_read_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    readout, path = tmp_path / "a.json", tmp_path / "a.mcap"
+    readout_of(2, 2, "as sent").save(readout)
+    text = lines_of(np.ones((40, 2, 2)), np.arange(40) * PERIOD_US)
+    with served(text) as left, served(text) as right, served("t_ms,a\n1,2\n") as imu:
+        sources = [f"{name}=lines+tcp:{at},array=2x2,time=1:us" for name, at in (("left", left), ("right", right))]
+        sources.append(f"imu=lines+tcp:{imu}")
+        words = [word for source in sources for word in ("--source", source)]
+        code, _, err = call(capsys, "live", *words, "--readout", readout, "--record", path, "--seconds", "0.3")
+    assert code == 0, err
+    told = [line for line in err.splitlines() if "recorded only" in line]
+    assert told == ["right: recorded only, not read out or shown; a second taxel live reads it out"]
+    code, _, err = call(capsys, "detect", path, "--readout", readout, "--tare", "0.1")
+    assert code == 0, err

@@ -145,3 +145,19 @@ def test_every_control_has_a_name_and_every_id_is_one(page: Any) -> None:
             .map(e => e.outerHTML.slice(0, 80))"""
     )
     assert nameless == []
+
+
+def test_curves_of_frames_have_gaps_where_none_arrived(replay: Any) -> None:
+    """Columns of 4 ms and two rows: a frame every 10 columns, none in 200 to 400 and after 900."""
+    found = replay.evaluate("""() => import('/timeline.js').then(({ Timeline }) => {
+        const timeline = new Timeline(2, 4000);
+        const [raster, count] = [new Uint8Array(2 * 1000), 1000];
+        for (let column = 0; column <= 900; column += 10)
+          if (column < 200 || column >= 400) raster[2 * column + 1] = 16;
+        timeline.put({ restart: false, column_us: 4000, t_us: 4e6 - 1, following: true, first: 0, count, raster });
+        const gaps = (us) => [...timeline.gaps(-5, 999, us)];
+        return [gaps(36000), gaps(35999).length, gaps(300000), gaps(1e6)];
+    })""")
+    silent = [*range(191, 400), *range(901, 1000)]
+    assert (found[0], found[2], found[3]) == (silent, silent, [])
+    assert found[1] == 1000 - sum(column < 200 or column >= 400 for column in range(0, 901, 10))

@@ -196,6 +196,39 @@ def test_detections_of_a_recording_are_in_order_and_the_time_stays_without_them(
     readout.unlink()
 
 
+def test_the_list_of_detections_says_which_readout_reads_and_of_which_sensor_each_is(
+    chromium: Any, recording: Path
+) -> None:
+    readout = recording.with_name("walk.readout.json")
+    readout.write_text("{}")
+    found = [{"label": "contact", "t_us": 10**6, "known_us": 10**6, "source": "right"}]
+    message = {
+        "type": "detections",
+        "source": recording.name,
+        "readout": readout.name,
+        "labels": ["contact"],
+        "encoders": [],
+    }
+    listing = {"type": "recordings", "folder": "", "files": [], "readouts": [readout.name]}
+    for answer, said in (
+        ([], "^None yet: walk.readout.json reads this recording"),
+        ([{**message, "detections": []}, {"type": "done"}], "^None: walk.readout.json detected nothing"),
+    ):
+        with answered(chromium, recording, {"read_out": answer, "recordings": [listing]}) as page:
+            page.locator("#readout").select_option(readout.name)
+            shows(page, "detections-none", said)
+    answers = {"read_out": [{**message, "detections": found}, {"type": "done"}], "recordings": [listing]}
+    with answered(chromium, recording, answers) as page:
+        page.locator("#readout").select_option(readout.name)
+        row = page.locator("#detection-list li .what")
+        until(lambda: row.all_inner_texts() == ["contact, right"], "the row names the sensor")
+        mark = page.locator("#detection-marks span")
+        until(
+            lambda: mark.count() == 1 and mark.get_attribute("title") == "contact, right at 1.000 s", "so does the mark"
+        )
+    readout.unlink()
+
+
 @pytest.mark.parametrize("count", [100, 101])
 def test_where_not_all_detections_are_listed_it_is_said(count: int, chromium: Any, recording: Path) -> None:
     readout = recording.with_name("walk.readout.json")

@@ -86,6 +86,28 @@ const CHECK_EVERY: Duration = Duration::from_millis(50);
 /// Capacity of the queue of [`Live::next`], detections; more are lost for it, and counted, but still reach the sinks.
 const OUTPUT_WAITING: usize = 1 << 14;
 
+/// The sources beside the one that is read out, as texts.
+struct OtherTexts<'a> {
+    texts: Vec<SourceText>,
+    /// The unit of the readout.
+    unit: Option<String>,
+    stop: Stop<'a>,
+}
+
+impl OtherTexts<'_> {
+    /// Opens them; those of frames that state no unit have the readout's, by which it reads their recording.
+    fn open(&self, wait: FirstLineWait<'_>) -> Result<Vec<NamedSource>> {
+        let open = |text: &SourceText| {
+            let mut kind = text.open(None, wait)?;
+            if let SourceKind::Frames(_, layout, _) = &mut kind {
+                layout.assume_unit(self.unit.as_deref());
+            }
+            Ok(NamedSource { name: text.name(), kind })
+        };
+        self.texts.iter().map(open).collect()
+    }
+}
+
 /// A running pipeline from datagrams to detections, from [`Live::start`] until [`Live::stop`].
 pub struct Live {
     shared: Arc<PipelineShared>,
@@ -145,9 +167,10 @@ impl Live {
                 })?,
             }
         }
+        let unit = unit.map(str::to_owned);
         let frames = frame_time(&options, input.layout());
         let readout = ReadoutSetup::new(readout, &options, frames)?;
-        Self::start_from(input, options, texts, readout, sinks)
+        Self::start_from(input, options, OtherTexts { texts, unit, stop }, readout, sinks)
     }
 
     /// Opens the socket (and the file), and starts to receive a board.
@@ -162,8 +185,8 @@ impl Live {
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
-        let texts = options.source_texts()?;
-        Self::start_from(PipelineInput::Board(address), options, texts, readout, sinks)
+        let others = OtherTexts { texts: options.source_texts()?, unit: None, stop: Stop::never() };
+        Self::start_from(PipelineInput::Board(address), options, others, readout, sinks)
     }
 
     /// As [`Live::start`], for datagrams that another computer receives ([`Receiver::fed`]).
@@ -177,28 +200,25 @@ impl Live {
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
-        let texts = options.source_texts()?;
-        Self::start_from(PipelineInput::Fed(receiver), options, texts, readout, sinks)
+        let others = OtherTexts { texts: options.source_texts()?, unit: None, stop: Stop::never() };
+        Self::start_from(PipelineInput::Fed(receiver), options, others, readout, sinks)
     }
 
     /// Starts with the further sources of these texts.
     fn start_from(
         input: PipelineInput,
         options: LiveOptions,
-        texts: Vec<SourceText>,
+        others: OtherTexts<'_>,
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         if options.record_later && options.record.is_some() {
             return Err(problem!("recordings that begin later, and one from the beginning: choose one").into());
         }
-        if let (None, false, Some(source)) = (&options.record, options.record_later, texts.first()) {
+        if let (None, false, Some(source)) = (&options.record, options.record_later, others.texts.first()) {
             return Err(problem!("source {} without a recording: nothing would keep it", source.name()).into());
         }
-        let sources = texts
-            .iter()
-            .map(|text| Ok(NamedSource { name: text.name(), kind: text.open(None, FirstLineWait::default())? }));
-        let sources = sources.collect::<Result<_>>()?;
+        let sources = others.open(options.first_line_wait(others.stop)?)?;
         Self::begin(input, options, sources, readout, sinks, None)
     }
 

@@ -224,8 +224,8 @@ pub struct Detected {
     pub labels: Vec<String>,
     /// Its encoder as JSON, with the tare that it read with; `None` of a plain rule.
     pub encoder: Option<String>,
-    /// Label, time, and when it was known, us.
-    pub detections: Vec<(String, i64, i64)>,
+    /// Label, time, when it was known, us, and which of several sensors it is of.
+    pub detections: Vec<(String, i64, i64, String)>,
 }
 
 /// How much of a file is read.

@@ -255,6 +255,7 @@ impl Hub {
                 Origin::Frames(_) => live.handle.options().sources.first().cloned(),
                 Origin::Udp(_) | Origin::Bridge(_) => None,
             }),
+            sources: live.map(|live| live.handle.source_names()).unwrap_or_default(),
             frames: live.and_then(|live| live.frames()),
             delta_intensity: live.map(|live| live.handle.options().differences),
             control: self.board().control.clone(),

@@ -274,7 +274,7 @@ async fn read_out(hub: &Hub, shown: Option<&OpenRecording>, readout: String) -> 
     let recording = hub.folder.file(&name)?;
     let Detected { labels, encoder, detections } =
         hub.ask(move |handlers| handlers.training.detect(&recording, trial.as_deref(), &path)).await?;
-    let found = |(label, t_us, known_us)| FoundDetection { label, t_us, known_us };
+    let found = |(label, t_us, known_us, source)| FoundDetection { label, t_us, known_us, source };
     let detections = detections.into_iter().map(found).collect();
     let encoder = encoder.as_deref().map(Encoder::from_json).transpose().map_err(taxel_live::Error::from)?;
     let encoders = encoder.map_or_else(ReadoutEncoders::default, ReadoutEncoders::from);

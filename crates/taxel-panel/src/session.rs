@@ -117,6 +117,9 @@ impl ClientSession {
         ] {
             self.connection.send_message(&message).await?;
         }
+        for detection in hub.live().map(|live| live.latest_detections()).unwrap_or_default() {
+            self.connection.send_message(&Message::detection(&detection)).await?;
+        }
         loop {
             // A frame that became due less than `FRAME_TIME` after the last one is sent when that time has passed.
             let due = self.viewport.is_playing() || self.viewport.is_dirty() && self.flow.has_credit();

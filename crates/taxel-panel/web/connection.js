@@ -187,7 +187,7 @@ export class Connection {
   }
 
   /** @param {Hello} hello */
-  greet({ live, options, udp, lines, source, control, delta_intensity }) {
+  greet({ live, options, udp, lines, source, sources: [, ...others], control, delta_intensity }) {
     const where = part("where", HTMLDetailsElement);
     where.hidden = !live;
     // Without a line there is something to choose.
@@ -199,6 +199,8 @@ export class Connection {
     // Without a source of lines, the one that was used last can be chosen again.
     if (!this.source.input.value) this.source.at(source ?? this.source.before[0] ?? null);
     this.showSource();
+    part("numbers-others", HTMLElement).hidden = !others.length;
+    write(part("numbers-others", HTMLElement), `Recorded only, not shown or read out here: ${others.join(", ")}.`);
     part("control-drop", HTMLButtonElement).disabled = control === null;
     part("delta-intensity", HTMLInputElement).checked = delta_intensity ?? false;
     const stated = Object.entries(options ?? {}).filter(([, value]) => value !== null && String(value) !== "");

@@ -4,11 +4,14 @@ import { collapsed } from "./clusters.js";
 import { entitle, make, part, write } from "./dom.js";
 import { counted, seconds, short, integer } from "./words.js";
 
-/** @typedef {{ label: string, t_us: number, latency_us: number | null }} Detection */
+/** @typedef {{ label: string, t_us: number, latency_us: number | null, source: string }} Detection `source`: which of several sensors it is of, else empty */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
-/** Detections of a recording, in their order. @param {{ label: string, t_us: number }[]} found @returns {Detection[]} */
-export const recorded = (found) => found.map(({ label, t_us }) => ({ label, t_us, latency_us: null }));
+/** Detections of a recording, in their order. @param {{ label: string, t_us: number, source: string }[]} found @returns {Detection[]} */
+export const recorded = (found) => found.map(({ label, t_us, source }) => ({ label, t_us, latency_us: null, source }));
+
+/** What it is, and of which of several sensors. @param {{ label: string, source: string }} detection */
+const named = ({ label, source }) => (source ? `${label}, ${source}` : label);
 
 /** Detections of the live source that are stored, and the number of those that are listed. */
 const MOST_STORED = 300;
@@ -34,6 +37,8 @@ export class Detections {
 
   /** @param {Detection} detection */
   add(detection) {
+    // A server that the page has reached again sends those that it had sent before too.
+    if (this.live.some(({ label, t_us }) => label === detection.label && t_us === detection.t_us)) return;
     this.live.unshift(detection);
     this.live.length = Math.min(this.live.length, MOST_STORED);
   }
@@ -58,14 +63,14 @@ export class Detections {
   list() {
     if (this.listed === this.shown.length && this.listed < MOST_STORED) return;
     this.listed = this.shown.length;
-    const rows = this.shown.slice(0, LISTED).map(({ label, t_us, latency_us }) => {
+    const rows = this.shown.slice(0, LISTED).map(({ label, t_us, latency_us, source }) => {
       // A line holds a frame that is over; a recording takes it as known at the time of the next one.
       const late = latency_us === null ? "" : latency_us < 0 ? "at once" : short(latency_us);
       const button = make(
         "button",
-        { type: "button", class: "link row", "aria-label": `${label} at ${seconds(t_us)}${late && `, reported ${late === "at once" ? late : `${late} later`}`}` },
+        { type: "button", class: "link row", "aria-label": `${named({ label, source })} at ${seconds(t_us)}${late && `, reported ${late === "at once" ? late : `${late} later`}`}` },
         make("span", { class: this.shape(label) }),
-        make("span", { class: "what" }, label),
+        make("span", { class: "what" }, named({ label, source })),
         make("span", { class: "when" }, seconds(t_us)),
         make("span", { class: "late" }, late),
       );
@@ -81,13 +86,13 @@ export class Detections {
     // What is hidden has no width.
     marks.hidden = !this.shown.length;
     const { clientWidth } = marks;
-    const inside = this.shown.flatMap(({ label, t_us }) => {
+    const inside = this.shown.flatMap(({ label, t_us, source }) => {
       const share = timeline?.share(t_us) ?? null;
-      return share === null ? [] : [{ label, t_us, x: share * clientWidth }];
+      return share === null ? [] : [{ label, t_us, source, x: share * clientWidth }];
     });
     const { single, counts } = collapsed(inside.sort((a, b) => a.x - b.x), MARK, 1);
     const all = [
-      ...single.map(({ label, t_us, x }) => ({ x, kind: this.shape(label), text: "", title: `${label} at ${seconds(t_us)}` })),
+      ...single.map(({ label, t_us, source, x }) => ({ x, kind: this.shape(label), text: "", title: `${named({ label, source })} at ${seconds(t_us)}` })),
       ...counts.map(({ from, to, marks: { length } }) => ({ x: (from + to) / 2, kind: "count", text: integer(length), title: counted(length, "detection") })),
     ];
     while (marks.children.length > all.length) marks.lastElementChild?.remove();

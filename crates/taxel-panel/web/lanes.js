@@ -21,6 +21,7 @@ import { rounded, integer } from "./words.js";
  * @property {string} named its name
  * @property {{ unit: string, step: number, zero: number, frames: boolean }} values their unit, the size of a tick in it, ticks of the value 0, and whether they are of frames
  * @property {{ unit: string, step: number }} sums unit of the sum of the values, and size of a tick in it
+ * @property {number | null} gap_us how long frames of a live source may be away until the curves have a gap; null: however long
  * @property {string} raster "changes" or "spikes"
  * @property {string} spikes encoder and latency
  */
@@ -280,6 +281,7 @@ export class Lanes {
     this.renew();
     this.span_s = timeline.span_us / 1e6;
     this.splits = timeline.ticks(part("lanes", HTMLElement).clientWidth / GRID_PX).map(({ share }) => share * this.span_s);
+    const gaps = shown.gap_us !== null && columns ? timeline.gaps(columns[0] - 1, columns[1], shown.gap_us) : new Set();
     for (const { lane, block, heading, painter, plot } of this.all) {
       if (block.hidden) continue;
       const drawn = painter?.draw(timeline, shown) ?? "";
@@ -291,7 +293,7 @@ export class Lanes {
       const curves = plot.series.slice(1).map(() => []);
       for (const number of numbers) {
         const column = timeline.known(number);
-        const values = column < 0 ? [] : lane.at(shown, timeline, column);
+        const values = column < 0 || gaps.has(number) ? [] : lane.at(shown, timeline, column);
         curves.forEach((curve, k) => curve.push(values[k] ?? null));
       }
       // A curve has the value at the end of its column.

@@ -41,6 +41,9 @@ const LANES_MS = 33;
 /** How often lanes are drawn for users who prefer reduced motion, ms. */
 const REDUCED_MS = 1000;
 const OVERVIEW_MS = 2000;
+/** The curves of frames have a gap where none came for so long, us, and for so many frames. */
+const LEAST_GAP_US = 500_000;
+const GAP_FRAMES = 3;
 
 const settings = new Settings();
 const fragment = new URLSearchParams(location.hash.slice(1));
@@ -59,7 +62,7 @@ const mistakes = new Mistakes(player, () => {
   marksDue = true;
   layout.arrange();
 });
-const training = new Training(server, player, mistakes);
+const training = new Training(server, player, mistakes, () => showDetections(detections.shown, detections.labels));
 const layout = new Layout(arrangement, () => (lanesDue = true));
 const board = new Board(server, settings, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
@@ -150,13 +153,19 @@ function showUnits() {
   showLanes();
 }
 
+/** @returns {number | null} how long frames of the live source may be away, us; null of a board, which sends nothing at rest */
+function gapOfFrames() {
+  const frame_us = counters?.arrival.heartbeat_us ?? null;
+  return opened || !hello?.lines || frame_us === null ? null : Math.max(LEAST_GAP_US, GAP_FRAMES * frame_us);
+}
+
 /** @returns {import("./lanes.js").Shown} */
 function shown() {
   const { geometry: sensor, taxel, values } = maps;
   const newtons = opened?.frames?.newtons ?? null;
   // The sum of the values is a force where they are in N, or where it is known of a pressure.
   const sums = newtons === null ? { unit: values.unit, step: values.step } : { unit: "N", step: newtons };
-  return { sensor, taxel, named: maps.named(), values, sums, raster: settings.values.raster, spikes };
+  return { sensor, taxel, named: maps.named(), values, sums, gap_us: gapOfFrames(), raster: settings.values.raster, spikes };
 }
 
 /** What the page has to place: see `Layout`. */
@@ -224,7 +233,8 @@ function receive(message) {
       if (player.transport.source === null) player.reach = message.reach_us;
       return writeState();
     case "detection":
-      detections.add(message);
+      // Of several sources the first is read out.
+      detections.add({ ...message, source: (hello?.sources.length ?? 0) > 1 ? hello?.sources[0] ?? "" : "" });
       marksDue = true;
       if (player.transport.source === null) showDetections(detections.live, hello?.readout ?? []);
       return;
@@ -247,6 +257,7 @@ function receive(message) {
     case "detections":
       if (message.source === player.transport.source) {
         view.offer(message.encoders);
+        training.reads = message.readout;
         showDetections(recorded(message.detections), message.labels);
       }
       return;
@@ -451,7 +462,11 @@ function move(transport) {
 
 /** @param {import("./detections.js").Detection[]} shown of the live source newest first @param {string[]} labels in the order of their readout */
 function showDetections(shown, labels) {
-  const none = opened ? "None in this recording: train on labels, or choose a readout." : hello?.readout ? "None yet." : "No readout runs: start taxel live with one, or choose one here.";
+  const chosen = training.readout.value;
+  const ofRecording = !chosen
+    ? "None in this recording: train on labels, or choose a readout."
+    : chosen === training.reads ? `None: ${chosen} detected nothing in this recording.` : `None yet: ${chosen} reads this recording.`;
+  const none = opened ? ofRecording : hello?.readout ? "None yet." : "No readout runs: start taxel live with one, or choose one here.";
   detections.show(shown, none, labels);
   marksDue = true;
 }

@@ -74,6 +74,8 @@ export interface FoundDetection {
   label: string;
   t_us: number;
   known_us: number;
+  /** Which of several sensors it is of; empty of a single one. */
+  source: string;
 }
 
 /** A recording of frames. */
@@ -313,6 +315,8 @@ export interface Hello {
   lines: string | null;
   /** That source as a text states it, with all of its keys; null of a board. */
   source: string | null;
+  /** The names of the live sources: first the one that is shown and read out, then those that are only recorded; empty without a board. */
+  sources: string[];
   /** The values of those frames, after the first one; null of a board, whose values are ticks. */
   frames: LiveFrames | null;
   /** Whether intensities are differences; null without a board. */
@@ -406,7 +410,7 @@ export interface Counters {
   ended: boolean;
 }
 
-/** A detection, as it is reported. */
+/** A detection, as it is reported; after the greeting the latest that were reported before. */
 export interface Detection {
   type: "detection";
   label: string;

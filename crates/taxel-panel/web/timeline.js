@@ -48,6 +48,31 @@ export class Timeline {
     this.number.fill(NaN);
   }
 
+  /** @param {number} number of a column @returns {boolean} whether nothing arrived in it */
+  isSilent(number) {
+    const column = this.known(number);
+    return column >= 0 && !this.raster.subarray(column * this.rows, (column + 1) * this.rows).some(Boolean);
+  }
+
+  /**
+   * The columns of a live source of frames in which none arrived for longer than this: each frame has a change at least.
+   * @param {number} first
+   * @param {number} last
+   * @param {number} gap_us
+   * @returns {Set<number>} their numbers
+   */
+  gaps(first, last, gap_us) {
+    const found = new Set();
+    for (let from = first; from <= last; from++) {
+      let to = from;
+      while (to <= last && this.isSilent(to)) to++;
+      // A gap that goes on beyond the edge is as long as what is seen of it.
+      if ((to - from) * this.column_us > gap_us) for (let number = from; number < to; number++) found.add(number);
+      from = to;
+    }
+    return found;
+  }
+
   /** @param {number} number @returns {number} its column in the ring */
   columnOf(number) {
     return ((number % SPAN) + SPAN) % SPAN;

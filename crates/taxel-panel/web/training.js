@@ -13,11 +13,17 @@ const ASKED_MS = 3000;
 
 /** The button that trains, what the training prints, and the choice of the readout. */
 export class Training {
-  /** @param {Server} server @param {import("./player.js").Player} player @param {import("./mistakes.js").Mistakes} mistakes */
-  constructor(server, player, mistakes) {
+  /**
+   * @param {Server} server
+   * @param {import("./player.js").Player} player
+   * @param {import("./mistakes.js").Mistakes} mistakes
+   * @param {() => void} chosen called when another readout is to read what is shown
+   */
+  constructor(server, player, mistakes, chosen) {
     this.server = server;
     this.player = player;
     this.mistakes = mistakes;
+    this.chosen = chosen;
     /** When the training began, ms; null while none runs. @type {number | null} */
     this.since = null;
     /** The recording that is shown; null: the live source. @type {string | null} */
@@ -88,6 +94,7 @@ export class Training {
     const { source } = this;
     const { t_us } = this.player;
     this.readout.value = readout;
+    this.chosen();
     if (readout) notify(`${readout} reads ${source ?? "the board: leave it at rest for the tare"}`);
     /** @type {import("./messages.js").Request} */
     const request = readout ? { type: "read_out", readout } : source === null ? { type: "live" } : { type: "open", name: source };
@@ -98,7 +105,10 @@ export class Training {
       // What is opened again begins at its beginning.
       if (!readout && source !== null && t_us !== null) this.player.seek(t_us);
     } catch (error) {
-      if (source === this.source && this.readout.value === readout) this.readout.value = this.reads;
+      if (source === this.source && this.readout.value === readout) {
+        this.readout.value = this.reads;
+        this.chosen();
+      }
       failed(error);
     }
   }

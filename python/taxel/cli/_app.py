@@ -47,6 +47,21 @@ class _Command(TyperCommand):
         ]
         super().__init__(*args, help="\n\n".join(paragraphs) or None, **options)
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse what is typed; refuse an option of one value that is given twice, of which click takes the last."""
+        self._check_repeated(ctx, args)
+        return super().parse_args(ctx, args)
+
+    def _check_repeated(self, ctx: Any, args: list[str]) -> None:
+        parser: Any = self.make_parser(ctx)
+        single = [o for o in {**parser._short_opt, **parser._long_opt}.values() if o.action == "store"]
+        for option in single:
+            option.action = "append"
+        typed, _, _ = parser.parse_args(list(args))
+        for option in single:
+            if len(values := typed.get(option.dest, ())) > 1:
+                raise ProblemError(f"{max(option.obj.opts, key=len)} is given twice: {values[0]} and {values[1]}")
+
     def invoke(self, ctx: Any) -> Any:
         """Run it."""
         try:

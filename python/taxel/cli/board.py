@@ -114,7 +114,7 @@ def for_live(
 ) -> dict[str, Any]:
     """Return typed options as `Live` takes them: files are read; `remote` stays an address.
 
-    A source of lines may be silent before its first line for `seconds`, by default as long as it takes.
+    Each source of lines may be silent before its first line for `seconds`, by default as long as it takes.
     """
     readout, size = options.get("readout"), options["array"]
     trained = None if readout is None else load(readout)
@@ -159,9 +159,9 @@ def remote(
 
 
 def say_waiting(options: dict[str, Any], console: Console) -> None:
-    """Say that a source of lines is opened, whose first lines show what is not stated."""
+    """Say that sources of lines are opened, whose first lines show what is not stated."""
     if options["sources"]:
-        console.print(f"waiting for the first line of {options['sources'][0]}; Ctrl-C ends")
+        console.print(f"waiting for the first line of {', then of '.join(options['sources'])}; Ctrl-C ends")
 
 
 def _rest(value: str | None) -> Tare | float | None:

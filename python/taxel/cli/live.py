@@ -6,6 +6,7 @@ import contextlib
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -112,7 +113,7 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
         if record is None or record.suffix != ".mcap":
             raise ProblemError("--report is made from the recording: give --record FILE.mcap")
         try_report(typed.report)
-    console = Console(stderr=True, quiet=lines)
+    console = Console(stderr=True)
     with contextlib.ExitStack() as connected, contextlib.ExitStack() as at_rest:
         if typed.control is not None and isinstance(rest, float):
             at_rest.enter_context(at_rest.enter_context(Cable(typed.control)).floor(0))
@@ -130,10 +131,13 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
         with Live(**options | {"remote": board}) as pipeline:
             if trained is not None and trained.unit is not None and not pipeline._states_unit:
                 console.print(f"values are taken in {pipeline.unit}, as of the readout: --source states no unit")
+            for name, counts in pipeline.counters["sources"].items():
+                if "capture" in counts:  # else lines that are no frames, as of an IMU
+                    console.print(f"{name}: recorded only, not read out or shown; a second taxel live reads it out")
             last = _show(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
             summary = last.stop()
             # Detections that the readout made while `stop` ran.
-            _drain(last, console, say)
+            _drain(last, None if lines else say)
     tare = summary.tare
     if typed.save_tare is not None and tare is not None:
         tare.save(typed.save_tare)
@@ -142,10 +146,7 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
         _report(typed.report, trained, summary, tare if tare is not None else rest)
         console.print(f"report: {typed.report / 'report.html'}")
     _report_unsent(summary)
-    if not lines:
-        _print_summary(summary, options["guard_frames"])
-    elif summary.verdict.status in ("damaged", "lost", "nothing arrived"):
-        say(f"taxel: {summary.verdict}", err=True)
+    _print_summary(summary, options["guard_frames"], err=lines)
     if typed.save_tare is not None and tare is None and not summary.nothing_came:
         seconds = summary.counters["seconds"]
         raise ProblemError(
@@ -173,8 +174,7 @@ def _show(
             shows = shown.enter_context(
                 Panel(pipeline, control=control, folder=typed.folder, host=typed.panel_host, port=typed.panel_port)
             )
-            # Standard output has the lines of --json; whoever reads them needs the address too.
-            announce(shows, typed.opens, Console(stderr=True))
+            announce(shows, typed.opens, console)
         _watch(pipeline, shows, typed.seconds, console, at_rest, fresh=fresh, control=later)
     return pipeline if shows is None or shows.live is None else shows.live
 
@@ -193,23 +193,24 @@ def _report(folder: Path, readout: Readout | PlainRule, summary: Summary, tare: 
     write_detections(folder, readout, [outcome], title=f"Live detections, recorded to {summary.path}")
 
 
-def _print_summary(summary: Summary, guard_frames: float) -> None:
-    counters = summary.counters
-    say(f"{counted(counters['detections'], 'detection')}, {received(counters)} in {counters['seconds']:.1f} s")
+def _print_summary(summary: Summary, guard_frames: float, *, err: bool) -> None:
+    """Print what was detected, received and lost; to standard error where `err` is true."""
+    counters, tell = summary.counters, partial(say, err=err)
+    tell(f"{counted(counters['detections'], 'detection')}, {received(counters)} in {counters['seconds']:.1f} s")
     if counters["detections"]:
-        say(f"from known to output: {delays(counters['report_latency'])}")
+        tell(f"from known to output: {delays(counters['report_latency'])}")
     if counters["wrong"]:
         wrong = counted(counters["wrong"], "detection")
-        say(f"{wrong} output too early: events arrived more than {guard_frames:g} frames late")
+        tell(f"{wrong} output too early: events arrived more than {guard_frames:g} frames late")
     if counters["late"]:
-        say(f"{counted(counters['late'], 'event')} out of order: read out on arrival, and recorded")
+        tell(f"{counted(counters['late'], 'event')} out of order: read out on arrival, and recorded")
     if counters["events_dropped"]:
-        say(f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow")
+        tell(f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow")
     for why in doubts(counters):
-        say(why)
+        tell(why)
     if summary.path is not None:
-        say(f"recorded to {summary.path}")
-    say(summary.verdict)
+        tell(f"recorded to {summary.path}")
+    tell(summary.verdict)
 
 
 def _report_unsent(summary: Summary) -> None:
@@ -254,6 +255,15 @@ def _warn_of_unknown(tare: Tare) -> None:
         )
 
 
+def _echo(pipeline: Live, console: Console) -> Callable[[str], None] | None:
+    """Return what prints a detection; None with --json, whose lines another thread writes."""
+    if pipeline._options.lines:
+        return None
+    # If both go to one terminal, detections are printed above the display; else they go to standard output.
+    above = console.is_terminal and sys.stdout.isatty()
+    return (lambda line: console.print(Text(line))) if above else say
+
+
 def _watch(
     pipeline: Live,
     panel: Panel | None,
@@ -268,11 +278,11 @@ def _watch(
 
     When a `fresh` tare is complete, `at_rest` is closed, and the panel gets the serial line, if `control` names it.
     """
-    # If both go to one terminal, detections are printed above the display; else they go to standard output.
-    above = console.is_terminal and sys.stdout.isatty()
-    echo: Callable[[str], None] = (lambda line: console.print(Text(line))) if above else say
+    echo = _echo(pipeline, console)
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
-    display = Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
+    # Lines that another thread writes would break a display.
+    shown = Console(stderr=True, quiet=True) if echo is None else console
+    display = Display(console=shown, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
     with asked_to_end() as end_request, display:
         before, silence = None, ""
         told: set[tuple[str, str]] = set()
@@ -285,7 +295,7 @@ def _watch(
                     pipeline, before = panel.live, None
                 if before is None:
                     before = pipeline.counters
-                _drain(pipeline, console, echo, REDRAW_S)
+                _drain(pipeline, echo, REDRAW_S)
                 now = pipeline.counters
             except ProblemError:
                 if panel is None or panel.live is pipeline:
@@ -293,7 +303,8 @@ def _watch(
                 # A client of the panel ended this receiver, to begin another.
                 continue
             # Where the display is not shown, each silence is one line.
-            if not console.is_terminal and bool(now_silent := _silence(now, pipeline.place)) != bool(silence):
+            is_shown = console.is_terminal and echo is not None
+            if not is_shown and bool(now_silent := _silence(now, pipeline.place)) != bool(silence):
                 silence = now_silent
                 console.print(silence or ("datagrams arrive" if now["lines"] is None else "frames arrive"))
             if not now["taring"]:
@@ -329,14 +340,14 @@ def _has_ended(pipeline: Live, panel: Panel | None) -> bool:
     return pipeline.is_over and (panel is None or panel.live is pipeline)
 
 
-def _drain(pipeline: Live, console: Console, echo: Callable[[str], None], wait_s: float = 0.0) -> None:
+def _drain(pipeline: Live, echo: Callable[[str], None] | None, wait_s: float = 0.0) -> None:
     """Wait for a detection; print it and all that wait, each with its delay after `known`.
 
-    With --json the readout's thread has written them.
+    Without `echo`, as with --json, the readout's thread has written them.
     """
     while (detection := pipeline.next(wait_s)) is not None:
         wait_s = 0.0
-        if not console.quiet:
+        if echo is not None:
             delay = to_ms(detection.latency or 0)
             # A line holds a frame that is over; a recording takes it as known at the time of the next one.
             when = f"{delay:.2f} ms after it was known" if delay >= 0 else f"{-delay:.2f} ms before the next frame"

@@ -90,7 +90,7 @@ class ReadFrames:
     number_us : int, optional
         Time from one frame to the next, us, where frames are numbered.
     notes : list of (time in us or None, text, source)
-    detections : list of (label, time, time at which it was known), us
+    detections : list of (label, time, time at which it was known, us; and which of several sensors it is of)
     verdict : str
         Empty if it is unknown.
     trial, trials : str and list of str
@@ -104,7 +104,7 @@ class ReadFrames:
     unit: str
     number_us: int | None
     notes: list[tuple[int | None, str, str]]
-    detections: list[tuple[str, int, int]]
+    detections: list[tuple[str, int, int, str]]
     verdict: str
     trial: str | None = None
     trials: list[str] = field(default_factory=list)
@@ -292,7 +292,8 @@ def _frames(recording: Recording) -> ReadFrames:
     notes |= {(t, text, name) for name, of_source in noted.items() for t, text in of_source - of_all}
     labels = {(row.t, row.text) for row in _labels_beside(recording)}
     notes = {note for note in notes if note[:2] not in labels}
-    found = [(d.label, d.t, d.known) for sensor in sources.values() for d in sensor.detections]
+    each = sources.items() if len(sources) > 1 else [("", sensor) for sensor in sources.values()]
+    found = [(d.label, d.t, d.known, name) for name, sensor in each for d in sensor.detections]
     sorted_notes = sorted(notes, key=lambda note: (note[0] or 0, note[1]))
     verdict = "" if recording.verdict.status == "unknown" else recording.verdict
     number_us = None if us == 1 else us

@@ -82,7 +82,7 @@ class StatedOptions:
         typed="May be repeated.",
     )
     first_line_s: float = option(
-        3.0, "How long the first source of lines may be silent before its first line, s.", least=0, commands=""
+        3.0, "How long each source of lines may be silent before its first line, s.", least=0, commands=""
     )
     compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.", commands="record")
     overwrite: bool = option(False, "Replace the file if it exists.", commands="record")

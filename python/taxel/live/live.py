@@ -91,8 +91,8 @@ class Live:
         subtracted from) and ``rate=`` (frames a second; default: measured). Lines without an array, as of an IMU, are
         recorded with the first source. "lsl:NAME" is a stream of the lab streaming layer.
     first_line_s : float, 0 or more
-        How long the first source of lines may be silent before its first line, s. A source of which the array, the
-        columns and the rate are stated may be silent longer: it starts without a line.
+        How long each source of lines may be silent before its first line, s. A source of which the array, the columns
+        and the rate are stated may be silent longer: it starts without a line.
     compression : str
         Compression of a .mcap: none, lz4 or zstd.
     overwrite : bool

@@ -37,6 +37,13 @@ impl Handle {
         &self.shared.options
     }
 
+    /// The names of its sources: first the one that is read out, then those that are only recorded.
+    #[must_use]
+    pub fn source_names(&self) -> Vec<String> {
+        let others = self.shared.sources.iter().map(|source| &source.name);
+        std::iter::once(&self.shared.options.name).chain(others).cloned().collect()
+    }
+
     /// The address on which it receives; unspecified, with port 0, if a bridge feeds it.
     #[must_use]
     pub fn address(&self) -> SocketAddr {

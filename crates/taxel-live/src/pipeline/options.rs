@@ -113,7 +113,7 @@ options! {
         sources: Vec<String> = vec![], "commands" = "live record", "flag" = "--source",
             "metavar" = "[NAME=]KIND:PLACE", "python" = "Mapping[str, str] | str | Sequence[str] | None",
             "typed" = "May be repeated.";
-        /// How long the first source of lines may be silent before its first line, s.
+        /// How long each source of lines may be silent before its first line, s.
         ///
         /// A source of which the array, the columns and the rate are stated may be silent longer: it starts without a line.
         first_line_s: f64 = 3.0, "commands" = "", "minimum" = 0;
@@ -203,7 +203,7 @@ impl LiveOptions {
         Ok(texts)
     }
 
-    /// How long the first source of lines may be silent, unless asked to stop.
+    /// How long each source of lines may be silent, unless asked to stop.
     ///
     /// # Errors
     ///

@@ -107,21 +107,24 @@ impl Indexed {
             Self::Frames(index) => (None, Some(index)),
         };
         let registers = events.and_then(|index| index.header().registers);
-        let (remarks, note_sources) = match self {
-            Self::Events(index) => (&index.remarks, &[][..]),
-            Self::Frames(index) => (&index.file.remarks, &index.file.note_sources[..]),
+        let (remarks, note_sources, detection_sources) = match self {
+            Self::Events(index) => (&index.remarks, &[][..], &[][..]),
+            Self::Frames(index) => {
+                (&index.file.remarks, &index.file.note_sources[..], &index.file.detection_sources[..])
+            }
         };
         let us = self.us();
-        let note_sources = note_sources.iter().map(String::as_str).chain(std::iter::repeat(""));
-        let notes = remarks.notes.iter().zip(note_sources).map(|(note, source)| RecordedNote {
+        let notes = remarks.notes.iter().zip(then_none(note_sources)).map(|(note, source)| RecordedNote {
             t_us: note.t_us.map(|t| t * us),
             text: note.text.clone(),
-            source: source.to_owned(),
+            source,
         });
-        let detections = remarks.detections.iter().take(MOST_DETECTIONS).map(|(_, found)| FoundDetection {
+        let found = remarks.detections.iter().take(MOST_DETECTIONS).zip(then_none(detection_sources));
+        let detections = found.map(|((_, found), source)| FoundDetection {
             label: found.label.clone(),
             t_us: found.t * us,
             known_us: found.known * us,
+            source,
         });
         Message::Opened {
             name: name.to_owned(),
@@ -149,6 +152,11 @@ impl Indexed {
             index_ms: begun.elapsed().as_secs_f64() * 1e3,
         }
     }
+}
+
+/// These sources, and then none.
+fn then_none(sources: &[String]) -> impl Iterator<Item = String> {
+    sources.iter().cloned().chain(std::iter::repeat(String::new()))
 }
 
 /// What `opened` says of frames.

@@ -1,5 +1,6 @@
 //! A live source: copies of a board's events from the pipeline, and the state and the keyframe index made of them.
 
+use std::collections::VecDeque;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -29,11 +30,16 @@ const BEHIND_NS: i64 = 40_000_000;
 /// A source this far behind the time shown has stalled, us; less is network delay and error of the clocks.
 const STALLED_US: i64 = 200_000;
 
+/// Maximum number of detections that a client that connects later receives.
+const MOST_LATEST: usize = 300;
+
 /// A live source with the state and the keyframe index that its events make.
 pub(crate) struct LiveSource {
     pub(crate) handle: Handle,
     events: Mutex<ViewerEvents>,
     detections: channel::Receiver<OutputDetection>,
+    /// The latest of them, oldest first, for clients that connect later.
+    latest_detections: Mutex<VecDeque<OutputDetection>>,
     pub(crate) state: Mutex<ArrayState>,
     pub(crate) index: LiveIndex,
     pub(crate) activity: Mutex<Activity>,
@@ -110,6 +116,7 @@ impl LiveSource {
             encoders: encoders.unwrap_or_default(),
             handle,
             detections,
+            latest_detections: Mutex::default(),
             missing: AtomicU64::new(0),
             rested: AtomicBool::new(false),
             zeroings: AtomicU64::new(0),
@@ -205,6 +212,11 @@ impl LiveSource {
         }
     }
 
+    /// The latest detections, oldest first.
+    pub(crate) fn latest_detections(&self) -> Vec<OutputDetection> {
+        lock(&self.latest_detections).iter().cloned().collect()
+    }
+
     /// Events that only the panel lacks.
     pub(crate) fn missing(&self) -> u64 {
         self.missing.load(Ordering::Relaxed)
@@ -245,6 +257,11 @@ impl LiveSource {
         }
         drop(events);
         received.detections.extend(self.detections.try_iter());
+        let mut latest = lock(&self.latest_detections);
+        latest.extend(received.detections.iter().cloned());
+        let excess = latest.len().saturating_sub(MOST_LATEST);
+        latest.drain(..excess);
+        drop(latest);
         self.apply_rest();
         received.zeroed = self.apply_zeroings();
         received.frame |= received.zeroed;

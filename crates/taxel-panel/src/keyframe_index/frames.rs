@@ -45,6 +45,8 @@ pub struct FrameFile {
     pub remarks: Remarks,
     /// The source that each note is of; "" where it is of all of them.
     pub note_sources: Vec<String>,
+    /// The sensor that each detection is of, of several; "" of a single one.
+    pub detection_sources: Vec<String>,
     /// One line that states what was lost.
     pub verdict: String,
     /// The trial of its file that is shown, and all of them, where there are several.

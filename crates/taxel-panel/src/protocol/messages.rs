@@ -44,6 +44,9 @@ pub(crate) enum Message {
         lines: Option<String>,
         /// That source as a text states it, with all of its keys; null of a board.
         source: Option<String>,
+        /// The names of the live sources: first the one that is shown and read out, then those that are only recorded; empty
+        /// without a board.
+        sources: Vec<String>,
         /// The values of those frames, after the first one; null of a board, whose values are ticks.
         frames: Option<LiveFrames>,
         /// Whether intensities are differences; null without a board.
@@ -134,7 +137,7 @@ pub(crate) enum Message {
         /// Whether the source has ended, by an error or its owner.
         ended: bool,
     },
-    /// A detection, as it is reported.
+    /// A detection, as it is reported; after the greeting the latest that were reported before.
     Detection {
         label: String,
         t_us: i64,
@@ -477,6 +480,8 @@ pub(crate) struct FoundDetection {
     pub(crate) label: String,
     pub(crate) t_us: i64,
     pub(crate) known_us: i64,
+    /// Which of several sensors it is of; empty of a single one.
+    pub(crate) source: String,
 }
 
 /// The values of a live source of frames.

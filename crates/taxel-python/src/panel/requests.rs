@@ -393,7 +393,7 @@ struct ReadFrames<'py> {
     unit: String,
     number_us: Option<i64>,
     notes: Vec<(Option<i64>, String, String)>,
-    detections: Vec<(String, i64, i64)>,
+    detections: Vec<(String, i64, i64, String)>,
     verdict: String,
     trial: Option<String>,
     trials: Vec<String>,
@@ -405,12 +405,12 @@ fn to_index(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<FrameIndex> {
     let array = to_array(array)?;
     let (notes, note_sources) =
         notes.into_iter().map(|(t_us, text, source)| (recording::Note { at_ns: 0, t_us, text }, source)).unzip();
-    let detections = detections
+    let (detections, detection_sources) = detections
         .into_iter()
-        .map(|(label, t, known)| (0, Detection { label, t, known, slope: f64::NAN, repaired: false }))
-        .collect();
+        .map(|(label, t, known, source)| ((0, Detection { label, t, known, slope: f64::NAN, repaired: false }), source))
+        .unzip();
     let remarks = Remarks { notes, detections, ..Remarks::default() };
-    let file = FrameFile { unit, number_us, remarks, note_sources, verdict, trial, trials, left_s };
+    let file = FrameFile { unit, number_us, remarks, note_sources, detection_sources, verdict, trial, trials, left_s };
     let mut placed = vec![];
     for ReadSource { name, left, rows, columns, t, values, rest } in &sources {
         let (t, values, rests) = (slice("t", t)?, slice("values", values)?, slice("rest", &rest.values)?);

@@ -165,14 +165,15 @@ class TrainingRequests:
 
     def detect(
         self, recording: Path, trial: str | None, readout: Path
-    ) -> tuple[list[str], str | None, list[tuple[str, int, int]]]:
+    ) -> tuple[list[str], str | None, list[tuple[str, int, int, str]]]:
         """Detect by a readout in a recording or its trial.
 
         Returns
         -------
-        tuple of list of str, str or None, and list of (str, int, int)
+        tuple of list of str, str or None, and list of (str, int, int, str)
             The readout's labels; its encoder, as JSON, with the tare that it read with (none for several sensors, each
-            of which has its own); the detections: label, time, when known, in order of the last.
+            of which has its own); the detections: label, time, when known, in order of the last, and which of several
+            sensors it is of.
         """
         from taxel.tasks import detect  # noqa: PLC0415  the command line starts quickly
 
@@ -183,5 +184,10 @@ class TrainingRequests:
         encoder = loaded.encoder if isinstance(loaded, Readout) else None
         if encoder is not None and len(detected) == 1 and detected[0].rest is not None:
             encoder = encoder.with_tare(detected[0].rest.tare)
-        found = [(found.label, found.t, found.known) for each in detected for found in each.outcome.found]
+        names = [each.recording.label or "" if len(detected) > 1 else "" for each in detected]
+        found = [
+            (found.label, found.t, found.known, name)
+            for each, name in zip(detected, names, strict=True)
+            for found in each.outcome.found
+        ]
         return list(loaded.labels), None if encoder is None else encoder.to_json(), sorted(found, key=itemgetter(2))
