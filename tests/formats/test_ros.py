@@ -567,5 +567,5 @@ def test_labels_of_two_topics_are_each_of_their_source(names: dict[str, str], tm
     table.write_text(f"label,t_us\ntouch,{us + 20_000}\n")
     assert [one["touch"].tolist() for one in references(str(table), opened)] == [[us + 20_000]] * 2
     other = bags.write(tmp_path / "other.mcap", several)
-    with pytest.raises(ProblemError, match="names no recording, and there are 2; must have the column recording"):
+    with pytest.raises(ProblemError, match="there are 2; must have the column recording; it has "):
         references(str(table), options.open_sensors([bag, other]))

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import column, mapping, several
+from taxel._base.arguments import column, mapping, several, shown
 from taxel._base.errors import refused
 from taxel._base.messages import counted, warn
 from taxel._base.times import beginning_us, begun
@@ -55,7 +55,9 @@ def references(
     if count > 1 and any(not row.recording for row in table.rows):
         trials = f", with names as {trial_name(recordings[0])}" if are_trials(recordings) else ""
         raise refused(
-            argument, f" is {source}: names no recording, and there are {count}; must have the column recording{trials}"
+            argument,
+            f" is {source}: names no recording, and there are {count}; must have the column recording{trials}; it has "
+            f"{', '.join(map(shown, table._columns))}",
         )
     _check_sources(table, argument, recordings)
     named = {
