@@ -311,6 +311,12 @@ def test_two_sides_in_one_table_are_said_with_the_columns_of_each(tmp_path: Path
 def test_a_folder_of_arrays_without_times_needs_their_rate_alone(tmp_path: Path) -> None:
     for k in range(12):
         np.save(tmp_path / f"trial{k}.npy", np.full((5 + k, 3, 2), k))
+    # Arrays of several sizes are read by what is printed of the first.
+    (tmp_path / "layout.toml").write_text(layout_said_of(tmp_path / "trial0.npy").replace("# rate", "rate"))
+    np.save(tmp_path / "larger.npy", np.zeros((5, 4, 2)))
+    assert {each.array.shape for each in taxel.open_all(tmp_path)} == {(3, 2), (4, 2)}
+    (tmp_path / "larger.npy").unlink()
+    (tmp_path / "layout.toml").unlink()
     opened = TextOptions(rate_hz=40).open_trials(tmp_path)
     assert [(each.path.name, each.frames().values[0, 0, 0]) for each in opened] == [
         (f"trial{k}.npy", k) for k in range(12)

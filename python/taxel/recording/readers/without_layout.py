@@ -49,6 +49,7 @@ _IN_BRACKETS = re.compile(r"[\[(]\s*([^\s\d\[\]()]{1,8})\s*[\])]$")
 _SIDE = re.compile(r"(left|right|links|rechts|l|r)(?![^\W\d_])", re.IGNORECASE)
 _SIDES = ({"left", "right"}, {"links", "rechts"}, {"l", "r"})
 _NO_RATE = "# rate_hz = 100  # frames a second: the file does not say it, and without it frames are numbered"
+_NO_UNIT = '# unit = "kPa"  # of the readings: the file does not say it, and without it they are counts'
 #: Names of the columns of events in the orders that programs write without names.
 _EVENTS = (("x", "y", "p", "t"), ("t", "x", "y", "p"))
 _EVENT_NAMES: dict[str, Callable[[str], bool]] = {
@@ -104,7 +105,8 @@ def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> 
     time = next((name for name, shape_of in shapes.items() if shape_of == (count,) and unit_of(name) is not None), None)
     times = [] if time is None else [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time], count)]
     data = [f"array = {_quote(name)}"] * bool(name) + times
-    size = [f"rows = {shape[0]}", f"columns = {shape[1]}"] if len(shape) == 2 else _size(shape[0], ())
+    # An array of frames x rows x columns says its size, and others of the folder may have another.
+    size = [_NO_UNIT] if len(shape) == 2 else _size(shape[0], ())
     return [*size, *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
 
 
@@ -265,9 +267,9 @@ class _TextTable:
         if set(sides) not in _SIDES or len({len(columns) for columns in sides.values()}) > 1 or len(taxels) < 4:
             return []
         lines = []
-        for side, columns in sides.items():
+        for name, columns in sides.items():
             others = sorted({*left, *taxels} - set(columns))
-            lines.append(f"# {side} alone: columns = {len(columns)}, leave_out = {[k + 1 for k in others]}")
+            lines.append(f"# {name} alone: columns = {len(columns)}, leave_out = {[k + 1 for k in others]}")
         return lines
 
     def form(self) -> list[str]:
