@@ -16,6 +16,8 @@ __all__ = ["are_of_events", "with_known_columns"]
 
 #: What the column of labels is called, the first that is there; capitals do not matter.
 _LABELS = ("label", "event", "ereignis", "name", "marker", "annotation")
+#: What the column of the recordings is called, if none is called `recording`; capitals do not matter.
+_RECORDINGS = ("recording", "trial", "versuch", "file", "filename", "datei", "aufnahme")
 #: Columns that hold neither times of events nor labels.
 _OTHERS = ("recording", "source", "host_ns", "replaces_us")
 _US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
@@ -25,7 +27,7 @@ _RIGHT = "must be label,t_us ..., or a column of texts and times with their unit
 
 
 def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
-    """Return a table with its labels in a column `label`, and its times in a column `t_us`; as it is if it has both.
+    """Return a table with its labels in a column `label`, its times in `t_us`, and names of recordings in `recording`.
 
     Parameters
     ----------
@@ -44,8 +46,10 @@ def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
     [(2, {'t_us': '86400500000', 'label': 'heel'})]
     """
     header = list(table.header)
+    if header and (recording := _recording(table, separator)) is not None:
+        header[recording] = "recording"
     if not header or {"label", "t_us"} <= set(header):
-        return table
+        return replace(table, header=tuple(header))
     time = header.index("t_us") if "t_us" in header else _time(table)
     rows, name, header[time] = list(table.rows), header[time], "t_us"
     for k, (line, cells) in enumerate(rows if name != "t_us" else ()):
@@ -66,8 +70,17 @@ def are_of_events(names: Sequence[str], cells: Sequence[str]) -> bool:
     """
     kinds = ["time" if unit_of(name) is not None else name.lower() for name in names]
     labels = [k for k, kind in enumerate(kinds) if kind in _LABELS]
-    known = all(kind == "time" or kind in (*_LABELS, *_OTHERS) for kind in kinds)
+    known = all(kind == "time" or kind in (*_LABELS, *_OTHERS, *_RECORDINGS) for kind in kinds)
     return known and kinds.count("time") == len(labels) == 1 and len(cells) == len(names) and _is_text(cells[labels[0]])
+
+
+def _recording(table: HeaderTable, separator: str) -> int | None:
+    """Return which column holds the names of recordings, by its name; numbers are of trials, and no names."""
+    if "recording" in table.header:
+        return table.header.index("recording")
+    names = [name.lower() for name in table.header]
+    named = (names.index(name) for name in _RECORDINGS if name in names)
+    return next((k for k in named if any(_is_text(cells[k], separator) for _, cells in table.rows)), None)
 
 
 def _time(table: HeaderTable) -> int:

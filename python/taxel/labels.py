@@ -97,6 +97,7 @@ class Labels:
         (`Note.others`). An empty text has no labels. Without `t_us` a column of times by its name is read: numbers in
         the unit that the name states ("Zeit [s]", "t_ms"), or dates, which count from 1970; without `label` one of
         that name in capitals, of the name event, Ereignis, name, marker or annotation, or the only column of texts.
+        Without `recording` that column is one of texts of the name trial, Versuch, file, filename, Datei or Aufnahme.
 
     Attributes
     ----------
@@ -122,7 +123,9 @@ class Labels:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         file = Path(checked_path("path", path))
-        rows = _rows(_table(file))
+        #: The names of the columns as the file has them.
+        self._columns, table = _table(file)
+        rows = _rows(table)
         self.path, self.rows = file, tuple(row for row in rows if row.text)
         self.removed = tuple(row for row in rows if not row.text)
 
@@ -280,8 +283,8 @@ def rows_of(location: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...
     return _rows(table), table.header
 
 
-def _table(file: Path) -> HeaderTable:
-    """Return a table in columns of taxel; one in those of another program may be in Windows-1252 too."""
+def _table(file: Path) -> tuple[tuple[str, ...], HeaderTable]:
+    """Return the columns of a table, and it in columns of taxel; one of another program may be in Windows-1252 too."""
     try:
         lines = text_of(file)
     except FormatError:
@@ -289,7 +292,8 @@ def _table(file: Path) -> HeaderTable:
         if set(_WANTED) <= set(HeaderTable.read(file, lines).header):
             raise
     names = next((line for line in lines if line.strip()), "")
-    return with_known_columns(HeaderTable.read(file, lines), separator_of(names))
+    table = HeaderTable.read(file, lines)
+    return table.header, with_known_columns(table, separator_of(names))
 
 
 def _rows(table: HeaderTable) -> tuple[Note, ...]:

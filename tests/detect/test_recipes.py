@@ -100,6 +100,30 @@ def test_the_last_word_of_a_label_counts_where_one_label_alone_has_it(labels: li
         assert said(recipe, "Grasp end") == said(Recipe.load("touch"), "lift")
 
 
+@pytest.mark.parametrize(
+    "labels",
+    [
+        ("Initial Contact", "Toe Off"),
+        ("Foot Strike", "Foot Off"),
+        ("touch down", "Lift-off"),
+        ("links Erstkontakt", "L Zehenablösung"),
+        ("AUFSETZEN", "Abheben"),
+        ("right heel strike", "right foot_off"),
+    ],
+)
+def test_what_gait_laboratories_call_the_ends_of_a_step_has_their_neurons(labels: tuple[str, str]) -> None:
+    for name, ends in (("touch", ("contact", "lift")), ("gait_insole", ("contact", "foot_off"))):
+        recipe, named = Recipe.load(name, labels=labels), Recipe.load(name, labels=ends)
+        assert [said(recipe, label) for label in labels] == [said(named, end) for end in ends], name
+
+
+def test_both_sides_are_kinds_of_touch_and_ends_of_steps() -> None:
+    sides = ["left toe off", "right toe off"]
+    assert {Recipe.load("touch", labels=sides).inputs_of(label)[0] for label in sides} == {"moments"}
+    insole = Recipe.load("gait_insole", labels=sides)
+    assert {said(insole, label) for label in sides} == {said(Recipe.load("gait_insole"), "foot_off")}
+
+
 def test_a_recipe_for_certain_labels_refuses_others(tmp_path: Path) -> None:
     (tmp_path / "certain.toml").write_text('fits = ["events"]\n[encoder]\nname = "fa1"\n[neurons.contact]\ntau = 2.0\n')
     with pytest.raises(

@@ -271,9 +271,52 @@ def test_a_text_without_numbers_prints_no_layout(tmp_path: Path) -> None:
         taxel.open(tmp_path / "a.txt")
 
 
+def test_columns_of_another_unit_and_of_remarks_are_no_taxels(tmp_path: Path) -> None:
+    names = ["Zeit [s]", "Ferse [N]", "Ballen [N]", "Zehe [N]", "Akku [%]", "Bemerkung"]
+    rows = [[f"{k / 50}", f"{k}", "1", "2", "87", ""] for k in range(30)]
+    place = tmp_path / "a.csv"
+    place.write_text("".join(";".join(row) + "\n" for row in [names, *rows]))
+    lines = layout_said_of(place)
+    assert 'leave_out = ["Akku [%]", "Bemerkung"]' in lines
+    (tmp_path / "a.layout.toml").write_text(lines)
+    recording = taxel.open(place)
+    assert (recording.array.names, recording.frames().unit) == (tuple(names[1:4]), "N")
+
+
+@pytest.mark.parametrize(
+    ("sides", "name"), [("LR", "{}{} [N]"), (("links", "rechts"), "{}_S{} [N]"), (("Left", "Right"), "{} {}")]
+)
+def test_two_sides_in_one_table_are_said_with_the_columns_of_each(tmp_path: Path, sides: str, name: str) -> None:
+    names = ["time (s)", *(name.format(side, k) for side in sides for k in range(1, 4)), "who"]
+    rows = [[f"{k / 50}", *"123456", "me"] for k in range(30)]
+    place = tmp_path / "a.csv"
+    place.write_text("".join(",".join(row) + "\n" for row in [names, *rows]))
+    lines = layout_said_of(place)
+    said = [line.partition(" alone: ") for line in lines.splitlines() if " alone: " in line]
+    for (side, _, keys), asked, values in zip(said, sides, ([1, 2, 3], [4, 5, 6]), strict=True):
+        assert side == f"# {asked.lower()}"
+        columns, _, left = keys.partition(", ")
+        (tmp_path / "a.layout.toml").write_text(
+            "\n".join(
+                left if line.startswith("leave_out") else columns if line.startswith("columns") else line
+                for line in lines.splitlines()
+            )
+        )
+        assert taxel.open(place).frames().values[0].tolist() == [values]
+    place.write_text(place.read_text().replace(name.format(sides[1], 3), "other"))
+    (tmp_path / "a.layout.toml").unlink()
+    assert " alone: " not in layout_said_of(place)
+
+
 def test_a_folder_of_arrays_without_times_needs_their_rate_alone(tmp_path: Path) -> None:
     for k in range(12):
         np.save(tmp_path / f"trial{k}.npy", np.full((5 + k, 3, 2), k))
+    # Arrays of several sizes are read by what is printed of the first.
+    (tmp_path / "layout.toml").write_text(layout_said_of(tmp_path / "trial0.npy").replace("# rate", "rate"))
+    np.save(tmp_path / "larger.npy", np.zeros((5, 4, 2)))
+    assert {each.array.shape for each in taxel.open_all(tmp_path)} == {(3, 2), (4, 2)}
+    (tmp_path / "larger.npy").unlink()
+    (tmp_path / "layout.toml").unlink()
     opened = TextOptions(rate_hz=40).open_trials(tmp_path)
     assert [(each.path.name, each.frames().values[0, 0, 0]) for each in opened] == [
         (f"trial{k}.npy", k) for k in range(12)

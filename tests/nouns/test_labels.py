@@ -16,6 +16,7 @@ from taxel.labels import TURN_US
 from taxel.live._requests.labels import LabelRequests
 from taxel.live._shown_files import Opening
 from taxel.recording.recognition import is_label_table, is_recording
+from taxel.tasks.labels import references
 
 ARRAY = {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}
 BEGAN_NS = 1_700_000_000_000_000_000
@@ -301,6 +302,27 @@ def test_the_page_refuses_a_table_of_another_program_and_leaves_it_alone(tmp_pat
     with pytest.raises(taxel.ProblemError, match=r"line 1: no column 'label'; .*: mend the table, then try again"):
         handler.change(place, "walk.mcap", 1, [[edit]])
     assert place.read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["Versuch", "Trial", "DATEI", "Aufnahme", "file", "Filename", "Recording"])
+def test_recordings_are_named_in_a_column_of_another_name(tmp_path: Path, name: str) -> None:
+    place = tmp_path / "labels.csv"
+    for header, row in (
+        (f"{name};Ereignis;Zeit [s]", "Meyer_01;auf;0,3"),
+        (f"{name},label,t_us", "Meyer_01,auf,300000"),
+    ):
+        place.write_text(f"{header}\n{row}\n")
+        assert taxel.Labels(place).recordings == ("Meyer_01",)
+        assert is_label_table(place)
+
+
+def test_numbers_of_trials_name_no_recording_and_the_columns_are_said(tmp_path: Path) -> None:
+    made = [record(tmp_path / f"{name}.mcap", 0, 1.0) for name in "ab"]
+    place = tmp_path / "given" / "labels.csv"
+    place.parent.mkdir()
+    place.write_text("Trial;Ereignis;Zeit [s]\n1;auf;0,3\n")
+    with pytest.raises(taxel.ProblemError, match="the column recording; it has 'Trial', 'Ereignis', 'Zeit \\[s\\]'"):
+        references(place, made)
 
 
 def test_a_table_of_another_program_is_no_recording_of_its_folder(tmp_path: Path) -> None:

@@ -186,7 +186,7 @@ def test_labels_of_a_folder_are_of_the_bag_that_they_name(capsys, tmp_path):
             "names no recording, and there are 2; must have the column recording",
         ),
         ("recording,label,t_us", f"c.bag,contact,{times['a.bag'][0]}", "c.bag is no recording of this folder"),
-        ("recording,label,t_us", "a.bag,contact,480000", "a.bag: has 1 note, none within"),
+        ("recording,label,t_us", "a.bag,contact,480000000", "a.bag: has 1 note, none within"),
     ):
         (folder / "b.notes.csv").unlink(missing_ok=True)
         (folder / "labels.csv").write_text(f"{head}\n{row}\n")

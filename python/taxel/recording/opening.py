@@ -14,7 +14,7 @@ import numpy as np
 
 from taxel import formats
 from taxel._base import arguments, limits
-from taxel._base.arguments import flag, instance, integer, text
+from taxel._base.arguments import flag, instance, integer, shown, text
 from taxel._base.errors import helped, refused
 from taxel._base.limits import opening
 from taxel._base.messages import warn
@@ -428,7 +428,10 @@ def _add_labels(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Record
     # The feet of one trial are one recording.
     count = len({trial_of(str(name), recording.label) for name, recording in pairs})
     if count > 1 and any(not row.recording for row in labels.rows):
-        raise FormatError(f"{table}: names no recording, and there are {count}; must have the column recording")
+        raise FormatError(
+            f"{table}: names no recording, and there are {count}; must have the column recording; it has "
+            f"{', '.join(map(shown, labels._columns))}"
+        )
     return [_with_labels(labels, name, recording) for name, recording in pairs]
 
 

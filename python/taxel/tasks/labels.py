@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import column, mapping, several
+from taxel._base.arguments import column, mapping, several, shown
 from taxel._base.errors import refused
 from taxel._base.messages import counted, warn
 from taxel._base.times import beginning_us, begun
@@ -39,7 +39,11 @@ def references(
     if not isinstance(source, str | os.PathLike):
         return _mapped(source, recordings, argument)
     if source == "notes":
-        noted = [_notes(recording) for recording in recordings]
+        noted = _from_beginnings([_noted(recording) for recording in recordings], recordings, "notes")
+        noted = [
+            _inside(events, recording, f"the notes of {recording.title}")
+            for events, recording in zip(noted, recordings, strict=True)
+        ]
         outside = next((each for each in recordings if any(note.t is not None for note in each.notes)), None)
         if outside is not None and not any(noted):
             notes = counted(sum(note.t is not None for note in outside.notes), "note")
@@ -51,7 +55,9 @@ def references(
     if count > 1 and any(not row.recording for row in table.rows):
         trials = f", with names as {trial_name(recordings[0])}" if are_trials(recordings) else ""
         raise refused(
-            argument, f" is {source}: names no recording, and there are {count}; must have the column recording{trials}"
+            argument,
+            f" is {source}: names no recording, and there are {count}; must have the column recording{trials}; it has "
+            f"{', '.join(map(shown, table._columns))}",
         )
     _check_sources(table, argument, recordings)
     named = {
@@ -64,7 +70,8 @@ def references(
         names = f"it names {few(table.recordings)}" if table.rows else "it is empty"
         raise refused(argument, f" is {source}: names no event in {titles_of(unnamed)}; {names}")
     _warn_of_strangers(table, recordings)
-    return [_within(table, recording, argument) for recording in recordings]
+    events = _from_beginnings([table.times(recording) for recording in recordings], recordings, str(table.path))
+    return [_within(table, each, recording, argument) for each, recording in zip(events, recordings, strict=True)]
 
 
 def sources_without(
@@ -193,18 +200,47 @@ def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]
             )
 
 
-def _notes(recording: Recording) -> dict[str, NDArray[np.int64]]:
+def _noted(recording: Recording) -> dict[str, NDArray[np.int64]]:
     times: dict[str, list[int]] = {}
     for note in recording.notes:
         if note.t is not None:
             times.setdefault(note.text, []).append(note.t)
-    events = {label: np.sort(np.array(t, np.int64)) for label, t in times.items()}
-    return _inside(events, recording, f"the notes of {recording.title}")
+    return {label: np.sort(np.array(t, np.int64)) for label, t in times.items()}
 
 
-def _within(table: Labels, recording: Recording, argument: str) -> dict[str, NDArray[np.int64]]:
+def _from_beginnings(
+    each: Sequence[dict[str, NDArray[np.int64]]], recordings: Sequence[Recording], where: str
+) -> list[dict[str, NDArray[np.int64]]]:
+    """Return events by the times of their recordings, and say of which they are counted from the beginning.
+
+    Those are all events of a recording whose times count from 1970, if all lie within its duration. Sources of a file
+    count from the first of them; if they begin apart, nobody knows from which.
+    """
+    begins: dict[tuple[Path, str], list[int]] = {}
+    labelled = [k for k, events in enumerate(each) if any(map(len, events.values()))]
+    spans = {k: span_us(recordings[k]) for k in labelled}
+    for k in labelled:
+        begins.setdefault((recordings[k].path, trial_name(recordings[k])), []).append(spans[k][0])
+    moved, of = list(each), []
+    for k in labelled:
+        firsts = begins[recordings[k].path, trial_name(recordings[k])]
+        begin, times = min(firsts), np.concatenate(list(each[k].values()))
+        if beginning_us(np.array(firsts)) and max(firsts) - begin <= _NEAR_US and times.min() >= 0:
+            if begin + times.max() > spans[k][1]:
+                continue
+            moved[k] = {label: begin + t for label, t in each[k].items()}
+            of.append((recordings[k].title, begin))
+    if of:
+        title, begin = of[0]
+        more = f", and so of {len(of) - 1} more" * (len(of) > 1)
+        warn(f"{where}: times are counted from the beginning of {title}, {begun(begin)}{more}", stacklevel=3)
+    return moved
+
+
+def _within(
+    table: Labels, events: dict[str, NDArray[np.int64]], recording: Recording, argument: str
+) -> dict[str, NDArray[np.int64]]:
     """Return the events of a table that lie within a recording; refuse a table of which none does."""
-    events = table.times(recording)
     if recording.clock is None and any(row.at_ns for row in table.rows):
         warn(
             f"the {kind_of_file(recording.kind)} holds no arrival times, so host_ns cannot show by how many periods of "
@@ -225,7 +261,7 @@ def _span(recording: Recording) -> str:
     more = "" if recording.timed else ", whose frames are numbered (rate_hz gives them times)"
     begin = beginning_us(np.array([first]))
     if begin:
-        more = f"; it begins {begun(begin)}, {begin} us since 1970, and labels must count from 1970 too"
+        more = f"; it begins {begun(begin)}, {begin} us since 1970, and labels must count from 1970, or all from there"
     return f"{recording.title} ({(first - begin) / 1e6:.3f} to {(last - begin) / 1e6:.3f} s){more}"
 
 

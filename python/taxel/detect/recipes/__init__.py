@@ -32,6 +32,17 @@ _ANY = "gait_channel"
 _MOST_CHANNELS = 32
 #: A label with one of these words is of a step, which begins and ends otherwise than a touch.
 _OF_STEPS = {"foot", "footfall", "heel", "toe", "step", "stride"}
+#: What gait laboratories call the ends of a step; a recipe without a neuron `foot_off` has it as `lift`, and the other
+#: way round.
+_ENDS = {
+    **dict.fromkeys(("heel_strike", "foot_strike", "foot_contact", "initial_contact", "touch_down"), "contact"),
+    **dict.fromkeys(("erstkontakt", "fersenkontakt", "aufsetzen"), "contact"),
+    **dict.fromkeys(("foot_off", "toe_off", "final_contact", "zehenablösung", "zehenabloesung"), "foot_off"),
+    **dict.fromkeys(("lift_off", "abheben"), "lift"),
+}
+_SAME_END = {"foot_off": "lift", "lift": "foot_off"}
+#: What those names may begin with.
+_SIDES = ("left", "right", "links", "rechts", "l", "r")
 
 
 @cache
@@ -54,13 +65,16 @@ def fitting(source: Events | Frames, labels: Sequence[str] = ()) -> str:
     source : Events or Frames
     labels : sequence of str
         What is to be learnt. Contact, lift and kinds of touch of a grid have one recipe whatever the unit; steps, as
-        "foot_off", and no labels have that of the unit, and where there is none that of channels.
+        "foot_off", and no labels have that of the unit. Where there is none, contact and foot off of a grid have that
+        of touches, if each is of one label, and all else that of channels.
 
     Examples
     --------
     >>> grid = Frames([[[0.0, 0.0]] * 2], [0], unit="counts")
     >>> fitting(grid, ["contact", "lift"]), fitting(grid, ["contact", "foot off"])
     ('touch', 'gait_plate')
+    >>> fitting(Frames([[[0.0] * 6] * 6], [0], unit="kPa"), ["Initial Contact", "Toe Off"])
+    'touch'
     >>> fitting(Frames([[[0.0]]], [0], unit="N")), fitting(Frames([[[0.0]]], [0], unit="V"))
     ('gait_insole', 'gait_channel')
     >>> fitting(Frames([[[0.0] * 6] * 6], [0], unit="V"), ["soft", "hard"])
@@ -84,11 +98,11 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
         subject = f"frames in {source.unit}" if isinstance(source, Frames) else "events of a board"
         return recipe_for.get(kind, _ANY), subject
     array, grids = source.array, recipe_for.get("grids")
-    known = False
+    known, steps = False, None
     if array.taxels < 2 or not array._has_neighbours:
         sensor = counted(array.taxels, "channel" if array.is_channels else "taxel")
         # Of these it knows contact and lift alone; a contact without its lift may be that of a step.
-        kinds = {_own(recipes[grids], label) for label in labels} if grids is not None else set()
+        kinds = {_listed(recipes[grids], label) for label in labels} if grids is not None else set()
         if "lift" in kinds and None not in kinds:
             return str(grids), f"{' and '.join(labels)} on {sensor}"
         grids = None
@@ -96,18 +110,22 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
         grids, sensor = None, counted(array.taxels, "taxel")
     else:
         sensor = f"a grid of {array.rows} x {array.columns} taxels"
-        others = [label for label in labels if _own(recipes[grids], label) is None]
-        known = any(_own(values, label) for label in others for values in recipes.values())
-        if not known and not any(_OF_STEPS & set(spelling(label).split("_")) for label in others):
-            return grids, f"{'kinds of touch' if others else ' and '.join(labels)} on {sensor}"
+        others = [label for label in labels if _listed(recipes[grids], label) is None]
+        known = any(_listed(values, label) for label in others for values in recipes.values())
+        ends = [_own(recipes[grids], label) for label in labels]
+        what = f"{'kinds of touch' if None in ends else ' and '.join(labels)} on {sensor}"
+        if not known and not any(map(_is_of_step, others)):
+            return grids, what
+        if None not in ends and len(set(ends)) == len(ends):
+            steps = grids, what
     many = array.taxels > _MOST_CHANNELS
     for unit in (f"many {source.unit}",) * (many or not array.is_channels) + (source.unit,):
         if unit in recipe_for:
             return recipe_for[unit], f"frames in {source.unit}"
-    if grids is not None and many and not known:
+    if steps is None and grids is not None and many and not known:
         # The levels of `_ANY`, 22 trains a taxel, take minutes.
-        return grids, sensor
-    return _ANY, f"{sensor} in {source.unit}"
+        steps = grids, sensor
+    return steps or (_ANY, f"{sensor} in {source.unit}")
 
 
 def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
@@ -141,9 +159,10 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
     """Return a recipe's values with one neuron a label, if it is one that is chosen by the recording (`fits`).
 
     "foot off", "Foot-off" and "foot_off" are one. A label in `also` has the parameters of the neuron that it names
-    there, any other label than the recipe's own those that `other` holds, or those of the neuron that it names. A
-    recipe with neither `fits` nor `other` stays as it is. A label whose last word alone is known, as "grasp_end", is
-    that neuron's too if no other label is: "soft_press" and "hard_press" are kinds.
+    there, and so has what gait laboratories call the ends of a step, as "left toe off"; any other label than the
+    recipe's own has those that `other` holds, or those of the neuron that it names. A recipe with neither `fits` nor
+    `other` stays as it is. Where `other` is of kinds, a label that names an end of a step, or whose last word alone is
+    known, as "grasp_end", is that neuron's if no other label is: "soft_press" and "hard_press" are kinds.
 
     Raises
     ------
@@ -159,13 +178,14 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
         return values
     listed = values.get("neurons", {})
     rest = values.get("other")
-    if rest is not None and not isinstance(rest, Mapping):
+    kinds = rest is None or isinstance(rest, Mapping)
+    if not kinds:
         rest = listed[text("recipe: other", rest, listed)]
-    named = {label: _own(values, text("label", label)) for label in labels}
-    last = {label: _own(values, spelling(label).rpartition("_")[2]) for label in labels}
+    named = {label: _listed(values, text("label", label)) for label in labels}
+    last = {label: _own(values, label) or _listed(values, spelling(label).rpartition("_")[2]) for label in labels}
     neurons = {}
     for label in labels:
-        alone = sum(last[label] in (named[kind], last[kind]) for kind in labels) == 1
+        alone = not kinds or sum(last[label] in (named[kind], last[kind]) for kind in labels) == 1
         neuron = listed.get(label, listed.get(named[label] or (last[label] if alone else None), rest))
         if neuron is None:
             raise ProblemError(
@@ -177,21 +197,39 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
 
 
 def knows(recipe: str, label: str) -> bool:
-    """Return whether a recipe has a neuron of its own for a label.
+    """Return whether a recipe itself names a label, as a neuron or in `also`; names of steps are no touch's.
 
     Examples
     --------
     >>> knows("touch", "Lift"), knows("touch", "foot_off")
     (True, False)
     """
-    return _own(read(recipe), text("label", label)) is not None
+    return _listed(read(recipe), text("label", label)) is not None
 
 
-def _own(values: Mapping[str, Any], label: str) -> str | None:
-    """Return the name of the recipe's own neuron for a label, or None."""
+def _listed(values: Mapping[str, Any], label: str) -> str | None:
+    """Return the name of the neuron that a recipe itself lists for a label, or None."""
     plain = spelling(label)
     name = values.get("also", {}).get(plain, plain)
     return name if name in values.get("neurons", {}) else None
+
+
+def _own(values: Mapping[str, Any], label: str) -> str | None:
+    """Return the name of the recipe's neuron for a label: that it lists, or that of an end of a step; or None."""
+    end = _end(label)
+    names = (_listed(values, label), end, _SAME_END.get(end or ""))
+    return next((name for name in names if name in values.get("neurons", {})), None)
+
+
+def _end(label: str) -> str | None:
+    """Return which end of a step a label names, of a side or of none: "contact", "foot_off", or "lift" of any load."""
+    plain = spelling(label)
+    side, _, name = plain.partition("_")
+    return _ENDS.get(plain) or (_ENDS.get(name) if side in _SIDES else None)
+
+
+def _is_of_step(label: str) -> bool:
+    return _end(label) == "foot_off" or bool(_OF_STEPS & set(spelling(label).split("_")))
 
 
 def spelling(label: str) -> str:

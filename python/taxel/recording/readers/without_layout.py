@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -42,7 +43,13 @@ _COUNTS = re.compile(
 _NUMBERED = re.compile(r"[^\W\d]{0,12}[ _\-\[(.]*\d+[\])]?", re.UNICODE)
 #: A unit of a force, a pressure or a voltage that ends a column's name: Heel [N], toe (kPa).
 _UNIT_IN_NAME = re.compile(r"[\[(](m?N|kgf?|g|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmHg|[mµu]?V)[\])]$")
+#: What ends a column's name in brackets: its unit, of which there may be others, as Battery [%].
+_IN_BRACKETS = re.compile(r"[\[(]\s*([^\s\d\[\]()]{1,8})\s*[\])]$")
+#: What the names of two feet or hands begin with.
+_SIDE = re.compile(r"(left|right|links|rechts|l|r)(?![^\W\d_])", re.IGNORECASE)
+_SIDES = ({"left", "right"}, {"links", "rechts"}, {"l", "r"})
 _NO_RATE = "# rate_hz = 100  # frames a second: the file does not say it, and without it frames are numbered"
+_NO_UNIT = '# unit = "kPa"  # of the readings: the file does not say it, and without it they are counts'
 #: Names of the columns of events in the orders that programs write without names.
 _EVENTS = (("x", "y", "p", "t"), ("t", "x", "y", "p"))
 _EVENT_NAMES: dict[str, Callable[[str], bool]] = {
@@ -98,7 +105,8 @@ def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> 
     time = next((name for name, shape_of in shapes.items() if shape_of == (count,) and unit_of(name) is not None), None)
     times = [] if time is None else [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time], count)]
     data = [f"array = {_quote(name)}"] * bool(name) + times
-    size = [f"rows = {shape[0]}", f"columns = {shape[1]}"] if len(shape) == 2 else _size(shape[0], ())
+    # An array of frames x rows x columns says its size, and others of the folder may have another.
+    size = [_NO_UNIT] if len(shape) == 2 else _size(shape[0], ())
     return [*size, *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
 
 
@@ -231,10 +239,38 @@ class _TextTable:
         return bool((np.diff(numbers[:: self.lines_of(numbers)]) == 1).all())
 
     def left_out(self, time: int | None) -> list[int]:
-        """Return which columns are no taxels: those of texts and of other times, and one that numbers the lines."""
+        """Return which columns are no taxels: of texts, other times, another unit than most, and numbers of lines."""
         times = [] if time is None else times_of(self.names)
-        left = [k for k, is_numeric in enumerate(self.numeric) if k != time and (not is_numeric or k in times)]
-        return sorted({0, *left}) if self.counts and time != 0 else left
+        left = {k for k, is_numeric in enumerate(self.numeric) if not is_numeric or k in times or self._is_empty(k)}
+        left |= {0} if self.counts else set()
+        units = {k: self.unit(k) or self._in_brackets(k) for k in range(len(self.numeric)) if k not in {*left, time}}
+        unit, count = Counter(units.values()).most_common(1)[0] if units else ("", 0)
+        others = {k for k, other in units.items() if other and unit and other != unit}
+        return sorted((left | (others if 2 * count > len(units) else set())) - {time})
+
+    def _in_brackets(self, column: int) -> str:
+        within = _IN_BRACKETS.search(self.names[column]) if self.names else None
+        return within[1] if within else ""
+
+    def _is_empty(self, column: int) -> bool:
+        """Whether a column of a name in words holds nothing, as remarks do; a taxel may lack all its values too."""
+        name = self.names[column] if self.names else ""
+        is_word = bool(name) and not _NUMBERED.fullmatch(name) and not self.unit(column)
+        return is_word and all(not row[column] for row in self.body)
+
+    def two_sides(self, taxels: Sequence[int], left: Sequence[int]) -> list[str]:
+        """Return comments that say how each of two sides is read alone, where names begin with them; else none."""
+        found = [_SIDE.match(self.names[k]) if self.names else None for k in taxels]
+        sides: dict[str, list[int]] = {}
+        for k, side in zip(taxels, found, strict=True):
+            sides.setdefault("" if side is None else side[1].lower(), []).append(k)
+        if set(sides) not in _SIDES or len({len(columns) for columns in sides.values()}) > 1 or len(taxels) < 4:
+            return []
+        lines = []
+        for name, columns in sides.items():
+            others = sorted({*left, *taxels} - set(columns))
+            lines.append(f"# {name} alone: columns = {len(columns)}, leave_out = {[k + 1 for k in others]}")
+        return lines
 
     def form(self) -> list[str]:
         """Return the lines that say how its lines are read."""
@@ -312,6 +348,7 @@ def _of_table(found: _TextTable, longer: float) -> tuple[str, list[str]]:
         table += [f"frame_lines = {lines}"] * (lines > 1)
     table += [] if time is None else found.of_time(time, longer)
     table += [f"leave_out = [{', '.join(map(found.called, left))}]"] * bool(left)
+    table += found.two_sides(taxels, left) if lines == 1 else []
     missing = {row[k] for row in found.body for k in taxels if row[k] in MISSING}
     table += [f"missing = {_quote(cell)}" for cell in sorted(missing - {"nan"} or missing)[-1:]]
     units = {found.unit(k) for k in taxels}
