@@ -324,7 +324,8 @@ def _trains(readout: Readout, outcome: Outcome) -> SpikeTrains:
     # A readout of grids of several sizes has weights for the largest.
     if isinstance(source, Frames) and array is not None and array.shape != source.array.shape:
         source, tare = padded_to(source, tare, array.shape)
-    return (readout.encoder if tare is None else readout.encoder.with_tare(tare)).encode(source)
+    encoder = readout._at_noise_of(tare).encoder
+    return (encoder if tare is None else encoder.with_tare(tare)).encode(source)
 
 
 def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:

@@ -1,0 +1,58 @@
+"""Counts of events in a file with more noise than in training: noise floors are of what the file holds at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from taxel import Array, Frames, Neuron, Readout, Tare
+from taxel.detect import PlainRule, run
+from taxel.encode import LocalLoad
+
+SHAPE, BURSTS, WINDOW_US = (40, 50), 12, 20_000
+UNIT = "events/20 ms"
+
+
+def counts(mean: float, seed: int, unit: str = UNIT) -> tuple[Frames, np.ndarray]:
+    """Draw Poisson noise of a mean in each taxel and window, with a burst a second from the third one on."""
+    random = np.random.default_rng(seed)
+    values = random.poisson(mean, (50 * (BURSTS + 3), *SHAPE))
+    frames = 50 * np.arange(2, 2 + BURSTS) + random.integers(0, 25, BURSTS)
+    for frame in frames:
+        y, x = random.integers(2, 37), random.integers(2, 47)
+        values[frame, y - 1 : y + 2, x - 1 : x + 2] += random.poisson(4 * np.sqrt(mean) + 8, (3, 3))
+    times = WINDOW_US * np.arange(len(values))
+    return Frames(values.astype(float), times, unit=unit, array=Array(*SHAPE)), WINDOW_US * frames
+
+
+def readout(floor: float, unit: str = UNIT) -> Readout:
+    """Return a readout of a level of the largest sum, of training at a noise floor."""
+    encoder = LocalLoad(levels=[3.0], release=0.5, noise_floor=floor, least_noise=floor / 10)
+    return Readout(encoder, {"burst": (Neuron(tau=2.0, refractory=50.0), [1.0, 0.0])})._with(unit=unit)
+
+
+@pytest.mark.parametrize("more", [1.0, 2.0, 4.0, 8.0, 30.0])
+@pytest.mark.parametrize("mean", [0.05, 0.3])
+def test_a_readout_finds_bursts_in_more_noise_than_in_training(mean: float, more: float) -> None:
+    floor = 6 * np.sqrt(mean)
+    frames, truth = counts(mean * more, seed=3)
+    tare = Tare.take(frames, stop_us=500_000)
+    found = run(readout(floor), frames, tare=tare)
+    assert len(found) == BURSTS
+    assert np.abs(found.t - truth).max() <= 2 * WINDOW_US
+    pieces = readout(floor).stream(frame_us=WINDOW_US, tare=tare)
+    streamed = pieces.push(frames[:300]) + pieces.push(frames[300:]) + pieces.advance(int(frames.t[-1]) + 100_000)
+    assert streamed.t.tolist() == found.t.tolist()
+
+
+def test_floors_are_raised_for_counts_alone_and_never_lowered() -> None:
+    frames, _ = counts(2.0, seed=4)
+    tare = Tare.take(frames, stop_us=500_000)
+    rule = PlainRule("area", 2, noise_floor=1.0, unit=UNIT)
+    assert rule._at_noise_of(tare).noise_floor == pytest.approx(6 * np.quantile(tare.noise, 0.9))
+    assert rule._at_noise_of(None) is rule
+    high = PlainRule("area", 2, noise_floor=100.0, unit=UNIT)
+    assert high._at_noise_of(tare) is high
+    for unit in ("counts", None):
+        other = PlainRule("area", 2, noise_floor=1.0, unit=unit)
+        assert other._at_noise_of(tare) is other
