@@ -309,7 +309,7 @@ def _moves(aligned: Alignment | None) -> Figure | None:
     number = np.arange(len(aligned.given))
     axis.vlines(number, 0.0, aligned.moved_ms, color=_TRUE, linewidth=0.8)
     axis.plot(number, aligned.moved_ms, ".", color=_TRUE, label="felt")
-    axis.plot(number[aligned.unpaired], np.zeros(aligned.unpaired.sum()), "x", color=_DETECTED, label="nothing felt")
+    axis.plot(number[aligned.unpaired], np.zeros(aligned.unpaired.sum()), "x", color=_DETECTED, label="no input near")
     axis.axhline(0, color="#999999", linewidth=0.8)
     axis.set_xlabel("label, in the order of recordings and time")
     axis.set_ylabel("felt minus given, ms")
