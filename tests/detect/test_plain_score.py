@@ -10,7 +10,8 @@ from shell import call
 from test_plain_rule import played
 
 import taxel
-from taxel.detect import Example, Fold, Part, PlainRule, Recipe, judge, run, score, tune
+from taxel import Detections
+from taxel.detect import Example, Fold, Part, PlainRule, PlainScore, Recipe, judge, run, score, tune
 from taxel.encode import ContactArea
 from taxel.tasks import Training, TrainOptions
 
@@ -194,3 +195,12 @@ def test_where_the_rule_is_better_the_training_says_how_to_write_it() -> None:
     result = Training(TrainOptions(), (), None, SimpleNamespace(plain=plain, together=nothing), "", {}, (), ())
     (line,) = result._better()
     assert line.endswith("; --rule FILE writes it, for taxel detect --readout FILE")
+
+
+def test_a_rule_that_detects_nothing_is_never_better() -> None:
+    true = {"lift": [1_000_000, 2_000_000]}
+    at = [5_000_000, 6_000_000, 7_000_000]
+    silent = PlainScore({"lift": PlainRule("area", 2)}, score(Detections([], [], []), true))
+    worse = score(Detections(["lift"] * 3, at, at), true)
+    assert worse.by_label["lift"].rank > silent.together.by_label["lift"].rank
+    assert silent.better(worse) == ()

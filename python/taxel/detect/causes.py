@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import comb
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from taxel._base.arguments import integer, mapping, several, shown, text
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel.detect import recipes
-from taxel.detect.alignment import WINDOW_MS
+from taxel.detect.alignment import WINDOW_MS, Alignment
 from taxel.detect.examples import Example
 from taxel.detect.fitting import TWO_FOLDS, Trained
 from taxel.detect.label_times import TOUCH, FeltLoads, early, held_by_tare, quiet_s, unlabelled_us
@@ -27,9 +27,10 @@ from taxel.detect.scoring import APART_US, Mistake, Score, score
 from taxel.detections import Detections
 from taxel.encode import ContactArea, Encoder, LevelCrossing, Moments, ThresholdIzhikevich
 from taxel.events import Events
+from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.analysis.rest import ZEROS_BEFORE, of_frames
+from taxel.recording.analysis.rest import TIMES_NOISE, ZEROS_BEFORE, of_frames
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
@@ -66,6 +67,8 @@ _GAP_US = 1_000_000
 _TIMES = 4
 #: From this share of the time before the first label and behind the last one on, some labels may be missing there.
 _UNLABELLED = 0.25
+#: Windows of counts so many times as long are looked at for a weak burst.
+_LONGER = (1, 2, 4)
 #: Kinds of touch are told apart where chance would tell as many with at most this probability.
 _CHANCE = 0.05
 
@@ -438,7 +441,7 @@ class Mistakes:
                 found += self._window(label, mistakes)
                 # A tare that does not fit lets labels lie far from what is felt, too.
                 if not any(cause.kind in ("foreign_labels", "tare") and label in cause.labels for cause in found):
-                    found += self._unpaired(label)
+                    found += self._unpaired(evidence.sound, label)
                 # More labels and other parameters are for what nothing else explains.
                 if all(2 * cause.mistakes < mistakes for cause in found if label in cause.labels):
                     found += self._of_learning(evidence, label, mistakes)
@@ -509,15 +512,31 @@ class Mistakes:
         mistakes = min(2 * pairs.found, wrong)
         yield _by_option("window", label, mistakes, measured, f"--window-ms {window_ms:g}", window_ms=window_ms)
 
-    def _unpaired(self, label: str) -> Iterator[Cause]:
-        """Yield how many labels lie far from what the neuron learnt them by."""
+    def _unpaired(self, examples: Sequence[Example], label: str) -> Iterator[Cause]:
+        """Yield how many labels lie far from what the neuron learnt them by, or are weaker than that."""
         alignment = self.trained.alignments.get(label)
-        if alignment is not None and (unpaired := int(alignment.unpaired.sum())):
+        if alignment is None or not (unpaired := int(alignment.unpaired.sum())):
+            return
+        mistakes = min(unpaired, self.scored[label].missed)
+        weak = list(_weak_bursts(examples, alignment))
+        if 2 * len(weak) <= unpaired:
             measured = (
                 f"no input that {label} is learnt from lies within {WINDOW_MS:.0f} ms of {counted(unpaired, 'label')}"
             )
-            mistakes = min(unpaired, self.scored[label].missed)
             yield Cause("foreign_labels", (label,), mistakes, measured, _FOREIGN)
+            return
+        events, rest = (np.median([getattr(burst, name) for burst in weak]) for name in ("events", "rest"))
+        times, most = max(_LONGER, key=lambda k: np.median([burst.by[k] for burst in weak])), weak[0].window_ms
+        present, longer = (np.median([burst.by[k] for burst in weak]) for k in (1, times))
+        measured = (
+            f"{len(weak)} bursts are weaker than the level that {label} is learnt from, at the median {events:.0f} "
+            f"events in {most:g} ms where the rest has {rest:.0f}: {present:.3g} times its noise"
+        )
+        advice = "the plain rule (--rule FILE)"
+        if times > 1:
+            measured += f", and {longer:.3g} times in {times * most:g} ms"
+            advice = f"frames of longer windows, --count-ms {times * most:g}"
+        yield Cause("levels", (label,), mistakes, measured, advice)
 
     def _name(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield that a label without its name may be the end of a touch, where it was learnt as a kind of touch."""
@@ -589,6 +608,42 @@ class Mistakes:
     def _touches(self) -> bool:
         """Whether all labels are those of the recipe `touch`, contact and lift: not contact and foot off."""
         return all(recipes.knows("touch", label) for label in self.trained.readout.labels)
+
+
+class _WeakBurst(NamedTuple):
+    """A label without an input near it, where a file of counts has far more events than at rest."""
+
+    window_ms: float
+    events: float
+    """Most of all taxels in a window near it ..."""
+    rest: float
+    """... and at rest."""
+    by: Mapping[int, float]
+    """How many times the noise at rest the events above it are, in so many windows together."""
+
+
+def _weak_bursts(examples: Sequence[Example], alignment: Alignment) -> Iterator[_WeakBurst]:
+    """Yield those of the labels without a pair that have a burst of events, of files of counts."""
+    for k, example in enumerate(examples):
+        source, tare = recorded(example.source), example.tare
+        if not isinstance(source, Frames) or not are_counts(source.unit) or tare is None or len(source) < 2:
+            continue
+        total = np.asarray(np.nansum(source.values, axis=(1, 2), dtype=np.float64))
+        resting = total[slice(*np.searchsorted(source.t, (tare.start_us, tare.stop_us)))]
+        if not len(resting):
+            continue
+        rest, window_us = resting.mean(), float(np.median(np.diff(source.t)))
+        noise = max(resting.std(), rest**0.5, 1.0)
+        for t in alignment.given[alignment.unpaired & (alignment.example == k)]:
+            reach_us = 1000 * WINDOW_MS
+            near = total[slice(*np.searchsorted(source.t, (t - reach_us, t + reach_us)))] - rest
+            by = {
+                n: float(np.convolve(near, np.ones(n), "valid").max()) / (noise * n**0.5)
+                for n in _LONGER
+                if n <= len(near)
+            }
+            if by and by[1] >= TIMES_NOISE:
+                yield _WeakBurst(window_us / 1000, near.max() + rest, rest, {n: by.get(n, 0.0) for n in _LONGER})
 
 
 def _chance(label: str, scored: Score, plain: PlainScore | None) -> str:

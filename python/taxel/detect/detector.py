@@ -6,6 +6,8 @@ import json
 from abc import abstractmethod
 from typing import Any, Self
 
+import numpy as np
+
 from taxel import _core
 from taxel._base.arguments import instance, integer, number, parameters, shown
 from taxel._base.arguments import text as checked_text
@@ -13,8 +15,10 @@ from taxel._base.errors import refused
 from taxel._base.saved import Saved
 from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.detect.floors import floor_at_rest
 from taxel.detections import Detections
 from taxel.events import Events
+from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import unit_of
 from taxel.recording.analysis.rest import FORCE_UNITS
@@ -66,6 +70,18 @@ class _Detector(Saved):
     def _with(self, **parts: Any) -> Self:
         """Return it with other parts of its file."""
         return self._from_text(parameters(self._parts | parts))
+
+    def _at_noise_of(self, tare: Tare | None) -> Self:
+        """Return it with the noise floors of the tare of a file of counts of events, where those of training are lower.
+
+        The noise of counts grows with their number, which light and the sensor's thresholds change from file to file.
+        """
+        if tare is None or self.unit is None or not are_counts(self.unit):
+            return self
+        known = tare.noise[np.isfinite(tare.noise)]
+        least = floor_at_rest(known) if len(known) else 0.0
+        parts = _raised(self._parts, least)
+        return self if parts == self._parts else self._from_text(parameters(parts))
 
     @classmethod
     def _from_text(cls, text: str) -> Self:
@@ -170,7 +186,7 @@ class ReadoutStream:
     ) -> None:
         self._detector = detector("readout", readout)
         self._frame_us = number("frame_us", frame_us, "us")
-        self._tare = tare_text(tare)
+        self._rest, self._tare = tare, tare_text(tare)
         self._version = integer("wire_version", wire_version, 1, 2)
         self._core: _core.ReadoutStream | None = None
         array = readout.array if array is None else array
@@ -180,7 +196,9 @@ class ReadoutStream:
     def _begin(self, array: Array) -> _core.ReadoutStream:
         if self._core is None:
             parts = instance("array", array, Array)._parts()
-            self._core = _core.ReadoutStream(self._detector.to_json(), parts, self._frame_us, self._version, self._tare)
+            self._core = _core.ReadoutStream(
+                self._detector._at_noise_of(self._rest).to_json(), parts, self._frame_us, self._version, self._tare
+            )
         return self._core
 
     def push(self, x: Events | Frames) -> Detections:
@@ -244,6 +262,13 @@ class ReadoutStream:
     def potentials(self) -> dict[str, float]:
         """Each neuron's potential now, mV; of a plain rule none."""
         return {} if self._core is None else dict(self._core.potentials)
+
+
+def _raised(part: Any, least: float) -> Any:
+    """Return a part of a detector's file with noise floors of so much at least."""
+    if not isinstance(part, dict):
+        return part
+    return {name: max(value, least) if name == "noise_floor" else _raised(value, least) for name, value in part.items()}
 
 
 def detector(name: str, value: object) -> _Detector:

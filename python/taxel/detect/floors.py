@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taxel.detect.examples import Example
 from taxel.frames import Frames
@@ -13,6 +14,11 @@ from taxel.recording.analysis.rest import SHARE, TIMES_NOISE
 
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01
+
+
+def floor_at_rest(noise: NDArray[np.float64]) -> float:
+    """Return the noise floor by the noise of taxels at rest, of which there is one at least, in its unit."""
+    return TIMES_NOISE * float(np.quantile(noise, SHARE))
 
 
 def measured_floor(examples: Sequence[Example]) -> float | None:
@@ -35,6 +41,6 @@ def measured_floor(examples: Sequence[Example]) -> float | None:
             continue
         above = np.fmax.reduce(source.values, axis=0, initial=-np.inf) - example.tare.rest
         known = np.isfinite(above) & np.isfinite(example.tare.noise)
-        noise, reach = (float(np.quantile(values[known], SHARE)) for values in (example.tare.noise, above))
-        floors.append(max(TIMES_NOISE * noise, _SHARE_OF_RANGE * reach))
+        reach = float(np.quantile(above[known], SHARE))
+        floors.append(max(floor_at_rest(example.tare.noise[known]), _SHARE_OF_RANGE * reach))
     return float(f"{max(floors):.3g}") if max(floors, default=0.0) > 0.0 else None

@@ -15,6 +15,8 @@ from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example
 from taxel.detect.floors import measured_floor
 from taxel.detect.loads import Loads, clock_of, lacks_neighbours
+from taxel.formats.event_camera import are_counts
+from taxel.frames import Frames
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 
@@ -289,7 +291,14 @@ def _held(example: Example, noise_floor: float, share: float) -> int:
     if early is None or late is None:
         return 0
     floor = measured_floor([example._replace(tare=early)]) or noise_floor
-    return int(np.count_nonzero(late.noise > _TIMES * early.noise + floor / _OF_FLOOR))
+    noise, more = early.noise, floor / _OF_FLOOR
+    source = example.source
+    if isinstance(source, Frames) and are_counts(source.unit):
+        # Few events show neither their noise nor that one more is chance.
+        first, last = (len(source.between(tare.start_us, tare.stop_us)) for tare in (early, late))
+        noise = np.maximum(noise, (np.nanmean(early.rest) + 1.0 / (first * noise.size)) ** 0.5)
+        more = max(more, last**-0.5)
+    return int(np.count_nonzero(late.noise > _TIMES * noise + more))
 
 
 def _early(example: Example, share: float = _EARLY) -> Tare | None:

@@ -74,7 +74,7 @@ class PlainScore:
         )
 
     def better(self, than: Score) -> tuple[str, ...]:
-        """Return the labels of which the rule has fewer missed and false than another score.
+        """Return the labels of which the rule finds some, with fewer missed and false than another score.
 
         Parameters
         ----------
@@ -97,7 +97,7 @@ class PlainScore:
         >>> plain.better(score(Detections([], [], []), true))
         ('contact',)
         """
-        return self._where(than, lambda a, b: a.rank[0] < b.rank[0])
+        return self._where(than, lambda a, b: bool(a.found) and a.rank[0] < b.rank[0])
 
     def _where(self, than: Score, holds: Callable[[Score, Score], bool]) -> tuple[str, ...]:
         """Return the labels with a rule whose score, and then the other one, are as asked."""

@@ -309,7 +309,7 @@ def _moves(aligned: Alignment | None) -> Figure | None:
     number = np.arange(len(aligned.given))
     axis.vlines(number, 0.0, aligned.moved_ms, color=_TRUE, linewidth=0.8)
     axis.plot(number, aligned.moved_ms, ".", color=_TRUE, label="felt")
-    axis.plot(number[aligned.unpaired], np.zeros(aligned.unpaired.sum()), "x", color=_DETECTED, label="nothing felt")
+    axis.plot(number[aligned.unpaired], np.zeros(aligned.unpaired.sum()), "x", color=_DETECTED, label="no input near")
     axis.axhline(0, color="#999999", linewidth=0.8)
     axis.set_xlabel("label, in the order of recordings and time")
     axis.set_ylabel("felt minus given, ms")
@@ -324,7 +324,8 @@ def _trains(readout: Readout, outcome: Outcome) -> SpikeTrains:
     # A readout of grids of several sizes has weights for the largest.
     if isinstance(source, Frames) and array is not None and array.shape != source.array.shape:
         source, tare = padded_to(source, tare, array.shape)
-    return (readout.encoder if tare is None else readout.encoder.with_tare(tare)).encode(source)
+    encoder = readout._at_noise_of(tare).encoder
+    return (encoder if tare is None else encoder.with_tare(tare)).encode(source)
 
 
 def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:

@@ -21,8 +21,10 @@ from taxel.detect.detector import detector
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import score_together
 from taxel.encode import ContactArea, Moments
+from taxel.events import Events
+from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
-from taxel.recorded import recorded
+from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
 from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.opening import sensors_of
@@ -265,6 +267,7 @@ def _detected(
         # Detections may lack or have wrong times.
         warn(f"{recording.title}: {recording.verdict}", stacklevel=3)
     with _naming(recording.title):
+        _check_unit(readout, recording)
         taken = _rest(readout, recording, options.tare)
         tare, begin_us = (None, None) if taken is None else (taken.tare, taken.detect_from_us)
         found, outside = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=begin_us)
@@ -275,6 +278,18 @@ def _detected(
     scored = score(example._known(found), true, options.window_ms) if true else None
     outcome = Outcome(recording.title, example, found, scored, outside)
     return Detected(recording, outcome, taken, _hint(outcome, readout))
+
+
+def _check_unit(readout: Readout | PlainRule, recording: Recording) -> None:
+    """Refuse a recording in another unit than the readout's, before its rest, which that unit may lack."""
+    source = recorded(recording, hold=False)
+    if isinstance(source, Events) and source.intensity is None and readout.unit and are_counts(readout.unit):
+        window_ms = readout.unit.removesuffix(" ms").rpartition("/")[2]
+        raise ProblemError(
+            f"these are events, not counts, and the {readout._WHAT} was trained on {readout.unit}: "
+            f"add --count-ms {window_ms}, and the --bin, --region and --polarity of training"
+        )
+    readout._check_unit(unit_of(source))
 
 
 def _rest(readout: Readout | PlainRule, recording: Recording, tare: GivenTare | None) -> TakenRest | None:

@@ -25,7 +25,7 @@ from taxel.recording.analysis.rest import (
     frames_above,
     loaded_from,
     of_frames,
-    ticks_by_unit,
+    rest_scale,
 )
 from taxel.recording.contents import Contents, source_from
 from taxel.recording.frames import FRAMES_HZ, period_us
@@ -451,7 +451,7 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
         return frames, floor, rest
     else:
         blocks = [(frames.t, frames.values.reshape(len(frames), frames.array.rows * frames.array.columns))]
-        [(_, shown)] = _above(rest, blocks, frames.array.columns, ticks_by_unit(frames))
+        [(_, shown)] = _above(rest, blocks, frames.array.columns, rest_scale(frames))
     shape = len(frames), *frames.array.shape
     return Frames(shown.reshape(shape), frames.t, unit=frames.unit, array=frames.array), floor, rest
 

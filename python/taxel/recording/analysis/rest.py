@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.times import beginning_us
 from taxel._core import FormatError
+from taxel.formats.event_camera import are_counts
 from taxel.formats.layout import Layout, or_given
 from taxel.frames import Frames
 from taxel.tare import Tare
@@ -31,6 +32,9 @@ TIMES_NOISE, SHARE = 6.0, 0.9
 NOISE_FLOOR = 3.0
 #: ... in another unit, the range of a recording's values counts as so many ticks.
 RANGE_TICKS = 150.0
+
+#: ... but counts of events are chance up to so many more than standard deviations of them, in this share of the frames.
+_BY_CHANCE, _QUIET_SHARE = 2.0, 0.75
 
 #: Reading: what a taxel reads in a quiet stretch is not its rest, but a load that stood still, if in more than this
 #: share of all frames it reads less by so many ticks.
@@ -160,7 +164,20 @@ def loaded_from(frames: Frames, rest: Rest) -> float:
         return TIMES_NOISE * float(np.quantile(tare.noise, SHARE))
     if rest.source != "quiet":
         return 0.0
-    return float(_core.touched_above(NOISE_FLOOR)) / ticks_by_unit(frames)
+    return float(_core.touched_above(NOISE_FLOOR)) / rest_scale(frames)
+
+
+def rest_scale(frames: Frames) -> float:
+    """Return the ticks by the unit of frames by which their rest is found: of counts of events by chance, not by range.
+
+    A count is chance up to so many standard deviations above the mean, and an event or two. The mean is that of the
+    frames with the fewest events: touches fill less than a quarter.
+    """
+    if not are_counts(frames.unit) or not len(frames):
+        return ticks_by_unit(frames)
+    means = np.nan_to_num(np.nanmean(frames.values.reshape(len(frames), -1), axis=1, dtype=np.float64))
+    mean = float(means[means <= np.quantile(means, _QUIET_SHARE)].mean())
+    return float(_core.touched_above(NOISE_FLOOR)) / (_BY_CHANCE + TIMES_NOISE * float(np.sqrt(mean)))
 
 
 def ticks_by_unit(frames: Frames) -> float:
@@ -283,7 +300,7 @@ def of_frames(frames: Frames) -> Rest:
 
 def of_quiet(frames: Frames) -> Rest:
     """Return the rest of frames that a quiet stretch of them shows, or none."""
-    scale = ticks_by_unit(frames)
+    scale = rest_scale(frames)
     rest = _of_rising(frames, scale)
     if rest.quiet_us is None or not _fall(frames, rest.quiet_us, scale):
         return rest

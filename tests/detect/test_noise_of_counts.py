@@ -1,0 +1,80 @@
+"""Counts of events in a file with more noise than in training: noise floors are of what the file holds at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from taxel import Array, Frames, Neuron, Readout, Tare
+from taxel.detect import Example, PlainRule, run
+from taxel.detect.alignment import Alignment
+from taxel.detect.causes import _weak_bursts
+from taxel.encode import LocalLoad
+
+SHAPE, BURSTS, WINDOW_US = (40, 50), 12, 20_000
+UNIT = "events/20 ms"
+
+
+def counts(mean: float, seed: int, unit: str = UNIT) -> tuple[Frames, np.ndarray]:
+    """Draw Poisson noise of a mean in each taxel and window, with a burst a second from the third one on."""
+    random = np.random.default_rng(seed)
+    values = random.poisson(mean, (50 * (BURSTS + 3), *SHAPE))
+    frames = 50 * np.arange(2, 2 + BURSTS) + random.integers(0, 25, BURSTS)
+    for frame in frames:
+        y, x = random.integers(2, 37), random.integers(2, 47)
+        values[frame, y - 1 : y + 2, x - 1 : x + 2] += random.poisson(4 * np.sqrt(mean) + 8, (3, 3))
+    times = WINDOW_US * np.arange(len(values))
+    return Frames(values.astype(float), times, unit=unit, array=Array(*SHAPE)), WINDOW_US * frames
+
+
+def readout(floor: float, unit: str = UNIT) -> Readout:
+    """Return a readout of a level of the largest sum, of training at a noise floor."""
+    encoder = LocalLoad(levels=[3.0], release=0.5, noise_floor=floor, least_noise=floor / 10)
+    return Readout(encoder, {"burst": (Neuron(tau=2.0, refractory=50.0), [1.0, 0.0])})._with(unit=unit)
+
+
+@pytest.mark.parametrize("more", [1.0, 2.0, 4.0, 8.0, 30.0])
+@pytest.mark.parametrize("mean", [0.05, 0.3])
+def test_a_readout_finds_bursts_in_more_noise_than_in_training(mean: float, more: float) -> None:
+    floor = 6 * np.sqrt(mean)
+    frames, truth = counts(mean * more, seed=3)
+    tare = Tare.take(frames, stop_us=500_000)
+    found = run(readout(floor), frames, tare=tare)
+    assert len(found) == BURSTS
+    assert np.abs(found.t - truth).max() <= 2 * WINDOW_US
+    pieces = readout(floor).stream(frame_us=WINDOW_US, tare=tare)
+    streamed = pieces.push(frames[:300]) + pieces.push(frames[300:]) + pieces.advance(int(frames.t[-1]) + 100_000)
+    assert streamed.t.tolist() == found.t.tolist()
+
+
+def test_floors_are_raised_for_counts_alone_and_never_lowered() -> None:
+    frames, _ = counts(2.0, seed=4)
+    tare = Tare.take(frames, stop_us=500_000)
+    rule = PlainRule("area", 2, noise_floor=1.0, unit=UNIT)
+    assert rule._at_noise_of(tare).noise_floor == pytest.approx(6 * np.quantile(tare.noise, 0.9))
+    assert rule._at_noise_of(None) is rule
+    high = PlainRule("area", 2, noise_floor=100.0, unit=UNIT)
+    assert high._at_noise_of(tare) is high
+    for unit in ("counts", None):
+        other = PlainRule("area", 2, noise_floor=1.0, unit=unit)
+        assert other._at_noise_of(tare) is other
+
+
+@pytest.mark.parametrize("strength", [0, 20])
+def test_labels_without_an_input_near_are_weak_bursts_where_a_file_holds_some(strength: int) -> None:
+    random = np.random.default_rng(5)
+    values = random.poisson(0.1, (2000, 10, 12)).astype(float)
+    given = np.arange(300, 1900, 100)
+    for frame in given:
+        values[frame : frame + 4, 3:6, 3:6] += random.poisson(strength, (4, 3, 3))
+    frames = Frames(values, 5000 * np.arange(2000), unit="events/5 ms", array=Array(10, 12))
+    tare = Tare.take(frames, stop_us=1_400_000)
+    nowhere = Alignment("burst", 0, np.zeros(len(given), np.int64), 5000 * given, np.full(len(given), np.nan))
+    weak = list(_weak_bursts([Example(frames, {"burst": 5000 * given}, tare)], nowhere))
+    assert len(weak) == (len(given) if strength else 0)
+    for burst in weak:
+        assert burst.window_ms == 5.0
+        assert burst.rest == pytest.approx(12, rel=0.1)
+        assert burst.events == pytest.approx(12 + 9 * strength, rel=0.3)
+        # The burst fills four windows: their noise grows by half as much.
+        assert burst.by[4] == pytest.approx(2 * burst.by[1], rel=0.3)
