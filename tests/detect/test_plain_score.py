@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from shell import call
+from test_label_times import touched
 from test_plain_rule import played
 
 import taxel
@@ -114,7 +115,7 @@ def test_channels_have_plain_rules_by_peak_alone() -> None:
         name = quantity.replace("_", " ")
         with pytest.raises(taxel.ProblemError, match=f"a plain rule by {name} needs neighbours on a grid; .* 1 x 4"):
             run(PlainRule(quantity, 2), frames, tare=tare)
-    tuned = tune([example])["contact"]
+    tuned = tune([example], noise_floor=0.2)["contact"]
     assert tuned is not None
     assert tuned.quantity == "peak"
     recipe = Recipe(taxel.encode.LevelCrossing([10.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
@@ -194,3 +195,22 @@ def test_where_the_rule_is_better_the_training_says_how_to_write_it() -> None:
     result = Training(TrainOptions(), (), None, SimpleNamespace(plain=plain, together=nothing), "", {}, (), ())
     (line,) = result._better()
     assert line.endswith("; --rule FILE writes it, for taxel detect --readout FILE")
+
+
+@pytest.fixture(scope="module")
+def of_touches(tmp_path_factory: pytest.TempPathFactory) -> tuple[taxel.Recording, Training]:
+    """Readings of less than 1, which no floor of a board fits, and what is trained on them by default."""
+    place = tmp_path_factory.mktemp("touches") / "a.npz"
+    taxel.convert(touched(1)[0], place)
+    recording = taxel.open(place)
+    return recording, taxel.train(recording, [touched(1)[1]], TrainOptions(folds=2))
+
+
+@pytest.mark.parametrize("encoder", ["peak", "contact_area", "local_load", "change_events"])
+def test_a_rule_does_not_depend_on_the_encoder(of_touches, encoder: str) -> None:
+    recording, by_default = of_touches
+    training = taxel.train(recording, [touched(1)[1]], TrainOptions(folds=2, changes={"encoder.name": encoder}))
+    plain = training.scored.plain
+    assert plain.rules == by_default.scored.plain.rules
+    assert plain.together.to_dict() == by_default.scored.plain.together.to_dict()
+    assert plain.together.missed == plain.together.false == 0

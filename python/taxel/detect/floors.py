@@ -9,7 +9,7 @@ import numpy as np
 from taxel.detect.examples import Example
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.analysis.rest import SHARE, TIMES_NOISE
+from taxel.recording.analysis.rest import NOISE_FLOOR, SHARE, TIMES_NOISE
 
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01
@@ -38,3 +38,14 @@ def measured_floor(examples: Sequence[Example]) -> float | None:
         noise, reach = (float(np.quantile(values[known], SHARE)) for values in (example.tare.noise, above))
         floors.append(max(TIMES_NOISE * noise, _SHARE_OF_RANGE * reach))
     return float(f"{max(floors):.3g}") if max(floors, default=0.0) > 0.0 else None
+
+
+def floor_of(examples: Sequence[Example]) -> float:
+    """Return the noise floor of plain rules: as it is measured, else that of the board's fast presets.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+        As of `measured_floor`.
+    """
+    return measured_floor(examples) or NOISE_FLOOR
