@@ -1,6 +1,7 @@
 """The plain rules beside a readout: as tuned and run one by one; the labels of which they are better."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -54,6 +55,19 @@ def test_a_rule_is_scored_in_the_stretch_that_its_fold_tests(examples) -> None:
     # What is tested in one fold only is counted there only.
     last = judge([one], RECIPE, [Fold([halves[0]], [halves[1]])])
     assert last.plain.together["hit"].events == 3
+
+
+def test_there_is_no_rule_where_none_finds_anything_held_out() -> None:
+    frames, truth = touched(1, 6, hold_s=(0.2, 0.3))
+    mixed = {"contact": np.r_[truth["contact"][:4], truth["lift"][4:]]}
+    middle = float(truth["contact"][4] - 100_000)
+    example = Example(frames, mixed, taxel.Tare.take(frames, stop_us=2_000_000))
+    assert tune([example], noise_floor=0.02)["contact"] is not None
+    recipe = replace(RECIPE, encoder=ContactArea(noise_floor=0.02))
+    halves = [Part(0, stop=middle), Part(0, start=middle)]
+    judged = judge([example], recipe, [Fold([halves[0]], [halves[1]]), Fold([halves[1]], [halves[0]])])
+    assert (judged.plain.together.found, judged.plain.rules) == (0, {"contact": None})
+    assert judged.plain.better(judged.together) == ()
 
 
 def test_the_labels_of_which_the_rule_is_better_are_named(examples) -> None:

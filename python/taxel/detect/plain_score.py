@@ -30,7 +30,8 @@ class PlainScore:
     Attributes
     ----------
     rules : mapping of str to PlainRule or None
-        The rule of each label, tuned on all examples; None where none is better than to detect nothing.
+        The rule of each label, tuned on all examples; None where none is better than to detect nothing, or where those
+        of the folds find nothing held out.
     together : Score or None
         Of the rules that were tuned on the training part of each fold; where a fold has no rule for a label, all its
         labels are missed. None where no quantity can be computed.
@@ -169,7 +170,9 @@ def plain_score(
         for part in test:
             detections.setdefault(part[0], []).append(_detect(loads, fold_rules, part))
     joined = [reduce(add, detections[index]) for index in sorted(detections)]
-    return PlainScore(rules, score_together(joined, truths, window_ms))
+    together = score_together(joined, truths, window_ms)
+    rules = {label: rule if together[label].found else None for label, rule in rules.items()}
+    return PlainScore(rules, together)
 
 
 def _detect(loads: Loads, rules: Mapping[str, PlainRule | None], part: Stretch) -> Detections:
