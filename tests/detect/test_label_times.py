@@ -20,7 +20,6 @@ from taxel.detect.examples import check_examples
 from taxel.detect.label_times import FeltLoads, Off, held_by_tare
 
 ARRAY = Array(6, 6, pitch_mm=5.0)
-FLOOR = 0.05
 
 
 def touched(
@@ -50,7 +49,7 @@ def example(seed: int, shift_ms: float, **more: Any) -> Example:
 
 def far(one: Example, *labels: str) -> dict[str, Off]:
     """Return the distances of labels that are too far off to be aligned."""
-    return {label: off for label, off in FeltLoads([one], FLOOR).distances(labels).items() if off.is_far}
+    return {label: off for label, off in FeltLoads([one]).distances(labels).items() if off.is_far}
 
 
 @given(st.integers(0, 1000), st.floats(-900, 900))
@@ -83,7 +82,7 @@ def test_labels_that_nothing_follows_are_not_off(seed: int) -> None:
 def test_keys_pressed_live_have_a_distance_and_a_window(seed: int, lag_ms: float, spread_ms: float) -> None:
     one, random = example(seed, 0, count=35), np.random.default_rng(seed)
     late = np.rint(1000 * random.normal(lag_ms, spread_ms, 35)).astype(np.int64)
-    felt = FeltLoads([one._replace(labels={"contact": one.labels["contact"] + late})], FLOOR)
+    felt = FeltLoads([one._replace(labels={"contact": one.labels["contact"] + late})])
     off = felt.distances(["contact"])["contact"]
     assert abs(off.ms - lag_ms) < 40
     if off.within_ms:
@@ -97,9 +96,9 @@ def test_a_tare_that_ends_in_a_touch_holds_it(seed: int, share: float) -> None:
     begin, end = (int(truth[label][0]) for label in ("contact", "lift"))
     until = int(begin + share * (end - begin))
     (one,) = check_examples([Example(frames, truth, Tare.take(frames, stop_us=until))])
-    held = held_by_tare([one], FLOOR)
+    held = held_by_tare([one])
     assert held == (4 if until - begin > 20_000 else held)
-    assert held_by_tare([one._replace(tare=Tare.take(frames, stop_us=begin - 20_000))], FLOOR) == 0
+    assert held_by_tare([one._replace(tare=Tare.take(frames, stop_us=begin - 20_000))]) == 0
 
 
 @pytest.mark.parametrize("shift_ms", [200, pytest.param(-200, marks=pytest.mark.slow)])

@@ -1,12 +1,14 @@
 """The plain rules beside a readout: as tuned and run one by one; the labels of which they are better."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from shell import call
+from test_label_times import touched
 from test_plain_rule import played
 
 import taxel
@@ -54,6 +56,19 @@ def test_a_rule_is_scored_in_the_stretch_that_its_fold_tests(examples) -> None:
     # What is tested in one fold only is counted there only.
     last = judge([one], RECIPE, [Fold([halves[0]], [halves[1]])])
     assert last.plain.together["hit"].events == 3
+
+
+def test_there_is_no_rule_where_none_finds_anything_held_out() -> None:
+    frames, truth = touched(1, 6, hold_s=(0.2, 0.3))
+    mixed = {"contact": np.r_[truth["contact"][:4], truth["lift"][4:]]}
+    middle = float(truth["contact"][4] - 100_000)
+    example = Example(frames, mixed, taxel.Tare.take(frames, stop_us=2_000_000))
+    assert tune([example], noise_floor=0.02)["contact"] is not None
+    recipe = replace(RECIPE, encoder=ContactArea(noise_floor=0.02))
+    halves = [Part(0, stop=middle), Part(0, start=middle)]
+    judged = judge([example], recipe, [Fold([halves[0]], [halves[1]]), Fold([halves[1]], [halves[0]])])
+    assert (judged.plain.together.found, judged.plain.rules) == (0, {"contact": None})
+    assert judged.plain.better(judged.together) == ()
 
 
 def test_the_labels_of_which_the_rule_is_better_are_named(examples) -> None:
@@ -115,7 +130,7 @@ def test_channels_have_plain_rules_by_peak_alone() -> None:
         name = quantity.replace("_", " ")
         with pytest.raises(taxel.ProblemError, match=f"a plain rule by {name} needs neighbours on a grid; .* 1 x 4"):
             run(PlainRule(quantity, 2), frames, tare=tare)
-    tuned = tune([example])["contact"]
+    tuned = tune([example], noise_floor=0.2)["contact"]
     assert tuned is not None
     assert tuned.quantity == "peak"
     recipe = Recipe(taxel.encode.LevelCrossing([10.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
@@ -204,3 +219,22 @@ def test_a_rule_that_detects_nothing_is_never_better() -> None:
     worse = score(Detections(["lift"] * 3, at, at), true)
     assert worse.by_label["lift"].rank > silent.together.by_label["lift"].rank
     assert silent.better(worse) == ()
+
+
+@pytest.fixture(scope="module")
+def of_touches(tmp_path_factory: pytest.TempPathFactory) -> tuple[taxel.Recording, Training]:
+    """Readings of less than 1, which no floor of a board fits, and what is trained on them by default."""
+    place = tmp_path_factory.mktemp("touches") / "a.npz"
+    taxel.convert(touched(1)[0], place)
+    recording = taxel.open(place)
+    return recording, taxel.train(recording, [touched(1)[1]], TrainOptions(folds=2))
+
+
+@pytest.mark.parametrize("encoder", ["peak", "contact_area", "local_load", "change_events"])
+def test_a_rule_does_not_depend_on_the_encoder(of_touches, encoder: str) -> None:
+    recording, by_default = of_touches
+    training = taxel.train(recording, [touched(1)[1]], TrainOptions(folds=2, changes={"encoder.name": encoder}))
+    plain = training.scored.plain
+    assert plain.rules == by_default.scored.plain.rules
+    assert plain.together.to_dict() == by_default.scored.plain.together.to_dict()
+    assert plain.together.missed == plain.together.false == 0

@@ -448,3 +448,38 @@ def test_a_single_taxel_of_a_board_that_is_touched_is_not_hot() -> None:
     t = np.arange(400) * 1000
     pressed = taxel.Events(t, np.full(400, 4), np.full(400, 4), t // 1000 % 40 < 20, array=taxel.Array(9, 9))
     assert taxel.health(pressed).named()["noisy"] == []
+
+
+def drifting(seed: int, shape: tuple[int, int], step: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return readings at 90 Hz of taxels that differ in gain, offset and drift, and are touched; and their times."""
+    random = np.random.default_rng(seed)
+    t, gain = np.arange(1800) / 90, random.uniform(0.8, 1.2, shape)
+    drift = random.normal(0, 0.03, shape) + random.normal(0.02, 0.01, shape) * (1 - np.exp(-t / 10))[:, None, None]
+    values = drift + gain * random.normal(0, 0.006, (len(t), *shape))
+    for begin in np.arange(1, 18, 1.5) + random.uniform(0, 0.5, 12):
+        y, x, load = random.uniform(0, shape[0]), random.uniform(0, shape[1]), np.exp(random.uniform(-4, 1))
+        held = (t >= begin) & (t < begin + random.uniform(0.2, 1.0))
+        rows, columns = np.mgrid[: shape[0], : shape[1]]
+        blob = gain * np.exp(-((rows - y) ** 2 + (columns - x) ** 2) / 2)
+        values += load * (held * (1 + 0.06 * np.sin(11 * t)))[:, None, None] * blob
+    return np.round(values / step) * step if step else values, np.rint(1e6 * t).astype(np.int64)
+
+
+@pytest.mark.parametrize("unit", ["N", "as sent"])
+@given(st.integers(0, 10_000), st.integers(1, 16), st.integers(1, 16), st.sampled_from([0.0, 0.002, 0.01, 0.05]))
+def test_clean_taxels_that_drift_are_not_noisy(unit: str, seed: int, rows: int, columns: int, step: float) -> None:
+    values, t = drifting(seed, (rows, columns), step)
+    assert not taxel.health(taxel.Frames(values, t, unit=unit, array=taxel.Array(rows, columns))).noisy.any()
+
+
+@pytest.mark.parametrize("unit", ["N", "as sent"])
+@given(st.integers(0, 10_000), st.integers(2, 16), st.integers(2, 16))
+def test_a_taxel_with_six_times_the_noise_of_the_others_is_noisy(unit: str, seed: int, rows: int, columns: int) -> None:
+    random = np.random.default_rng(seed)
+    values, t = drifting(seed, (rows, columns))
+    at = random.integers(0, rows), random.integers(0, columns)
+    # Before the first touch.
+    noise = np.delete(np.std(values[:90], axis=0), at[0] * columns + at[1])
+    values[:, *at] = 0.04 + random.normal(0, 6 * np.median(noise), len(t))
+    found = taxel.health(taxel.Frames(values, t, unit=unit, array=taxel.Array(rows, columns)))
+    assert list(zip(*np.nonzero(found.noisy), strict=True)) == [at]

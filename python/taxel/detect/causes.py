@@ -21,7 +21,7 @@ from taxel.detect.fitting import TWO_FOLDS, Trained
 from taxel.detect.label_times import TOUCH, FeltLoads, early, held_by_tare, quiet_s, unlabelled_us
 from taxel.detect.levels import LEAST_LEVELS, loaded_levels
 from taxel.detect.loads import lacks_neighbours
-from taxel.detect.plain_score import PlainScore, floor_of
+from taxel.detect.plain_score import PlainScore
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import APART_US, Mistake, Score, score
 from taxel.detections import Detections
@@ -186,7 +186,7 @@ class Evidence:
 
     @cached_property
     def _felt(self) -> FeltLoads:
-        return FeltLoads(self.sound, floor_of(self.plan.encoder))
+        return FeltLoads(self.sound)
 
     @cached_property
     def _counts(self) -> dict[str, int]:
@@ -236,10 +236,9 @@ class Evidence:
     @cached_property
     def _of_tare(self) -> tuple[str, str, dict[str, Any]]:
         """What is wrong with the tare, the option that helps, and its value in Python; empty where nothing is."""
-        floor = floor_of(self.plan.encoder)
-        held = held_by_tare(self.sound, floor)
+        held = held_by_tare(self.sound)
         if held >= TOUCH:
-            seconds = quiet_s(self.sound, floor)
+            seconds = quiet_s(self.sound)
             by = ("--tare FILE", {}) if seconds is None else (f"--tare {seconds:g}", {"tare": seconds})
             return f"it holds a touch of {held} taxels", *by
         if self._loaded >= TOUCH:

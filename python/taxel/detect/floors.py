@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from taxel.detect.examples import Example
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.analysis.rest import SHARE, TIMES_NOISE
+from taxel.recording.analysis.rest import NOISE_FLOOR, SHARE, TIMES_NOISE
 
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01
@@ -44,3 +44,14 @@ def measured_floor(examples: Sequence[Example]) -> float | None:
         reach = float(np.quantile(above[known], SHARE))
         floors.append(max(floor_at_rest(example.tare.noise[known]), _SHARE_OF_RANGE * reach))
     return float(f"{max(floors):.3g}") if max(floors, default=0.0) > 0.0 else None
+
+
+def floor_of(examples: Sequence[Example]) -> float:
+    """Return the noise floor of plain rules: as it is measured, else that of the board's fast presets.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+        As of `measured_floor`.
+    """
+    return measured_floor(examples) or NOISE_FLOOR

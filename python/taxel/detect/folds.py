@@ -34,7 +34,7 @@ from taxel.detect.fitting import (
 )
 from taxel.detect.levels import fit_levels
 from taxel.detect.loads import Clock, clock_of
-from taxel.detect.plain_score import PlainScore, floor_of, plain_score
+from taxel.detect.plain_score import PlainScore, plain_score
 from taxel.detect.readout import Readout, run
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Mistake, Score, mistakes_of, score, score_together
@@ -203,7 +203,7 @@ def judge(
     truths = _truths(examples, ways, labels)
     scores = tuple(score(*compared, window) for compared in zip(joined, truths, strict=True))
     parts = [(fold.train, fold.test) for fold in ways]
-    plain = plain_score(examples, labels, clocks, floor_of(recipe.encoder), parts, truths, window, report)
+    plain = plain_score(examples, labels, clocks, parts, truths, window, report)
     together, mistakes = score_together(joined, truths, window), mistakes_of(joined, truths, scores)
     return Judged(scores, together, how, tuple(trained), plain, mistakes)
 

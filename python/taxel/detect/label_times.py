@@ -13,7 +13,7 @@ from taxel._base.progress import reporting
 from taxel._core import ProblemError
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example
-from taxel.detect.floors import measured_floor
+from taxel.detect.floors import floor_of
 from taxel.detect.loads import Loads, clock_of, lacks_neighbours
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
@@ -78,18 +78,15 @@ class FeltLoads:
     ----------
     examples : sequence of Example, checked
         Nothing is known where one has no tare, or is of spike trains.
-    noise_floor : float, in the sensor's unit
-        Of a board; that of other sensors is measured.
     """
 
-    def __init__(self, examples: Sequence[Example], noise_floor: float) -> None:
+    def __init__(self, examples: Sequence[Example]) -> None:
         known = all(example.tare is not None and not isinstance(example.source, SpikeTrains) for example in examples)
         early = [example if (tare := _early(example)) is None else example._replace(tare=tare) for example in examples]
         self._loads, self._felt = None, {"peak": PEAK} | ({} if lacks_neighbours(examples) else {"area": TOUCH})
         if known and examples:
-            floor = measured_floor(early) or noise_floor
             clocks = [clock_of(example) for example in early]
-            self._loads = Loads(early, clocks, floor, reporting(None), list(self._felt))
+            self._loads = Loads(early, clocks, floor_of(early), reporting(None), list(self._felt))
 
     def near(self, label: str) -> tuple[int, int, int] | None:
         """Return how many labels of a name lie within 50 ms of a load, of its begin or end, and how many there are.
@@ -250,7 +247,7 @@ def unlabelled_us(examples: Sequence[Example], label: str) -> tuple[int, int]:
     return outside, total
 
 
-def held_by_tare(examples: Sequence[Example], noise_floor: float) -> int:
+def held_by_tare(examples: Sequence[Example]) -> int:
     """Return how many taxels vary far more in the tare of an example than at its beginning, as a touch is in it.
 
     Of several examples it is the largest number. A tare that is not of its own recording says nothing: 0.
@@ -258,39 +255,35 @@ def held_by_tare(examples: Sequence[Example], noise_floor: float) -> int:
     Parameters
     ----------
     examples : sequence of Example, checked
-    noise_floor : float, in the sensor's unit
-        As of `FeltLoads`.
     """
-    return max((_held(example, noise_floor, 1.0) for example in examples), default=0)
+    return max((_held(example, 1.0) for example in examples), default=0)
 
 
-def quiet_s(examples: Sequence[Example], noise_floor: float) -> float | None:
+def quiet_s(examples: Sequence[Example]) -> float | None:
     """Return how many seconds at the beginning of each recording hold no touch, of its tare; None if not known.
 
     Parameters
     ----------
     examples : sequence of Example, checked
-    noise_floor : float, in the sensor's unit
-        As of `FeltLoads`.
     """
     least = []
     for example in examples:
         tare, source = example.tare, example.source
         if _early(example) is None or tare is None or tare.start_us > int(source.t[0]):  # type: ignore[union-attr]
             return None
-        share = next(share for share in _SHARES if _held(example, noise_floor, share) < TOUCH)
+        share = next(share for share in _SHARES if _held(example, share) < TOUCH)
         least.append(share * (tare.stop_us - tare.start_us) / 1e6)
     seconds = min(least, default=0.0)
     digits = 10 ** (2 - int(np.floor(np.log10(seconds)))) if seconds > 0 else 1
     return float(np.floor(seconds * digits) / digits) if seconds > 0 else None
 
 
-def _held(example: Example, noise_floor: float, share: float) -> int:
+def _held(example: Example, share: float) -> int:
     """Return how many taxels vary far more in that share of a tare than at its beginning."""
     early, late = _early(example), _early(example, share)
     if early is None or late is None:
         return 0
-    floor = measured_floor([example._replace(tare=early)]) or noise_floor
+    floor = floor_of([example._replace(tare=early)])
     noise, more = early.noise, floor / _OF_FLOOR
     source = example.source
     if isinstance(source, Frames) and are_counts(source.unit):

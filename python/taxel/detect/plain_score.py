@@ -14,16 +14,13 @@ from numpy.typing import NDArray
 from taxel._base.arguments import instance
 from taxel._base.progress import Progress
 from taxel.detect.examples import Example, name_of
+from taxel.detect.floors import floor_of
 from taxel.detect.loads import Clock, Loads, Stretch
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.scoring import Score, score_together
 from taxel.detect.tuning import best_rules
 from taxel.detections import Detections
-from taxel.encode import Encoder
 from taxel.spikes import SpikeTrains
-
-#: The noise floor of rules where the encoder has none: that of the board's fast presets.
-_FLOOR = 3.0
 
 
 @dataclass(frozen=True)
@@ -33,7 +30,8 @@ class PlainScore:
     Attributes
     ----------
     rules : mapping of str to PlainRule or None
-        The rule of each label, tuned on all examples; None where none is better than to detect nothing.
+        The rule of each label, tuned on all examples; None where none is better than to detect nothing, or where those
+        of the folds find nothing held out.
     together : Score or None
         Of the rules that were tuned on the training part of each fold; where a fold has no rule for a label, all its
         labels are missed. None where no quantity can be computed.
@@ -131,17 +129,10 @@ class PlainScore:
         }
 
 
-def floor_of(encoder: Encoder) -> float:
-    """Return the noise floor with which rules are tried beside an encoder."""
-    floors = [float(part.noise_floor) for part in encoder._each() if hasattr(part, "noise_floor")]
-    return floors[0] if floors else _FLOOR
-
-
 def plain_score(
     examples: Sequence[Example],
     labels: Sequence[str],
     clocks: Sequence[Clock],
-    noise_floor: float,
     ways: Sequence[tuple[Sequence[Stretch], Sequence[Stretch]]],
     truths: Sequence[Mapping[str, NDArray[np.int64]]],
     window_ms: float,
@@ -155,7 +146,6 @@ def plain_score(
     labels : sequence of str
     clocks : sequence of (float or None, int)
         Of each example.
-    noise_floor : float
     ways : sequence of (parts, parts)
         What is trained on, and what is tested; none: all examples are both.
     truths : sequence of mapping of str to int64, us
@@ -169,7 +159,7 @@ def plain_score(
     if lacking:
         why = f"{name_of(lacking[0], examples[lacking[0]])} has no tare" if len(examples) > 1 else "there is no tare"
         return PlainScore(dict.fromkeys(labels), None, f"{why} to measure a load from")
-    loads = Loads(examples, clocks, noise_floor, report)
+    loads = Loads(examples, clocks, floor_of(examples), report)
     report("tuning plain rules", 0, 0)
     rules = best_rules(loads, labels, loads.whole_examples, window_ms)
     detections: dict[int, list[Detections]] = {}
@@ -180,7 +170,9 @@ def plain_score(
         for part in test:
             detections.setdefault(part[0], []).append(_detect(loads, fold_rules, part))
     joined = [reduce(add, detections[index]) for index in sorted(detections)]
-    return PlainScore(rules, score_together(joined, truths, window_ms))
+    together = score_together(joined, truths, window_ms)
+    rules = {label: rule if together[label].found else None for label, rule in rules.items()}
+    return PlainScore(rules, together)
 
 
 def _detect(loads: Loads, rules: Mapping[str, PlainRule | None], part: Stretch) -> Detections:

@@ -27,7 +27,7 @@ from taxel.recorded import recorded
 from taxel.recording import Recording, open_one
 from taxel.recording.analysis.preload import free_of_preload, without_preload
 from taxel.recording.analysis.pressure import quiet_rest
-from taxel.recording.analysis.rest import NOISE_FLOOR, ZEROS_BEFORE, by_unit, of_quiet
+from taxel.recording.analysis.rest import ZEROS_BEFORE, by_unit, of_quiet
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
@@ -276,7 +276,7 @@ def zero_by_unit(recording: Recording) -> Tare | None:
 
 def _warn_of_touch(subject: str, remedy: str, source: Events | Frames, measured: Tare) -> None:
     """Warn of a tare in which something was touched, by which lifts are missed or false."""
-    taxels = held_by_tare([Example(source, {}, measured)], NOISE_FLOOR)
+    taxels = held_by_tare([Example(source, {}, measured)])
     if taxels >= TOUCH:
         warn(f"{subject} is not quiet but holds a touch of {taxels} taxels; {remedy}", stacklevel=3)
 
@@ -298,12 +298,12 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
 
 def _without_touch(tare: Tare, recording: Recording, source: Events | Frames) -> Tare:
     """Return a tare of a recording; if it holds a touch, and the first quiet stretch none, that of this stretch."""
-    taxels = held_by_tare([Example(source, {}, tare)], NOISE_FLOOR)
+    taxels = held_by_tare([Example(source, {}, tare)])
     span = _quiet_us(recording, source)[0] if taxels >= TOUCH else None
     if span is None:
         return tare
     quiet = _measured(recording, source, span[1], span[0])
-    if held_by_tare([Example(source, {}, quiet)], NOISE_FLOOR) >= TOUCH:
+    if held_by_tare([Example(source, {}, quiet)]) >= TOUCH:
         return tare
     begin_us = beginning_us(source.t[:1])
     first, end, *stretch = ((t - begin_us) / 1e6 for t in (tare.start_us, tare.stop_us, *span))

@@ -24,7 +24,7 @@ from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.folds import INNER, count_of_folds
 from taxel.detect.loads import clock_of
-from taxel.detect.plain_score import floor_of, plain_score
+from taxel.detect.plain_score import plain_score
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import mistakes_of, score_together
 from taxel.events import Events
@@ -260,7 +260,7 @@ class _Work:
         trained_on = _own(outcomes, window_ms)
         if scored is None:
             truths, sound = [outcome.example.labels for outcome in outcomes], check_examples(self.examples)
-            loads = sound, list(truths[0]), [clock_of(example) for example in self.examples], floor_of(plan.encoder)
+            loads = sound, list(truths[0]), [clock_of(example) for example in self.examples]
             scored = replace(trained_on, plain=plain_score(*loads, [], truths, window_ms, self.update))
         scores = scored.together, trained_on.together, scored.scores
         causes = Mistakes(trained, *scores, search, scored.plain, scored.mistakes, window_ms).causes(evidence)

@@ -48,6 +48,11 @@ NOISY_FROM, NOISY_SHARE, NOISY_ON = 10, 0.5, 0.45
 #: A pixel of a camera is noisy too, "hot", if it has at least this number of events, so many spreads (as of normal
 #: noise) more than the median of all pixels, and so many times those of all but one of the 24 around it.
 HOT_FROM, HOT_SPREADS, HOT_TIMES = 50, 10, 4
+#: A taxel of frames is noisy too if the noise of its quieter stretches is at least so many times the median of all, and
+#: so many times that of all but one of the 24 around it. Stretches have so many frames; a recording has at least, and
+#: of it are looked at at most, so many. Readings in steps have a noise of half a step at least.
+UNQUIET_FROM, UNQUIET_TIMES = 4.5, 3.0
+_STRETCH, _STRETCHES, _QUIETER = 20, (10, 200), 0.1
 #: The standard deviation of normal noise is this many times the median distance from its median.
 _DEVIATION = 1.4826
 
@@ -139,8 +144,10 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     3 changes or more, and more than 8 times those of all but one of the 24 taxels around it; and at most 45 % of its
     changes go on in the direction of the one before. Of frames, too, one that jumps for less than two frames at a time,
     10 times or more, more than half as far from its median as ever, while all but one of its neighbours move less than
-    an eighth as much. A pixel of a camera's events or counts is noisy too if it has 50 events or more, more than the
-    median of all by 10 times their spread, and more than 4 times those of all but one of the 24 around it.
+    an eighth as much; and one whose noise from frame to frame, in the quieter tenth of stretches of 20 frames, is 4.5
+    times the median of all taxels or more, and more than 3 times that of all but one of the 24 around it. A pixel of a
+    camera's events or counts is noisy too if it has 50 events or more, more than the median of all by 10 times their
+    spread, and more than 4 times those of all but one of the 24 around it.
 
     Examples
     --------
@@ -177,6 +184,8 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     # In frames a taxel that never changes is dead or stuck, depending on its value.
     loaded = table.values[0] > least
     noisy = result.noisy | flickering(table)
+    if not are_counts(table.unit):
+        noisy |= _unquiet(table) & (moved <= NOISY_ON * activity)
     dead, stuck = (grid & ~noisy for grid in (result.dead & ~loaded, result.stuck | result.dead & loaded))
     bounds = [extreme.reduce(ticks.values, axis=0) for extreme in (np.fmin, np.fmax)]
     at_top = _at_top(table.array, *bounds)
@@ -270,6 +279,36 @@ def judge(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> He
     return Health(array, activity, dead, stuck, noisy, untested)
 
 
+def _unquiet(frames: Frames) -> NDArray[np.bool_]:
+    """Return which taxels have far more noise than all others where they are quietest, and than those around them."""
+    found, count = np.zeros(frames.array.shape, bool), len(frames) // _STRETCH
+    least, most = _STRETCHES
+    if min(found.shape) == 1 or count < least:
+        return found
+    begins = _STRETCH * np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
+    stretches = frames.values[begins[:, None] + np.arange(_STRETCH)]
+    # Drift and touches that last are not in what changes from frame to frame.
+    steps = np.abs(np.diff(stretches, axis=1)).astype(np.float64)
+    noise = np.quantile(np.sqrt(np.mean(steps**2, axis=1) / 2), _QUIETER, axis=0)
+    known = np.isfinite(noise)
+    if not known.any():
+        return found
+    step = float(np.min(steps, where=steps > 0, initial=np.inf))
+    # Of the two in the middle the lower one: of four taxels one may be noisy.
+    median = max(float(np.quantile(noise[known], 0.5, method="lower")), step / 2)
+    noise = np.where(known, noise, 0.0)
+    for row, column in np.argwhere(noise >= UNQUIET_FROM * median).tolist():
+        found[row, column] = noise[row, column] > UNQUIET_TIMES * _second_around(noise, row, column)
+    return found
+
+
+def _second_around(values: NDArray[Any], row: int, column: int) -> Any:
+    """Return the second largest of the 24 values around a taxel, of which it is the largest, or more than that."""
+    rows, columns = (slice(max(0, at - 2), at + 3) for at in (row, column))
+    around = np.sort(values[rows, columns], axis=None)
+    return around[-3] if len(around) > 2 else 0
+
+
 def _with_hot(result: Health, counts: NDArray[Any]) -> Health:
     """Return the same with taxels as noisy that have far more events than all others, and than those around them."""
     exists = np.ones(counts.shape, bool) if result.array.exists is None else result.array.exists.reshape(counts.shape)
@@ -278,12 +317,9 @@ def _with_hot(result: Health, counts: NDArray[Any]) -> Health:
     median = float(np.median(counts[exists]))
     spread = max(float(np.median(np.abs(counts[exists] - median))) * _DEVIATION, median**0.5)
     far = exists & (counts >= max(HOT_FROM, median + HOT_SPREADS * spread))
-    padded, places = np.pad(np.where(exists, counts, 0), 2), np.argwhere(far)
-    noisy = result.noisy.copy()
-    for row, column in places.tolist():
-        around = np.partition(padded[row : row + 5, column : column + 5].ravel(), -3)
-        # The largest is its own.
-        noisy[row, column] |= bool(counts[row, column] > HOT_TIMES * around[-3])
+    counts, noisy = np.where(exists, counts, 0), result.noisy.copy()
+    for row, column in np.argwhere(far).tolist():
+        noisy[row, column] |= bool(counts[row, column] > HOT_TIMES * _second_around(counts, row, column))
     return replace(result, noisy=noisy, untested=result.untested & ~noisy, dead=result.dead & ~noisy)
 
 
