@@ -264,6 +264,27 @@ def test_lines_of_the_standard_input_are_read_to_their_end(tmp_path: Path, shown
     assert len(done.stdout.splitlines()) == len(expected) > 3
 
 
+@pytest.mark.parametrize("falls", [False, True])
+def test_values_that_fall_are_named_in_the_shell(tmp_path: Path, falls: bool) -> None:
+    random = np.random.default_rng(5)
+    values = 600 + random.normal(0, 2, (900, 8, 8)).round()
+    for begin in range(200, 900, 100):
+        values[begin : begin + 30, 2:4, 3:5] += -150 if falls else 150
+    text = lines_of(values, np.arange(len(values)) * PERIOD_US)
+    words = ["record", tmp_path / "a.mcap", "--source", "lines:-,array=8x8,time=1:us"]
+    done = subprocess.run(
+        [sys.executable, "-m", "taxel", *map(str, words)],
+        input=text,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    said = done.stdout + done.stderr
+    assert done.returncode == 0, said
+    assert ("values fall under touch: add ,falls=true to the source" in " ".join(said.split())) == falls
+
+
 def test_the_report_says_how_many_detections_lie_outside_the_training(tmp_path: Path) -> None:
     values = touches(np.random.default_rng(5), 2, 3, 400, "N")
     frames = Frames(values, np.arange(len(values)) * PERIOD_US, unit="N", array=Array(2, 3))
