@@ -308,6 +308,27 @@ def test_two_sides_in_one_table_are_said_with_the_columns_of_each(tmp_path: Path
     assert " alone: " not in layout_said_of(place)
 
 
+@pytest.mark.parametrize("above", ["Frame {k}", "Bild {k}", "Time {k},5 s"])
+@pytest.mark.parametrize("between", ["", "\n"])
+def test_frames_below_lines_of_text_are_read_by_what_is_printed(tmp_path: Path, above: str, between: str) -> None:
+    values = np.arange(5 * 3 * 4).reshape(5, 3, 4) / 4
+    frames = [
+        f"{above.format(k=k)}\n" + "".join("\t".join(map(str, row)).replace(".", ",") + "\n" for row in frame) + between
+        for k, frame in enumerate(values, 1)
+    ]
+    place = tmp_path / "a.txt"
+    place.write_text("Export 3.1\nSensors:\t3 x 4\n\n" + "".join(frames))
+    lines = layout_said_of(place)
+    assert f'frame_begin = "{above[: above.index(" ")]}"' in lines
+    (tmp_path / "a.layout.toml").write_text(lines)
+    np.testing.assert_array_equal(taxel.open(place).frames().values, values)
+    place.write_text("".join(frames[:2]) + frames[2].replace("8,0", "x"))
+    (tmp_path / "a.layout.toml").write_text(lines.replace("skip_lines = 4", "skip_lines = 1"))
+    line = 14 if between else 12
+    with pytest.raises(FormatError, match=rf"a\.txt, line {line}: column 1 is 'x', not a number"):
+        taxel.open(place)
+
+
 def test_a_folder_of_arrays_without_times_needs_their_rate_alone(tmp_path: Path) -> None:
     for k in range(12):
         np.save(tmp_path / f"trial{k}.npy", np.full((5 + k, 3, 2), k))

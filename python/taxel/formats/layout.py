@@ -59,6 +59,8 @@ class Table:
         Lines a frame, of which the first has its time; default: 1.
     frame_end : {"blank"}, optional
         An empty line ends a frame.
+    frame_begin : str, optional
+        What the line of text above each frame begins with, as "Frame"; empty lines are then between frames too.
     events : bool
         Whether each line is an event, in the columns x, y and p (the polarity: 1 for more pressure, 0 or -1 for less).
 
@@ -77,6 +79,7 @@ class Table:
     leave_out: Sequence[str | int] = ()
     frame_lines: int | None = None
     frame_end: str | None = None
+    frame_begin: str | None = None
     events: bool = False
 
     def __post_init__(self) -> None:
@@ -87,8 +90,12 @@ class Table:
         for column in several("columns", self.columns):
             text("columns", column)
         _check_end(self)
-        if flag("events", self.events) and (self.time_column is None or self.frame_lines or self.frame_end):
-            raise refused("events", " is true: must have a time_column, and no frame_lines or frame_end")
+        if self.frame_begin is not None and not text("frame_begin", self.frame_begin).strip():
+            raise refused("frame_begin", f" is {shown(self.frame_begin)}: must be a text")
+        if self.frame_begin is not None and (self.frame_lines is not None or self.frame_end is not None):
+            raise refused("frame_begin", " is given, and so is frame_lines or frame_end: give one")
+        if flag("events", self.events) and (self.time_column is None or self.has_lines):
+            raise refused("events", " is true: must have a time_column, and no frames of several lines")
         integer("skip_lines", self.skip_lines, 0)
         if self.time_column is not None:
             _column("time_column", self.time_column)
@@ -99,6 +106,15 @@ class Table:
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
         if self.missing is not None:
             text("missing", self.missing)
+
+    @property
+    def has_lines(self) -> bool:
+        """Whether a frame may have several lines."""
+        return not (self.frame_lines is None and self.frame_end is None and self.frame_begin is None)
+
+    def is_between(self, line: str) -> bool:
+        """Whether a line holds no numbers, but stands between frames."""
+        return not line.strip() or (self.frame_begin is not None and line.lstrip().startswith(self.frame_begin))
 
 
 def _check_end(how: Table | PrintedFrames) -> None:

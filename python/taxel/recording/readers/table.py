@@ -158,9 +158,9 @@ class _Head:
         """Yield the cells of each line of numbers that are kept, with decimal points; None for an empty line."""
         how, time, row = self.how, self.time, 0
         # Between frames, a line of separators alone is an empty one of a spreadsheet, if no cell may be empty.
-        empty = how.separator if (how.frame_lines or how.frame_end) and how.missing != "" else ""
+        empty = how.separator if how.has_lines and how.missing != "" else ""
         for number, line in enumerate(islice(text.stream(self.path), self.first - 1, None), self.first):
-            if not line.strip() or (empty and not line.strip(f" {empty}")):
+            if how.is_between(line) or (empty and not line.strip(f" {empty}")):
                 self.blanks.append(row)
                 yield None
                 continue
@@ -195,7 +195,7 @@ def read_table(path: Path, layout: Layout) -> Readings:
     if end < rows:
         lost = (*lost, f"lines at the end that make no whole frame: {rows - end} of {lines}")
     size = counted(width, "column") if lines == 1 else f"{lines} lines of {counted(width, 'column')} a frame"
-    if how.frame_lines or how.frame_end:
+    if how.has_lines:
         values = values[:end].reshape(-1, lines, width)
         t = None if t is None else t[:end:lines].copy()
     return Readings(values, t, size, lambda frame: head.line(frame * lines), names_of_taxels, lost)
@@ -204,7 +204,7 @@ def read_table(path: Path, layout: Layout) -> Readings:
 def frames_hint(layout: Layout, taxels: int) -> str:
     """Return what a layout could say of a table whose lines are parts of frames, as the end of an error."""
     how, lines = layout.table or Table(), (layout.rows or 0) * (layout.columns or 0) // taxels
-    if how.frame_lines or how.frame_end or lines < 2 or lines * taxels != (layout.rows or 0) * (layout.columns or 0):
+    if how.has_lines or lines < 2 or lines * taxels != (layout.rows or 0) * (layout.columns or 0):
         return ""
     return f"; if {lines} lines are a frame, say in the layout: [table] frame_lines = {lines}"
 
@@ -262,7 +262,7 @@ def _lines_of_frame(head: _Head, rows: int, needed: int | None) -> int:
     FormatError : an empty line within a frame, or frames of several sizes (names the line)
     """
     how = head.how
-    if how.frame_lines is None and how.frame_end is None:
+    if not how.has_lines:
         return 1
     ends = [row for row in dict.fromkeys(head.blanks) if 0 < row < rows]
     if how.frame_lines is not None:
@@ -294,7 +294,7 @@ def _beginning(path: Path, how: Table) -> tuple[tuple[int, str] | None, list[tup
     """Return the last line that the layout skips and the first three below it, those that are not empty, by number."""
     skipped, lines = None, list[tuple[int, str]]()
     for number, line in enumerate(text.stream(path), 1):
-        if not line.strip():
+        if how.is_between(line):
             continue
         if number <= how.skip_lines:
             skipped = number, line

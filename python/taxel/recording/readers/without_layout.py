@@ -34,6 +34,8 @@ _FEWEST = 3
 _FEW, _MORE = 200, 1 << 20
 #: What a time column's unit is guessed by: the rate and the duration of a usual recording, Hz and s.
 _USUAL_HZ, _USUAL_S = 100.0, 30.0
+#: A line above a frame: a word and the frame's number, or its time.
+_ABOVE_FRAME = re.compile(r"([^\W\d_]+)[ \t:=#.]*\d+(?:[.,]\d+)?[ \t]*(?:m?s)?[ \t]*")
 #: Names of columns that number the lines.
 _COUNTS = re.compile(
     r"(frames?|index|idx|samples?|records?|no|nr|num|number|count|#|bild|lfd)[ ._]*(nr|no|number|#|id)?\.?",
@@ -71,12 +73,13 @@ def refuse_without_layout(path: Path) -> None:
     """
     if path.suffix.lower() not in ARRAYS:
         lines = _beginning(path)
-        found = _TextTable.find(lines)
+        begin = _begin_of_frames(lines)
+        found = _TextTable.find([line if not begin or not line.startswith(begin) else "" for line in lines])
         if found is None:
             return
         # Compressed texts are several times larger.
         size = path.stat().st_size * (4 if path.suffix.lower() == ".gz" else 1)
-        holds, lines = _of_table(found, max(1.0, size / sum(len(line) + 1 for line in lines)))
+        holds, lines = _of_table(found, max(1.0, size / sum(len(line) + 1 for line in lines)), begin)
         says = "says how to read it"
     else:
         shapes = shapes_of(path)
@@ -97,6 +100,16 @@ def _beginning(path: Path) -> list[str]:
     if len(lines) < _FEW:
         lines = text.beginning(path, _MORE)
     return lines or text.beginning(path, LINE + 1)
+
+
+def _begin_of_frames(lines: Sequence[str]) -> str:
+    """Return the word that begins a line above every few lines, and a number behind it, as of "Frame 1"; else ""."""
+    at: dict[str, list[int]] = {}
+    for k, line in enumerate(line for line in lines if line.strip()):
+        if found := _ABOVE_FRAME.fullmatch(line):
+            at.setdefault(found[1], []).append(k)
+    steps = {word: np.diff(places) for word, places in at.items() if len(places) > 1}
+    return next((word for word, each in steps.items() if each[0] > 1 and (each == each[0]).all()), "")
 
 
 def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
@@ -331,8 +344,8 @@ def _between_empty(numbers: Sequence[int]) -> int:
     return int(sizes[0]) if rest == sizes[0] or (rest < sizes[0] and len(sizes) > 1) else 1
 
 
-def _of_table(found: _TextTable, longer: float) -> tuple[str, list[str]]:
-    """Return what a table holds, and its layout; the file is `longer` than what was read of it."""
+def _of_table(found: _TextTable, longer: float, begin: str) -> tuple[str, list[str]]:
+    """Return what a table holds, and its layout; the file is `longer` than what was read, `begin` is above frames."""
     if events := found.events():
         return _of_events(found, events)
     time = found.time()
@@ -341,7 +354,7 @@ def _of_table(found: _TextTable, longer: float) -> tuple[str, list[str]]:
     table = found.form()
     lines = found.between_empty
     if lines > 1:
-        table.append('frame_end = "blank"')
+        table.append(f"frame_begin = {_quote(begin)}" if begin else 'frame_end = "blank"')
     elif time is not None:
         times = found.numbers(time) if found.numeric[time] else np.array([seconds_of(row[time]) for row in found.body])
         lines = found.lines_of(times)
