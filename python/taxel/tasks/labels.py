@@ -221,7 +221,7 @@ def _from_beginnings(
     spans = {k: span_us(recordings[k]) for k in labelled}
     for k in labelled:
         begins.setdefault((recordings[k].path, trial_name(recordings[k])), []).append(spans[k][0])
-    moved, of = list(each), []
+    moved, counted_anew = list(each), []
     for k in labelled:
         firsts = begins[recordings[k].path, trial_name(recordings[k])]
         begin, times = min(firsts), np.concatenate(list(each[k].values()))
@@ -229,10 +229,10 @@ def _from_beginnings(
             if begin + times.max() > spans[k][1]:
                 continue
             moved[k] = {label: begin + t for label, t in each[k].items()}
-            of.append((recordings[k].title, begin))
-    if of:
-        title, begin = of[0]
-        more = f", and so of {len(of) - 1} more" * (len(of) > 1)
+            counted_anew.append((recordings[k].title, begin))
+    if counted_anew:
+        (title, begin), *others = counted_anew
+        more = f", and so of {len(others)} more" * bool(others)
         warn(f"{where}: times are counted from the beginning of {title}, {begun(begin)}{more}", stacklevel=3)
     return moved
 

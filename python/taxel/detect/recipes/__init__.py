@@ -113,11 +113,11 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
         others = [label for label in labels if _listed(recipes[grids], label) is None]
         known = any(_listed(values, label) for label in others for values in recipes.values())
         ends = [_own(recipes[grids], label) for label in labels]
-        what = f"{'kinds of touch' if None in ends else ' and '.join(labels)} on {sensor}"
+        subject = f"{'kinds of touch' if None in ends else ' and '.join(labels)} on {sensor}"
         if not known and not any(map(_is_of_step, others)):
-            return grids, what
+            return grids, subject
         if None not in ends and len(set(ends)) == len(ends):
-            steps = grids, what
+            steps = grids, subject
     many = array.taxels > _MOST_CHANNELS
     for unit in (f"many {source.unit}",) * (many or not array.is_channels) + (source.unit,):
         if unit in recipe_for:

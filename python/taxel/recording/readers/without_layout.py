@@ -258,7 +258,7 @@ class _TextTable:
         left |= {0} if self.counts else set()
         units = {k: self.unit(k) or self._in_brackets(k) for k in range(len(self.numeric)) if k not in {*left, time}}
         unit, count = Counter(units.values()).most_common(1)[0] if units else ("", 0)
-        others = {k for k, other in units.items() if other and unit and other != unit}
+        others = {k for k, stated in units.items() if stated and unit and stated != unit}
         return sorted((left | (others if 2 * count > len(units) else set())) - {time})
 
     def _in_brackets(self, column: int) -> str:
