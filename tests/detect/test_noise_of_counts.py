@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from taxel import Array, Frames, Neuron, Readout, Tare
+import taxel
+from taxel import Array, Events, Frames, Neuron, ProblemError, Readout, Tare
 from taxel.detect import Example, PlainRule, run
 from taxel.detect.alignment import Alignment
 from taxel.detect.causes import _weak_bursts
 from taxel.encode import LocalLoad
+from taxel.tasks.detect import detect
 
 SHAPE, BURSTS, WINDOW_US = (40, 50), 12, 20_000
 UNIT = "events/20 ms"
@@ -78,3 +82,20 @@ def test_labels_without_an_input_near_are_weak_bursts_where_a_file_holds_some(st
         assert burst.events == pytest.approx(12 + 9 * strength, rel=0.3)
         # The burst fills four windows: their noise grows by half as much.
         assert burst.by[4] == pytest.approx(2 * burst.by[1], rel=0.3)
+
+
+def test_what_is_no_count_of_the_training_is_refused_before_its_rest(tmp_path: Path) -> None:
+    rule = PlainRule("area", 2, unit="on events/5 ms")
+    camera = Events([0, 10, 400_000], [1, 2, 3], [0, 1, 1], [True, False, True], array=Array(4, 5))
+    taxel.convert(camera, tmp_path / "camera.npz")
+    with pytest.raises(
+        ProblemError, match=r"camera.npz: these are events, not counts, .* on events/5 ms: add --count-ms 5,"
+    ):
+        detect(rule, taxel.open(tmp_path / "camera.npz"))
+    # Never quiet, and in another unit.
+    values = np.random.default_rng(1).integers(0, 500, (100, 4, 5)).astype(float)
+    taxel.convert(Frames(values, 20_000 * np.arange(100), unit=UNIT, array=Array(4, 5)), tmp_path / "loud.npz")
+    with pytest.raises(
+        ProblemError, match=r"loud.npz: values in events/20 ms, and the plain rule was trained on on events/5 ms"
+    ):
+        detect(rule, taxel.open(tmp_path / "loud.npz"))

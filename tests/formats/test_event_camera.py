@@ -341,7 +341,7 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: 
             r"\(AEDAT 2\), not with a recording; of event cameras .raw, .dat, .aedat4 are read",
         ),
         ("a.aedat", b"#!AER-DAT4.0\r\n", r"AEDAT 4\), .*; name it .aedat4"),
-        ("a.dat", b"", "starts with nothing: no recording; there are .*, and of event cameras .raw, .dat, .aedat4;"),
+        ("a.dat", b"", "is empty: no recording"),
     ],
 )
 def test_what_is_no_file_of_a_camera_names_those(name: str, begins: bytes, said: str, tmp_path: Path) -> None:
@@ -353,6 +353,22 @@ def test_what_is_no_file_of_a_camera_names_those(name: str, begins: bytes, said:
 def test_too_many_frames_name_a_larger_window(tmp_path: Path) -> None:
     with refused(r"frames of 48 x 64 taxels \(less by --region, by a larger --bin, or by a larger window", FormatError):
         taxel.open(write(tmp_path / "a.raw", some_rows()), window_ms=0.001, limit=10_000)
+
+
+@pytest.mark.parametrize("names", ["timestamp,col,row,polarity", "t,column,row,on", "ts,x,y,p", "time (us),X,Y,pol"])
+def test_names_of_columns_of_events_are_known(names: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(f"{names}\n100,3,4,1\n230,5,6,0\n400,3,6,1\n600,1,1,0\n")
+    with pytest.raises(FormatError, match=r"a table of events \(t, x, y, p\)(.|\n)*columns = \[.t., .x., .y., .p.\]"):
+        taxel.open(tmp_path / "a.csv")
+
+
+def test_taxels_beyond_the_sensor_are_refused(tmp_path: Path) -> None:
+    file = write(tmp_path / "a.raw", some_rows())
+    with refused(r"bin is 65: must be a whole number from 1 to 64, as the sensor has 64 columns and 48 rows"):
+        taxel.open(file, bin=65)
+    with refused(r"bin is 9: must be a whole number from 1 to 8, as the region has 8 columns and 4 rows"):
+        taxel.open(file, bin=9, region="0:8,0:4")
+    assert taxel.open(file, bin=64).array.shape == (1, 1)
 
 
 def test_the_pitch_of_a_camera_stays_unknown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -63,7 +63,12 @@ class FileOptions:
     ] = None
     bin: Annotated[
         int | None,
-        typer.Option(min=1, metavar="PIXELS", help="So many pixels of an event camera along a side become one taxel."),
+        typer.Option(
+            min=1,
+            max=65_535,
+            metavar="PIXELS",
+            help="So many pixels of an event camera along a side become one taxel.",
+        ),
     ] = None
     count_ms: Annotated[
         float | None,

@@ -353,7 +353,8 @@ def _by_first_bytes(path: Path) -> TaxelFile | Refusal:
     if ending is None:
         describes = advice(path, "describes a table or an array of another program")
         known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
-        return Refusal(FormatError(f"{starts}: no recording; there are {known}; {describes}"))
+        wrong = f"{starts}: no recording; there are {known}; {describes}" if head else f"{path}: is empty: no recording"
+        return Refusal(FormatError(wrong))
     if ending in {"npz", "h5"}:
         magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]
         return Refusal(FormatError(f"{starts}, not with {expected[ending]} ({magic})"))

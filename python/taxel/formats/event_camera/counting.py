@@ -66,7 +66,7 @@ def reduced(name: str, events: Events, reduction: Reduction) -> Events | Frames:
     Raises
     ------
     FormatError : more frames than may be read
-    ProblemError : a region beyond the sensor
+    ProblemError : a region or a taxel beyond the sensor
     """
     sensor_array = events.array
     left, right, top, bottom = reduction.bounds(sensor_array.columns, sensor_array.rows)

@@ -44,7 +44,7 @@ def read(path: Path, reduction: Reduction) -> Events | Frames:
     ------
     FormatError : a file that is damaged, has no header or no event, or holds more than may be read
     ImportError : faery is not installed
-    ProblemError : a region beyond the sensor
+    ProblemError : a region or a taxel beyond the sensor
     """
     kind = check(path)
     if find_spec("faery") is None:

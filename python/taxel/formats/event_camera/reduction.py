@@ -90,10 +90,18 @@ class Reduction:
 
         Raises
         ------
-        ProblemError : a region beyond the sensor
+        ProblemError : a region or a taxel beyond the sensor
         """
         left, right, top, bottom = self.bounds(columns, rows)
-        return -(-(bottom - top) // self.side), -(-(right - left) // self.side)
+        width, height = right - left, bottom - top
+        if self.side > max(width, height):
+            what = "the region" if self.region else "the sensor"
+            raise refused(
+                "bin",
+                f" is {self.side}: must be a whole number from 1 to {max(width, height)}, as {what} has "
+                f"{width} columns and {height} rows",
+            )
+        return -(-height // self.side), -(-width // self.side)
 
     def bounds(self, columns: int, rows: int) -> tuple[int, int, int, int]:
         """Return first and last (exclusive) column and row of the region on a sensor.

@@ -55,10 +55,10 @@ _NO_UNIT = '# unit = "kPa"  # of the readings: the file does not say it, and wit
 #: Names of the columns of events in the orders that programs write without names.
 _EVENTS = (("x", "y", "p", "t"), ("t", "x", "y", "p"))
 _EVENT_NAMES: dict[str, Callable[[str], bool]] = {
-    "x": lambda name: name.lower() == "x",
-    "y": lambda name: name.lower() == "y",
+    "x": lambda name: name.lower() in ("x", "col", "column"),
+    "y": lambda name: name.lower() in ("y", "row"),
     "p": lambda name: name.lower() in ("p", "pol", "polarity", "on"),
-    "t": lambda name: unit_of(name) is not None or name.lower() == "ts",
+    "t": lambda name: unit_of(name) is not None or name.lower() in ("ts", "timestamp"),
 }
 
 
