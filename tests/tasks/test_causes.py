@@ -183,6 +183,28 @@ def window(folder: Path, seed: int) -> Situation:
     return Situation(saved(folder, frames, {"contact": labels["contact"] + off}))
 
 
+def released(seed: int) -> tuple[taxel.Frames, Labels]:
+    """Return grasps of all forces that are released slowly, from their labels on, so that the end is felt late."""
+    random = np.random.default_rng(seed)
+    begins = np.rint(100 * (1 + np.cumsum(random.uniform(1.2, 1.8, 25)))).astype(int)
+    ends, values = begins + random.integers(20, 60, 25), random.normal(50, 0.5, (int(begins[-1]) + 200, 6, 6))
+    for begin, end in zip(begins, ends, strict=True):
+        (y, x), load = random.integers(0, 5, 2), 120 * np.exp(random.uniform(-np.log(30), 0))
+        lasts = random.integers(3, 9)
+        gone = np.clip((np.arange(len(values)) - end) / lasts, 0, 1)
+        shape = (np.arange(len(values)) >= begin) * (1 + np.cos(np.pi * gone)) / 2
+        shape *= 1 + 0.15 * np.sin(0.25 * (np.arange(len(values)) - begin))
+        values[:, y : y + 2, x : x + 2] += load * shape[:, None, None]
+    t = 10_000 * np.arange(len(values))
+    labels = {"contact": t[begins], "release": t[ends]}
+    return taxel.Frames(values, t, unit="counts", array=taxel.Array(6, 6)), labels
+
+
+def slow(folder: Path, seed: int) -> Situation:
+    """Exact labels of releases that are felt late."""
+    return Situation(saved(folder, *released(seed)))
+
+
 def recipe(folder: Path, seed: int) -> Situation:
     """Contact and lift of a mat, learnt by the recipe of insoles."""
     frames, labels = pressed(seed)
@@ -205,6 +227,7 @@ SITUATIONS = {
     "shifted_labels by hand": by_hand,
     "shifted_labels in pictures": in_pictures,
     "window": window,
+    "window slow": slow,
     "recipe": recipe,
 }
 
@@ -336,6 +359,19 @@ def test_what_happens_while_a_touch_lasts_is_no_label_of_another_recording(seed:
     alone = example._replace(labels={"slip": labels["slip"]})
     causes = Evidence([alone], check_examples([alone]), plan).causes({"slip": 15})
     assert [cause.kind for cause in causes] == ["shifted_labels" if later else "foreign_labels"]
+
+
+@pytest.mark.parametrize("late_us", [0, 300_000, -300_000])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_labels_of_one_name_are_not_moved_where_others_fit(seed: int, late_us: int) -> None:
+    frames, labels = released(seed)
+    moved = {label: times + late_us for label, times in labels.items()}
+    example = Example(frames, moved, taxel.Tare.take(frames.between(0, 600_000)))
+    plan = Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example]))
+    evidence = Evidence([example], check_examples([example]), plan)
+    causes = evidence.causes({"contact": 2, "release": 20})
+    assert [cause.kind for cause in causes] == (["shifted_labels"] * 2 if late_us else [])
+    assert list(evidence.felt_apart) == ([] if late_us else ["release"])
 
 
 def test_two_feet_are_no_two_sensors_at_different_places() -> None:

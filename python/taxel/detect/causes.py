@@ -18,7 +18,7 @@ from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS, Alignment
 from taxel.detect.examples import Example
 from taxel.detect.fitting import TWO_FOLDS, Trained
-from taxel.detect.label_times import TOUCH, FeltLoads, early, held_by_tare, quiet_s, unlabelled_us
+from taxel.detect.label_times import TOUCH, FeltLoads, Off, early, held_by_tare, quiet_s, unlabelled_us
 from taxel.detect.levels import LEAST_LEVELS, loaded_levels
 from taxel.detect.loads import lacks_neighbours
 from taxel.detect.plain_score import PlainScore
@@ -156,7 +156,8 @@ def _ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
         before = merged.setdefault((cause.kind, cause.advice), cause)
         if before is cause:
             continue
-        measured = dict.fromkeys([*before.measured.split("; "), *cause.measured.split("; ")])
+        parts = cause.measured.split("; ")
+        measured = [*(part for part in before.measured.split("; ") if part not in parts), *parts]
         merged[cause.kind, cause.advice] = replace(
             before,
             labels=(*before.labels, *cause.labels),
@@ -200,6 +201,11 @@ class Evidence:
         return Evidence([self.examples[k] for k in left], [self.sound[k] for k in left], self.plan)
 
     @property
+    def is_of_one_name(self) -> bool:
+        """Whether all labels have one name."""
+        return len(self._counts) == 1
+
+    @property
     def falls(self) -> str:
         """That values fall from their rest, and what turns them; empty where none do."""
         advice, measured = self._fall
@@ -215,6 +221,25 @@ class Evidence:
                 turned = f" as {layout} turns them" * bool(layout)
                 return advice, f"{example.name}: " * bool(example.name) + f"values fall from their rest{turned}"
         return "", ""
+
+    @cached_property
+    def _distances(self) -> dict[str, Off]:
+        return self._felt.distances(self._counts)
+
+    @cached_property
+    def felt_apart(self) -> dict[str, Off]:
+        """Labels too far from what was felt to be aligned, and near enough for a window, where no other name is off."""
+        if not self.is_of_one_name and all(distance.is_far for distance in self._distances.values()):
+            return {}
+        return {
+            label: distance
+            for label, distance in self._distances.items()
+            if distance.is_far and abs(distance.ms) <= 2 * WINDOW_MS
+        }
+
+    def felt_rank(self, label: str) -> int:
+        """Return how many loads that begin, or end, and labels have no pair within twice the window of alignments."""
+        return self._felt.rank(label, 2 * WINDOW_MS)
 
     @cached_property
     def _early(self) -> str:
@@ -296,7 +321,7 @@ class Evidence:
             return
         _, at_edge, total = self._near.get(label, (0, 0, 0))
         # A tare that does not fit tells nothing.
-        if at_edge == total or self._loaded >= TOUCH:
+        if at_edge == total or self._loaded >= TOUCH or label in self.felt_apart:
             return
         away = total - at_edge
         measured = (
@@ -310,9 +335,10 @@ class Evidence:
     def _shifts(self, wrong: Mapping[str, int]) -> Iterator[Cause]:
         """Yield by how much labels are off, which one option moves if no label is then too far off.
 
-        Where a hand set them live another one is for their spread.
+        Where a hand set them live another one is for their spread. Of labels of which others fit those are right that
+        a wider window reaches: what they name is felt late, or early, as the end of a slow release.
         """
-        distances = self._felt.distances(self._counts)
+        distances = self._distances
         all_ms = [distance.ms for distance in distances.values()]
         together = bool(all_ms) and max(all_ms) - min(all_ms) <= _TOGETHER * WINDOW_MS
         shift_ms = -round((max(all_ms) + min(all_ms)) / 2) if together else 0
@@ -320,7 +346,9 @@ class Evidence:
         for label, distance in distances.items():
             if label not in wrong or not distance.is_far:
                 continue
-            measured = f"{distance}, and are aligned within {WINDOW_MS:.0f} ms only"
+            if label in self.felt_apart and not self.is_of_one_name:
+                continue
+            measured = f"{distance}; the score is then against the moved labels"
             if together:
                 option, arguments = f"--shift-ms {shift_ms}", {"shift_ms": float(shift_ms)}
                 if within_ms > WINDOW_MS:
@@ -431,13 +459,22 @@ class Mistakes:
                 scores = (self.each[place].by_label.get(label) for place in sources)
                 wrong[label] -= sum(score.rank[0] for score in scores if score is not None)
             wrong = {label: count for label, count in wrong.items() if count > 0}
-        found += evidence.causes(wrong)
+        windows = {label: list(self._window(evidence, label, mistakes)) for label, mistakes in wrong.items()}
+        # Whether labels are off or felt late is not known of those of one name alone: a wider window keeps their times.
+        wide = {
+            cause.labels
+            for causes in windows.values()
+            for cause in causes
+            if evidence.is_of_one_name and 2 * cause.mistakes >= wrong[cause.labels[0]]
+        }
+        measured = evidence.causes(wrong)
+        found += [cause for cause in measured if cause.kind != "shifted_labels" or cause.labels not in wide]
         if not any(cause.kind in ("falling_values", "shifted_labels") for cause in found):
             for label, mistakes in wrong.items():
                 if any(cause.kind == "label_name" and label in cause.labels for cause in found):
                     continue
                 found += [*self._unlabelled_time(evidence.sound, label), *self._name(label, mistakes)]
-                found += self._window(label, mistakes)
+                found += windows[label]
                 # A tare that does not fit lets labels lie far from what is felt, too.
                 if not any(cause.kind in ("foreign_labels", "tare") and label in cause.labels for cause in found):
                     found += self._unpaired(evidence.sound, label)
@@ -491,8 +528,19 @@ class Mistakes:
                 "labels of all events",
             )
 
-    def _window(self, label: str, wrong: int) -> Iterator[Cause]:
-        """Yield the window that pairs what is missed with what is false, if most of it lies so near."""
+    def _window(self, evidence: Evidence, label: str, wrong: int) -> Iterator[Cause]:
+        """Yield the window in which a plain rule halves what is wrong, as something is felt late or early.
+
+        Else that which pairs what is missed with what is false, if most of it lies so near.
+        """
+        apart = evidence.felt_apart.get(label)
+        if apart is not None and self.window_ms < 2 * WINDOW_MS and 2 * (left := evidence.felt_rank(label)) <= wrong:
+            option = f"--window-ms {2 * WINDOW_MS:g} --rule FILE"
+            advice = f"a wider window and the plain rule ({option})"
+            within = f"within {2 * WINDOW_MS:g} ms a plain rule leaves {left} missed and false, the neuron {wrong}"
+            measured = f"{apart}; {within}"
+            yield Cause("window", (label,), wrong - left, measured, advice, option, {"window_ms": 2 * WINDOW_MS})
+            return
         missed, false = (
             np.sort(
                 [m.recording * APART_US + m.t for m in self.mistakes if (m.label, m.is_missed) == (label, is_missed)]

@@ -15,6 +15,8 @@ from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example
 from taxel.detect.floors import floor_of
 from taxel.detect.loads import Loads, clock_of, lacks_neighbours
+from taxel.detect.scoring import score
+from taxel.detections import Detections
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -104,6 +106,14 @@ class FeltLoads:
             for edge in edges:
                 at_edge |= np.diff(np.searchsorted(edge, [times - reach, times + reach]), axis=0)[0] > 0
         return int(near.sum()), int(at_edge.sum()), len(times)
+
+    def rank(self, label: str, reach_ms: float) -> int:
+        """Return how many labels of a name, and begins of loads, have no pair that near; or ends, if that is fewer."""
+        assert self._loads is not None
+        times = self._loads.truth(label, self._loads.whole_examples)
+        edges = (edge for of in self._felt.items() for edge in self._loads.edges(*of, 1.0, 1))
+        scores = (score(Detections([label] * len(t), t, known), {label: times}, reach_ms) for t, known, _ in edges)
+        return min(found.rank[0] for found in scores)
 
     def distances(self, labels: Iterable[str]) -> dict[str, Off]:
         """Return by how much labels lie after what was felt, of each name of which most lie at one distance.

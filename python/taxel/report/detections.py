@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from shlex import quote
@@ -44,6 +45,10 @@ if TYPE_CHECKING:
 _MOMENTS, _AROUND = 4, 6.0
 #: How much more is drawn around an event that was missed and a false detection, ms: the usual window of a score.
 _MISSED_MS = 50.0
+#: The end of a recording's name that fits over a picture, letters.
+_TITLE = 32
+#: So many frames are drawn before a moment and behind it at least.
+_FRAMES = 15
 #: Files that `taxel view` shows, and the largest number of them that the page lists.
 _VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
 #: Recordings of frames whose sums are drawn, and stretches of a curve, each with its greatest value.
@@ -191,7 +196,7 @@ def _picture(figure: Figure | None) -> Markup | None:
 def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
     """Draw the sum of each recording of frames over time, so of each foot, and what was detected."""
     of_outcomes = [(outcome, recorded(outcome.example.source, hold=False)) for outcome in listened]
-    shown = [(outcome, pressed) for outcome, pressed in of_outcomes if isinstance(pressed, Frames) and len(pressed)][
+    shown = [(outcome, source) for outcome, source in of_outcomes if isinstance(source, Frames) and len(source)][
         :_MOST_SUMS
     ]
     if not shown:
@@ -200,14 +205,10 @@ def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
         len(shown), 1, figsize=(9.0, 0.6 + 1.4 * len(shown)), layout="constrained", squeeze=False
     )
     for axis, (outcome, frames) in zip(axes[:, 0], shown, strict=True):
-        pressed = series(
-            Recording(Contents.single(source_from(frames, Origin(Path(outcome.name))))), outcome.example.tare
-        )
-        assert pressed is not None  # frames have values
-        total, unit = (pressed.total, pressed.unit) if pressed.force is None else (pressed.force, "N")
-        first, after = _shown(outcome, pressed.t)
+        t, total, unit = _pressed(outcome, frames)
+        first, after = _shown(outcome, t)
         begins = np.arange(first, after, 1 + (after - first) // _STRETCHES)
-        seconds, most = (pressed.t[begins] - outcome.begin_us) / 1e6, np.fmax.reduceat(total[:after], begins)
+        seconds, most = (t[begins] - outcome.begin_us) / 1e6, np.fmax.reduceat(total[:after], begins)
         axis.plot(seconds, most, color=INK, linewidth=0.9, label=escaped(f"sum, {unit}"))
         for k, label in enumerate(labels):
             at = (outcome.found[label].t - outcome.begin_us) / 1e6
@@ -225,6 +226,13 @@ def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes[-1][0].set_xlabel("s")
     return figure
+
+
+def _pressed(outcome: Outcome, frames: Frames) -> tuple[NDArray[np.int64], NDArray[np.float64], str]:
+    """Return the times of the frames of an outcome, us, the sum of each above its rest, and its unit."""
+    pressed = series(Recording(Contents.single(source_from(frames, Origin(Path(outcome.name))))), outcome.example.tare)
+    assert pressed is not None  # frames have values
+    return (pressed.t, pressed.total, pressed.unit) if pressed.force is None else (pressed.t, pressed.force, "N")
 
 
 def _shown(outcome: Outcome, t: NDArray[np.int64]) -> tuple[int, int]:
@@ -261,43 +269,74 @@ def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
             _Moment(k, label, float(t), f"{error:+.2f} ms", abs(float(error)))
             for t, error in zip(happened, score.errors_ms, strict=True)
         ]
-    return sorted(moments, key=lambda moment: -moment.badness)[:_MOMENTS]
+    # Of equally bad ones each recording, and both kinds, take turns.
+    turns: Counter[tuple[int, str]] = Counter()
+    in_turn = []
+    for moment in moments:
+        in_turn.append((-moment.badness, turns[moment.recording, moment.title], moment))
+        turns[moment.recording, moment.title] += 1
+    return [moment for *_, moment in sorted(in_turn, key=lambda ranked: ranked[:2])[:_MOMENTS]]
 
 
 def _potential(
     readout: Readout, listened: Sequence[Outcome], label: str, moments: list[_Moment], aligned: Alignment | None
 ) -> Figure | None:
-    """Draw potential and threshold around moments, with detections, and labels as given and as learnt."""
+    """Draw the sum of frames, potential and threshold around moments, with detections and labels, given and learnt."""
     if not moments:
         return None
     trained = readout.neurons[label]
+    sources = {k: recorded(listened[k].example.source, hold=False) for k in {moment.recording for moment in moments}}
+    sums = {k: (source, _pressed(listened[k], source)) for k, source in sources.items() if isinstance(source, Frames)}
+    rows = 2 if sums else 1
     figure, axes = plt.subplots(
-        1, len(moments), figsize=(2.9 * len(moments), 2.6), layout="constrained", squeeze=False, sharey=True
+        rows,
+        len(moments),
+        figsize=(1.6 + 2.5 * len(moments), 0.7 + 1.9 * rows),
+        layout="constrained",
+        squeeze=False,
+        sharex="col",
     )
-    for axis, moment in zip(axes[0], moments, strict=True):
+    for axis in axes[-1][1:]:
+        axis.sharey(axes[-1][0])
+    lines: dict[str, Any] = {}
+    for column, moment in zip(axes.T, moments, strict=True):
         # Wide enough for the label and its detection, or for what was felt late of one that has none.
         apart = moment.badness if np.isfinite(moment.badness) else _MISSED_MS
         reach = _AROUND * trained.neuron.tau + trained.delay_ms + apart
-        outcome = listened[moment.recording]
+        outcome, at = listened[moment.recording], to_ms(moment.t)
+        if moment.recording in sums:
+            frames, (stamps, total, unit) = sums[moment.recording]
+            reach = max(reach, _FRAMES * to_ms(float(np.median(np.diff(frames.t))))) if len(frames) > 1 else reach
+            near = np.abs(to_ms(stamps) - at) < reach
+            (lines["sum above rest"],) = column[0].plot(
+                to_ms(stamps[near]) - at, total[near], ".-", color=INK, linewidth=1, markersize=3
+            )
+            axes[0][0].set_ylabel(escaped(f"sum, {unit}"))
         trains = readout.trains_of(label, _trains(readout, outcome))
         detected_ms = to_ms(outcome.found[label].t)
-        at = to_ms(moment.t)
-        times = np.linspace(at - reach, at + reach, 600)
+        # A neuron that forgets at once is at its threshold for less than what lies between two of many times.
+        inputs = trains.times[np.abs(trains.times - at) < reach]
+        after = np.linspace(0.0, trained.delay_ms + _AROUND * trained.neuron.tau, 40)
+        times = np.concatenate([np.linspace(at - reach, at + reach, 600), (inputs[:, None] + after).ravel()])
+        times = np.unique(times[times < at + reach])
         crossings = detected_ms + readout.encoder_of(label).latency_ms + trained.delay_ms
         potential = trained.neuron.potential(trained.weights, trains, times, spikes=crossings)
-        axis.plot(times - at, potential, color=_POTENTIAL, linewidth=1, label="potential")
+        (lines["potential"],) = column[-1].plot(times - at, potential, color=_POTENTIAL, linewidth=1)
         threshold = readout.run_threshold * trained.neuron.theta_0
-        axis.axhline(threshold, color="#999999", linewidth=0.8, linestyle=":", label="threshold at rest")
+        lines["threshold at rest"] = column[-1].axhline(threshold, color="#999999", linewidth=0.8, linestyle=":")
         true = to_ms(np.asarray(outcome.example.labels.get(label, ()), np.float64))
         felt = np.empty(0) if aligned is None else to_ms(aligned.felt(moment.recording))
-        lines = (("detected", detected_ms, _DETECTED, "-"), ("true", true, _TRUE, "--"), ("felt", felt, _TRUE, ":"))
-        for title, ms, color, style in lines:
-            for k, t in enumerate(ms[np.abs(ms - at) < reach]):
-                axis.axvline(t - at, color=color, linewidth=1.2, linestyle=style, label=title * (k == 0))
-        axis.set_title(escaped(f"{moment.title}, {(at - to_ms(outcome.begin_us)) / 1000.0:.3f} s"), fontsize=9)
-        axis.set_xlabel("ms from then")
-        axis.legend()
-    axes[0][0].set_ylabel("potential, mV")
+        marks = (("detected", detected_ms, _DETECTED, "-"), ("true", true, _TRUE, "--"), ("felt", felt, _TRUE, ":"))
+        for title, ms, color, style in marks:
+            for t in ms[np.abs(ms - at) < reach]:
+                for axis in column:
+                    lines[title] = axis.axvline(t - at, color=color, linewidth=1.2, linestyle=style)
+        seconds = f"{(at - to_ms(outcome.begin_us)) / 1000.0:.3f} s"
+        source = outcome.name[-_TITLE:] if len(listened) > 1 else ""
+        column[0].set_title(f"{escaped(source)}\n{escaped(f'{moment.title}, {seconds}')}".strip(), fontsize=8)
+        column[-1].set_xlabel("ms from then")
+    axes[-1][0].set_ylabel("potential, mV")
+    figure.legend(list(lines.values()), list(lines), loc="outside right upper")
     return figure
 
 
