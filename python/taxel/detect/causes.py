@@ -31,7 +31,7 @@ from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording.analysis.rest import TIMES_NOISE, ZEROS_BEFORE, of_frames
-from taxel.spikes import SpikeTrains
+from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 
 #: The kinds of causes. Where two concern equally many mistakes the earlier comes first: the later may follow from it.
@@ -682,7 +682,7 @@ def _weak_bursts(examples: Sequence[Example], alignment: Alignment) -> Iterator[
         rest, window_us = resting.mean(), float(np.median(np.diff(source.t)))
         noise = max(resting.std(), rest**0.5, 1.0)
         for t in alignment.given[alignment.unpaired & (alignment.example == k)]:
-            reach_us = 1000 * WINDOW_MS
+            reach_us = to_us(WINDOW_MS)
             near = total[slice(*np.searchsorted(source.t, (t - reach_us, t + reach_us)))] - rest
             by = {
                 n: float(np.convolve(near, np.ones(n), "valid").max()) / (noise * n**0.5)
@@ -690,7 +690,7 @@ def _weak_bursts(examples: Sequence[Example], alignment: Alignment) -> Iterator[
                 if n <= len(near)
             }
             if by and by[1] >= TIMES_NOISE:
-                yield _WeakBurst(window_us / 1000, near.max() + rest, rest, {n: by.get(n, 0.0) for n in _LONGER})
+                yield _WeakBurst(to_ms(window_us), near.max() + rest, rest, {n: by.get(n, 0.0) for n in _LONGER})
 
 
 def _chance(label: str, scored: Score, plain: PlainScore | None) -> str:

@@ -95,10 +95,10 @@ class Reduction:
         left, right, top, bottom = self.bounds(columns, rows)
         width, height = right - left, bottom - top
         if self.side > max(width, height):
-            what = "the region" if self.region else "the sensor"
+            part = "the region" if self.region else "the sensor"
             raise refused(
                 "bin",
-                f" is {self.side}: must be a whole number from 1 to {max(width, height)}, as {what} has "
+                f" is {self.side}: must be a whole number from 1 to {max(width, height)}, as {part} has "
                 f"{width} columns and {height} rows",
             )
         return -(-height // self.side), -(-width // self.side)
