@@ -475,8 +475,9 @@ class Mistakes:
                     continue
                 found += [*self._unlabelled_time(evidence.sound, label), *self._name(label, mistakes)]
                 found += windows[label]
-                # A tare that does not fit lets labels lie far from what is felt, too.
-                if not any(cause.kind in ("foreign_labels", "tare") and label in cause.labels for cause in found):
+                # A tare that does not fit lets labels lie far from what is felt, too, and so does what is felt late.
+                explained = any(cause.kind in ("foreign_labels", "tare") and label in cause.labels for cause in found)
+                if not explained and label not in evidence.felt_apart:
                     found += self._unpaired(evidence.sound, label)
                 # More labels and other parameters are for what nothing else explains.
                 if all(2 * cause.mistakes < mistakes for cause in found if label in cause.labels):
