@@ -172,8 +172,9 @@ def test_a_new_file_never_replaces_another(tmp_path: Path, monkeypatch: pytest.M
 def test_windows_firewall_is_named_on_windows_alone(tmp_path: Path) -> None:
     assert ("Windows' firewall" in _core.FIREWALL) == (sys.platform == "win32")
     with Live(0, host="127.0.0.1", record=tmp_path / "walk.mcap") as live:
+        port = live.address[1]
         said = str(live.stop().verdict)
-    assert said.endswith(f"and to port {live.address[1]}?{_core.FIREWALL}"), said
+    assert said.endswith(f"and to port {port}?{_core.FIREWALL}"), said
 
 
 def test_ctrl_break_stops_as_ctrl_c_does(monkeypatch: pytest.MonkeyPatch) -> None:

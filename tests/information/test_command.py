@@ -217,9 +217,8 @@ def test_what_is_wrong_is_one_clear_error(tmp_path, table, arguments, text):
     taxel.convert(events, tmp_path / "touches.npz")
     (tmp_path / "labels.csv").write_text(table)
     page = tmp_path / "page.html"
-    quick = ["--draws", "1", "--shuffles", "1", "--taxels", "1", "--pools", "2", *arguments]
-    if "--periods" not in arguments:
-        quick += ["--periods", "5"]
+    usual = {"--draws": "1", "--shuffles": "1", "--taxels": "1", "--pools": "2", "--periods": "5"}
+    quick = [word for option, value in usual.items() if option not in arguments for word in (option, value)] + arguments
     done = run(tmp_path / "touches.npz", "--labels", tmp_path / "labels.csv", "--report", page, *quick)
     if text is None:  # fewer groups than folds: as many folds as groups
         assert done.exit_code == 0, done.exception

@@ -123,12 +123,16 @@ def test_what_comes_before_the_first_line_is_counted_and_names_no_column(tmp_pat
         code, out, _ = call(capsys, "record", path, "--port", "0", "--host", LOOPBACK, *source)
     summary = json.loads(out)
     counts = summary["counters"]["sources"]["imu"]
-    assert (code, counts["lines"], counts["strange"]) == (3, 2, 0)
-    assert counts["bytes_in_no_line"] == len(garbage) - garbage.count(b"\n")
-    assert summary["verdict_details"]["parts"]["imu"]["lost"] == {"bytes_in_no_line": counts["bytes_in_no_line"]}
+    # Lines that are short enough to be of numbers are read as lines.
+    strange = garbage.count(b"\n")
+    assert (code, counts["lines"], counts["strange"]) == (3, 2 + strange, strange)
+    assert counts["bytes_in_no_line"] == (0 if strange else len(garbage))
+    lost = {} if strange else {"bytes_in_no_line": len(garbage)}
+    assert summary["verdict_details"]["parts"]["imu"]["lost"] == lost
     assert taxel.open(path).sources["imu"].columns == ["column_0", "column_1"]
     code, out, _ = call(capsys, "info", path)
-    assert f"{counts['bytes_in_no_line']} bytes in no line of numbers" in out.replace("\n", " ")
+    said = f"{strange} lines that could not be read" if strange else f"{len(garbage)} bytes in no line of numbers"
+    assert said in out.replace("\n", " ")
 
 
 def test_without_a_first_line_the_error_says_how_much_came(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from taxel import Array, Frames, Tare
 from taxel.detect.examples import Example
 from taxel.detect.label_times import TOUCH, held_by_tare
-from taxel.recording.analysis.rest import NOISE_FLOOR, of_quiet
+from taxel.recording.analysis.rest import of_quiet
 
 SHAPES = [(1, 1), (1, 4), (1, 16), (4, 4), (10, 12), (60, 80)]
 WINDOWS_US = [5000, 20_000]
@@ -30,7 +30,7 @@ def test_noise_is_quiet_and_no_touch_at_any_rate(shape: tuple[int, int], mean: f
         assert (rest.source, rest.falls, rest.preload_at) == ("quiet", False, "")
         for count in (25, 115, 250):
             tare = Tare.take(frames, stop_us=window_us * count)
-            assert held_by_tare([Example(frames, {}, tare)], NOISE_FLOOR) < TOUCH
+            assert held_by_tare([Example(frames, {}, tare)]) < TOUCH
 
 
 @pytest.mark.parametrize("mean", [0.01, 0.3])
@@ -43,4 +43,4 @@ def test_short_touches_leave_a_quiet_stretch_and_are_seen_in_a_tare(mean: float)
     quiet = of_quiet(touched).quiet_us
     assert quiet is not None
     assert quiet[1] <= 40 * 20_000
-    assert held_by_tare([Example(touched, {}, Tare.take(touched, stop_us=2_300_000))], NOISE_FLOOR) >= TOUCH
+    assert held_by_tare([Example(touched, {}, Tare.take(touched, stop_us=2_300_000))]) >= TOUCH

@@ -245,6 +245,15 @@ def trained(capsys: Any, folder: Path, words: list[Any]) -> tuple[float, str, st
     return wrong([line for line in out.splitlines() if ", neuron: " in line]), advice, out + error
 
 
+def replaced(words: list[Any], more: list[str]) -> list[Any]:
+    """Return words with more options, in the place of those that they replace."""
+    for option in more:
+        if option.startswith("--") and option in words:
+            k = words.index(option)
+            words = words[:k] + words[k + 2 :]
+    return [*words, *more]
+
+
 def wrong(lines: list[str]) -> float:
     """Return how many are missed and false in lines of labels, in shares of the labels."""
     counts = [int(count) for line in lines for count in re.findall(r"(\d+) (?:missed|false)", line)]
@@ -259,7 +268,7 @@ def test_the_first_advice_halves_what_is_missed_and_false(name: str, seed: int, 
     assert advice, printed
     words = situation.words
     if option := re.search(r"--.*(?=\)|$)", advice):
-        words = [*words, *shlex.split(option[0].replace("FILE", str(tmp_path / "rule.json")))]
+        words = replaced(words, shlex.split(option[0].replace("FILE", str(tmp_path / "rule.json"))))
     else:
         situation.carried()
     after, _, printed_after = trained(capsys, tmp_path, words)

@@ -543,11 +543,11 @@ mod tests {
             (frames.found(0).strange(), frames.unread().text.lines, frames.unread().no_text.lines)
         };
         assert_eq!(
-            ["rst:0x1 (POWERON_RESET)", "\u{fffd}\u{1}", "1,2", "boot"].map(&mut push),
+            ["rst:0x1 (POWERON RESET)", "\u{fffd}\u{1}", "1,2", "boot"].map(&mut push),
             [(0, 1, 0), (0, 1, 1), (0, 1, 1), (1, 2, 1)]
         );
         frames.restart();
-        frames.push(&line("rst:0x1 (POWERON_RESET)"), 0);
+        frames.push(&line("rst:0x1 (POWERON RESET)"), 0);
         assert_eq!((frames.found(0).strange(), frames.unread().text.lines), (1, 3));
     }
 

@@ -111,7 +111,7 @@ class FeltLoads:
         """Return how many labels of a name, and begins of loads, have no pair that near; or ends, if that is fewer."""
         assert self._loads is not None
         times = self._loads.truth(label, self._loads.whole_examples)
-        edges = (edge for of in self._felt.items() for edge in self._loads.edges(*of, 1.0, 1))
+        edges = (edge for felt in self._felt.items() for edge in self._loads.edges(*felt, 1.0, 1))
         scores = (score(Detections([label] * len(t), t, known), {label: times}, reach_ms) for t, known, _ in edges)
         return min(found.rank[0] for found in scores)
 
