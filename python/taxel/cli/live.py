@@ -171,10 +171,15 @@ def _show(
     with contextlib.ExitStack() as shown, contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
         if typed.panel:
             control = None if later is not None else typed.control
-            shows = shown.enter_context(
-                Panel(pipeline, control=control, folder=typed.folder, host=typed.panel_host, port=typed.panel_port)
-            )
-            announce(shows, typed.opens, console)
+            try:
+                shows = shown.enter_context(
+                    Panel(pipeline, control=control, folder=typed.folder, host=typed.panel_host, port=typed.panel_port)
+                )
+                announce(shows, typed.opens, console)
+            except ProblemError:
+                if not pipeline.is_over:
+                    raise
+                console.print("the page was not served: the source ended first")
         _watch(pipeline, shows, typed.seconds, console, at_rest, fresh=fresh, control=later)
     return pipeline if shows is None or shows.live is None else shows.live
 
