@@ -84,7 +84,7 @@ impl StreamColumns {
         values.len() == self.columns.len()
     }
 
-    /// Parses a line of numbers ([`cells`]); `None` if a cell is not a number that is held, or if the number of cells differs
+    /// Parses a line of numbers; `None` if a cell is not a number that is held, or if the number of cells differs
     /// from that of columns.
     #[must_use]
     pub fn parse(&self, line: &str) -> Option<Vec<f64>> {
