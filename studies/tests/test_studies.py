@@ -193,7 +193,12 @@ def test_the_command_prints_json(small, capsys):
     ],
 )
 def test_nonsense_ends_in_one_line(small, capsys, more, message):
-    assert ends([*small, *more]) == 2
+    words = list(small)
+    if more[0] in words and more[0] != "--set":
+        # An option of one value is given once.
+        k = words.index(more[0])
+        del words[k : k + 2]
+    assert ends([*words, *more]) == 2
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
