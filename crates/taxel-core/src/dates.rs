@@ -5,7 +5,7 @@ const DAY_US: i64 = 86_400_000_000;
 /// The seconds since 1970, or of the day, of a text of ISO 8601 or of a day with points; none of any other text.
 ///
 /// Days with points are day, month and year (DIN 5008). Days with slashes are none: their order differs by country. Without a
-/// zone a time is of UTC. Of a fraction six digits count.
+/// zone a time is of UTC. Six digits of a fraction count.
 #[must_use]
 #[allow(clippy::cast_precision_loss)]
 pub fn seconds_of(text: &str) -> Option<f64> {

@@ -335,8 +335,8 @@ class Evidence:
     def _shifts(self, wrong: Mapping[str, int]) -> Iterator[Cause]:
         """Yield by how much labels are off, which one option moves if no label is then too far off.
 
-        Where a hand set them live another one is for their spread. Of labels of which others fit those are right that
-        a wider window reaches: what they name is felt late, or early, as the end of a slow release.
+        Labels that a hand set live need a second option, for their spread. Where other labels fit, those that a wider
+        window reaches are right: what they name is felt late, or early, as the end of a slow release.
         """
         distances = self._distances
         all_ms = [distance.ms for distance in distances.values()]

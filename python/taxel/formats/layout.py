@@ -244,8 +244,8 @@ class Layout:
     rate_hz : float, Hz, above 0, optional
         Frames a second, where the recording has no times.
     zeros_before_s : float, s, above 0, at most 60, optional
-        Of recordings whose first frame is loaded, as trials that a contact starts: for how long the sensor is said to
-        have read 0 before.
+        How long the sensor read 0 before recordings whose first frame is loaded, as before trials that a contact
+        starts.
     table : Table, optional
     data : Data, optional
     source : PrintedFrames, optional

@@ -214,7 +214,7 @@ def _from_beginnings(
     """Return events by the times of their recordings, and say of which they are counted from the beginning.
 
     Those are all events of a recording whose times count from 1970, if all lie within its duration. Sources of a file
-    count from the first of them; if they begin apart, nobody knows from which.
+    count from the first of them; if they begin apart, the labels are refused.
     """
     begins: dict[tuple[Path, str], list[int]] = {}
     labelled = [k for k, events in enumerate(each) if any(map(len, events.values()))]

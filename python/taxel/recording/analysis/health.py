@@ -294,7 +294,7 @@ def _unquiet(frames: Frames) -> NDArray[np.bool_]:
     if not known.any():
         return found
     step = float(np.min(steps, where=steps > 0, initial=np.inf))
-    # Of the two in the middle the lower one: of four taxels one may be noisy.
+    # The lower of the two in the middle: one of four taxels may be noisy.
     median = max(float(np.quantile(noise[known], 0.5, method="lower")), step / 2)
     noise = np.where(known, noise, 0.0)
     for row, column in np.argwhere(noise >= UNQUIET_FROM * median).tolist():
