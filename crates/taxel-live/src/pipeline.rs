@@ -22,6 +22,7 @@ mod preview_buffer;
 mod readout_queue;
 mod readout_stage;
 mod receive_stage;
+mod recent_frames;
 mod record_stage;
 mod recording_switch;
 mod rest_shift;

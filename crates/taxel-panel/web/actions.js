@@ -53,11 +53,9 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
     if (!taxel) return notify("point at a taxel first: click a map, or use its arrow keys", true);
     server.request({ type: "zero", taxels: [taxel] }).then(() => notify(`zeroed row ${taxel[1]}, column ${taxel[0]}`), failed);
   };
-  /** Sets the rest of all taxels to their held values: nothing may touch the sensor. */
+  /** Sets the rest of all taxels to their medians of the last second: nothing may touch the sensor. */
   const zeroAll = () => {
-    const { rows, columns, geometry } = maps;
-    const all = Array.from({ length: rows * columns }, (_, k) => /** @type {[number, number]} */ ([k % columns, Math.floor(k / columns)]));
-    const taxels = all.filter((taxel) => geometry.has(...taxel));
+    const taxels = maps.geometry.taxelsThatExist;
     server.request({ type: "zero", taxels }).then(() => notify(`zeroed ${taxels.length} taxels`), failed);
   };
   view.cutHere = cutHere;

@@ -33,6 +33,12 @@ class Sensor {
     return x >= 0 && y >= 0 && x < this.columns && y < this.rows && (!this.exists || this.exists[y * this.columns + x] === "1");
   }
 
+  /** @returns {Taxel[]} those that exist, row by row */
+  get taxelsThatExist() {
+    const all = Array.from({ length: this.rows * this.columns }, (_, k) => /** @type {Taxel} */ ([k % this.columns, Math.floor(k / this.columns)]));
+    return all.filter((taxel) => this.has(...taxel));
+  }
+
   /** @param {number} x @returns {FrameSourceInfo | undefined} the source that a column is of, where there are several */
   source(x) {
     return this.sources.length < 2 ? undefined : this.sources.find(({ left, columns }) => x >= left && x < left + columns);

@@ -359,7 +359,9 @@ export class Maps {
         map.marks.append(mark);
       };
       for (const kind of /** @type {const} */ (["dead", "stuck", "noisy"])) for (const taxel of this.health?.[kind] ?? []) put(taxel, kind);
-      for (const { taxel, rest } of this.zeroed) put(taxel, "zeroed", `, rests at ${rest} ${this.values.unit}`);
+      // Marks on all taxels, as "Zero all" makes them, would tell nothing.
+      const marked = this.zeroed.length < this.geometry.taxelsThatExist.length ? this.zeroed : [];
+      for (const { taxel, rest } of marked) put(taxel, "zeroed", `, rests at ${rest} ${this.values.unit}`);
       map.sources.replaceChildren(...(this.sources.length > 1 ? this.sources.map((source) => this.nameOf(source)) : []));
     }
   }

@@ -109,9 +109,7 @@ impl FrameStage {
             }
             is_new |= self.fit_steps();
             self.change(t);
-            if let Some(noise) = self.measured_noise {
-                self.is_still |= self.shift.take(message.arrived_ns, &self.last, noise);
-            }
+            self.is_still |= self.shift.take(message.arrived_ns, &self.last, self.measured_noise);
             if let Some(falling) = &mut self.falling {
                 falling.take(t, &self.last, self.measured_noise);
                 if self.count.is_multiple_of(LOOK_FRAMES) {
@@ -189,9 +187,9 @@ impl FrameStage {
         &self.last
     }
 
-    /// The value of a taxel in the last frame; none before it.
-    pub(super) fn value(&self, taxel: usize) -> Option<f32> {
-        self.last.get(taxel).copied().filter(|value| !value.is_nan())
+    /// The rest of a taxel that nothing touches now; none before the first frame.
+    pub(super) fn rest_now(&self, taxel: usize) -> Option<f64> {
+        self.shift.rest_now(taxel)
     }
 
     /// Whether the taxels hold still after a gap, once.

@@ -171,8 +171,8 @@ impl Handle {
         self.shared.note(text, false)
     }
 
-    /// Makes the values that these taxels (column, row) hold their rest from now on, in the readout and in the recording's
-    /// previews; the recording states when that was, and the rests before and after. Only done on request.
+    /// Makes the values that these taxels (column, row) hold (of a source of frames: their medians over the last second) their
+    /// rest from now on, in the readout and in the recording's previews; the recording states when that was, and the rests before and after. Only done on request.
     ///
     /// # Errors
     ///

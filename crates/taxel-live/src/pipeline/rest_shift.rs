@@ -1,15 +1,11 @@
 //! Whether the taxels of a source of frames rest elsewhere after a gap than their tare has it, as those of a sensor do that
 //! was unplugged.
 
-use std::collections::VecDeque;
+use super::recent_frames::RecentFrames;
 
 /// A gap lasts so long, ns, and so many frames.
 const GAP_NS: i64 = 1_000_000_000;
 const GAP_FRAMES: f64 = 3.0;
-
-/// The taxels must hold still over so many frames, so far apart, ns.
-const LOOKS: usize = 10;
-const LOOK_EVERY_NS: i64 = 100_000_000;
 
 /// Of so many times its noise a taxel has left its rest, where the readout has no noise floor.
 const NOISE: f64 = 6.0;
@@ -25,8 +21,10 @@ pub(super) struct RestShift {
     noise_floor: f64,
     last_ns: Option<i64>,
     longest_ns: i64,
-    /// The frames since a gap, each with its arrival, ns since 1970.
-    looks: Option<VecDeque<(i64, Vec<f32>)>>,
+    /// Whether the taxels were not still since a gap.
+    is_waiting: bool,
+    /// The frames since a gap.
+    recent: RecentFrames,
     still: Option<StillTaxels>,
 }
 
@@ -46,36 +44,28 @@ impl RestShift {
 
     /// Takes a frame that arrived at `at_ns`, whose values have this noise; returns whether the taxels hold still for the
     /// first time after a gap.
-    pub(super) fn take(&mut self, at_ns: i64, values: &[f32], noise: f64) -> bool {
+    pub(super) fn take(&mut self, at_ns: i64, values: &[f32], noise: Option<f64>) -> bool {
         let silent_ns = self.last_ns.replace(at_ns).map_or(0, |last| at_ns - last);
         if silent_ns >= self.gap_ns {
             self.longest_ns = self.longest_ns.max(silent_ns);
-            self.looks = Some(VecDeque::new());
+            self.recent.clear();
+            self.is_waiting = true;
         }
-        let Some(looks) = &mut self.looks else { return false };
-        if looks.back().is_some_and(|(last_ns, _)| at_ns - last_ns < LOOK_EVERY_NS) {
-            return false;
-        }
-        looks.push_back((at_ns, values.to_vec()));
-        if looks.len() > LOOKS {
-            looks.pop_front();
-        }
+        let is_kept = self.recent.take(at_ns, values);
+        let (true, Some(noise)) = (is_kept && self.is_waiting && self.recent.is_full(), noise) else { return false };
         let floor = if self.noise_floor > 0.0 { self.noise_floor } else { NOISE * noise };
-        if looks.len() < LOOKS {
+        if (0..values.len()).any(|taxel| self.recent.range(taxel) > 2.0 * floor) {
             return false;
         }
-        let mut middles = vec![];
-        for taxel in 0..values.len() {
-            let mut seen: Vec<f64> = looks.iter().map(|(_, frame)| f64::from(frame[taxel])).collect();
-            seen.sort_by(f64::total_cmp);
-            if seen[LOOKS - 1] - seen[0] > 2.0 * floor {
-                return false;
-            }
-            middles.push(f64::midpoint(seen[LOOKS / 2 - 1], seen[LOOKS / 2]));
-        }
-        self.looks = None;
+        self.is_waiting = false;
+        let middles = (0..values.len()).map(|taxel| self.recent.middle(taxel).unwrap_or(f64::NAN)).collect();
         self.still = Some(StillTaxels { values: middles, floor });
         true
+    }
+
+    /// The rest of a taxel that nothing touches now: the median of its last second; none without a value.
+    pub(super) fn rest_now(&self, taxel: usize) -> Option<f64> {
+        self.recent.middle(taxel)
     }
 
     /// What is wrong, if a part of the taxels that hold still lies elsewhere than their rest, in this unit.
@@ -117,7 +107,7 @@ mod tests {
             let moved = |taxel: usize| if k < 100 { 0.0 } else { shift(taxel) };
             let values: Vec<f32> =
                 (0..TAXELS).map(|taxel| (REST + moved(taxel) + random.random_range(-1.7..1.7)) as f32).collect();
-            if watch.take((at_s * 1e9) as i64, &values, 1.0) {
+            if watch.take((at_s * 1e9) as i64, &values, Some(1.0)) {
                 assert!(found.is_none(), "told twice");
                 found = Some(watch.found(&[Some(REST); TAXELS], "counts"));
             }
@@ -150,7 +140,7 @@ mod tests {
         let (mut random, mut watch) = (StdRng::seed_from_u64(3), RestShift::new(10.0, 1e4));
         for k in 0..300_i64 {
             let values: Vec<f32> = (0..TAXELS).map(|_| 500.0 + random.random_range(0.0..99.0)).collect();
-            assert!(!watch.take(k * 10_000_000 + if k > 0 { 2_000_000_000 } else { 0 }, &values, 1.0));
+            assert!(!watch.take(k * 10_000_000 + if k > 0 { 2_000_000_000 } else { 0 }, &values, Some(1.0)));
         }
     }
 
@@ -158,7 +148,7 @@ mod tests {
     fn a_taxel_that_is_zeroed_is_compared_with_its_new_rest() {
         let mut watch = RestShift::new(10.0, 1e4);
         for k in 0..200_i64 {
-            watch.take(k * 10_000_000 + if k > 0 { 2_000_000_000 } else { 0 }, &[532.0; TAXELS], 1.0);
+            watch.take(k * 10_000_000 + if k > 0 { 2_000_000_000 } else { 0 }, &[532.0; TAXELS], Some(1.0));
         }
         assert!(watch.found(&[Some(500.0); TAXELS], "counts").is_some());
         assert_eq!(watch.found(&[Some(532.0); TAXELS], "counts"), None);

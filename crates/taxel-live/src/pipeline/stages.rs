@@ -77,11 +77,11 @@ impl SourceStage {
         }
     }
 
-    /// The value that a taxel holds.
-    fn value(&self, taxel: usize) -> Option<f64> {
+    /// The rest of a taxel that nothing touches now: the held value of a board, the median of a noisy source's last second.
+    fn rest_now(&self, taxel: usize) -> Option<f64> {
         match self {
             Self::Board(decode) => Some(decode.held().values()[taxel]).filter(|&held| held != UNKNOWN).map(f64::from),
-            Self::Frames(frames) => frames.value(taxel).map(f64::from),
+            Self::Frames(frames) => frames.rest_now(taxel),
         }
     }
 }
@@ -285,7 +285,7 @@ impl Stages {
         Ok(())
     }
 
-    /// Makes the values that these taxels hold their rest from now on: where one cannot be zeroed none is.
+    /// Makes what these taxels rest at now their rest: where one cannot be zeroed none is.
     fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let array = &self.shared.options.array;
         let published = self.shared.published();
@@ -301,10 +301,10 @@ impl Stages {
             let mut zeroing = Zeroing { t, x, y, rest: 0.0, before: None };
             zeroing.check(array)?;
             let taxel = array.index(x, y);
-            let Some(held) = self.source.value(taxel) else {
+            let Some(rest) = self.source.rest_now(taxel) else {
                 return Err(problem!("taxel at row {y}, column {x}: no event so far, so its value is unknown").into());
             };
-            zeroing.rest = held;
+            zeroing.rest = rest;
             let tared = published.rest.get(taxel).copied().flatten();
             zeroing.before = published.zeroed.get(&taxel).map(|earlier| earlier.rest).or(tared);
             zeroings.push(zeroing);
