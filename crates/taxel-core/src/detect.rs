@@ -10,6 +10,7 @@ mod running_rule;
 mod score;
 mod stream;
 mod trained;
+mod training_data;
 
 pub use detector::Detector;
 pub use frame_clock::{FrameClock, FrameTime};
@@ -20,6 +21,7 @@ pub use running_rule::Decision;
 pub use score::{Spread, Tally, WIDEST_WINDOW_US, score};
 pub use stream::ReadoutStream;
 pub use trained::{Seen, TrainedNeuron};
+pub use training_data::TrainingData;
 
 use serde::{Deserialize, Serialize};
 

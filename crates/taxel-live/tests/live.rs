@@ -106,6 +106,7 @@ fn readout_of(encoder: &str, cell: TrainedNeuron) -> Readout {
         delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), cell)].into(),
         seen: BTreeMap::new(),
+        training: None,
     }
 }
 

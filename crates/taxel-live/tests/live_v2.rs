@@ -157,6 +157,7 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), cell)].into(),
         seen: BTreeMap::new(),
+        training: None,
     };
     let readout = ReadoutSetup::Reading(Box::new(readout.stream(&array, 192.0, None).expect("a sound readout")));
     let live = Live::start(ANY, options(&array, registers, None), readout, vec![]).expect("a port");

@@ -102,8 +102,8 @@ def _say_found(
             _print(each, given=given, named=several, rows=None if lists else _ROWS * (found.score is None))
             if isinstance(readout, taxel.Readout):
                 say(each.outcome.outside_text)
-        elif each.hint is not None:
-            say(f"{each.outcome.name}: {each.hint}")
+        else:
+            say(*(f"{each.outcome.name}: {remark}" for remark in each.remarks))
     if found.score is not None and not lists:
         say("--list prints the detections")
 
@@ -164,8 +164,7 @@ def _print(each: Detected, *, given: bool, named: bool, rows: int | None) -> Non
     say(repr(detections))
     if each.rest is not None and not given:
         say(f"rest taken: {each.rest}; --tare gives another")
-    if each.hint is not None:
-        say(each.hint)
+    say(*each.remarks)
     first = detections[:rows]
     if not len(first):
         return

@@ -117,13 +117,17 @@ class Loads:
         """Return how long every touch lasted, ms, when it ended."""
         return self._together([curve.at_end() for curve in self._curves["area"]])
 
-    def values(self, quantity: str, parts: Iterable[Stretch]) -> NDArray[np.float64]:
-        """Return what a quantity is after each of its changes in parts of the examples."""
+    def changes(self, quantity: str, k: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return when a quantity changes in example k, us by its clock, and what it is from then on."""
         if quantity not in self._changes:
             self._changes[quantity] = [curve.changes() for curve in self._curves[quantity]]
+        return self._changes[quantity][k]
+
+    def values(self, quantity: str, parts: Iterable[Stretch]) -> NDArray[np.float64]:
+        """Return what a quantity is after each of its changes in parts of the examples."""
         inside = [np.empty(0)]
         for k, start, stop in parts:
-            t, values = self._changes[quantity][k]
+            t, values = self.changes(quantity, k)
             inside.append(values[(t >= start) & (t < stop)])
         return np.concatenate(inside)
 

@@ -121,7 +121,7 @@ class PlainScore:
         ProblemError : no Score
         """
         return {
-            "rules": {label: None if rule is None else dict(rule._parts) for label, rule in self.rules.items()},
+            "rules": {label: None if rule is None else _without_training(rule) for label, rule in self.rules.items()},
             "score": None if self.together is None else self.together.to_dict(),
             "better": list(self.better(than)),
             "sooner": list(self.sooner(than)),
@@ -194,3 +194,8 @@ def _detect(loads: Loads, rules: Mapping[str, PlainRule | None], part: Stretch) 
             found = found._replace(t=found.t[is_label], known=found.known[is_label])
         detections += Detections([label] * len(found.t), found.t, found.known)
     return detections
+
+
+def _without_training(rule: PlainRule) -> dict[str, Any]:
+    """Return the parts of a rule but the summary of its training, which has a mark for each taxel."""
+    return {name: part for name, part in rule._parts.items() if name != "training"}

@@ -395,10 +395,10 @@ class Live:
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
         """Use the values that taxels hold now as their rest from now on: for taxels that drift.
 
-        The new rest of a taxel of frames, which are noisy, is the median of its last second. The readout's encoder reads
-        the taxels above that rest, if it uses a tare; the recording contains the zeroing, with the rests before and
-        after, and `taxel.detect.run` applies it. Only done on request: done automatically, it would use a standing load
-        as the rest.
+        The new rest of a taxel of frames, which are noisy, is the median of its last second. An encoder with a tare
+        reads the taxels above that rest; the recording contains the zeroing, with the rests before and after, and
+        `taxel.detect.run` applies it. Only done on request: done automatically, it would use a standing load as the
+        rest.
 
         Parameters
         ----------

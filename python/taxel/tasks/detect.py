@@ -20,6 +20,7 @@ from taxel.detect.causes import count_drifted
 from taxel.detect.detector import detector
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import score_together
+from taxel.detect.training_data import unlike
 from taxel.encode import ContactArea, Moments
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
@@ -82,14 +83,15 @@ class Detected:
         Detections, score and what was outside the range of the training.
     rest : TakenRest, optional
         Which rest was taken; None where the readout needs none.
-    hint : str, optional
-        What may keep detections away or make false ones: values that fall from their rest, or a drifted rest.
+    remarks : tuple of str
+        What may keep detections away or make false ones: values that fall from their rest, a drifted rest, and in what
+        the recording differs from the training.
     """
 
     recording: Recording
     outcome: Outcome
     rest: TakenRest | None
-    hint: str | None
+    remarks: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the detections as plain values for JSON; a detection has the keys of ``taxel live --json``."""
@@ -100,7 +102,7 @@ class Detected:
             "verdict_details": verdict.to_dict(),
             "outside": self.outcome.outside,
             "rest": None if self.rest is None else self.rest.to_dict(),
-            "hint": self.hint,
+            "remarks": list(self.remarks),
             "detections": [
                 {
                     "label": d.label,
@@ -277,7 +279,7 @@ def _detected(
     example = Example(recording, true, tare, unlabelled=tuple(without))
     scored = score(example._known(found), true, options.window_ms) if true else None
     outcome = Outcome(recording.title, example, found, scored, outside)
-    return Detected(recording, outcome, taken, _hint(outcome, readout))
+    return Detected(recording, outcome, taken, tuple(_remarks(outcome, readout)))
 
 
 def _check_unit(readout: Readout | PlainRule, recording: Recording) -> None:
@@ -325,15 +327,21 @@ def noise_floors(readout: Readout | PlainRule) -> list[float]:
     return [float(part.noise_floor) for part in readout.encoder._each() if isinstance(part, ContactArea | Moments)]
 
 
-def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
+def _remarks(outcome: Outcome, readout: Readout | PlainRule) -> Iterator[str]:
+    """Yield what may keep detections away or make false ones."""
     source, tare = recorded(outcome.example.source, hold=False), outcome.example.tare
     if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
-        return f"rest: {quiet.text(getattr(outcome.example.source, 'path', None))}"
+        # What else is measured is measured upside down.
+        yield f"rest: {quiet.text(getattr(outcome.example.source, 'path', None))}"
+        return
     floors = noise_floors(readout)
-    if tare is None or not floors or isinstance(source, SpikeTrains):
-        return None
-    count = count_drifted(source, tare, max(floors))
-    cause = (
-        f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that lifts are missed"
-    )
-    return f"{cause}: take another tare" if count else None
+    if tare is not None and floors and not isinstance(source, SpikeTrains):
+        count = count_drifted(source, tare, max(floors))
+        if count:
+            yield (
+                f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that touches "
+                "may seem not to end, and others be missed: take a tare between touches nearer to them "
+                "(taxel cut RECORDING FILE --from S --to S, --tare FILE)"
+            )
+    if difference := unlike(readout, outcome.example, outcome.found):
+        yield difference

@@ -27,6 +27,7 @@ from taxel.detect.loads import clock_of
 from taxel.detect.plain_score import plain_score
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import mistakes_of, score_together
+from taxel.detect.training_data import training_data
 from taxel.events import Events
 from taxel.recorded import recorded
 from taxel.recording import Recording
@@ -257,11 +258,17 @@ class _Work:
             plan = choose(self.examples, plan, window_ms=window_ms, progress=self.update)
             trained = fit_aligned(self.examples, plan, self.update)
         outcomes = self._outcomes(trained)
+        data = training_data(self.examples, [outcome.found for outcome in outcomes])
+        trained = trained._replace(readout=trained.readout._with(training=data))
         trained_on = _own(outcomes, window_ms)
         if scored is None:
             truths, sound = [outcome.example.labels for outcome in outcomes], check_examples(self.examples)
             loads = sound, list(truths[0]), [clock_of(example) for example in self.examples]
             scored = replace(trained_on, plain=plain_score(*loads, [], truths, window_ms, self.update))
+        if scored.plain is not None:
+            # The share of touches with a detection is that of the neurons.
+            rules = {label: rule and rule._with(training=data) for label, rule in scored.plain.rules.items()}
+            scored = replace(scored, plain=replace(scored.plain, rules=rules))
         scores = scored.together, trained_on.together, scored.scores
         causes = Mistakes(trained, *scores, search, scored.plain, scored.mistakes, window_ms).causes(evidence)
         if evidence.falls and not causes:

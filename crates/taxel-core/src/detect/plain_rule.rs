@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use crate::allowed::above_0;
 use crate::detect::running_rule::{Limits, RunningRule, When};
-use crate::detect::{FrameClock, FrameTime, ReadoutStream, file};
+use crate::detect::{FrameClock, FrameTime, ReadoutStream, TrainingData, file};
 use crate::encode::{Quantity, Tare};
 use crate::spikes::us;
 use crate::{Array, Error, Result, problem, reading};
@@ -71,6 +71,9 @@ pub struct PlainRule {
     /// The taxels' rest. It is valid for one board on one day: a saved rule has none and receives one when it is used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tare: Option<Tare>,
+    /// What the data of the training were like; `None` if it is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub training: Option<TrainingData>,
 }
 
 impl PlainRule {
@@ -121,6 +124,7 @@ impl PlainRule {
             }
             _ => {}
         }
+        self.training.as_ref().map_or(Ok(()), TrainingData::check)?;
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }
 

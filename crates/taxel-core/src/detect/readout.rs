@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::allowed::{above_0, is_weight, weight_error};
 use crate::detect::stream::{DelayedNeurons, NamedNeuron, Ranges, ReceivedTrains};
-use crate::detect::{self, FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeuron};
+use crate::detect::{self, FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeuron, TrainingData};
 use crate::encode::{Composite, Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
@@ -52,6 +52,9 @@ pub struct Readout {
     /// The range of each neuron's inputs in its training data, by label; empty if it is not known.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub seen: BTreeMap<String, Seen>,
+    /// What the data of the training were like; `None` if it is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub training: Option<TrainingData>,
 }
 
 fn no_delay() -> Vec<f64> {
@@ -76,6 +79,7 @@ impl Readout {
         detect::file::check_unit(self.unit.as_deref())?;
         above_0("run_threshold", self.run_threshold, "")?;
         self.check_delays()?;
+        self.training.as_ref().map_or(Ok(()), TrainingData::check)?;
         if self.neurons.is_empty() {
             return Err(problem!("readout without a neuron: needs one or more"));
         }

@@ -181,6 +181,7 @@ mod tests {
             delays_ms: vec![0.0],
             neurons: [("touch".to_owned(), cell)].into(),
             seen: BTreeMap::new(),
+            training: None,
         };
         SpeculativeReadout::new(Box::new(readout.stream(&array(), 192.0, None).unwrap()))
     }

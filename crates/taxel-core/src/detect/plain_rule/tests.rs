@@ -14,6 +14,7 @@ fn rule() -> PlainRule {
         noise_floor: 0.0,
         unit: Some("kPa".to_owned()),
         tare: None,
+        training: None,
     }
 }
 

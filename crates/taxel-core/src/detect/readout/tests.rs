@@ -29,6 +29,7 @@ fn readout() -> Readout {
         delays_ms: vec![0.0],
         neurons: [("contact".to_owned(), cell(0.2, 3.0)), ("lift".to_owned(), cell(0.5, -0.1))].into(),
         seen: BTreeMap::new(),
+        training: None,
     }
 }
 

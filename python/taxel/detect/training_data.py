@@ -1,0 +1,245 @@
+"""What the data of a training were like, and in what a recording differs from them: no label is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._base.messages import counted
+from taxel._base.progress import reporting
+from taxel._core import ProblemError
+from taxel.detect.detector import _Detector
+from taxel.detect.examples import Example, check_examples
+from taxel.detect.floors import floor_of
+from taxel.detect.label_times import PEAK, TOUCH
+from taxel.detect.loads import Loads, clock_of, lacks_neighbours
+from taxel.detections import Detections
+from taxel.events import Events
+from taxel.formats.event_camera import are_counts
+from taxel.frames import Frames
+from taxel.spikes import SpikeTrains, to_ms, to_us
+
+#: A touch has a detection at most so far before its begin or after its end, ms.
+_NEAR_MS = 100.0
+#: Noise is measured in so many stretches of so many frames, of which this share is quiet.
+_STRETCHES, _FRAMES, _QUIET = 64, 16, 0.1
+#: At most so many frames are looked at for the taxels that touches load; a taxel is loaded in this share of them.
+_LOOKS, _LOADED = 2000, 0.05
+#: A touch has this share of the strength of those that are detected in the training: weaker loads are noise.
+_TOUCH = 0.1
+#: Noise and strength differ from these times on.
+_NOISIER, _WEAKER, _STRONGER = 1.5, 0.6, 1.7
+#: So many touches tell something; this share fewer of them with a detection, or of the loaded taxels, is a difference.
+_LEAST, _FEWER = 5, 0.2
+#: Two detections are close at this part of the shortest time between labels; this share of close ones is a difference.
+_CLOSE, _MANY = 0.5, 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """Hold what was measured in an example."""
+
+    noise: float
+    peaks: NDArray[np.float64]
+    """The largest sum of all taxels above rest in each load, of which those that are strong enough are touches."""
+    begins: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    loaded: NDArray[np.bool_]
+    """Which taxels touches load often, shape (rows, columns), and ..."""
+    reached: NDArray[np.bool_]
+    """... which they load at all."""
+
+    def detected(self, t: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which loads have a detection."""
+        near, ordered = round(to_us(_NEAR_MS)), np.sort(t)
+        first = np.searchsorted(ordered, self.begins - near)
+        return np.asarray(np.searchsorted(ordered, self.ends + near, side="right") > first)
+
+
+def training_data(examples: Sequence[Example], found: Sequence[Detections]) -> dict[str, Any] | None:
+    """Return a summary of the data of a training, as a readout's file holds it; None of spike trains or without a rest.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+    found : sequence of Detections
+        What the readout detects in each of them.
+    """
+    sound = check_examples(examples)
+    measured = [_measured(example) for example in examples]
+    known = [each for each in measured if each is not None]
+    if len(known) < len(measured) or not known:
+        return None
+    shape = tuple(int(size) for size in np.max([each.loaded.shape for each in known], axis=0))
+    touched = np.any([_within(each.loaded, shape) for each in known], axis=0)
+    peaks = np.concatenate([each.peaks for each in known])
+    has = np.concatenate([each.detected(detections.t) for each, detections in zip(known, found, strict=True)])
+    strength = _usual(peaks, _TOUCH * _usual(peaks[has]))
+    are_touches = peaks >= _TOUCH * strength
+    return {
+        "shape": list(shape),
+        "touched": "".join("1" if loaded else "0" for loaded in touched.flat),
+        "noise": float(np.median([each.noise for each in known])),
+        "strength": strength,
+        "detected": float(has[are_touches].mean()) if are_touches.any() else 0.0,
+        "apart_ms": _apart_ms(sound),
+    }
+
+
+def _usual(peaks: NDArray[np.float64], least: float = 0.0) -> float:
+    """Return the median of the peaks of loads, from a least one on; 0 without a load."""
+    touches = peaks[peaks >= least]
+    return float(np.median(touches)) if len(touches) else 0.0
+
+
+def _apart_ms(examples: Sequence[Example]) -> dict[str, float]:
+    """Return the shortest time between two labels of each name, ms; nothing of a name that has but one a recording."""
+    shortest: dict[str, float] = {}
+    for example in examples:
+        for label, times in example.labels.items():
+            apart = np.diff(np.unique(times))
+            if len(apart):
+                shortest[label] = min(shortest.get(label, np.inf), float(to_ms(apart.min())))
+    return shortest
+
+
+def unlike(readout: _Detector, example: Example, found: Detections) -> str:
+    """Return in what a recording and its detections differ from the training; "" where nothing does or is not known.
+
+    Parameters
+    ----------
+    readout : Readout or PlainRule
+    example : Example
+        The recording, with its rest.
+    found : Detections
+    """
+    data: dict[str, Any] | None = readout._parts.get("training")
+    if data is None:
+        return ""
+    measured = _measured(example)
+    is_counts = readout.unit is not None and are_counts(readout.unit)
+    parts = [] if measured is None else _of_sensor(data, measured, found, is_counts=is_counts)
+    parts += _of_detections(data["apart_ms"], readout.labels, found)
+    return f"unlike the training: {'; '.join(parts)}" if parts else ""
+
+
+def _of_sensor(data: Mapping[str, Any], measured: _Measured, found: Detections, *, is_counts: bool) -> list[str]:
+    """Return in what noise, touches and taxels differ."""
+    parts, shape = [], tuple(data["shape"])
+    are_touches = measured.peaks >= _TOUCH * data["strength"]
+    touches = int(np.count_nonzero(are_touches))
+    if any(size > most for size, most in zip(measured.loaded.shape, shape, strict=True)):
+        parts.append("{} x {} taxels, where the training had {} x {}".format(*measured.loaded.shape, *shape))
+    if data["noise"] > 0.0:
+        noisier = measured.noise / data["noise"]
+        if is_counts and noisier**2 >= _NOISIER:
+            # The variance of events by chance is their number.
+            parts.append(f"events at rest are {noisier**2:.2g} times as many")
+        elif noisier >= _NOISIER:
+            parts.append(f"the noise at rest is {noisier:.2g} times as strong")
+    if touches >= _LEAST:
+        ratio = _usual(measured.peaks, _TOUCH * data["strength"]) / data["strength"] if data["strength"] else 1.0
+        if not _WEAKER <= ratio <= _STRONGER:
+            parts.append(f"touches are {ratio:.2g} times as strong")
+        missing = touches - int(np.count_nonzero(measured.detected(found.t) & are_touches))
+        if missing / touches >= 1.0 - data["detected"] + _FEWER:
+            parts.append(
+                f"{missing} of {counted(touches, 'touch', 'touches')} have no detection, in the training "
+                f"{1.0 - data['detected']:.0%}"
+            )
+        # Of counts the pixels that are loaded most are hot ones.
+        if not is_counts and all(size <= most for size, most in zip(measured.loaded.shape, shape, strict=True)):
+            touched = np.frombuffer(data["touched"].encode(), np.uint8).reshape(shape) == ord("1")
+            never = int(np.count_nonzero(touched & ~_within(measured.reached, shape)))
+            if never >= max(1.0, _FEWER * np.count_nonzero(touched)):
+                parts.append(f"{never} of {counted(int(touched.sum()), 'taxel')} that touches loaded are never loaded")
+    return parts
+
+
+def _of_detections(apart_ms: Mapping[str, float], labels: Sequence[str], found: Detections) -> list[str]:
+    """Return which detections follow one another too soon, and of which label there is none."""
+    parts = []
+    for label, shortest in apart_ms.items():
+        t = np.sort(found.t[np.array([each == label for each in found.label], np.bool_)])
+        close = int(np.count_nonzero(to_ms(np.diff(t)) < _CLOSE * shortest))
+        if close > max(2.0, _MANY * len(t)):
+            parts.append(
+                f"{close} of {len(t)} detections of {label} follow another one within {_CLOSE * shortest:.3g} ms, half "
+                "the shortest time between its labels"
+            )
+    counts = {label: sum(each == label for each in found.label) for label in labels}
+    if max(counts.values(), default=0) >= _LEAST:
+        parts += [f"no {label} is detected" for label, count in counts.items() if not count and label in apart_ms]
+    return parts
+
+
+def _within(mask: NDArray[np.bool_], shape: Sequence[int]) -> NDArray[np.bool_]:
+    """Return a mask padded at its far edges to a shape that is as large at least."""
+    return np.pad(mask, [(0, most - size) for size, most in zip(mask.shape, shape, strict=True)])
+
+
+def _measured(given: Example) -> _Measured | None:
+    """Return what is measured in an example; None of spike trains, of one without a rest, and of one that is empty."""
+    try:
+        (example,) = check_examples([given])
+    except ProblemError:
+        return None
+    source, tare = example.source, example.tare
+    if isinstance(source, SpikeTrains) or tare is None or not len(source):  # type: ignore[arg-type]
+        return None
+    assert isinstance(source, Events | Frames)
+    quantity, threshold = ("peak", PEAK) if lacks_neighbours([example]) else ("area", TOUCH)
+    strength = "peak" if quantity == "peak" else "total"
+    floor = floor_of([example])
+    loads = Loads([example], [clock_of(given)], floor, reporting(None), sorted({quantity, strength}))
+    begins, ends = (loads.off(edge, 0).t for edge in loads.edges(quantity, threshold, 1.0, 1))
+    begin, end = _touches(begins, ends, int(source.t[-1]))
+    above = tare.off(_touched(source, begin, end)).values >= _core.touched_above(floor)
+    share = above.mean(axis=0) if len(above) else np.zeros(source.array.shape)
+    peaks = _largest(*loads.changes(strength, 0), begin, end)
+    return _Measured(_noise(source), peaks, begin, end, share >= _LOADED, share > 0.0)
+
+
+def _touches(
+    begins: NDArray[np.int64], ends: NDArray[np.int64], last: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the begin and the end of each touch; one that has not ended lasts until the recording does."""
+    return begins, np.append(ends, last)[: len(begins)] if len(ends) < len(begins) else ends[: len(begins)]
+
+
+def _touched(source: Events | Frames, begin: NDArray[np.int64], end: NDArray[np.int64]) -> Frames:
+    """Return some frames of touches."""
+    if isinstance(source, Events):
+        lasts = int(source.t[-1] - source.t[0])
+        source = Frames.from_events(source, max(1, lasts // _LOOKS), int(source.t[0]))
+    during = np.searchsorted(begin, source.t, side="right") > np.searchsorted(end, source.t, side="right")
+    inside = np.flatnonzero(during)
+    chosen = inside[:: max(1, len(inside) // _LOOKS)]
+    return Frames(source.values[chosen], source.t[chosen], unit=source.unit, array=source.array)
+
+
+def _largest(
+    t: NDArray[np.int64], values: NDArray[np.float64], begin: NDArray[np.int64], end: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return the largest value, of those that hold from each of some times on, in each touch."""
+    if not len(t):
+        return np.zeros(len(begin))
+    first = np.maximum(np.searchsorted(t, begin, side="right") - 1, 0)
+    stop = np.maximum(np.searchsorted(t, end), first + 1)
+    return np.array([values[i:k].max() for i, k in zip(first.tolist(), stop.tolist(), strict=True)])
+
+
+def _noise(source: Events | Frames) -> float:
+    """Return the noise of a taxel of frames while nothing touches: that of the quiet stretches; of events 0."""
+    if isinstance(source, Events) or len(source) < 2 * _FRAMES:
+        return 0.0
+    begins = np.linspace(0, len(source) - _FRAMES, _STRETCHES).astype(np.int64)
+    values = (source.values[begin : begin + _FRAMES].astype(np.float64) for begin in begins)
+    # Of independent noise two neighbours in time differ by twice its variance.
+    squares = [float(np.nanmean(np.diff(stretch, axis=0) ** 2)) / 2.0 for stretch in values]
+    return float(np.quantile(squares, _QUIET)) ** 0.5

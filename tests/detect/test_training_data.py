@@ -1,0 +1,126 @@
+"""What a detection says of a recording that differs from the training: laws on made recordings, with seeds."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import taxel
+from taxel.tasks import DetectOptions, TrainOptions
+
+SHAPE = (8, 8)
+RATE = 100.0
+SEEDS = (1, 2, 3)
+
+
+def made(
+    place: Path,
+    seed: int,
+    *,
+    strength: float = 300.0,
+    noise: float = 2.0,
+    dead: NDArray[np.bool_] | None = None,
+    flicker: bool = False,
+    shape: tuple[int, int] = SHAPE,
+    touches: int = 30,
+) -> tuple[Path, dict[str, NDArray[np.int64]]]:
+    """Write a recording of touches that last .4 s each; return it with the labels."""
+    rng = np.random.default_rng(seed)
+    begins = 300 + np.cumsum(rng.integers(90, 130, touches))
+    values = 500.0 + noise * rng.standard_normal((int(begins[-1]) + 200, *shape))
+    for begin in begins:
+        row, column = rng.integers(0, [size - 3 for size in shape])
+        force = strength * rng.uniform(0.8, 1.2) * np.ones(40)
+        if flicker:
+            force[4::8] = force[5::8] = 0.0
+        values[begin : begin + 40, row : row + 4, column : column + 4] += force[:, None, None]
+    if dead is not None:
+        values[:, dead] = 500.0
+    t = np.arange(len(values)) * round(1e6 / RATE)
+    frames = taxel.Frames(np.round(values), t, unit="counts", array=taxel.Array(*shape))
+    path = place / f"{seed}-{len(list(place.iterdir()))}.npz"
+    taxel.convert(frames, path)
+    return path, {"contact": t[begins], "lift": t[begins + 40]}
+
+
+@pytest.fixture(scope="module")
+def training(tmp_path_factory: pytest.TempPathFactory) -> taxel.tasks.Training:
+    path, labels = made(tmp_path_factory.mktemp("training"), 0, touches=40)
+    return taxel.train(taxel.open(path), [labels], TrainOptions(folds=0))
+
+
+def remarks(training: taxel.tasks.Training, path: Path) -> str:
+    [found] = taxel.tasks.detect(training.readout, taxel.open(path), options=DetectOptions(tare=2.0)).each
+    assert found.to_dict()["remarks"] == list(found.remarks)
+    return "\n".join(found.remarks)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_nothing_is_said_of_a_recording_as_in_the_training(
+    training: taxel.tasks.Training, tmp_path: Path, seed: int
+) -> None:
+    assert remarks(training, made(tmp_path, seed)[0]) == ""
+    assert remarks(training, made(tmp_path, seed, strength=240.0, noise=2.6, touches=12)[0]) == ""
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_noise_strength_and_taxels_that_differ_are_named(
+    training: taxel.tasks.Training, tmp_path: Path, seed: int
+) -> None:
+    def times(what: str, **how: float) -> float:
+        return float(
+            re.search(f"{what} ([0-9.]+) times as strong", remarks(training, made(tmp_path, seed, **how)[0]))[1]
+        )  # type: ignore[index,arg-type]
+
+    assert times("the noise at rest is", noise=6.0) == pytest.approx(3.0, abs=0.3)
+    assert times("touches are", strength=60.0) == pytest.approx(0.2, abs=0.03)
+    assert times("touches are", strength=900.0) == pytest.approx(3.0, abs=0.3)
+    heel = np.zeros(SHAPE, np.bool_)
+    heel[:3] = True
+    assert "taxels that touches loaded are never loaded" in remarks(training, made(tmp_path, seed, dead=heel)[0])
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_touches_without_a_detection_and_detections_too_close_are_counted(
+    training: taxel.tasks.Training, tmp_path: Path, seed: int
+) -> None:
+    path, labels = made(tmp_path, seed, flicker=True)
+    said = remarks(training, path)
+    [found] = taxel.tasks.detect(training.readout, taxel.open(path), labels_of(labels), DetectOptions(tare=2.0)).each
+    assert found.outcome.score is not None
+    assert found.outcome.score.false > 30
+    assert "detections of contact follow another one within" in said
+    # A threshold of so many taxels is out of reach of small touches.
+    rule = taxel.detect.PlainRule("total", 1e5, noise_floor=10.0, unit="counts")
+    data = training.readout._parts["training"]
+    [missed] = taxel.tasks.detect(rule._with(training=data), taxel.open(path), options=DetectOptions(tare=2.0)).each
+    assert "touches have no detection, in the training 0%" in missed.remarks[0]
+
+
+def labels_of(labels: dict[str, NDArray[np.int64]]) -> list[dict[str, NDArray[np.int64]]]:
+    return [labels]
+
+
+def test_a_rule_says_that_it_was_tuned_on_fewer_taxels(training: taxel.tasks.Training, tmp_path: Path) -> None:
+    assert training.scored.plain is not None
+    rule = training.scored.plain.rules["contact"]
+    assert rule is not None
+    path, _ = made(tmp_path, 5, shape=(16, 8))
+    [found] = taxel.tasks.detect(rule, taxel.open(path), options=DetectOptions(tare=2.0)).each
+    assert "unlike the training: 16 x 8 taxels, where the training had 8 x 8" in found.remarks[0]
+
+
+def test_a_readout_without_the_summary_says_nothing_and_one_with_it_comes_back(
+    training: taxel.tasks.Training, tmp_path: Path
+) -> None:
+    path, _ = made(tmp_path, 1, noise=6.0)
+    saved = training.readout.save(tmp_path / "readout.json")
+    again = taxel.detect.load(saved)
+    assert again.to_json() == training.readout.to_json()
+    bare = training.readout._with(training=None)
+    [found] = taxel.tasks.detect(bare, taxel.open(path), options=DetectOptions(tare=2.0)).each
+    assert found.remarks == ()
