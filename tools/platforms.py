@@ -83,7 +83,13 @@ LEFT_OUT: dict[str, dict[str, str]] = {
         "control message UDP_SEGMENT",
     },
     "arm-rust": {},
-    "windows": OF_THE_CHECKOUT,
+    "windows": OF_THE_CHECKOUT
+    | {
+        "tests/test_systems.py::test_a_board_is_recorded_and_labelled_in_any_folder[300-characters]": "wine names a path of that "
+        "length that is not there by an error (234) which Python expects of none",
+        "tests/test_systems.py::test_a_recording_is_complete_after_ctrl_break": "wine passes no Ctrl-Break on to another process "
+        "where there is no console",
+    },
 }
 #: Runs a program in a tree: its /proc and /dev exist for it and its children alone, which end with it.
 IN_TREE = """
@@ -93,8 +99,8 @@ mount -t tmpfs -o mode=755 tmpfs "$1/dev"
 for device in null:3 zero:5 full:7 random:8 urandom:9; do mknod -m 666 "$1/dev/${device%:*}" c 1 "${device#*:}"; done
 exec chroot "$@"
 """
-#: Runs a Windows program in the folder of Windows; wine's server stores the registry before it ends.
-WINE = 'cd /root/windows; wine64 "$@"; code=$?; /usr/lib/x86_64-linux-gnu/wine/wineserver -w; exit $code'
+#: Runs a Windows program in the folder of Windows; wine's server then ends what it left behind, and stores the registry.
+WINE = 'cd /root/windows; wine64 "$@"; code=$?; cd /usr/lib/x86_64-linux-gnu/wine; ./wineserver -k; ./wineserver -w; exit $code'
 
 
 class PlatformError(Exception):
