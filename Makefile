@@ -45,7 +45,6 @@ EXTRAS_test := test beside foxglove neo nir nwb cluster bench
 EXTRAS_lint := lint
 EXTRAS_docs := docs
 EXTRAS_dist := dist
-EXTRAS_platforms := platforms
 $(VENV)/.for-%: $(PROJECTS) | $(VENV)/.installed
 	@echo "taxel: installing what make $* needs"
 	@$(wanted) $(EXTRAS_$*) > $(VENV)/wanted-$*.txt
@@ -203,7 +202,7 @@ dist: $(VENV)/.for-dist
 	@ls -l dist
 
 # The wheels of dist/ on other systems.
-platforms: $(VENV)/.for-test $(VENV)/.for-dist $(VENV)/.for-platforms
+platforms: $(VENV)/.for-test $(VENV)/.for-dist
 	@test -n "$(wildcard dist/*.whl)" || $(MAKE) --no-print-directory dist
 	@$(BIN)/python tools/platforms.py
 

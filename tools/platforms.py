@@ -61,11 +61,37 @@ TESTS = (
     "tests/test_command_line.py",
     "tests/live/test_files.py",
 )
-#: Tests that are left out, by pytest's name, and why; of Rust by its own.
+#: Tests that are left out on every other system, by pytest's name, and why.
+OF_THE_CHECKOUT = {
+    "tests/wire/test_registers_source.py": "reads the sources, which are the same for all systems",
+    "tests/encode/test_laws.py::test_an_encoder_has_a_file_in_each_place_and_nothing_is_left_out": "reads the sources",
+    "tests/test_command_line.py::test_exit_codes_are_those_of_the_docs": "reads the documentation",
+    "tests/test_command_line.py::test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work": "taxel study and "
+    "taxel bench are other wheels",
+    "tests/test_command_line.py::test_an_error_names_what_was_typed[arguments45---set kappa: must be KEY=VALUE]": "taxel study "
+    "is another wheel",
+    "tests/detect/test_scoring.py::test_detections_come_back_from_neo": "neo is not installed",
+}
+STARTS = "tests/test_command_line.py::test_ctrl_c_while_it_starts_ends_quietly"
+EARLY = "qemu's vfork does not wait for exec: the test sees its own libraries in the new process and interrupts it too early"
+#: Those of each system; of Rust by its own name.
 LEFT_OUT: dict[str, dict[str, str]] = {
-    "arm": {},
+    "arm": OF_THE_CHECKOUT
+    | {f"{STARTS}[{after}]": EARLY for after in (0.0, 0.1, 0.3)}
+    | {
+        "tests/test_command_line.py::test_a_datagram_larger_than_the_paths_mtu_is_named_in_the_error[True]": "qemu lacks the "
+        "control message UDP_SEGMENT",
+        "tests/learn/test_cone_x.py::test_control_c_stops_a_fit_at_once_keeps_the_best_so_far_and_then_raises": "an emulated "
+        "processor has no first result within the 0.5 s after which it is interrupted",
+    },
     "arm-rust": {},
-    "windows": {},
+    "windows": OF_THE_CHECKOUT
+    | {
+        "tests/test_systems.py::test_a_board_is_recorded_and_labelled_in_any_folder[300-characters]": "wine names a path of that "
+        "length that is not there by an error (234) which Python expects of none",
+        "tests/test_systems.py::test_a_recording_is_complete_after_ctrl_break": "wine passes no Ctrl-Break on to another process "
+        "where there is no console",
+    },
 }
 #: Runs a program in a tree: its /proc and /dev exist for it and its children alone, which end with it.
 IN_TREE = """
@@ -75,8 +101,8 @@ mount -t tmpfs -o mode=755 tmpfs "$1/dev"
 for device in null:3 zero:5 full:7 random:8 urandom:9; do mknod -m 666 "$1/dev/${device%:*}" c 1 "${device#*:}"; done
 exec chroot "$@"
 """
-#: Runs a Windows program in the folder of Windows; wine's server stores the registry before it ends.
-WINE = 'cd /root/windows; wine64 "$@"; code=$?; /usr/lib/x86_64-linux-gnu/wine/wineserver -w; exit $code'
+#: Runs a Windows program in the folder of Windows; wine's server then ends what it left behind, and stores the registry.
+WINE = 'cd /root/windows; wine64 "$@"; code=$?; cd /usr/lib/x86_64-linux-gnu/wine; ./wineserver -k; ./wineserver -w; exit $code'
 
 
 class PlatformError(Exception):
@@ -208,11 +234,11 @@ def test(part: Part, folder: Path, python: Callable[..., str]) -> str:
     copy_tests(folder)
     shutil.rmtree(folder / "demo", ignore_errors=True)
     shutil.copytree(LINUX / "written", folder / "Linux", dirs_exist_ok=True)
-    options = ["-q", "-p", "no:cacheprovider", "-o", "timeout=3000", "-m", "not slow"]
+    options = ["-v", "-p", "no:cacheprovider", "-o", "timeout=3000", "-m", "not slow"]
     left_out = [f"--deselect={name}" for name in LEFT_OUT[part.name]]
     counted, faults = "", []
     steps: tuple[Callable[[], object], ...] = (
-        lambda: python("-m", "pytest", *options, *TESTS, *left_out).splitlines()[-1],
+        lambda: python("-m", "pytest", *options, *TESTS, *left_out).splitlines()[-1].strip("= "),
         lambda: python("-m", "taxel", "demo", "--scenes", "2", "--seed", "1", "--no-clock", "--folder", "demo"),
         lambda: results(python, "Linux"),
     )

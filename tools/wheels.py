@@ -13,7 +13,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 BIN = Path(sys.executable).parent
-CRATES = ("crates/taxel-python", "rules")
+#: Crates with a compiled part, and its name.
+CRATES = {"crates/taxel-python": "_core", "rules": "_rules"}
 #: What Rust calls a target, and what a user does.
 TARGETS = {
     "x86_64-unknown-linux-gnu": "Linux on x86-64",
@@ -43,10 +44,20 @@ def library(target: str) -> dict[str, str] | None:
 def build(target: str, variables: dict[str, str]) -> None:
     """Build the wheels of a target, and check the glibc of those for Linux."""
     environment = {**os.environ, **variables, "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
-    for crate in CRATES:
+    if "windows" in target:
+        # Maturin's own way, --zig, passes a list of exports that lld refuses (1.16): to other crates too, by a name with a dot.
+        environment |= {"CARGO": str(BIN / "cargo-zigbuild"), "ZIG_COMMAND": f"{sys.executable} -m ziglang"}
+    for crate, module in CRATES.items():
         before = set((ROOT / "dist").glob("*.whl"))
-        command = ["maturin", "build", "--release", "--zig", "--compatibility", GLIBC, "--target", target]
+        command = ["maturin", "build", "--release", "--target", target]
         command += ["--out", "dist", "--manifest-path", f"{crate}/Cargo.toml"]
+        if "linux" in target:
+            command += ["--zig", "--compatibility", GLIBC]
+        else:
+            # Without this list zig's linker exports, and so keeps, every function.
+            exports = ROOT / "target" / f"{module}.def"
+            exports.write_text(f"EXPORTS\n    PyInit_{module}\n")
+            command += ["--", "-C", f"link-arg={exports}"]
         subprocess.run(command, cwd=ROOT, env=environment, check=True)
         if "linux" in target:
             (wheel,) = set((ROOT / "dist").glob("*.whl")) - before
