@@ -185,7 +185,15 @@ class Array:
     @classmethod
     def _of(cls, array: object) -> Array:
         """Return the given array, or the thesis' array for None."""
-        return cls.thesis() if array is None else instance("array", array, cls)
+        return cls.thesis() if array is None else cls._given(array)
+
+    @classmethod
+    def _given(cls, array: object) -> Array:
+        """Return a given array; where it is two numbers, as a shape, say what makes an array of them."""
+        if isinstance(array, tuple | list) and len(array) == 2 and all(type(side) is int for side in array):
+            wanted = f"must be taxel.Array({array[0]}, {array[1]}), of so many rows and columns"
+            raise refused("array", f" is {shown(array)}: {wanted}")
+        return instance("array", array, cls)
 
     @classmethod
     def _beside(cls, arrays: Sequence[Array], gap: int = 0) -> tuple[Array, list[int]]:

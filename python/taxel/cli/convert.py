@@ -84,7 +84,7 @@ def _targets(opened: list[Recording], folder: Path) -> list[Path]:
     """Return the new files of recordings in a folder, which is created."""
     folder.mkdir(parents=True, exist_ok=True)
     stems = [Path(each.name).stem if each.path.name == each.name else each.name for each in opened]
-    targets = [folder / f"{re.sub(r'[^A-Za-z0-9._-]+', '_', stem)}.mcap" for stem in stems]
+    targets = [folder / (re.sub(r"[^\w.-]+", "_", stem) + ".mcap") for stem in stems]
     twice = next((target for target in targets if targets.count(target) > 1), None)
     if twice is not None:
         raise ProblemError(f"{twice}: two recordings have this name; convert them one by one")

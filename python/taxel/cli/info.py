@@ -40,6 +40,8 @@ app = App()
 _PICTURES = (".png", ".svg", ".pdf")
 #: Verdicts that name no fault.
 _SOUND = ("complete", "complete after arrival", "unknown")
+#: Columns of the table of several recordings: how many taxels do not work.
+_TAXELS = ("dead", "stuck", "noisy")
 
 
 @app.command()
@@ -188,10 +190,16 @@ def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:
     sums = {noun: sum(facts.get(f"{noun}s", 0) for facts in sensors) for noun in ("event", "frame")}
     notes = Counter(note["text"] for facts in of_each for note in _notes(facts))
     faults = Counter(str(facts["verdict"]) for facts in of_each if facts["verdict"].status not in _SOUND)
-    head = ("recording", "array", "time (s)", "contents", "rate (1/s)", "notes", "verdict")
+    # Columns that say the same of each recording say nothing.
+    with_gaps = any(facts["gaps"] for facts in sensors)
+    with_verdict = any(facts["verdict"].status != "unknown" for facts in sensors)
+    head = ("recording", "array", "time (s)", "contents", "rate (1/s)", "notes", *_TAXELS)
+    head += ("gaps",) * with_gaps + ("verdict",) * with_verdict
     contents = ", ".join(counted(total, noun) for noun, total in sums.items() if total)
-    last = ("sum", "", f"{sum(facts['seconds'] for facts in sensors):.3f}", contents, "", str(notes.total()), "")
-    rows = [head, *map(_row, sensors), last]
+    bad = [str(sum(len(facts["taxels"][name]) for facts in sensors)) for name in _TAXELS]
+    last = ("sum", "", f"{sum(facts['seconds'] for facts in sensors):.3f}", contents, "", str(notes.total()), *bad)
+    last += ("",) * (with_gaps + with_verdict)
+    rows = [head, *(_row(facts, with_gaps=with_gaps, with_verdict=with_verdict) for facts in sensors), last]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     of_notes = ", ".join(f"{text} {count}" for text, count in sorted(notes.items()))
     return [
@@ -213,7 +221,7 @@ def _notes(facts: dict[str, Any]) -> list[dict[str, Any]]:
     return next((notes for sensor in _sensors(facts) if (notes := sensor["notes"])), [])
 
 
-def _row(facts: dict[str, Any]) -> tuple[str, ...]:
+def _row(facts: dict[str, Any], *, with_gaps: bool, with_verdict: bool) -> tuple[str, ...]:
     """Return the cells of a sensor in the table of several recordings."""
     array, events = Array._from_geometry(facts["array"]), facts.get("events")
     rate = facts["frames_per_s"] if events is None else facts["events_per_s_board"]
@@ -224,8 +232,14 @@ def _row(facts: dict[str, Any]) -> tuple[str, ...]:
         f"{counted(facts['frames'], 'frame')} ({facts['unit']})" if events is None else counted(events, "event"),
         "" if rate is None else f"{rate:.4g}",
         str(len(facts["notes"])),
-        facts["verdict"].status,
+        *(str(len(facts["taxels"][name])) for name in _TAXELS),
+        *([_gaps(facts["gaps"])] if with_gaps else []),
+        *([facts["verdict"].status] if with_verdict else []),
     )
+
+
+def _gaps(gaps: dict[str, int] | None) -> str:
+    return "" if gaps is None else f"{gaps['count']} ({gaps['total_us'] / 1e6:.3g} s)"
 
 
 def _pages(facts: dict[str, Any]) -> list[str]:
@@ -277,6 +291,8 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield from _time(facts)
     if "events" in facts:
         words = f"{facts['intensities']} with intensity, {counted(len(facts['markers']), 'marker')}"
+        if facts.get("on_share") is not None:
+            words = f"{100 * facts['on_share']:.1f} % on"
         yield "events", f"{facts['events']}, {words}"
     else:
         yield ("samples" if "columns" in facts else "frames"), f"{facts['frames']} ({facts['unit']})"
@@ -307,7 +323,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield what frames lack: values, times, and loads beyond the sensor's range."""
+    """Yield what frames lack: values, and loads beyond the sensor's range."""
     if facts["missing"]["values"]:
         yield "missing values", f"{facts['missing']['values']} of {facts['missing']['of']}"
     if (full := facts["full_scale"]) is not None:
@@ -316,9 +332,6 @@ def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
             f"{counted(full['readings'], 'reading')} of {counted(full['taxels'], 'taxel')} {are} at {full['value']:g}"
         )
         yield "full scale", f"{readings}, the greatest value: larger loads may be cut off"
-    if (gaps := facts["gaps"]) is not None:
-        longest = f"the longest {to_ms(gaps['longest_us']):g} ms, from {gaps['t_us'] - _begin_us(facts)} us"
-        yield "gaps", f"{gaps['count']} of more than 2.5 intervals between frames, {longest}"
 
 
 def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -330,7 +343,8 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
     for name, taxels in facts["taxels"].items():
         yield f"{name} taxels", f"{len(taxels)}{at(taxels, len(taxels))}"
-    if untested := facts["taxels_untested"]:
+    # Of a camera's pixels few see each touch.
+    if (untested := facts["taxels_untested"]) and "on_share" not in facts:
         # The places of most of an array say nothing.
         few = 2 * untested <= Array._from_geometry(facts["array"]).taxels
         where = at(facts["taxels_untested_at"], untested) if few else ""
@@ -374,8 +388,11 @@ def _pressure(pressed: dict[str, Any], begin_us: int, *, timed: bool) -> Iterato
 def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if facts.get("events_per_s_board") is not None:
         peak = f"{facts['peak_events_per_s_board']:.0f} events/s in the busiest 10 ms"
+        if facts.get("events_per_s_rest") is not None:
+            peak = f"{facts['events_per_s_rest']:.0f} events/s in the quiet tenth of the time, {peak}"
         before = ", before the start marker, where a board sends the rest of every taxel" * facts["peak_before_start"]
-        yield "rate, board", f"{facts['events_per_s_board']:.0f} events/s; {peak}{before}"
+        name = "rate" if "on_share" in facts else "rate, board"
+        yield name, f"{facts['events_per_s_board']:.0f} events/s; {peak}{before}"
     if facts.get("frames_per_s") is not None:
         yield "rate", f"{facts['frames_per_s']:.1f} frames/s"
     if facts.get("events_per_s_host") is not None:

@@ -205,7 +205,8 @@ def _write_rules(plain: PlainScore | None, path_given: Path | None, *, overwrite
 
 def _of_label(path: Path, label: str) -> Path:
     """Return the file of the rule of one of several labels."""
-    return path.parent / f"{path.stem}.{re.sub('[^A-Za-z0-9_-]', '_', label)}{path.suffix}"
+    name = re.sub(r"[^\w-]", "_", label)
+    return path.parent / f"{path.stem}.{name}{path.suffix}"
 
 
 def _next(training: Training, out: Path, tare: str | None) -> str:

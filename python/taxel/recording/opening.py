@@ -261,14 +261,14 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
                 assert layout is not None  # one without is refused
                 if options.topics.are_given:
                     raise ProblemError(f"{path}: no ROS bag; topic, field, types and ros are of one")
-                array = None if options.array is None else instance("array", options.array, Array)
+                array = None if options.array is None else Array._given(options.array)
                 contents = Contents.single(read_foreign(path, layout, array))
                 if array is not None and not contents.main.has_events:
                     contents = Contents.single(_on_given(contents.main, array))
             case recognition.TaxelFile(kind):
                 if options.topics.are_given:
                     raise ProblemError(f"{path}: a .{kind}; topic, field, types and ros are of a ROS bag")
-                array = None if options.array is None else instance("array", options.array, Array)
+                array = None if options.array is None else Array._given(options.array)
                 if kind == "records" and array is None and layout is not None:
                     array = layout.grid()
                 contents = _read(path, kind, array, options.pairing, options.differences)

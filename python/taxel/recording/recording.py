@@ -27,6 +27,7 @@ from taxel.recording.between import Slices, between, inside
 from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Contents, FrameSource, S, Stream, refuse_several
 from taxel.recording.frames import as_frames, at_rate, calibrate
+from taxel.recording.gaps import Gaps, gaps_of, with_gaps
 from taxel.recording.kinds import kind_of_file, verdict_of
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import UNKNOWN, Once
@@ -91,6 +92,7 @@ class Recording:
         self.path, self.name, self.kind = main.origin.path, main.origin.name, main.origin.kind
         self.array, self.source = main.sensor.array, main.origin.source
         self._cut_from: tuple[weakref.ref[Recording], float, float] | None = None
+        self._gaps: Once[Gaps | None] = Once(lambda: None if contents.is_several else gaps_of(main))
 
     path: Path
     name: str
@@ -358,10 +360,12 @@ class Recording:
     def verdict(self) -> Verdict:
         """What was lost at which stage: a line of text, with a status and numbers by cause (`taxel.Verdict`).
 
-        That of a part is that of the whole file. The page *What the output means* lists statuses, causes and wordings;
-        all else there is to know is in `remarks`.
+        That of a part is that of the whole file. Gaps of frames with times, and of the events of a camera, are those of
+        the part. The page *What the output means* lists statuses, causes and wordings; all else there is to know is in
+        `remarks`.
         """
-        return verdict_of(self._contents.main)
+        each = self.sources if self.is_several else {self.label: self}
+        return with_gaps(verdict_of(self._contents.main), {name: source._gaps() for name, source in each.items()})
 
     @property
     def remarks(self) -> tuple[str, ...]:

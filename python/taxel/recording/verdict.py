@@ -99,6 +99,12 @@ class Verdict(str):
         """Return the verdict on the recording whose times are later by so many us."""
         return self._of({"later": [shift, self._held]})
 
+    def _noting(self, texts: Iterable[str], noted: Mapping[str, int]) -> Self:
+        """Return the same verdict with more texts at its end, and more that is no loss of its own."""
+        return self._from(
+            {**self._held, "text": "; ".join([str(self), *texts]), "noted": {**self._held["noted"], **noted}}
+        )
+
     @property
     def status(self) -> Status:
         """How much of the recording is there."""

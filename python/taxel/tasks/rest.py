@@ -22,6 +22,7 @@ from taxel._core import ProblemError
 from taxel.detect import Example
 from taxel.detect.label_times import TOUCH, held_by_tare
 from taxel.events import Events
+from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording, open_one
@@ -44,8 +45,18 @@ _LEAST_FRAMES = 20
 #: than this share of all are many. It has no load that stays for a while if it reads as much in all but this share of
 #: the frames, of so many.
 _TIMES, _MANY, _LOWEST, _FRAMES = 3.0, 0.25, 0.05, 2000
+#: A recording begins loaded if the sum of its first so many frames is so many times its least sums, and not less than
+#: its largest ones by more.
+_FIRST_FRAMES, _LOADED_TIMES = 5, 10.0
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
+
+
+class UnknownRestError(ProblemError):
+    """Say that the rest of a recording's taxels is not known, as nothing in it is quiet: a tare must be given.
+
+    Of several recordings the others can still be detected.
+    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +113,8 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
 
     Raises
     ------
-    ProblemError : nothing is quiet, so that a tare must be given; a given one is invalid
+    UnknownRestError : nothing is quiet, so that a tare must be given
+    ProblemError : a given tare is invalid
     FormatError : the file is neither a tare nor a recording
 
     Examples
@@ -130,7 +142,7 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     if warning:
         warn(warning, stacklevel=2)
     if span is None:
-        error = ProblemError(
+        error = UnknownRestError(
             f"{recording.path}: the rest of its taxels is not known, as no half second is quiet with nothing on it"
             + (_slow(source) or _begun_loaded(source))
         )
@@ -338,7 +350,7 @@ def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Ta
         ends += [t for t, start in source.markers if start and t > first]
     if not ends or min(ends) - first < _LEAST_REST_US:
         content = f"only {to_ms(max(0, min(ends) - first)):g} ms before its first label" if ends else "no label"
-        error = ProblemError(
+        error = UnknownRestError(
             f"{recording.path}: holds {content}, from which to take the taxels' rest{_begun_loaded(source)}"
         )
         raise helped(error, "tare", "give")
@@ -352,10 +364,17 @@ def _slow(source: Events | Frames) -> str:
 
 
 def _begun_loaded(source: Events | Frames) -> str:
-    """Return what helps if a recording may begin loaded, whose taxels all read 0 at some time; else ""."""
-    if not isinstance(source, Frames) or not source.values[:1].any() or source.values.min(axis=0).any():
+    """Return what helps if a recording of taxels that read 0 at some time seems to begin loaded; else "".
+
+    It does if the sum of all taxels in its first frames is far above its least ones, and not far below its largest
+    ones. Counts of events do not: noise alone counts, and is 0 at times.
+    """
+    if not isinstance(source, Frames) or are_counts(source.unit) or source.values.min(axis=0, initial=np.inf).any():
         return ""
-    return f"; where trials begin loaded, {ZEROS_BEFORE} helps"
+    sums = np.nansum(source.values, axis=(1, 2), dtype=np.float64)
+    begin, (least, most) = np.median(sums[:_FIRST_FRAMES]), np.quantile(sums, (_LOWEST, 1 - _LOWEST))
+    is_loaded = begin > 0 and begin >= _LOADED_TIMES * least and begin >= most / _LOADED_TIMES
+    return f"; where trials begin loaded, {ZEROS_BEFORE} helps" if is_loaded else ""
 
 
 def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare | None:

@@ -6,7 +6,10 @@ use std::collections::BTreeSet;
 pub const NOISE_FLOOR: f64 = 3.0;
 
 /// Units of force and pressure, in which the rest of a taxel is 0.
-pub const FORCE_UNITS: [&str; 5] = ["N", "mN", "kPa", "Pa", "N/cm2"];
+pub const FORCE_UNITS: [&str; 20] = [
+    "N", "mN", "kN", "gf", "kgf", "Pa", "hPa", "kPa", "MPa", "mbar", "bar", "psi", "mmHg", "N/cm2", "N/cm²", "N/mm2",
+    "N/mm²", "N/m2", "N/m²", "kgf/cm2",
+];
 
 /// Half a tick, which is added to the noise floor as a threshold: the rest is a mean, and values are whole ticks.
 const HALF_TICK: f64 = 0.5;

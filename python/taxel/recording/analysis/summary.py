@@ -5,19 +5,20 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from taxel.clock import doubt
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.analysis.health import health
 from taxel.recording.analysis.pressure import Series
+from taxel.recording.gaps import of_camera
 from taxel.recording.recording import Recording
 
 #: The interval over which the highest rate is measured, us.
 _PEAK_US = 10_000
-#: Reading: frames are apart by a gap if by so many median intervals.
-_GAP = 2.5
+#: Reading: an event camera's rate at rest is that which this share of intervals of so many us do not exceed, of at most
+#: so many; those without an event, as in a gap, are left out.
+_REST_SHARE, _REST_US, _MOST_INTERVALS = 0.1, 100_000, 1_000_000
 #: Reading: a taxel was at full scale if it read the greatest value in so many frames, of at least so many levels.
 _AT_TOP, _LEVELS = 3, 50
 #: Reading: readings are cut off if the greatest value is so many times as frequent as each of so many values below it.
@@ -58,13 +59,19 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         facts["intensities"] = 0 if events.present is None else int(events.present.sum())
         facts["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
         facts["events_per_s_board"] = len(events) / seconds if seconds else None
+        if of_camera(recording._contents.main):
+            facts |= {
+                "on_share": float(events.p.mean()) if len(events) else None,
+                "events_per_s_rest": _at_rest(events),
+            }
         facts["peak_events_per_s_board"], facts["peak_before_start"] = _peak(events)
     else:
         facts["frames"], facts["unit"] = len(table), table.unit
         facts["frames_per_s"] = (len(table) - 1) / seconds if seconds else None
         facts["missing"] = {"values": table.missing, "of": table.values.size}
         facts["full_scale"] = _full_scale(table)
-        facts["gaps"] = _gaps(table.t) if recording.timed else None
+    gaps = recording._gaps()
+    facts["gaps"] = None if gaps is None else gaps.to_dict()
     clock = recording.clock
     if clock is not None and len(clock.board_us) > 1:
         host = (int(clock.arrived_ns.max()) - int(clock.arrived_ns.min())) / 1e9
@@ -153,14 +160,15 @@ def _full_scale(frames: Frames) -> dict[str, Any] | None:
     return {"value": top, "readings": readings, "taxels": taxels} if cut_off else None
 
 
-def _gaps(t: NDArray[np.int64]) -> dict[str, int] | None:
-    """Return the number of gaps between frames, and the length (us) and begin of the longest; None without any."""
-    apart = np.diff(t)
-    gaps = np.flatnonzero(apart > _GAP * np.median(apart)) if len(apart) else apart
-    if not len(gaps):
+def _at_rest(events: Events) -> float | None:
+    """Return the rate of an event camera at rest, events/s: that of its quiet intervals."""
+    if not len(events):
         return None
-    longest = int(apart.argmax())
-    return {"count": len(gaps), "longest_us": int(apart[longest]), "t_us": int(t[longest])}
+    first, last = int(events.t[0]), int(events.t[-1])
+    interval = max(_REST_US, -(-(last - first) // _MOST_INTERVALS))
+    counts = np.diff(np.searchsorted(events.t, np.arange(first, last + 1, interval)))
+    counts = counts[counts > 0]
+    return float(np.quantile(counts, _REST_SHARE)) / (interval / 1e6) if len(counts) else None
 
 
 def _peak(events: Events) -> tuple[float | None, bool]:

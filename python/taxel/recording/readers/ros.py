@@ -80,7 +80,10 @@ def _texts(name: str, texts: str | Sequence[str] | None) -> list[str]:
 def _arrays(array: Array | Sequence[Array] | None) -> list[Array]:
     if array is None or isinstance(array, Array):
         return [] if array is None else [array]
-    return [arguments.instance("array", entry, Array) for entry in arguments.several("array", array)]
+    entries = arguments.several("array", array)
+    if entries and not isinstance(entries[0], Array):
+        Array._given(array)
+    return [arguments.instance("array", entry, Array) for entry in entries]
 
 
 def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) -> Contents:

@@ -43,8 +43,16 @@ _COUNTS = re.compile(
 )
 #: Names of columns with a number each, as taxels of a grid have, and no words.
 _NUMBERED = re.compile(r"[^\W\d]{0,12}[ _\-\[(.]*\d+[\])]?", re.UNICODE)
-#: A unit of a force, a pressure or a voltage that ends a column's name: Heel [N], toe (kPa).
-_UNIT_IN_NAME = re.compile(r"[\[(](m?N|kgf?|g|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmHg|[mµu]?V)[\])]$")
+#: A unit of a force, a pressure or a voltage ...
+_FORCE_UNIT = r"([mk]?N|kgf?|gf?|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmHg|[mµu]?V)"
+#: ... that ends a column's name: Heel [N], toe (kPa).
+_UNIT_IN_NAME = re.compile(rf"[\[(]{_FORCE_UNIT}[\])]$")
+#: ... that a line above a table states: Einheit;kPa, Unit of pressure: N/cm2, Druck [kPa], Force in N, or only [kPa].
+_UNIT_ABOVE = re.compile(
+    r"(?:\b(?i:(?:mess|druck|kraft)?einheit(?:en)?|units?)\b(?:[^:;=\t,\[(]*[:;=\t,\[(])?"
+    r"|\b(?i:druck|kraft|pressure|force)\b[^\[(\d]*?(?:[:;=\t,\[(]|\bin\b)|^\W*[\[(])"
+    rf"[ \t\"':;=,\[(]*{_FORCE_UNIT}(?![\w/²])"
+)
 #: What ends a column's name in brackets: its unit, of which there may be others, as Battery [%].
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\s\d\[\]()]{1,8})\s*[\])]$")
 #: What the names of two feet or hands begin with.
@@ -135,6 +143,8 @@ class _TextTable:
     body: Sequence[Sequence[str]]
     #: Which columns hold numbers; the others hold texts.
     numeric: Sequence[bool]
+    #: The unit that the lines above state, "" if none does.
+    unit_above: str
     #: Lines a frame, if empty lines are between frames, else 1.
     between_empty: int
 
@@ -167,7 +177,11 @@ class _TextTable:
             # Read as numbers they would be a frame.
             names, skipped = [""] * columns, fit.numbers[first - 1] + 1
         between = _between_empty(fit.numbers[first:])
-        return cls(separator, fit.decimal, skipped, names[:columns], units, body, numeric[:columns], between)
+        above = {found[1] for line in fit.lines[:skipped] if (found := _UNIT_ABOVE.search(line))}
+        unit_above = above.pop() if len(above) == 1 else ""
+        return cls(
+            separator, fit.decimal, skipped, names[:columns], units, body, numeric[:columns], unit_above, between
+        )
 
     def numbers(self, column: int) -> NDArray[np.float64]:
         return np.array([_number(row[column], self.decimal) for row in self.body])
@@ -365,7 +379,11 @@ def _of_table(found: _TextTable, longer: float, begin: str) -> tuple[str, list[s
     missing = {row[k] for row in found.body for k in taxels if row[k] in MISSING}
     table += [f"missing = {_quote(cell)}" for cell in sorted(missing - {"nan"} or missing)[-1:]]
     units = {found.unit(k) for k in taxels}
-    unit = [f"unit = {_quote(name)}" for name in units if name and len(units) == 1]
+    # Columns of several units have none in common.
+    name = units.pop() if len(units) == 1 else None
+    unit = (
+        [] if name is None else [f"unit = {_quote(name or found.unit_above)}" if name or found.unit_above else _NO_UNIT]
+    )
     rate = [_NO_RATE] if time is None else []
     holds = f"a table of {counted(len(found.numeric), 'column')}" + f", {lines} lines a frame" * (lines > 1)
     names = [found.names[k] for k in taxels] if found.names else []
@@ -447,7 +465,10 @@ def _unit(name: str, times: NDArray[np.float64], count: float) -> list[str]:
         return abs(math.log10(step_s * _USUAL_HZ)) + abs(math.log10(max(count - 1, 1) * step_s / _USUAL_S))
 
     unit = stated or (min(fitting, key=unlike) if step > 0 and fitting else fitting[0] if fitting else "us")
-    notes = [f"{1e6 / (step * UNITS_US[unit]):.4g} frames/s"] if step > 0 else []
+    steps = np.diff(times)
+    # Stamps are rounded, so that a rate follows from all steps, without those of gaps.
+    regular = steps[(steps > 0.5 * step) & (steps < 1.5 * step)]
+    notes = [f"{1e6 / (regular.mean() * UNITS_US[unit]):.4g} frames/s"] if step > 0 else []
     others = [_quote(name) for name in UNITS_US if name != unit]
     notes += [f"a guess; or {', '.join(others[:-1])} or {others[-1]}"] * (not stated)
     return [f"time_unit = {_quote(unit)}" + "  # " * bool(notes) + ", ".join(notes)]
