@@ -595,6 +595,8 @@ def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: P
     assert "The worst" not in page
     code, _, error = call(capsys, *arguments, tmp_path / "without")
     assert (code, "exists already" in error) == (2, True)
+    code, _, error = call(capsys, *arguments, tmp_path / "without", "--truth", folder / "truth.csv", "--overwrite")
+    assert (code, "The worst" in (tmp_path / "without" / "report.html").read_text()) == (0, True), error
 
 
 def test_weights_are_drawn_by_taxel_where_trains_are_taxels() -> None:
@@ -672,6 +674,9 @@ def test_a_folder_of_trials_is_trained_on_and_heard_as_its_recordings_are(tmp_pa
         [f'"t{k}.npz"', "contact"] for k in range(4)
     ]
     assert "t3.npz" in (tmp_path / "r" / "report.html").read_text()
+    code, said, _ = call(capsys, "detect", *files, "--readout", out, "--truth", trials / "labels.csv", "--json")
+    del folder["written"], folder["report"]
+    assert (code, json.loads(said)) == (0, {key: value for key, value in folder.items() if key != "recording"})
 
 
 def test_an_example_may_be_a_recording(folder: Path) -> None:

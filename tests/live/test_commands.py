@@ -129,14 +129,17 @@ def test_taxel_record_ends_with_the_boards_stop_marker(tmp_path: Path) -> None:
     port, file = free_port(), tmp_path / "marked.mcap"
     marked = Events([], [], [], [], array=SMALL, markers=[(1000, True), (5000, False)])
     arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--markers", "--seconds", 60, "--json")
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
             while process.poll() is None:
                 link.sendto(wire.encode(marked), (LOOPBACK, port))
                 time.sleep(0.05)
-        said, _ = process.communicate(timeout=60)
+        said, for_people = process.communicate(timeout=60)
     summary = json.loads(said)
     assert process.returncode == 0
+    first, *_, last = for_people.splitlines()
+    assert first.startswith("listening on ")
+    assert last.endswith(" s: stop marked")
     assert summary["counters"]["markers"] >= 2
     assert summary["path"] == str(file)
 

@@ -320,6 +320,32 @@ def test_the_report_says_how_many_detections_lie_outside_the_training(tmp_path: 
     assert f"detections with an input outside what was seen in training: {outside} of {len(found)}" in page
 
 
+def test_what_a_live_command_writes_is_replaced_only_where_it_is_told_to(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    readout, places = tmp_path / "a.json", [tmp_path / name for name in ("a.mcap", "tare.json", "r/report.html")]
+    readout_of(2, 2, "counts").save(readout)
+    (tmp_path / "r").mkdir()
+    for place in places:
+        place.write_text("an earlier one")
+    text = lines_of(np.ones((60, 2, 2)), np.arange(60) * PERIOD_US)
+    record, save_tare, report = ("--record", places[0]), ("--save-tare", places[1]), ("--report", tmp_path / "r")
+    plan = ("--readout", readout, "--tare", "0.05", "--seconds", "0.5")
+    for place, option in zip(places, (record, save_tare, (*record, *report)), strict=True):
+        with served(text) as at:
+            source = f"lines+tcp:{at},array=2x2,time=1:us,unit=counts"
+            code, _, err = call(capsys, "live", "--source", source, *plan, *option)
+        said = f"taxel: {place}: exists already; give --overwrite, or name another"
+        assert (code, err.splitlines()[-1]) == (2, said)
+    with served(text) as at:
+        source = f"lines+tcp:{at},array=2x2,time=1:us,unit=counts"
+        code, _, err = call(capsys, "live", "--source", source, *plan, *record, *save_tare, *report, "--overwrite")
+    assert code == 0, err
+    assert len(taxel.open(places[0]).frames()) == 60
+    assert Tare.load(places[1]).rest.shape == (2, 2)
+    assert places[2].read_text().startswith("<!doctype html>")
+
+
 def test_numbers_that_a_program_passes_are_frames(tmp_path: Path) -> None:
     values = touches(np.random.default_rng(5), 2, 3, 100, "N")
     path = tmp_path / "a.mcap"

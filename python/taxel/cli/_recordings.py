@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from itertools import chain, repeat
 from pathlib import Path
@@ -53,6 +53,11 @@ def pairs(option: str, texts: Iterable[str], form: str = "NAME=VALUE") -> Iterat
         yield name, value
 
 
+def paths_text(paths: Sequence[Path]) -> str:
+    """Return the first three paths in words."""
+    return ", ".join(map(str, paths[:3])) + " ..." * (len(paths) > 3)
+
+
 def assignments(settings: list[str]) -> dict[str, Any]:
     """Return the values of ``--set KEY=VALUE``; a VALUE that is not TOML is text."""
     values = {}
@@ -74,18 +79,18 @@ def encoder_of(name: str | None, settings: list[str]) -> Encoder:
     return of_values(name, assignments(settings))
 
 
-def try_report(folder: Path) -> None:
+def try_report(folder: Path, *, overwrite: bool) -> None:
     """Check that a report's page can be written to a folder, before the work that it will show; leave no folder behind.
 
     Raises
     ------
-    FileExistsError : the folder holds a report already
+    FileExistsError : the folder holds a report already and `overwrite` is false
     OSError : the folder cannot be made
     """
     missing = [missing_folder for missing_folder in (folder, *folder.parents) if not missing_folder.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        check_writable(folder / "report.html")
+        check_writable(folder / "report.html", overwrite=overwrite)
     finally:
         for missing_folder in missing:
             with suppress(OSError):

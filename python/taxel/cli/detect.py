@@ -15,7 +15,7 @@ from taxel._base.files import check_writable, write_whole
 from taxel._base.times import begun
 from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import READ_HELP, ReportOption, progress, say_warnings, tare_option, try_report
+from taxel.cli._recordings import READ_HELP, ReportOption, paths_text, progress, say_warnings, tare_option, try_report
 from taxel.cli._say import say
 from taxel.detections import Detections
 from taxel.spikes import to_ms
@@ -34,7 +34,7 @@ _ROWS = 40
 
 @app.command()
 def detect(
-    recording: Annotated[Path, typer.Argument(help=f"A recording: {READ_HELP}, or a folder of them.")],
+    recordings: Annotated[list[Path], typer.Argument(help=f"Recordings: {READ_HELP}, or folders of them.")],
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],
     files: FileOptions,
     tare: Annotated[str | None, tare_option("Default: 0 of force and pressure, else the first quiet stretch.")] = None,
@@ -60,19 +60,20 @@ def detect(
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Detect events in a recording, or in each of a folder, by a trained readout or a plain rule.
+    """Detect events in recordings, or in each of a folder, by a trained readout or a plain rule.
 
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv -o found.csv
+    Example: taxel detect monday/ friday.mcap --readout gait.json --truth steps.csv
     """
     if out is not None:
         check_writable(out, overwrite=overwrite)
     if report is not None:
-        try_report(report)
+        try_report(report, overwrite=overwrite)
     options = taxel.tasks.DetectOptions(tare, frame_us, window_ms)
     loaded = taxel.detect.load(readout)
     with progress(as_json) as update:
-        update(f"reading {recording}", 0, 0)
-        opened = files.opener.open_sensors([recording])
+        update(f"reading {paths_text(recordings)}", 0, 0)
+        opened = files.opener.open_sensors(recordings)
         found = taxel.tasks.detect(loaded, opened, truth, options, progress=update)
     if out is not None:
         write_whole(out, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
@@ -80,21 +81,27 @@ def detect(
     if as_json:
         written = {"written": out, "report": None if report is None else report / "report.html"}
         files_written = {name: str(path) for name, path in written.items() if path is not None}
-        say(json.dumps(_result(recording, readout, found.to_dict()) | files_written))
+        say(json.dumps(_result(recordings, readout, found.to_dict()) | files_written))
     else:
-        _say_found(found, loaded, recording, truth, given=tare is not None, lists=lists)
+        _say_found(found, loaded, recordings, truth, given=tare is not None, lists=lists)
         say(*[] if out is None else [f"written to {out}"])
     if report is not None:  # last, so that nothing is lost where it fails
-        title = f"Detections of {readout} in {recording}"
-        place = taxel.report.write_detections(report, loaded, found.outcomes, title=title)
+        title = f"Detections of {readout} in {paths_text(recordings)}"
+        place = taxel.report.write_detections(report, loaded, found.outcomes, title=title, overwrite=overwrite)
         say(*[] if as_json else [f"report: {place}"])
 
 
 def _say_found(
-    found: Detecting, readout: Readout | PlainRule, recording: Path, truth: str | None, *, given: bool, lists: bool
+    found: Detecting,
+    readout: Readout | PlainRule,
+    recordings: Sequence[Path],
+    truth: str | None,
+    *,
+    given: bool,
+    lists: bool,
 ) -> None:
     """Print score and detections; `given`: whether a tare is."""
-    several = recording.is_dir() or len(found.each) > 1
+    several = _are_several(recordings) or len(found.each) > 1
     if found.score is not None:
         _print_score(found, readout.labels, truth, several=several)
     for each in found.each:
@@ -108,12 +115,19 @@ def _say_found(
         say("--list prints the detections")
 
 
-def _result(recording: Path, readout: Path, found: dict[str, Any]) -> dict[str, Any]:
+def _are_several(recordings: Sequence[Path]) -> bool:
+    """Return whether several recordings are named, or a folder, which may hold several."""
+    return len(recordings) > 1 or recordings[0].is_dir()
+
+
+def _result(recordings: Sequence[Path], readout: Path, found: dict[str, Any]) -> dict[str, Any]:
     """Return the result for JSON; that of a single recording is not in a list."""
     each = found.pop("recordings")
-    if len(each) == 1 and not recording.is_dir():
+    if len(each) == 1 and not _are_several(recordings):
         return {"readout": str(readout), **each[0], **found}
-    return {"readout": str(readout), "recording": str(recording), "recordings": each, **found}
+    # A folder is the place of all of them; several that are named have none.
+    place = {"recording": str(recordings[0])} if len(recordings) == 1 else {}
+    return {"readout": str(readout), **place, "recordings": each, **found}
 
 
 def _table(outcomes: Sequence[Outcome]) -> str:

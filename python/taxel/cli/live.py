@@ -108,11 +108,11 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     given_tare = options["tare"]
     options = for_live(options, typed.rate_hz, typed.bits, typed.seconds)
     trained, rest, record, address, lines = (options[name] for name in ("readout", "tare", "record", "remote", "lines"))
-    _check_fresh_tare(typed, rest)
+    _check_fresh_tare(typed, rest, overwrite=options["overwrite"])
     if typed.report is not None:
         if record is None or record.suffix != ".mcap":
             raise ProblemError("--report is made from the recording: give --record FILE.mcap")
-        try_report(typed.report)
+        try_report(typed.report, overwrite=options["overwrite"])
     console = Console(stderr=True)
     with contextlib.ExitStack() as connected, contextlib.ExitStack() as at_rest:
         if typed.control is not None and isinstance(rest, float):
@@ -140,10 +140,10 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
             _drain(last, None if lines else say)
     tare = summary.tare
     if typed.save_tare is not None and tare is not None:
-        tare.save(typed.save_tare)
+        tare.save(typed.save_tare, overwrite=options["overwrite"])
         console.print(f"tare written to {typed.save_tare}")
     if typed.report is not None and trained is not None and summary.path is not None:
-        _report(typed.report, trained, summary, tare if tare is not None else rest)
+        _report(typed.report, trained, summary, tare if tare is not None else rest, overwrite=options["overwrite"])
         console.print(f"report: {typed.report / 'report.html'}")
     _report_unsent(summary)
     _print_summary(summary, options["guard_frames"], err=lines)
@@ -184,7 +184,9 @@ def _show(
     return pipeline if shows is None or shows.live is None else shows.live
 
 
-def _report(folder: Path, readout: Readout | PlainRule, summary: Summary, tare: Tare | float | None) -> None:
+def _report(
+    folder: Path, readout: Readout | PlainRule, summary: Summary, tare: Tare | float | None, *, overwrite: bool
+) -> None:
     """Write the report on a recording: its events and its detections."""
     import taxel  # noqa: PLC0415
     from taxel.detect import Example, Outcome  # noqa: PLC0415
@@ -195,7 +197,8 @@ def _report(folder: Path, readout: Readout | PlainRule, summary: Summary, tare: 
     rest = tare if isinstance(tare, Tare) else None
     example, outside = Example(recording, {}, rest), summary.counters["outside"]
     outcome = Outcome(str(summary.path), example, recording.detections, outside=outside)
-    write_detections(folder, readout, [outcome], title=f"Live detections, recorded to {summary.path}")
+    title = f"Live detections, recorded to {summary.path}"
+    write_detections(folder, readout, [outcome], title=title, overwrite=overwrite)
 
 
 def _print_summary(summary: Summary, guard_frames: float, *, err: bool) -> None:
@@ -237,11 +240,11 @@ def _check_options(options: dict[str, Any], typed: _LiveArguments) -> None:
         raise ProblemError("--folder belongs to the panel: give --panel")
 
 
-def _check_fresh_tare(typed: _LiveArguments, rest: Tare | float | None) -> None:
+def _check_fresh_tare(typed: _LiveArguments, rest: Tare | float | None, *, overwrite: bool) -> None:
     """Refuse options that need a fresh tare, if none is taken."""
     if isinstance(rest, float):
         if typed.save_tare is not None:
-            check_writable(typed.save_tare)
+            check_writable(typed.save_tare, overwrite=overwrite)
     elif typed.save_tare is not None:
         raise ProblemError("--save-tare without a fresh tare: give --tare SECONDS")
     elif typed.control is not None and not typed.panel:

@@ -63,7 +63,10 @@ class _RecordArguments:
         int | None, typer.Option(min=1, help="Automatic mode: number of trials. Default: until Ctrl-C.")
     ] = None
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print one line of JSON for each recording, and nothing else.")
+        bool,
+        typer.Option(
+            "--json", help="Print one line of JSON for each recording; what is for people goes to standard error."
+        ),
     ] = False
 
 
@@ -97,7 +100,7 @@ def record(
     if typed.length is not None and typed.seconds is not None:
         raise ProblemError("--seconds and --length: give --length for automatic mode, --seconds for one recording")
     live = for_live(options, typed.rate_hz, typed.bits, typed.seconds)
-    console = Console(stderr=True, quiet=typed.as_json)
+    console = Console(stderr=True)
     say_waiting(live, console)
     if typed.length is None:
         summary, code = _one(file, live, typed, console)

@@ -24,6 +24,7 @@ from taxel.cli._recordings import (
     SET_HELP,
     ReportOption,
     assignments,
+    paths_text,
     progress,
     say_warnings,
     tare_option,
@@ -119,13 +120,13 @@ def train(
     """
     check_writable(out, overwrite=overwrite)
     if report is not None:
-        try_report(report)
+        try_report(report, overwrite=overwrite)
     changes = assignments(values or []) | {
         key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None
     }
     options = taxel.tasks.TrainOptions(recipe, changes, tare, folds, search, window_ms, shift_ms, labels_as_given)
     with progress(as_json) as update:
-        update(f"reading {', '.join(map(str, recordings[:3]))}" + " ..." * (len(recordings) > 3), 0, 0)
+        update(f"reading {paths_text(recordings)}", 0, 0)
         opened = files.opener.open_sensors(recordings)
         _try_rules(rule, labels, opened, overwrite=overwrite)
     training = _trained(opened, labels, options, as_json=as_json)
@@ -150,6 +151,7 @@ def train(
             held_out=training.scored.scores if training.held_out else (),
             alignments=training.made.alignments,
             scored=training.scored,
+            overwrite=overwrite,
         )
         say(*[] if as_json else [f"report: {place}"])
 

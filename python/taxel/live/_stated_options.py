@@ -85,7 +85,7 @@ class StatedOptions:
         3.0, "How long each source of lines may be silent before its first line, s.", least=0, commands=""
     )
     compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.", commands="record")
-    overwrite: bool = option(False, "Replace the file if it exists.", commands="record")
+    overwrite: bool = option(False, "Replace files that are written, if they exist.", commands="live record")
     guard_frames: float = option(
         5.0, "How far, in frames, a readout stays behind the host's clock while no events arrive.", least=0
     )

@@ -96,7 +96,7 @@ class Live:
     compression : str
         Compression of a .mcap: none, lz4 or zstd.
     overwrite : bool
-        Replace the file if it exists.
+        Replace files that are written, if they exist.
     guard_frames : float, 0 or more
         How far, in frames, a readout stays behind the host's clock while no events arrive.
     gap_frames : float, 0 or more

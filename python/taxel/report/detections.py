@@ -80,13 +80,14 @@ def write_detections(
     held_out: Sequence[Score] = (),
     alignments: Mapping[str, Alignment] | None = None,
     scored: Judged | None = None,
+    overwrite: bool = False,
 ) -> Path:
-    """Write the detections of a readout in recordings as a page with pictures, ``report.html`` in a new folder.
+    """Write the detections of a readout in recordings as a page with pictures, ``report.html`` in a folder.
 
     Parameters
     ----------
     folder : path
-        New, or empty.
+        Made where it is missing.
     readout : Readout or PlainRule
         A rule has neither potential nor weights to draw.
     listened : sequence of Outcome, one or more
@@ -99,6 +100,8 @@ def write_detections(
         By how much labels were moved to what the sensor felt before they were learnt; examples are those of `listened`.
     scored : Judged, optional
         The scores of a training, and those of the plain rules beside it.
+    overwrite : bool
+        Whether an existing report may be replaced.
 
     Returns
     -------
@@ -106,7 +109,7 @@ def write_detections(
 
     Raises
     ------
-    FileExistsError : the folder holds a report already
+    FileExistsError : the folder holds a report already and `overwrite` is false
     OSError : the folder cannot be made
     """
     detector("readout", readout)
@@ -153,7 +156,7 @@ def write_detections(
         scored=any(outcome.score is not None for outcome in listened),
     )
     target.mkdir(parents=True, exist_ok=True)  # so late that nothing is left of one that is ended
-    return write_whole(target / "report.html", lambda file: file.write(text.encode()))
+    return write_whole(target / "report.html", lambda file: file.write(text.encode()), overwrite=overwrite)
 
 
 def _beside(labels: Sequence[str], scored: Judged | None) -> list[tuple[str, str, Score | None]]:

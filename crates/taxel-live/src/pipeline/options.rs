@@ -119,8 +119,8 @@ options! {
         first_line_s: f64 = 3.0, "commands" = "", "minimum" = 0;
         /// Compression of a .mcap: none, lz4 or zstd.
         compression: String = "none".to_owned(), "commands" = "record";
-        /// Replace the file if it exists.
-        overwrite: bool = false, "commands" = "record";
+        /// Replace files that are written, if they exist.
+        overwrite: bool = false, "commands" = "live record";
         /// How far, in frames, a readout stays behind the host's clock while no events arrive.
         guard_frames: f64 = 5.0, "minimum" = 0;
         /// At a gap in the sequence of version 2, frames to wait for what may only be late.
