@@ -135,7 +135,7 @@ def test_recordings_of_other_arrays_are_left_out_where_one_fits(
     names = ", ".join(str(tmp_path / f"{k}.npz") for k in (1, 2, 3))
     warning = f"left out 4 recordings of other arrays than the 8 x 8 taxels that the readout was trained on: {names}"
     assert (code, f"taxel: warning: {warning} and 1 more" in error.splitlines()) == (0, True), error
-    assert "(window 10 ms), in 1 of 5 recordings, as the others do not fit:" in said.splitlines()[0]
+    assert "(window 10 ms), in 1 of 5 recordings, as the others are left out:" in said.splitlines()[0]
     code, said, _ = call(capsys, *arguments, "--json")
     found = json.loads(said)
     assert (code, [Path(each["recording"]).name for each in found["recordings"]]) == (0, ["9.npz"])

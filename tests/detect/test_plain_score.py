@@ -234,6 +234,7 @@ def of_touches(tmp_path_factory: pytest.TempPathFactory) -> tuple[taxel.Recordin
 def test_a_rule_does_not_depend_on_the_encoder(of_touches, encoder: str) -> None:
     recording, by_default = of_touches
     training = taxel.train(recording, [touched(1)[1]], TrainOptions(folds=2, changes={"encoder.name": encoder}))
+    plain = training.scored.plain
     rules, others = (
         {label: rule and rule._with(training=None) for label, rule in each.scored.plain.rules.items()}
         for each in (training, by_default)

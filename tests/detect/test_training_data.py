@@ -124,3 +124,24 @@ def test_a_readout_without_the_summary_says_nothing_and_one_with_it_comes_back(
     bare = training.readout._with(training=None)
     [found] = taxel.tasks.detect(bare, taxel.open(path), options=DetectOptions(tare=2.0)).each
     assert found.remarks == ()
+
+
+def test_a_gap_is_named_and_a_recording_without_a_rest_stops_no_other(
+    training: taxel.tasks.Training, tmp_path: Path
+) -> None:
+    path, _ = made(tmp_path, 1)
+    [recording] = [taxel.open(path)]
+    frames = recording.frames
+    late = np.where(frames.t >= 6_000_000, frames.t + 3_500_000, frames.t)
+    gap = tmp_path / "gap.npz"
+    taxel.convert(taxel.Frames(frames.values, late, unit="counts", array=frames.array), gap)
+    assert "1 gap of 3.5 s at 6.0 s: nothing is detected in there" in remarks(training, gap)
+    restless = tmp_path / "restless.npz"
+    moving = 500.0 + 200.0 * np.sin(np.arange(len(frames)) * 0.05)[:, None, None] + np.zeros(frames.values.shape)
+    taxel.convert(taxel.Frames(moving, frames.t, unit="counts", array=frames.array), restless)
+    found = taxel.tasks.detect(training.readout, [taxel.open(restless), recording])
+    assert found.left_out == ("restless.npz",)
+    assert [each.recording.title for each in found.each] == [path.name]
+    assert any("restless.npz" in warning and "rest of its taxels is not known" in warning for warning in found.warnings)
+    with pytest.raises(taxel.ProblemError, match="rest of its taxels is not known"):
+        taxel.tasks.detect(training.readout, taxel.open(restless))

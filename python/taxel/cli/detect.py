@@ -155,7 +155,7 @@ def _print_score(found: Detecting, labels: Sequence[str], truth: str | None, *, 
     from taxel.detect.scoring import score_rows  # noqa: PLC0415  a command loads what it needs
 
     count, left_out = len(found.each), len(found.left_out)
-    read = f", in {count} of {count + left_out} recordings, as the others do not fit" if left_out else ""
+    read = f", in {count} of {count + left_out} recordings, as the others are left out" if left_out else ""
     say(f"against {truth} (window {found.window_ms:g} ms){read}:", *repr(found.score).split("\n"))
     for label, sources in found.unlabelled.items():
         say(f"not scored, as no row of {truth} names it: {label} of {', '.join(sources)}")

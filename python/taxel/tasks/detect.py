@@ -31,7 +31,7 @@ from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
 from taxel.tasks.labels import GivenLabels, few, references, sources_without, titles_of
-from taxel.tasks.rest import GivenTare, TakenRest, check_tare, rest
+from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, rest
 
 #: No event.
 _NONE = np.empty(0, np.int64)
@@ -132,7 +132,7 @@ class Detecting:
     window_ms : float, ms
     warnings : tuple of str
     left_out : tuple of str
-        The recordings of other arrays than the readout's, beside those that fit.
+        The recordings of other arrays than the readout's, beside those that fit, and those without a known rest.
     """
 
     each: tuple[Detected, ...]
@@ -221,13 +221,21 @@ def detect(
             raise refused("truth", f" is {truth}: names no event in {titles_of(opened)}")
         unlabelled = {} if truth is None else sources_without(truth, opened, events)
         left_out = _of_other_arrays(readout, opened)
-        each = []
+        each: list[Detected] = []
+        unknown_rests: dict[str, UnknownRestError] = {}
         for recording, labelled in zip(opened, events, strict=True):
             if left_out and not readout._accepts(recording.array):
                 continue
             update(f"detecting in {recording.title}", 0, 0)
             without = {label for label, sources in unlabelled.items() if recording.label in sources}
-            each.append(_detected(readout, recording, labelled, without, options))
+            try:
+                each.append(_detected(readout, recording, labelled, without, options))
+            except UnknownRestError as error:
+                unknown_rests[recording.title] = error
+        if not each and unknown_rests:
+            raise next(iter(unknown_rests.values()))
+        for error in unknown_rests.values():
+            warn(f"left out: {error}", stacklevel=2)
     scored = [outcome for detected in each if (outcome := detected.outcome).score is not None]
     truths = [outcome.example.labels for outcome in scored]
     found = [outcome.example._known(outcome.found) for outcome in scored]
@@ -240,7 +248,7 @@ def detect(
             warnings.append(
                 f"truth has {shown(label)}, the readout {shown(alike[0])}: must be spelt alike to be scored"
             )
-    names = tuple(recording.title for recording in left_out)
+    names = (*(recording.title for recording in left_out), *unknown_rests)
     return Detecting(tuple(each), together, tuple(unknown), unlabelled, options.window_ms, tuple(warnings), names)
 
 
@@ -279,7 +287,7 @@ def _detected(
     example = Example(recording, true, tare, unlabelled=tuple(without))
     scored = score(example._known(found), true, options.window_ms) if true else None
     outcome = Outcome(recording.title, example, found, scored, outside)
-    return Detected(recording, outcome, taken, tuple(_remarks(outcome, readout)))
+    return Detected(recording, outcome, taken, tuple(_remarks(recording, outcome, readout)))
 
 
 def _check_unit(readout: Readout | PlainRule, recording: Recording) -> None:
@@ -327,8 +335,10 @@ def noise_floors(readout: Readout | PlainRule) -> list[float]:
     return [float(part.noise_floor) for part in readout.encoder._each() if isinstance(part, ContactArea | Moments)]
 
 
-def _remarks(outcome: Outcome, readout: Readout | PlainRule) -> Iterator[str]:
+def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRule) -> Iterator[str]:
     """Yield what may keep detections away or make false ones."""
+    if gaps := recording._gaps():
+        yield f"{gaps}: nothing is detected in there"
     source, tare = recorded(outcome.example.source, hold=False), outcome.example.tare
     if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
         # What else is measured is measured upside down.
