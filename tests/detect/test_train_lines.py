@@ -12,9 +12,12 @@ from test_readout import ARRAY, recipe, tare, touches
 
 import taxel
 from taxel.detect import Example, PlainRule, run, score
-from taxel.detect.causes import Cause, Evidence, Mistakes, loaded_at_rest
+from taxel.detect.cause import Cause
+from taxel.detect.causes import Mistakes
+from taxel.detect.evidence import Evidence
 from taxel.detect.examples import check_examples
 from taxel.detect.fitting import Trained, fit_aligned
+from taxel.detect.tares import loaded_at_rest
 from taxel.encode import ContactArea, LevelCrossing
 
 pytestmark = pytest.mark.usefixtures("undrawn")

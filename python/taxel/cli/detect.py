@@ -104,6 +104,8 @@ def _say_found(
                 say(each.outcome.outside_text)
         elif each.hint is not None:
             say(f"{each.outcome.name}: {each.hint}")
+    for outcome in found.outcomes:
+        say(*(f"{outcome.name}: " * several + line for line in outcome.causes_lines))
     if found.score is not None and not lists:
         say("--list prints the detections")
 

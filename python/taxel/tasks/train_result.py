@@ -11,7 +11,7 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted, three_digits
 from taxel._base.times import beginning_us
 from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained
-from taxel.detect.causes import Cause
+from taxel.detect.cause import Cause
 from taxel.detect.levels import LEAST_LEVELS
 from taxel.detect.recipe import change_values, with_floor
 from taxel.detect.scoring import score_rows
