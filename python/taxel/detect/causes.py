@@ -180,9 +180,9 @@ class Mistakes:
         kinds = self._by_touch and not recipes.knows("touch", label)
         if not kinds or self.scored[label].found or alignment is None or alignment.train is not None:
             return
-        ends = ", ".join(("lift", *(name for name, kind in recipes.read("touch")["also"].items() if kind == "lift")))
         measured = (
-            f"by this one it is learnt as a kind of touch, told as one begins; names of the end of a touch are {ends}"
+            "by this one it is learnt as a kind of touch, told as one begins; names of the end of a touch are "
+            f"{recipes.names_of('touch', 'lift')}"
         )
         yield Cause("label_name", (label,), wrong, measured, "another name of the label")
 

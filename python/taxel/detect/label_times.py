@@ -223,7 +223,7 @@ def _apart(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[NDArray[n
     far = round(to_us(_FARTHEST_MS))
     reach = np.searchsorted(felt, [times - far, times + far])
     label_index = np.repeat(np.arange(len(times)), reach[1] - reach[0])
-    beside = np.concatenate([np.arange(*span) for span in reach.T])
+    beside = np.concatenate([np.empty(0, np.int64), *(np.arange(*span) for span in reach.T)])
     apart = to_ms(times[label_index] - felt[beside])
     order = np.argsort(apart, kind="stable")
     return apart[order], label_index[order]

@@ -194,6 +194,9 @@ class Measured:
         advice = f"labels {abs(round(alike.ms, -1)):.0f} ms {side}, if the clock of the recording is right"
         if stretch:
             measured, advice = f"{measured}, all {stretch}", advice.replace("labels", f"labels {stretch}", 1)
+        elif fits := [name for name, part in self._scores.items() if name != label and 2 * part.found > part.events]:
+            what = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
+            measured, advice = f"{measured}, while {what}: {label} is felt {side} there, as where taxels are dead", ""
         expected = missed - round(to_us(alike.ms))
         detected = np.array([np.argmin(np.abs(left.false - t)) for t in expected])
         is_near = np.abs(left.false[detected] - expected) <= to_us(WINDOW_MS)
