@@ -17,7 +17,8 @@ from taxel import Array, Frames, Tare
 from taxel.detect import Example, score
 from taxel.detect.causes import _chance
 from taxel.detect.examples import check_examples
-from taxel.detect.label_times import FeltLoads, Off, held_by_tare
+from taxel.detect.label_times import FeltLoads, Off
+from taxel.detect.tares import held_by_tare
 
 ARRAY = Array(6, 6, pitch_mm=5.0)
 

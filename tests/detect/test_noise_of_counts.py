@@ -11,7 +11,7 @@ import taxel
 from taxel import Array, Events, Frames, Neuron, ProblemError, Readout, Tare
 from taxel.detect import Example, PlainRule, run
 from taxel.detect.alignment import Alignment
-from taxel.detect.causes import _weak_bursts
+from taxel.detect.evidence import weak_bursts
 from taxel.encode import LocalLoad
 from taxel.tasks.detect import detect
 
@@ -74,7 +74,7 @@ def test_labels_without_an_input_near_are_weak_bursts_where_a_file_holds_some(st
     frames = Frames(values, 5000 * np.arange(2000), unit="events/5 ms", array=Array(10, 12))
     tare = Tare.take(frames, stop_us=1_400_000)
     nowhere = Alignment("burst", 0, np.zeros(len(given), np.int64), 5000 * given, np.full(len(given), np.nan))
-    weak = list(_weak_bursts([Example(frames, {"burst": 5000 * given}, tare)], nowhere))
+    weak = list(weak_bursts([Example(frames, {"burst": 5000 * given}, tare)], nowhere))
     assert len(weak) == (len(given) if strength else 0)
     for burst in weak:
         assert burst.window_ms == 5.0

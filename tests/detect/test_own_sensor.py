@@ -21,7 +21,9 @@ from taxel import Array, Frames, SpikeTrains, Tare
 from taxel._base import progress
 from taxel.cli import _recordings
 from taxel.detect import Example, PlainRule, Recipe, choose, judge, load, recipes, run, score
-from taxel.detect.causes import Cause, Evidence, Mistakes
+from taxel.detect.cause import Cause
+from taxel.detect.causes import Mistakes
+from taxel.detect.evidence import Evidence
 from taxel.detect.examples import check_examples
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor

@@ -12,8 +12,8 @@ from shell import call
 import taxel
 from taxel import Array, Events, Frames, Tare
 from taxel.detect import PlainRule, run
-from taxel.detect.causes import count_drifted
 from taxel.detect.readout import run_counting
+from taxel.detect.tares import count_drifted
 
 FLOOR = 6.0
 

@@ -131,7 +131,8 @@ def test_a_gap_is_named_and_a_recording_without_a_rest_stops_no_other(
 ) -> None:
     path, _ = made(tmp_path, 1)
     [recording] = [taxel.open(path)]
-    frames = recording.frames
+    frames = taxel.recorded.recorded(recording)
+    assert isinstance(frames, taxel.Frames)
     late = np.where(frames.t >= 6_000_000, frames.t + 3_500_000, frames.t)
     gap = tmp_path / "gap.npz"
     taxel.convert(taxel.Frames(frames.values, late, unit="counts", array=frames.array), gap)
@@ -140,8 +141,8 @@ def test_a_gap_is_named_and_a_recording_without_a_rest_stops_no_other(
     moving = 500.0 + 200.0 * np.sin(np.arange(len(frames)) * 0.05)[:, None, None] + np.zeros(frames.values.shape)
     taxel.convert(taxel.Frames(moving, frames.t, unit="counts", array=frames.array), restless)
     found = taxel.tasks.detect(training.readout, [taxel.open(restless), recording])
-    assert found.left_out == ("restless.npz",)
-    assert [each.recording.title for each in found.each] == [path.name]
+    assert [Path(name).name for name in found.left_out] == ["restless.npz"]
+    assert [each.recording.path for each in found.each] == [path]
     assert any("restless.npz" in warning and "rest of its taxels is not known" in warning for warning in found.warnings)
     with pytest.raises(taxel.ProblemError, match="rest of its taxels is not known"):
         taxel.tasks.detect(training.readout, taxel.open(restless))

@@ -20,7 +20,7 @@ import taxel
 from taxel._base.messages import collected
 from taxel._base.progress import Forecast
 from taxel.detect import Example, Recipe
-from taxel.detect.causes import Evidence
+from taxel.detect.evidence import Evidence
 from taxel.detect.examples import array_of, check_examples
 from taxel.detect.floors import measured_floor
 from taxel.recording.contents import alone, source_from

@@ -110,7 +110,10 @@ def _say_found(
             if isinstance(readout, taxel.Readout):
                 say(each.outcome.outside_text)
         else:
-            say(*(f"{each.outcome.name}: {remark}" for remark in each.remarks))
+            outside = [each.outcome.outside_text] if each.outcome.are_mostly_outside else []
+            say(*(f"{each.outcome.name}: {remark}" for remark in (*each.remarks, *outside)))
+    for outcome in found.outcomes:
+        say(*(f"{outcome.name}: " * several + line for line in outcome.causes_lines))
     if found.score is not None and not lists:
         say("--list prints the detections")
 

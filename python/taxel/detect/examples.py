@@ -16,6 +16,7 @@ from taxel._base.errors import refused
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.detect.cause import Cause
 from taxel.detect.scoring import Score
 from taxel.detections import Detections
 from taxel.events import Events
@@ -24,6 +25,9 @@ from taxel.recorded import Recorded, recorded
 from taxel.recorded import unit_of as recorded_unit
 from taxel.spikes import SpikeTrains, to_us
 from taxel.tare import Tare
+
+#: So many causes are said in lines.
+_LINES = 2
 
 
 class Example(NamedTuple):
@@ -88,6 +92,8 @@ class Outcome(NamedTuple):
         None of an example without labels.
     outside : int, 0 or more, optional
         How many detections have an input outside the range that it had in training; None if that is not known.
+    causes : sequence of Cause
+        What concerns most of what is missed and false, where that is much.
     """
 
     name: str
@@ -95,12 +101,18 @@ class Outcome(NamedTuple):
     found: Detections
     score: Score | None = None
     outside: int | None = None
+    causes: Sequence[Cause] = ()
 
     @property
     def begin_us(self) -> int:
         """The time that text counts its times from, us: its first if they count from 1970, else 0."""
         source = recorded(self.example.source, hold=False)
         return beginning_us(np.array([int(to_us(source.start))]) if isinstance(source, SpikeTrains) else source.t)
+
+    @property
+    def are_mostly_outside(self) -> bool:
+        """Whether more than half of the detections have an input outside the range that it had in training."""
+        return self.outside is not None and 2 * self.outside > len(self.found)
 
     @property
     def outside_text(self) -> str:
@@ -110,6 +122,11 @@ class Outcome(NamedTuple):
             return f"detections {noun}: not known, as the readout's file does not hold it"
         share = f" ({self.outside / len(self.found):.0%})" if len(self.found) else ""
         return f"detections {noun}: {self.outside} of {len(self.found)}{share}"
+
+    @property
+    def causes_lines(self) -> list[str]:
+        """The first causes of what is missed and false, a line each: two at most."""
+        return [f"{', '.join(cause.labels)}: {cause}" for cause in self.causes[:_LINES]]
 
 
 def check_examples(examples: Sequence[Example]) -> list[Example]:

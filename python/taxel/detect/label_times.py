@@ -1,4 +1,4 @@
-"""Whether the labels of a training are at the times of what the sensor felt, and whether a tare holds a touch."""
+"""Whether labels are at the times of what the sensor felt, and by how much they are off."""
 
 from __future__ import annotations
 
@@ -10,20 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.progress import reporting
-from taxel._core import ProblemError
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example
 from taxel.detect.floors import floor_of
 from taxel.detect.loads import Loads, clock_of, lacks_neighbours
-from taxel.detect.scoring import score
+from taxel.detect.scoring import APART_US, score
+from taxel.detect.tares import TOUCH, early_part
 from taxel.detections import Detections
-from taxel.formats.event_camera import are_counts
-from taxel.frames import Frames
 from taxel.spikes import SpikeTrains, to_ms, to_us
-from taxel.tare import Tare
 
-#: The number of loaded taxels of the smallest touch, and the peak that noise does not reach.
-TOUCH, PEAK = 2.0, 6.0
+#: The peak that noise does not reach.
+PEAK = 6.0
 #: Distances between labels and touches are looked at up to this, ms, and are the same that differ by this.
 _FARTHEST_MS, _SAME_MS = 1000.0, 50.0
 #: Labels are off where this share of them has the same distance, and so many; of fewer chance may do so. They are not
@@ -40,12 +37,6 @@ _CHANCE = 0.01
 _MOST_A_LABEL = 4
 #: So many labels that all lie in the first such share of a recording may be in another unit of time.
 _SEVERAL, _FIRST = 4, 0.01
-#: This share of a tare, at its beginning, holds no touch.
-_EARLY = 0.25
-#: These shares of a tare are looked at for a touch, to say how much of it is quiet.
-_SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, _EARLY)
-#: A taxel varies more than its noise at the beginning from so many times that on, and this part of the noise floor.
-_TIMES, _OF_FLOOR = 3.0, 6.0
 
 
 class Off(NamedTuple):
@@ -84,7 +75,9 @@ class FeltLoads:
 
     def __init__(self, examples: Sequence[Example]) -> None:
         known = all(example.tare is not None and not isinstance(example.source, SpikeTrains) for example in examples)
-        early = [example if (tare := _early(example)) is None else example._replace(tare=tare) for example in examples]
+        early = [
+            example if (tare := early_part(example)) is None else example._replace(tare=tare) for example in examples
+        ]
         self._loads, self._felt = None, {"peak": PEAK} | ({} if lacks_neighbours(examples) else {"area": TOUCH})
         if known and examples:
             clocks = [clock_of(example) for example in early]
@@ -97,15 +90,59 @@ class FeltLoads:
         """
         if self._loads is None:
             return None
-        reach = round(to_us(WINDOW_MS))
-        times = self._loads.truth(label, self._loads.whole_examples)
-        near, at_edge = np.zeros(len(times), np.bool_), np.zeros(len(times), np.bool_)
-        for quantity, threshold in self._felt.items():
-            edges = begins, ends = [np.sort(edge.t) for edge in self._loads.edges(quantity, threshold, 1.0, 1)]
-            near |= np.searchsorted(begins, times + reach, side="right") > np.searchsorted(ends, times - reach)
-            for edge in edges:
-                at_edge |= np.diff(np.searchsorted(edge, [times - reach, times + reach]), axis=0)[0] > 0
+        times = self.times(label)
+        near, at_edge = self.felt_at(times)
         return int(near.sum()), int(at_edge.sum()), len(times)
+
+    @property
+    def are_known(self) -> bool:
+        """Whether it is known when the examples were loaded."""
+        return self._loads is not None
+
+    def times(self, label: str) -> NDArray[np.int64]:
+        """Return the labels of a name in all examples, us on one clock."""
+        assert self._loads is not None
+        return self._loads.truth(label, self._loads.whole_examples)
+
+    def felt_at(self, times: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which times lie within 50 ms of a load, and which within 50 ms of its begin or end."""
+        reach = round(to_us(WINDOW_MS))
+        near, at_edge = np.zeros(len(times), np.bool_), np.zeros(len(times), np.bool_)
+        for quantity in self._felt:
+            begins, ends = self._spans(quantity)
+            load = np.searchsorted(begins, times + reach, side="right") - 1
+            near |= (load >= 0) & (np.append(ends, 0)[load] >= times - reach)
+            for edge in (begins, ends):
+                at_edge |= np.diff(np.searchsorted(edge, [times - reach, times + reach]), axis=0)[0] > 0
+        return near, at_edge
+
+    def covered(self) -> int:
+        """Return for how long something lies within 50 ms of the begin or end of a load, us, at most."""
+        return sum(4 * round(to_us(WINDOW_MS)) * len(self._spans(quantity)[0]) for quantity in self._felt)
+
+    def overlapped(self, label: str) -> NDArray[np.bool_]:
+        """Return which labels of a name lie while a load lasts that holds two of them or more, far from its ends."""
+        reach, times = round(to_us(WINDOW_MS)), self.times(label)
+        if not len(times):
+            return np.zeros(0, np.bool_)
+        begins, ends = self._spans(self._quantity)
+        load = np.searchsorted(begins, times + reach, side="right") - 1
+        load[(load >= 0) & (np.append(ends, 0)[load] < times - reach)] = -1
+        inside = (load >= 0) & (times - np.append(begins, 0)[load] > reach) & (np.append(ends, 0)[load] - times > reach)
+        several: NDArray[np.bool_] = inside & (np.bincount(load + 1)[load + 1] > 1)
+        return several
+
+    @property
+    def _quantity(self) -> str:
+        return "area" if "area" in self._felt else "peak"
+
+    def _spans(self, quantity: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return when loads began and ended, in order; one without an end lasts until the next, in its example."""
+        assert self._loads is not None
+        begins, ends = (np.sort(edge.t) for edge in self._loads.edges(quantity, self._felt[quantity], 1.0, 1))
+        last = begins // APART_US * APART_US + APART_US // 2
+        after = np.append(ends, np.iinfo(np.int64).max)[np.searchsorted(ends, begins)]
+        return begins, np.minimum(np.minimum(after, np.append(begins[1:], last[-1:])), last)
 
     def rank(self, label: str, reach_ms: float) -> int:
         """Return how many labels of a name, and begins of loads, have no pair that near; or ends, if that is fewer."""
@@ -123,19 +160,62 @@ class FeltLoads:
         """
         if self._loads is None:
             return {}
-        quantity = "area" if "area" in self._felt else "peak"
-        felt = [edge.t for edge in self._loads.edges(quantity, self._felt[quantity], 1.0, 1)]
-        found = {}
-        for label in labels:
-            times = self._loads.truth(label, self._loads.whole_examples)
-            steady = [felt_edge for edge in felt for felt_edge in _steady(times, edge)]
-            near = [felt_edge for felt_edge in steady if abs(felt_edge[0].ms) <= WINDOW_MS]
-            by_hand = [] if steady else [felt_edge for edge in felt for felt_edge in _by_hand(times, edge)]
-            if alike := near or steady:
-                found[label], _ = min(alike, key=lambda found_edge: (-found_edge[0].alike, found_edge[1]))
-            elif by_hand:
-                found[label], _ = min(by_hand, key=lambda found_edge: found_edge[1])
+        found: dict[str, Off] = {}
+        for quantity in dict.fromkeys((self._quantity, *self._felt)):
+            felt = [edge.t for edge in self._loads.edges(quantity, self._felt[quantity], 1.0, 1)]
+            for label in labels:
+                if label not in found and (off := _distance(self.times(label), felt)) is not None:
+                    found[label] = off
         return found
+
+    def part_off(self, label: str) -> Alike | None:
+        """Return which labels of a name lie at one distance from what was felt, of those that lie near nothing felt."""
+        if self._loads is None:
+            return None
+        times = self.times(label)
+        away = np.flatnonzero(~self.felt_at(times)[1])
+        felt = (edge.t for edge in self._loads.edges(self._quantity, self._felt[self._quantity], 1.0, 1))
+        found = [alike for edge in felt if (alike := same_distance(times[away], edge, WINDOW_MS)) is not None]
+        best = max(found, key=lambda alike: int(alike.which.sum()), default=None)
+        return None if best is None else Alike(best.ms, np.isin(np.arange(len(times)), away[best.which]))
+
+
+def _distance(times: NDArray[np.int64], felt: Sequence[NDArray[np.int64]]) -> Off | None:
+    """Return by how much labels lie after begins or ends of loads; None where it is not the same of most."""
+    steady = [felt_edge for edge in felt for felt_edge in _steady(times, edge)]
+    near = [felt_edge for felt_edge in steady if abs(felt_edge[0].ms) <= WINDOW_MS]
+    if alike := near or steady:
+        return min(alike, key=lambda found_edge: (-found_edge[0].alike, found_edge[1]))[0]
+    by_hand = [felt_edge for edge in felt for felt_edge in _by_hand(times, edge)]
+    return min(by_hand, key=lambda found_edge: found_edge[1])[0] if by_hand else None
+
+
+class Alike(NamedTuple):
+    """Times that lie at one distance after others, ms, and which of the times they are."""
+
+    ms: float
+    which: NDArray[np.bool_]
+
+
+def same_distance(times: NDArray[np.int64], others: NDArray[np.int64], beyond_ms: float) -> Alike | None:
+    """Return which times lie at one distance from others, of those that have none of these nearer than `beyond_ms`.
+
+    None where they are fewer than five, or as many as chance may bring to one distance.
+    """
+    apart, index = _apart(times, np.sort(others))
+    is_near = np.zeros(len(times), np.bool_)
+    is_near[index[np.abs(apart) <= beyond_ms]] = True
+    apart, index = apart[~is_near[index]], index[~is_near[index]]
+    stops = np.searchsorted(apart, apart + _SAME_MS, side="right")
+    counts = [len(np.unique(index[k:stop])) for k, stop in enumerate(stops)]
+    most = max(counts, default=0)
+    left = int(np.count_nonzero(~is_near))
+    if most < _LEAST or _by_chance(most, left, len(apart), _SAME_MS) > _CHANCE:
+        return None
+    here = slice(begin := counts.index(most), stops[begin])
+    which = np.zeros(len(times), np.bool_)
+    which[index[here]] = True
+    return Alike(float(np.median(apart[here])), which)
 
 
 def _apart(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -143,7 +223,7 @@ def _apart(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[NDArray[n
     far = round(to_us(_FARTHEST_MS))
     reach = np.searchsorted(felt, [times - far, times + far])
     label_index = np.repeat(np.arange(len(times)), reach[1] - reach[0])
-    beside = np.concatenate([np.arange(*span) for span in reach.T])
+    beside = np.concatenate([np.empty(0, np.int64), *(np.arange(*span) for span in reach.T)])
     apart = to_ms(times[label_index] - felt[beside])
     order = np.argsort(apart, kind="stable")
     return apart[order], label_index[order]
@@ -255,67 +335,3 @@ def unlabelled_us(examples: Sequence[Example], label: str) -> tuple[int, int]:
             outside += max(0, int(times[0]) - first - apart) + max(0, last - int(times[-1]) - apart)
             total += last - first
     return outside, total
-
-
-def held_by_tare(examples: Sequence[Example]) -> int:
-    """Return how many taxels vary far more in the tare of an example than at its beginning, as a touch is in it.
-
-    Of several examples it is the largest number. A tare that is not of its own recording says nothing: 0.
-
-    Parameters
-    ----------
-    examples : sequence of Example, checked
-    """
-    return max((_held(example, 1.0) for example in examples), default=0)
-
-
-def quiet_s(examples: Sequence[Example]) -> float | None:
-    """Return how many seconds at the beginning of each recording hold no touch, of its tare; None if not known.
-
-    Parameters
-    ----------
-    examples : sequence of Example, checked
-    """
-    least = []
-    for example in examples:
-        tare, source = example.tare, example.source
-        if _early(example) is None or tare is None or tare.start_us > int(source.t[0]):  # type: ignore[union-attr]
-            return None
-        share = next(share for share in _SHARES if _held(example, share) < TOUCH)
-        least.append(share * (tare.stop_us - tare.start_us) / 1e6)
-    seconds = min(least, default=0.0)
-    digits = 10 ** (2 - int(np.floor(np.log10(seconds)))) if seconds > 0 else 1
-    return float(np.floor(seconds * digits) / digits) if seconds > 0 else None
-
-
-def _held(example: Example, share: float) -> int:
-    """Return how many taxels vary far more in that share of a tare than at its beginning."""
-    early, late = _early(example), _early(example, share)
-    if early is None or late is None:
-        return 0
-    floor = floor_of([example._replace(tare=early)])
-    noise, more = early.noise, floor / _OF_FLOOR
-    source = example.source
-    if isinstance(source, Frames) and are_counts(source.unit):
-        # Few events show neither their noise nor that one more is chance.
-        first, last = (len(source.between(tare.start_us, tare.stop_us)) for tare in (early, late))
-        noise = np.maximum(noise, (np.nanmean(early.rest) + 1.0 / (first * noise.size)) ** 0.5)
-        more = max(more, last**-0.5)
-    return int(np.count_nonzero(late.noise > _TIMES * noise + more))
-
-
-def _early(example: Example, share: float = _EARLY) -> Tare | None:
-    """Return the beginning of a tare that is of its own recording; None of another."""
-    tare, source = example.tare, example.source
-    if tare is None or isinstance(source, SpikeTrains):
-        return None
-    try:
-        tare_again = Tare.take(source, start_us=tare.start_us, stop_us=tare.stop_us)
-        early = tare.start_us + round(share * (tare.stop_us - tare.start_us))
-        return (
-            Tare.take(source, start_us=tare.start_us, stop_us=early)
-            if np.array_equal(tare_again.rest, tare.rest, equal_nan=True)
-            else None
-        )
-    except ProblemError:
-        return None

@@ -90,6 +90,8 @@ class Score:
         Places of the reference events without a detection, and of the detections without an event.
     false_near : int, 0 or more
         How many of the false ones lie within the window of a reference event: the thesis' false positives (6.5.2).
+    false_beside : int, 0 or more
+        How many of the false ones lie within twice the window of a reference event.
     errors_ms, delays_ms : float64, shape (found,), ms
         `t` minus reference (negative is early) and `known` minus reference.
     by_label : dict of str to Score
@@ -104,6 +106,7 @@ class Score:
     errors_ms: NDArray[np.float64]
     delays_ms: NDArray[np.float64]
     by_label: Mapping[str, Score] = field(default_factory=dict)
+    false_beside: int = 0
 
     @property
     def events(self) -> int:
@@ -152,7 +155,7 @@ class Score:
     def to_dict(self) -> dict[str, Any]:
         """Return counts and spreads (ms) as plain values, label by label; what is not known is None."""
         plain: dict[str, Any] = {
-            name: getattr(self, name) for name in ("events", "found", "missed", "false", "false_near")
+            name: getattr(self, name) for name in ("events", "found", "missed", "false", "false_near", "false_beside")
         }
         for name, spread in (("error_ms", self.error), ("known_delay_ms", self.delay)):
             plain[name] = {part: None if np.isnan(value) else value for part, value in spread._asdict().items()}
@@ -163,7 +166,7 @@ class Score:
     def __repr__(self) -> str:
         rows = [*self.by_label.values()] if len(self.by_label) > 1 else []
         scores = [*rows, self]
-        counts = [(score.events, score.found, score.missed, score.false, score.false_near) for score in scores]
+        counts = [(score.events, score.found, score.missed, score.false, score.false_beside) for score in scores]
         table: list[tuple[str, ...]] = [("", "events", "found", "missed", "false", "near")]
         table += [(escaped(score.label), *map(str, row)) for score, row in zip(scores, counts, strict=True)]
         widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
@@ -242,17 +245,28 @@ def score(
     """
     instance("found", found, Detections)
     labels, times = _truth(found, truth)
-    tallies = _core.score(found._parts(), labels, times, _windows(labels, window_ms))
+    windows = _windows(labels, window_ms)
+    tallies = _core.score(found._parts(), labels, times, windows)
     scores = {}
     for tally in tallies:
         pairs, lost = np.column_stack([tally.detected, tally.events]), (tally.missed_events, tally.false_detections)
-        scores[tally.label] = Score(tally.label, pairs, *lost, tally.false_near, tally.errors_ms, tally.delays_ms)
+        of_label = np.array([label == tally.label for label in labels], np.bool_)
+        beside = _within(found.t[tally.false_detections], times[of_label], 2 * windows[of_label])
+        apart_ms = tally.errors_ms, tally.delays_ms
+        scores[tally.label] = Score(tally.label, pairs, *lost, tally.false_near, *apart_ms, false_beside=beside)
     no_times, ms = np.empty(0, np.int64), np.empty(0)
     parts = [Score("all", np.empty((0, 2), np.int64), no_times, no_times, 0, ms, ms), *scores.values()]
     names = ("pairs", "missed_events", "false_detections", "errors_ms", "delays_ms")
     together: dict[str, Any] = {name: np.concatenate([getattr(score, name) for score in parts]) for name in names}
-    near = sum(score.false_near for score in parts)
-    return Score(parts[-1].label if len(scores) == 1 else "all", false_near=near, by_label=scores, **together)
+    together |= {name: sum(getattr(score, name) for score in parts) for name in ("false_near", "false_beside")}
+    return Score(parts[-1].label if len(scores) == 1 else "all", by_label=scores, **together)
+
+
+def _within(t: NDArray[np.int64], events: NDArray[np.int64], windows: NDArray[np.int64]) -> int:
+    """Return how many times lie within the window of an event, each of which has its own, us."""
+    begun = np.searchsorted(np.sort(events - windows), t, side="right")
+    ended = np.searchsorted(np.sort(events + windows), t, side="left")
+    return int(np.count_nonzero(begun > ended))
 
 
 def mistakes_of(

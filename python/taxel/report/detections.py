@@ -152,6 +152,7 @@ def write_detections(
         begun=[(outcome.name, begun(outcome.begin_us)) for outcome in listened if outcome.begin_us],
         viewed=[quote(outcome.name) for outcome in listened if outcome.name.endswith(_VIEWED)][:_MOST_VIEWED],
         beside=_beside(readout.labels, scored),
+        causes=[(outcome.name, line) for outcome in listened for line in outcome.causes_lines],
         outside=[outcome for outcome in listened if isinstance(readout, Readout)],
         scored=any(outcome.score is not None for outcome in listened),
     )

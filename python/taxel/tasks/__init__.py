@@ -6,7 +6,7 @@ by its own methods. The command line and the page call these functions; ``python
 process of its own (`taxel.tasks.__main__`).
 """
 
-from taxel.detect.causes import Cause as Cause
+from taxel.detect.cause import Cause as Cause
 from taxel.tasks.calibrate import Calibrated as Calibrated
 from taxel.tasks.calibrate import CalibrateOptions as CalibrateOptions
 from taxel.tasks.calibrate import KnownLoad as KnownLoad

@@ -16,10 +16,11 @@ from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, recipes, score
-from taxel.detect.causes import count_drifted
 from taxel.detect.detector import detector
+from taxel.detect.mistakes import causes_of
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import score_together
+from taxel.detect.tares import count_drifted
 from taxel.detect.training_data import unlike
 from taxel.encode import ContactArea, Moments
 from taxel.events import Events
@@ -113,7 +114,7 @@ class Detected:
                 }
                 for d in self.outcome.found
             ],
-        } | ({} if found is None else {"score": found.to_dict()})
+        } | ({} if found is None else {"score": found.to_dict(), "causes": [c.to_dict() for c in self.outcome.causes]})
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,6 +288,7 @@ def _detected(
     example = Example(recording, true, tare, unlabelled=tuple(without))
     scored = score(example._known(found), true, options.window_ms) if true else None
     outcome = Outcome(recording.title, example, found, scored, outside)
+    outcome = outcome._replace(causes=causes_of(outcome, options.window_ms))
     return Detected(recording, outcome, taken, tuple(_remarks(recording, outcome, readout)))
 
 

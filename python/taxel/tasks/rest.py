@@ -20,7 +20,7 @@ from taxel._base.number_text import float_of
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.detect import Example
-from taxel.detect.label_times import TOUCH, held_by_tare
+from taxel.detect.tares import TOUCH, held_by_tare
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames

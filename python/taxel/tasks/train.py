@@ -18,7 +18,8 @@ from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
-from taxel.detect.causes import Evidence, Mistakes
+from taxel.detect.causes import Mistakes
+from taxel.detect.evidence import Evidence
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor

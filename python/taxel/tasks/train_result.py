@@ -10,8 +10,8 @@ from taxel._base.arguments import finite, flag, integer, mapping
 from taxel._base.errors import refused
 from taxel._base.messages import counted, three_digits
 from taxel._base.times import beginning_us
-from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained
-from taxel.detect.causes import Cause
+from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained, recipes
+from taxel.detect.cause import Cause
 from taxel.detect.levels import LEAST_LEVELS
 from taxel.detect.recipe import change_values, with_floor
 from taxel.detect.scoring import score_rows
@@ -217,6 +217,7 @@ class Training:
         lines += [*self._better(), *self._advised(), *self._aligned()]
         if self.options.shift_ms:
             lines.append(f"labels moved by {self.options.shift_ms:+g} ms before, as asked")
+        lines += self._kinds()
         if recipe is not None:
             about = self.made.recipe.about
             lines += ["", f"recipe {recipe}" + (f": {about}" if about else "")]
@@ -242,6 +243,17 @@ class Training:
     def fitted_levels(self) -> tuple[float, ...]:
         """The levels of the encoder if they are of the training data, in the sensor's unit; else none."""
         return tuple(self.made.recipe.encoder.levels) if self.made.fitted_levels else ()  # type: ignore[attr-defined]
+
+    def _kinds(self) -> Iterator[str]:
+        """Yield the labels that are learnt as kinds of touch, and what ends of touches are called."""
+        recipe = self.options.recipe
+        if recipe is None:
+            return
+        for label in recipes.kinds(recipe, self.readout.labels):
+            yield (
+                f"{label}: learnt as a kind of touch, told at an age of the touch; its begin is called "
+                f"{recipes.names_of(recipe, 'contact')}; its end {recipes.names_of(recipe, 'lift')}"
+            )
 
     def _levels(self) -> Iterator[str]:
         """Yield the levels that the training data gave, if they did."""
@@ -315,16 +327,18 @@ class Training:
             yield f"{', '.join(cause.labels)}: {cause}"
 
     def unreliable(self) -> Iterator[str]:
-        """Yield the labels that the readout detects no better than one that detects nothing, and what may help."""
+        """Yield the labels of which the readout misses most, or detects no more than one of nothing; what may help."""
         for label in self.readout.labels:
             score = self.scored.together[label]
-            if score.rank[0] < score.events:
+            if score.rank[0] < score.events and 2 * score.missed <= score.events:
                 continue
-            helps = next((f"; what may help is {cause.advice}" for cause in self.causes if label in cause.labels), "")
+            worth = ", no better than to detect nothing" if score.rank[0] >= score.events else ""
+            first = next((cause for cause in self.causes if label in cause.labels), None)
+            helps = f"; what may help is {first.advice}" if first is not None and first.advice else ""
             labels = "labels that it was trained on" if self.why else "held-out labels"
             yield (
                 f"{label}: do not rely on this readout: {score.found} of {score.events} {labels} found, {score.false} "
-                f"false, no better than to detect nothing{helps}"
+                f"false{worth}{helps}"
             )
 
     def _aligned(self) -> Iterator[str]:
@@ -346,8 +360,10 @@ class Training:
                 more = f" and {len(events) - _NAMED} more" if len(events) > _NAMED else ""
                 labels = counted(len(events), "label")
                 named = ", ".join(events[:_NAMED]) + more
+                weaker = next((f"; {c.measured}" for c in self.causes if c.kind == "levels" and label in c.labels), "")
                 yield (
                     f"{label}: no input that {label} is learnt from lies within 50 ms of {labels}, not learnt: {named}"
+                    f"{weaker}"
                 )
 
 

@@ -24,7 +24,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["chosen", "fitting", "for_labels", "knows", "names", "read", "spelling"]
+__all__ = ["chosen", "fitting", "for_labels", "kinds", "knows", "names", "names_of", "read", "spelling"]
 
 #: The recipe of recordings that no other fits: its levels are shares of the running range, of any unit.
 _ANY = "gait_channel"
@@ -36,8 +36,10 @@ _OF_STEPS = {"foot", "footfall", "heel", "toe", "step", "stride"}
 #: way round.
 _ENDS = {
     **dict.fromkeys(("heel_strike", "foot_strike", "foot_contact", "initial_contact", "touch_down"), "contact"),
-    **dict.fromkeys(("erstkontakt", "fersenkontakt", "aufsetzen"), "contact"),
-    **dict.fromkeys(("foot_off", "toe_off", "final_contact", "zehenablösung", "zehenabloesung"), "foot_off"),
+    **dict.fromkeys(("erstkontakt", "fersenkontakt", "aufsetzen", "ic", "hs"), "contact"),
+    **dict.fromkeys(
+        ("foot_off", "toe_off", "final_contact", "zehenablösung", "zehenabloesung", "fo", "to"), "foot_off"
+    ),
     **dict.fromkeys(("lift_off", "abheben"), "lift"),
 }
 _SAME_END = {"foot_off": "lift", "lift": "foot_off"}
@@ -205,6 +207,33 @@ def knows(recipe: str, label: str) -> bool:
     (True, False)
     """
     return _listed(read(recipe), text("label", label)) is not None
+
+
+def kinds(recipe: str, labels: Sequence[str]) -> tuple[str, ...]:
+    """Return the labels that a recipe learns as kinds of touch, as it has neurons of ends of touches, but not of these.
+
+    Examples
+    --------
+    >>> kinds("touch", ["grasp", "release", "slip"])
+    ('slip',)
+    """
+    values = read(recipe)
+    kind = values.get("other")
+    if not isinstance(kind, Mapping) or not values.get("neurons"):
+        return ()
+    neurons = for_labels(values, labels)["neurons"]
+    return tuple(label for label in labels if neurons[label] == dict(kind))
+
+
+def names_of(recipe: str, end: str) -> str:
+    """Return what the labels of a recipe's neuron may be called, as a list in words.
+
+    Examples
+    --------
+    >>> names_of("touch", "lift")
+    'lift, release, removal, end, stop, off'
+    """
+    return ", ".join((end, *(name for name, kind in read(recipe).get("also", {}).items() if kind == end)))
 
 
 def _listed(values: Mapping[str, Any], label: str) -> str | None:

@@ -1,0 +1,109 @@
+"""One cause of missed and false events: what was measured, and what helps; and the order of several."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from taxel._base.arguments import integer, mapping, several, shown, text
+from taxel._base.errors import refused
+
+#: The kinds of causes. Where two concern equally many mistakes the earlier comes first: the later may follow from it.
+KINDS = (
+    "falling_values", "shifted_labels", "few_labels", "unlabelled_source", "levels", "overlapping_loads",
+    "foreign_labels", "tare", "begun_loaded", "durations", "recipe", "window", "gaps", "unlabelled_time", "label_name",
+    "other_name", "unlabelled_loads", "plain_rule", "no_neighbours", "indistinct_kinds", "overfitting", "many_false",
+    "unknown",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Hold one cause of missed and false events: what was measured, and what helps.
+
+    Parameters
+    ----------
+    kind : str
+        One of `taxel.detect.cause.KINDS`; the page on training explains each.
+    labels : tuple of str
+        The labels that it concerns.
+    mistakes : int, 0 or more
+        How many missed and false events it concerns, at most.
+    measured : str
+        What was measured.
+    advice : str
+        What helps: the option of ``taxel train`` with its value, where there is one; empty where nothing is known to.
+    option : str
+        That option, as it is typed; empty where none helps.
+    arguments : mapping of str to value
+        The same in Python: fields of `taxel.tasks.TrainOptions`. Those of "changes" are added to the others.
+
+    Raises
+    ------
+    ProblemError : another kind, or a value of another type
+
+    Examples
+    --------
+    >>> cause = Cause("shifted_labels", ("contact",), 12, "12 of 12 lie 203 ms late", "--shift-ms -203")
+    >>> str(cause)
+    'what may help is --shift-ms -203: 12 of 12 lie 203 ms late'
+    """
+
+    kind: str
+    labels: tuple[str, ...]
+    mistakes: int
+    measured: str
+    advice: str
+    option: str = ""
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if text("kind", self.kind) not in KINDS:
+            raise refused("kind", f" is {shown(self.kind)}: must be one of {', '.join(KINDS)}")
+        object.__setattr__(self, "labels", tuple(text("labels", label) for label in several("labels", self.labels)))
+        integer("mistakes", self.mistakes, 0)
+        for name in ("measured", "advice", "option"):
+            text(name, getattr(self, name))
+        mapping("arguments", self.arguments)
+
+    def __str__(self) -> str:
+        return f"what may help is {self.advice}: {self.measured}" if self.advice else self.measured
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the cause as plain values for JSON."""
+        return {
+            "kind": self.kind,
+            "labels": list(self.labels),
+            "mistakes": self.mistakes,
+            "measured": self.measured,
+            "advice": self.advice,
+            "option": self.option,
+            "arguments": dict(self.arguments),
+        }
+
+
+def by_option(kind: str, label: str, mistakes: int, measured: str, option: str, **arguments: Any) -> Cause:
+    """Return a cause against which an option of the training helps."""
+    return Cause(kind, (label,), mistakes, measured, option, option, arguments)
+
+
+def ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
+    """Return causes with the same advice as one, those of most mistakes first."""
+    merged: dict[tuple[str, str], Cause] = {}
+    for cause in causes:
+        before = merged.setdefault((cause.kind, cause.advice), cause)
+        if before is cause or (before.labels, before.measured) == (cause.labels, cause.measured):
+            continue
+        merged[cause.kind, cause.advice] = replace(
+            before,
+            labels=tuple(dict.fromkeys((*before.labels, *cause.labels))),
+            mistakes=before.mistakes + cause.mistakes,
+            measured="; ".join(dict.fromkeys((*before.measured.split("; "), *cause.measured.split("; ")))),
+        )
+    return tuple(sorted(merged.values(), key=lambda cause: (-cause.mistakes, KINDS.index(cause.kind))))
+
+
+def lie(count: int) -> str:
+    """Return the verb of so many that lie somewhere."""
+    return "lies" if count == 1 else "lie"

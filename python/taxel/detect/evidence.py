@@ -1,0 +1,364 @@
+"""What training data show of their labels and tares without a training."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from taxel._base.messages import counted
+from taxel.detect import recipes
+from taxel.detect.alignment import WINDOW_MS, Alignment
+from taxel.detect.cause import Cause, by_option, lie, ordered
+from taxel.detect.examples import Example
+from taxel.detect.fitting import TWO_FOLDS
+from taxel.detect.label_times import FeltLoads, Off, early
+from taxel.detect.levels import LEAST_LEVELS, loaded_levels
+from taxel.detect.mistakes import overlapping, stretch_of
+from taxel.detect.recipe import Recipe
+from taxel.detect.tares import TOUCH, held_by_tare, loaded_at_rest, quiet_s
+from taxel.encode import LevelCrossing, ThresholdIzhikevich
+from taxel.events import Events
+from taxel.formats.event_camera import are_counts
+from taxel.frames import Frames
+from taxel.recorded import recorded
+from taxel.recording.analysis.rest import TIMES_NOISE, ZEROS_BEFORE, of_frames
+from taxel.spikes import SpikeTrains, to_ms, to_us
+
+#: What helps against labels that lie elsewhere.
+FOREIGN = "labels of this recording, where it was touched"
+#: What makes a tare's file of a recording.
+_MAKES_TARE = "taxel cut RECORDING FILE --from S --to S"
+#: Labels are a question before a training if at most this share of them lies near anything that was felt ...
+_NEARLY_NONE = 0.1
+#: ... of so many or more.
+_LEAST_LABELS = 4
+#: Labels of several names are moved together whose distances from what was felt differ by so many windows at most.
+_TOGETHER = 1.5
+#: Five folds need this many labels.
+FIVE_FOLDS = 10
+#: Windows of counts so many times as long are looked at for a weak burst.
+_LONGER = (1, 2, 4)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Hold the training data, and find the causes that they show without a training.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+        As they were given, and ...
+    sound : sequence of Example
+        ... checked.
+    plan : Recipe
+        That is trained by.
+    """
+
+    examples: Sequence[Example]
+    sound: Sequence[Example]
+    plan: Recipe
+
+    @cached_property
+    def felt(self) -> FeltLoads:
+        """When the examples were loaded."""
+        return FeltLoads(self.sound)
+
+    @cached_property
+    def _counts(self) -> dict[str, int]:
+        """How many labels there are of each name."""
+        names = sorted({label for example in self.sound for label in example.labels})
+        return {name: sum(len(example.labels.get(name, ())) for example in self.sound) for name in names}
+
+    def without(self, places: Collection[int]) -> Evidence:
+        """Return the same of the other examples."""
+        left = [k for k in range(len(self.sound)) if k not in places]
+        return Evidence([self.examples[k] for k in left], [self.sound[k] for k in left], self.plan)
+
+    @property
+    def is_of_one_name(self) -> bool:
+        """Whether all labels have one name."""
+        return len(self._counts) == 1
+
+    @property
+    def falls(self) -> str:
+        """That values fall from their rest, and what turns them; empty where none do."""
+        advice, measured = self._fall
+        return f"{measured}: if less means more pressure, {advice} helps" if advice else ""
+
+    @cached_property
+    def _fall(self) -> tuple[str, str]:
+        """What turns values that fall, and that they do; empty where none do."""
+        for example in self.examples:
+            source = recorded(example.source, hold=False)
+            if isinstance(source, Frames) and (rest := of_frames(source)).falls:
+                layout, advice = rest.turning(getattr(example.source, "path", None))
+                turned = f" as {layout} turns them" * bool(layout)
+                return advice, f"{example.name}: " * bool(example.name) + f"values fall from their rest{turned}"
+        return "", ""
+
+    @cached_property
+    def _distances(self) -> dict[str, Off]:
+        return self.felt.distances(self._counts)
+
+    @cached_property
+    def felt_apart(self) -> dict[str, Off]:
+        """Labels too far from what was felt to be aligned, and near enough for a window, where no other name is off."""
+        if not self.is_of_one_name and all(distance.is_far for distance in self._distances.values()):
+            return {}
+        return {
+            label: distance
+            for label, distance in self._distances.items()
+            if distance.is_far and abs(distance.ms) <= 2 * WINDOW_MS
+        }
+
+    def felt_rank(self, label: str) -> int:
+        """Return how many loads that begin, or end, and labels have no pair within twice the window of alignments."""
+        return self.felt.rank(label, 2 * WINDOW_MS)
+
+    @cached_property
+    def _early(self) -> str:
+        """That the labels of each recording lie at its very beginning; empty where they do not."""
+        texts = [
+            early(example.labels, int(source.t[0]), int(source.t[-1]))
+            for example in self.sound
+            if isinstance(source := example.source, Events | Frames)
+            and len(source)
+            and any(map(len, example.labels.values()))
+        ]
+        return texts[0] if texts and all(texts) else ""
+
+    @cached_property
+    def _loaded(self) -> int:
+        """How many taxels read above their tare while nothing touches them."""
+        return loaded_at_rest(self.examples, self.plan.encoder)
+
+    @cached_property
+    def _of_tare(self) -> tuple[str, str, dict[str, Any]]:
+        """What is wrong with the tare, the option that helps, and its value in Python; empty where nothing is."""
+        held = held_by_tare(self.sound)
+        if held >= TOUCH:
+            seconds = quiet_s(self.sound)
+            by = ("--tare FILE", {}) if seconds is None else (f"--tare {seconds:g}", {"tare": seconds})
+            return f"it holds a touch of {held} taxels", *by
+        if self._loaded >= TOUCH:
+            return f"{self._loaded} taxels read above theirs while nothing touches them", "--tare FILE", {}
+        return "", "", {}
+
+    @cached_property
+    def _near(self) -> dict[str, tuple[int, int, int]]:
+        """How many labels of each name lie near a load, near its begin or end, and how many there are, if known."""
+        near = {label: self.felt.near(label) for label in self._counts}
+        return {label: counts for label, counts in near.items() if counts is not None and counts[-1]}
+
+    def unfelt(self) -> str:
+        """Return how many labels lie near anything felt, if nearly none does; else, and where it is not known, ""."""
+        count, _, total = np.sum([*self._near.values(), (0, 0, 0)], axis=0).tolist()
+        if total < _LEAST_LABELS or count > _NEARLY_NONE * total:
+            return ""
+        return f"{count} of {counted(total, 'label')} {lie(count)} within {WINDOW_MS:.0f} ms of anything that was felt"
+
+    def refused(self) -> tuple[Cause, ...]:
+        """Return the causes that the data show of a training that was refused: all labels count as missed."""
+        return ordered([cause for cause in self.causes(self._counts) if cause.kind != "few_labels"])
+
+    def causes(self, wrong: Mapping[str, int]) -> list[Cause]:
+        """Return the causes that the data show, for each of the labels of which so many are missed or false."""
+        advice, measured = self._fall
+        if advice and wrong:
+            # What else is measured is measured upside down.
+            return [Cause("falling_values", tuple(wrong), sum(wrong.values()), measured, advice)]
+        while_lasting = [cause for label, count in wrong.items() for cause in self._while_lasting(label, count)]
+        wrong = {label: count for label, count in wrong.items() if all(label not in c.labels for c in while_lasting)}
+        shifts = list(self._shifts(wrong))
+        found = [cause for label, count in wrong.items() for cause in self._of_label(label, count)]
+        found += [cause for label, count in wrong.items() for cause in self._foreign(label, count)]
+        return [*while_lasting, *(shifts or found)]
+
+    def _while_lasting(self, label: str, wrong: int) -> Iterator[Cause]:
+        """Yield that most labels of a name lie within touches, where most labels of another name lie at their edges."""
+        near, at_edge, total = self._near.get(label, (0, 0, 0))
+        fits = [name for name, (_, edges, count) in self._near.items() if name != label and 2 * edges > count]
+        within = near - at_edge
+        # A tare that does not fit lets touches seem to last.
+        if recipes.knows("touch", label) or not fits or 2 * within <= total or self._loaded >= TOUCH:
+            return
+        measured = (
+            f"{within} of {counted(total, 'label')} {lie(within)} within touches, which {', '.join(fits)} "
+            f"{'fits' if len(fits) == 1 else 'fit'}, and no recipe tells what happens while a touch lasts"
+        )
+        yield Cause("label_name", (label,), wrong, measured, "labels of where touches begin or end")
+
+    def _foreign(self, label: str, wrong: int) -> Iterator[Cause]:
+        """Yield at how many labels no load begins or ends; all mistakes may be by them if that is most."""
+        if self._early:
+            yield Cause("foreign_labels", (label,), wrong, f"the labels {self._early}", "labels with times in us")
+            return
+        _, at_edge, total = self._near.get(label, (0, 0, 0))
+        # A tare that does not fit tells nothing.
+        if at_edge == total or self._loaded >= TOUCH or label in self.felt_apart:
+            return
+        away = total - at_edge
+        if 2 * (count := int(self.felt.overlapped(label).sum())) > away:
+            yield overlapping(label, count, total, wrong)
+            return
+        measured = (
+            f"{away} of {counted(total, 'label')} {lie(away)} more than {WINDOW_MS:.0f} ms from where a load begins "
+            "or ends: they are of another recording, or off by another time each, or name what the sensor does not "
+            "feel, or a tare from elsewhere does not fit"
+        )
+        mistakes = wrong if 2 * away > total else min(away, wrong)
+        yield Cause("foreign_labels", (label,), mistakes, measured, FOREIGN)
+
+    def _shifts(self, wrong: Mapping[str, int]) -> Iterator[Cause]:
+        """Yield by how much labels are off, which one option moves if no label is then too far off.
+
+        Labels that a hand set live need a second option, for their spread. Where other labels fit, those that a wider
+        window reaches are right: what they name is felt late, or early, as the end of a slow release.
+        """
+        distances = self._distances
+        all_ms = [distance.ms for distance in distances.values()]
+        together = bool(all_ms) and max(all_ms) - min(all_ms) <= _TOGETHER * WINDOW_MS
+        shift_ms = -round((max(all_ms) + min(all_ms)) / 2) if together else 0
+        within_ms = max((distance.within_ms for distance in distances.values()), default=0.0)
+        for label in wrong:
+            if label not in distances:
+                yield from self._part_off(label, wrong[label])
+        for label, distance in distances.items():
+            if label not in wrong or not distance.is_far:
+                continue
+            if label in self.felt_apart and not self.is_of_one_name:
+                continue
+            measured = f"{distance}; the score is then against the moved labels"
+            if together:
+                option, arguments = f"--shift-ms {shift_ms}", {"shift_ms": float(shift_ms)}
+                if within_ms > WINDOW_MS:
+                    option, arguments = f"{option} --window-ms {within_ms:.0f}", arguments | {"window_ms": within_ms}
+                yield by_option("shifted_labels", label, wrong[label], measured, option, **arguments)
+            else:
+                side = "earlier" if distance.ms > 0 else "later"
+                advice = f"times of {label} {abs(distance.ms):.0f} ms {side} in the labels, as others fit"
+                yield Cause("shifted_labels", (label,), wrong[label], measured, advice)
+
+    def _part_off(self, label: str, wrong: int) -> Iterator[Cause]:
+        """Yield by how much labels of a part of a recording are off."""
+        alike = self.felt.part_off(label)
+        if alike is None or 4 * (count := int(alike.which.sum())) < wrong:
+            return
+        times = self.felt.times(label)
+        if stretch := stretch_of(times, alike.which, self.sound):
+            side, back = ("after", "earlier") if alike.ms > 0 else ("before", "later")
+            distance = f"{abs(alike.ms):.0f} ms"
+            measured = f"{count} of {len(times)} lie {distance} {side} what the sensor felt, all {stretch}"
+            advice = f"labels {stretch} {distance} {back}"
+            yield Cause("shifted_labels", (label,), min(2 * count, wrong), measured, advice)
+
+    def _of_label(self, label: str, wrong: int) -> Iterator[Cause]:
+        if (count := self._counts.get(label, 0)) < TWO_FOLDS:
+            there = f"there {'is' if count == 1 else 'are'} {count}"
+            folds = f"{TWO_FOLDS} are the least to score it held out, {FIVE_FOLDS} for five folds"
+            yield Cause("few_labels", (label,), wrong, f"{there}; {folds}", "more labels")
+        if not self.plan.fit_levels:
+            stretches = [(k, -np.inf, np.inf) for k in range(len(self.sound))]
+            loaded = loaded_levels(self.plan.encoder, self.sound, stretches)
+            if loaded is not None and loaded.within < min(LEAST_LEVELS, len(self.plan.encoder.levels)):  # type: ignore[attr-defined]
+                measured = (
+                    f"{loaded.within} of the encoder's levels {lie(loaded.within)} within what "
+                    f"loaded taxels read, {loaded.low:.3g} to {loaded.high:.3g}"
+                )
+                changes = {"fit_levels": True}
+                yield by_option("levels", label, wrong, measured, "--set fit_levels=true", changes=changes)
+        because, option, arguments = self._of_tare
+        if because:
+            advice = option if arguments else "another tare, of the time just before (--tare FILE)"
+            measured = f"of the tare: {because}" + ("" if arguments else f"; {_MAKES_TARE} makes that file, a .npz")
+            yield Cause("tare", (label,), wrong, measured, advice, option, arguments)
+        yield from self._begun_loaded(label, wrong)
+        yield from self._other_recipe(label, wrong)
+
+    def _begun_loaded(self, label: str, wrong: int) -> Iterator[Cause]:
+        """Yield how many labels lie where a recording begins loaded, of which encoders of levels see no begin."""
+        encoder = self.plan.encoder
+        if not isinstance(encoder, LevelCrossing | ThresholdIzhikevich):
+            return
+        count = 0
+        for example in self.sound:
+            source = example.source
+            if isinstance(source, Frames) and len(source) > 1 and (source.values[0] >= min(encoder.levels)).any():
+                count += int(np.count_nonzero(example.labels.get(label, np.empty(0)) <= source.t[1]))
+        if count:
+            measured = (
+                f"{count} of {counted(self._counts[label], 'label')} {lie(count)} in the first two frames of "
+                "recordings that begin loaded, where no load begins"
+            )
+            yield Cause("begun_loaded", (label,), min(count, wrong), measured, ZEROS_BEFORE)
+
+    def _other_recipe(self, label: str, wrong: int) -> Iterator[Cause]:
+        """Yield the recipe that fits recording and labels, if another named one is trained by."""
+        used = next((name for name in recipes.names() if recipes.read(name)["about"] == self.plan.about), None)
+        source = recorded(self.examples[0].source)
+        if used is None or isinstance(source, SpikeTrains):
+            return
+        fits, why = recipes.chosen(source, list(self._counts))
+        if fits != used:
+            measured = f"it is made for {why}; this training took {used}"
+            yield by_option("recipe", label, wrong, measured, f"--recipe {fits}", recipe=fits)
+
+
+class _WeakBurst(NamedTuple):
+    """A label without an input near it, where a file of counts has far more events than at rest."""
+
+    window_ms: float
+    events: float
+    """Most of all taxels in a window near it ..."""
+    rest: float
+    """... and at rest."""
+    by: Mapping[int, float]
+    """How many times the noise at rest the events above it are, in so many windows together."""
+
+
+def weak_bursts(examples: Sequence[Example], alignment: Alignment) -> Iterator[_WeakBurst]:
+    """Yield those of the labels without a pair that have a burst of events, of files of counts."""
+    for k, example in enumerate(examples):
+        source, tare = recorded(example.source), example.tare
+        if not isinstance(source, Frames) or not are_counts(source.unit) or tare is None or len(source) < 2:
+            continue
+        total = np.asarray(np.nansum(source.values, axis=(1, 2), dtype=np.float64))
+        resting = total[slice(*np.searchsorted(source.t, (tare.start_us, tare.stop_us)))]
+        if not len(resting):
+            continue
+        rest, window_us = resting.mean(), float(np.median(np.diff(source.t)))
+        noise = max(resting.std(), rest**0.5, 1.0)
+        for t in alignment.given[alignment.unpaired & (alignment.example == k)]:
+            reach_us = to_us(WINDOW_MS)
+            near = total[slice(*np.searchsorted(source.t, (t - reach_us, t + reach_us)))] - rest
+            by = {
+                n: float(np.convolve(near, np.ones(n), "valid").max()) / (noise * n**0.5)
+                for n in _LONGER
+                if n <= len(near)
+            }
+            if by and by[1] >= TIMES_NOISE:
+                yield _WeakBurst(to_ms(window_us), near.max() + rest, rest, {n: by.get(n, 0.0) for n in _LONGER})
+
+
+def of_weak_bursts(examples: Sequence[Example], label: str, alignment: Alignment, mistakes: int) -> Cause | None:
+    """Return the cause that most labels without a pair have a burst below the level that is learnt; else None."""
+    weak = list(weak_bursts(examples, alignment))
+    if 2 * len(weak) <= alignment.unpaired.sum():
+        return None
+    events, rest = (np.median([getattr(burst, name) for burst in weak]) for name in ("events", "rest"))
+    times, most = max(_LONGER, key=lambda k: np.median([burst.by[k] for burst in weak])), weak[0].window_ms
+    present, longer = (np.median([burst.by[k] for burst in weak]) for k in (1, times))
+    measured = (
+        f"{counted(len(weak), 'burst')} {'is' if len(weak) == 1 else 'are'} weaker than the level that {label} is "
+        f"learnt from, at the median {events:.0f} events in {most:g} ms where the rest has {rest:.0f}: {present:.3g} "
+        "times its noise"
+    )
+    advice = ""
+    if times > 1:
+        measured += f", and {longer:.3g} times in {times * most:g} ms"
+        advice = f"frames of longer windows, --count-ms {times * most:g}"
+    return Cause("levels", (label,), mistakes, measured, advice)
