@@ -353,7 +353,8 @@ def look(*program: str | Path, variables: Mapping[str, str]) -> str:
                 page.wait_for_function(shows, timeout=300_000)
                 return f"its page shows {page.locator('#source').inner_text()}"
         finally:
-            serving.terminate()
+            # unshare ignores SIGTERM while its child runs, which ends with it.
+            serving.kill()
 
 
 def unpack_windows_python(part: Part, folder: Path) -> None:
