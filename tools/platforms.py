@@ -328,6 +328,7 @@ def windows(part: Part) -> str:
     within = ("unshare", "--mount", "--pid", "--fork", "--kill-child", "sh", "-c", IN_TREE, "sh", SID)
     program = (*within, "sh", "-c", WINE, "sh", "python/python.exe")
     variables = {"HOME": "/root", "PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "LANG": "C.UTF-8", "WINEDEBUG": "-all"}
+    variables |= {"MPLBACKEND": "Agg"}  # this Python has no library of windows
 
     def python(*arguments: str) -> str:
         return part.run(*program, *arguments, variables=variables)
