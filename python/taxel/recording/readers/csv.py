@@ -250,7 +250,7 @@ def _numbers(path: Path, names: list[str], first: int, body: bytes, dtype: type[
         return np.empty((0, len(names)), dtype)
     try:
         with warnings.catch_warnings():
-            # NumPy before 2.4 cuts a decimal to a whole number with no more than this warning.
+            # Older NumPy, as 2.1, cuts a decimal to a whole number with no more than this warning.
             warnings.simplefilter("error", DeprecationWarning)
             table = np.loadtxt(io.BytesIO(body), dtype=dtype, delimiter=",", comments=None, ndmin=2)
     except (ValueError, OverflowError) as error:
