@@ -74,10 +74,16 @@ OF_THE_CHECKOUT = {
 }
 STARTS = "tests/test_command_line.py::test_ctrl_c_while_it_starts_ends_quietly"
 EARLY = "qemu's vfork does not wait for exec: the test sees its own libraries in the new process and interrupts it too early"
+FILES = "tests/live/test_files.py"
 HELD = "replaces a recording that it has open itself, which Windows refuses"
 OVERWRITES = ("test_any_silence_and_any_start_survive_mcap", "test_what_a_target_cannot_hold_is_said")
 NO_SIGNAL = "ends another process by a signal that Windows does not have"
-INTERRUPTED = (STARTS, "tests/live/test_files.py::test_a_second_recorder_does_not_take_the_file_of_a_running_one")
+INTERRUPTED = (STARTS, f"{FILES}::test_a_second_recorder_does_not_take_the_file_of_a_running_one")
+OPEN = "removes, renames or replaces a file that a recorder has open, which Windows refuses"
+REMOVED = (
+    f"{FILES}::test_a_recording_whose_file_is_gone_at_its_end_is_said_to_be_lost",
+    f"{FILES}::test_taxel_record_says_that_its_file_is_gone",
+)
 #: Those of each system; of Rust by its own name.
 LEFT_OUT: dict[str, dict[str, str]] = {
     "arm": OF_THE_CHECKOUT
@@ -95,7 +101,10 @@ LEFT_OUT: dict[str, dict[str, str]] = {
     "windows": OF_THE_CHECKOUT
     | {f"tests/recording/test_convert.py::{name}": HELD for name in OVERWRITES}
     | dict.fromkeys(INTERRUPTED, NO_SIGNAL)
+    | dict.fromkeys(REMOVED, OPEN)
     | {
+        f"{FILES}::test_a_full_disk_is_one_clear_error": "fills a disk by Linux' calls",
+        f"{FILES}::test_two_recordings_of_one_program_do_not_share_a_file": "Windows itself refuses the second, in other words",
         "tests/test_systems.py::test_a_board_is_recorded_and_labelled_in_any_folder[300-characters]": "wine names a path of that "
         "length that is not there by an error (234) which Python expects of none",
         "tests/test_systems.py::test_a_recording_is_complete_after_ctrl_break": "wine passes no Ctrl-Break on to another process "
