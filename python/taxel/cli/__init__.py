@@ -55,6 +55,8 @@ def _root(version: bool = typer.Option(False, "--version", help="Print the versi
 def program() -> NoReturn:
     """Run the command line as the only work of this process: its environment and its signals are the command's."""
     make_safe(os.environ)
+    # Commands draw into files alone: matplotlib needs no windows, for which a Python may lack a library.
+    os.environ.setdefault("MPLBACKEND", "Agg")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             # What a console's encoding lacks is shown escaped, as control characters are.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
@@ -12,7 +13,6 @@ from typing import Any
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
-import psutil
 from markupsafe import Markup
 
 import taxel
@@ -30,6 +30,11 @@ __all__ = ["figures", "lines", "write"]
 _EVENT_BITS = 80
 
 
+def _load() -> float | None:
+    """Return the machine's load of the last minute; None where the system keeps none."""
+    return None if sys.platform == "win32" else os.getloadavg()[0]
+
+
 def figures(
     evaluation: Evaluation, quiet: Evaluation, playing: Playing | None, *, seed: int, scenes: int
 ) -> dict[str, Any]:
@@ -44,7 +49,7 @@ def figures(
         else "in real time, over UDP",
         "board_seconds": evaluation.seconds,
         "rest_seconds": evaluation.start_us * 1e-6,
-        "machine": {"cores": os.cpu_count(), "load": psutil.getloadavg()[0], "taxel": taxel.__version__},
+        "machine": {"cores": os.cpu_count(), "load": _load(), "taxel": taxel.__version__},
         "neuron": evaluation.judged.to_dict(),
         "plain_rule": evaluation.judged_plain.to_dict(),
         "detections": len(evaluation.detections),

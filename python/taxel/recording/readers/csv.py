@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -248,7 +249,10 @@ def _numbers(path: Path, names: list[str], first: int, body: bytes, dtype: type[
     if not body.strip():
         return np.empty((0, len(names)), dtype)
     try:
-        table = np.loadtxt(io.BytesIO(body), dtype=dtype, delimiter=",", comments=None, ndmin=2)
+        with warnings.catch_warnings():
+            # Older NumPy, as 2.1, cuts a decimal to a whole number with no more than this warning.
+            warnings.simplefilter("error", DeprecationWarning)
+            table = np.loadtxt(io.BytesIO(body), dtype=dtype, delimiter=",", comments=None, ndmin=2)
     except (ValueError, OverflowError) as error:
         match = re.search(r"at row (\d+)(?:, column (\d+))?", str(error))
         # NumPy counts rows from 0 in one of its messages, and from 1 in the other.
