@@ -379,5 +379,6 @@ def test_the_unit_above_a_table_and_the_rate_of_rounded_stamps_are_in_the_layout
 @pytest.mark.parametrize("array", [(5, 7), [5, 7]])
 def test_two_numbers_for_an_array_are_told_what_makes_one(tmp_path: Path, array: Any) -> None:
     np.save(tmp_path / "a.npy", np.ones((3, 35)))
+    (tmp_path / "a.layout.toml").write_text("rate_hz = 100\n")
     with pytest.raises(taxel.ProblemError, match=r"must be taxel\.Array\(5, 7\), of so many rows and columns"):
-        taxel.open(tmp_path / "a.npy", array=array, layout={"rate_hz": 100})
+        taxel.open(tmp_path / "a.npy", array=array)

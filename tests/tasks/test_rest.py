@@ -227,7 +227,7 @@ def test_zeros_before_are_advised_only_where_a_recording_begins_loaded(tmp_path:
     """The sensor reads 0 without a load; each load lasts for less than half a second, and moves."""
     t = np.arange(300)
     values = (
-        np.abs(np.random.default_rng(4).normal(0, 40, (300, 3, 4))) * ((t // 20) % 2 == (not loaded))[:, None, None]
+        np.abs(np.random.default_rng(4).normal(0, 400, (300, 3, 4))) * ((t // 20) % 2 == (not loaded))[:, None, None]
     )
     taxel.convert(Frames(values, 10_000 * t, unit=unit), tmp_path / "a.npz")
     with pytest.raises(UnknownRestError, match="the rest of its taxels is not known") as caught:
