@@ -92,7 +92,8 @@ class Labels:
     path : path
         A CSV ``recording,source,label,t_us,host_ns,replaces_us``, its columns in any order, with commas, semicolons or
         tabs between; all but `label` and `t_us` may be absent. A label without a source is of all sources of its
-        recording; a source that was a topic of a ROS bag may have the topic's name. A row with `replaces_us` stands for
+        recording; a source that was a topic of a ROS bag may have the topic's name,
+        and one of a known side that side's, left or right. A row with `replaces_us` stands for
         the recording's own note of that time; one without a label says that this note is none. Other columns are kept
         (`Note.others`). An empty text has no labels. Without `t_us` a column of times by its name is read: numbers in
         the unit that the name states ("Zeit [s]", "t_ms"), or dates, which count from 1970; without `label` one of
@@ -180,13 +181,14 @@ class Labels:
             raise refused("recording", f" is {shown(recording)}: must be a taxel.Recording")
         source = getattr(recording, "label", "")
         trial = trial_of(getattr(recording, "name", ""), source)
-        return self._times(recording.path, lambda: recording.clock, source, trial)
+        side = getattr(recording, "side", "")
+        return self._times(recording.path, lambda: recording.clock, source, trial, side)
 
     def _times(
-        self, path: Path, clock_of: Callable[[], Clock | None], source: str, trial: str = ""
+        self, path: Path, clock_of: Callable[[], Clock | None], source: str, trial: str = "", side: str = ""
     ) -> dict[str, NDArray[np.int64]]:
         """Return the events of a source of the recording at this path; its clock is read only if it is needed."""
-        rows = self._rows(path, source, trial)
+        rows = self._rows(path, source, trial, side=side)
         clock = clock_of() if any(row.at_ns for row in rows) else None
         by_label: dict[str, list[int]] = {}
         for row in rows:
@@ -194,14 +196,19 @@ class Labels:
             by_label.setdefault(row.text, []).append((row.t or 0) - ahead)
         return {label: np.sort(np.array(times, np.int64)) for label, times in by_label.items()}
 
-    def _rows(self, path: Path, source: str, trial: str, among: Sequence[Note] | None = None) -> list[Note]:
-        """Return the labels of a source of a recording, or of its trial: those of all of the file, and its own."""
+    def _rows(
+        self, path: Path, source: str, trial: str, among: Sequence[Note] | None = None, side: str = ""
+    ) -> list[Note]:
+        """Return the labels of a source of a recording, or of its trial: those of all of the file, and its own.
+
+        Labels may name a source by the foot or hand that it is of.
+        """
         rows = self.rows if among is None else among
         is_file = trial in ("", path.name, path.stem)
         names = {self.named(path), self.named(path, "" if is_file else trial, source), None if is_file else trial} - {
             None
         }
-        return [row for row in rows if row.recording in names and row.source in ("", source)]
+        return [row for row in rows if row.recording in names and row.source in ("", source, side)]
 
     def _replaced(self, path: Path, source: str, trial: str) -> set[int | None]:
         """Return the times of the notes of a source of a recording that its labels replace."""

@@ -196,10 +196,11 @@ def test_info_counts_missing_values_readings_at_full_scale_and_gaps(tmp_path, ca
     assert facts["full_scale"] == {"value": 3300, "readings": counts.sum(), "taxels": np.count_nonzero(counts)}
     assert counts.any()
     # One frame left out is two intervals.
-    assert facts["gaps"] == {"count": 2, "longest_us": 40_000, "t_us": 2_990_000}
+    assert facts["gaps"] == {"count": 2, "total_us": 70_000, "longest_us": 40_000, "t_us": 2_990_000}
     code, shown, _ = call(capsys, "info", tmp_path / "flawed.npz")
     assert code == 0
-    assert all(f"  {name:<20}" in shown for name in ("missing values", "full scale", "gaps"))
+    assert all(f"  {name:<20}" in shown for name in ("missing values", "full scale"))
+    assert "; 2 gaps, 70 ms together, the longest 40 ms at 3.0 s" in shown
 
 
 @pytest.mark.parametrize("seed", [3, 19])

@@ -347,3 +347,38 @@ def test_a_folder_of_arrays_without_times_needs_their_rate_alone(tmp_path: Path)
     (tmp_path / "a.csv").write_text("a,b\n1,2\n3,4\n")
     with pytest.raises(FormatError, match="a layout file beside it"):
         TextOptions(rate_hz=40).open_trials(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("line", "unit"),
+    [
+        ("Einheit;kPa", "kPa"),
+        ("Unit of pressure: N/cm2", "N/cm2"),
+        ("# Druckeinheit = N/cm²", "N/cm²"),
+        ("Druck [mmHg]", "mmHg"),
+        ("Force in N", "N"),
+        ("Luftdruck [hPa];1013", None),
+        ("Abtastrate [Hz];120", None),
+        ("Time unit: ms", None),
+    ],
+)
+def test_the_unit_above_a_table_and_the_rate_of_rounded_stamps_are_in_the_layout(
+    tmp_path: Path, line: str, unit: str | None
+) -> None:
+    place = tmp_path / "sole.txt"
+    rows = "".join(f"{k / 120:.4f};{k % 7};{k % 5}\n".replace(".", ",") for k in range(400))
+    place.write_text(f"Export 4.2\n{line}\n\nZeit [s];Z001;Z002\n{rows}")
+    said = layout_said_of(place)
+    assert "# 120 frames/s" in said
+    assert said.count("unit = ") - said.count("time_unit = ") == 1
+    assert ("# unit = " in said) == (unit is None)
+    (tmp_path / "sole.layout.toml").write_text(said)
+    assert taxel.open(place).frames().unit == (unit or "counts")
+
+
+@pytest.mark.parametrize("array", [(5, 7), [5, 7]])
+def test_two_numbers_for_an_array_are_told_what_makes_one(tmp_path: Path, array: Any) -> None:
+    np.save(tmp_path / "a.npy", np.ones((3, 35)))
+    (tmp_path / "a.layout.toml").write_text("rate_hz = 100\n")
+    with pytest.raises(taxel.ProblemError, match=r"must be taxel\.Array\(5, 7\), of so many rows and columns"):
+        taxel.open(tmp_path / "a.npy", array=array)

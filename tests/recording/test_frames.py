@@ -28,6 +28,7 @@ from taxel.recording.once import known
 from taxel.recording.opening import join_feet
 from taxel.recording.sections import Losses, Marks, Origin
 from taxel.recording.text_options import TextOptions
+from taxel.tasks.labels import references
 
 WHOLE = st.integers(0, 65_535).map(float)
 ANY = st.one_of(WHOLE, st.floats(width=32, allow_nan=True, allow_infinity=False), st.sampled_from([-0.0, 65_536.0]))
@@ -66,7 +67,8 @@ def test_a_mcap_gives_frames_back_to_the_last_bit(tmp_path: Path, frames: Frames
     assert np.array_equal(back.t, frames.t)
     assert np.array_equal(bits(back), bits(frames))
     assert recording.timed
-    assert recording.verdict == "nothing lost"
+    # Drawn times may have gaps.
+    assert recording.verdict.split("; ")[0] == "nothing lost"
 
 
 def decoded(place: Path) -> list[tuple[str, dict[str, str], int, object]]:
@@ -292,6 +294,19 @@ def test_labels_of_a_source_that_is_not_there_are_refused(tmp_path: Path, capsys
     code, _, said = call(capsys, "train", tmp_path / "a.mcap", "--labels", labels, "-o", tmp_path / "r.json")
     assert code == 2
     assert "heel at 10000 us is of source left; there is board" in said
+
+
+def test_a_side_that_a_layout_states_names_the_source_of_labels(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "P1.csv", np.column_stack([np.arange(50) / 100, np.ones((50, 2))]), delimiter=",")
+    (tmp_path / "layout.toml").write_text(
+        'rows = 1\ncolumns = 2\nunit = "N"\nside = "left"\n[table]\ntime_column = 1\ntime_unit = "s"\n'
+    )
+    rows = [("left", 10_000), ("right", 20_000), ("", 30_000), ("right", 40_000)]
+    labels = tmp_path / "events.csv"
+    labels.write_text("recording,source,label,t_us\n" + "".join(f"P1,{side},heel,{t}\n" for side, t in rows))
+    with pytest.warns(UserWarning, match="left out 2 events of the right; what is here is left"):
+        (events,) = references(labels, [taxel.open(tmp_path / "P1.csv")])
+    assert events["heel"].tolist() == [10_000, 30_000]
 
 
 # without times

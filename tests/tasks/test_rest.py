@@ -19,7 +19,7 @@ from taxel.detect import PlainRule
 from taxel.live._requests.training import TrainingRequests
 from taxel.live._shown_files import Opening, ShownFiles
 from taxel.tasks import detect, rest
-from taxel.tasks.rest import tare_before, tare_if_any
+from taxel.tasks.rest import UnknownRestError, tare_before, tare_if_any
 
 from .recordings import board, mat, trials
 from .test_causes import pressed
@@ -220,3 +220,26 @@ def test_frames_too_far_apart_for_a_quiet_half_second_are_said(tmp_path: Path) -
     taxel.convert(Frames(values, 1_000_000 * np.arange(60), unit="mV"), tmp_path / "a.npz")
     with pytest.raises(ProblemError, match="quiet with nothing on it: its frames are 1 s apart; give tare"):
         rest(taxel.open(tmp_path / "a.npz"))
+
+
+@pytest.mark.parametrize(("loaded", "unit"), [(True, "counts"), (False, "counts"), (True, "events/5 ms")])
+def test_zeros_before_are_advised_only_where_a_recording_begins_loaded(tmp_path: Path, loaded: bool, unit: str) -> None:
+    """The sensor reads 0 without a load; each load lasts for less than half a second, and moves."""
+    t = np.arange(300)
+    values = (
+        np.abs(np.random.default_rng(4).normal(0, 400, (300, 3, 4))) * ((t // 20) % 2 == (not loaded))[:, None, None]
+    )
+    taxel.convert(Frames(values, 10_000 * t, unit=unit), tmp_path / "a.npz")
+    with pytest.raises(UnknownRestError, match="the rest of its taxels is not known") as caught:
+        rest(taxel.open(tmp_path / "a.npz"))
+    assert ("zeros_before_s" in str(caught.value)) == (loaded and unit == "counts")
+    assert caught.value.argument == "tare"
+
+
+@pytest.mark.parametrize(
+    "unit", ["N", "mN", "gf", "kgf", "Pa", "hPa", "kPa", "mbar", "bar", "psi", "mmHg", "N/cm2", "N/cm²"]
+)
+def test_units_of_force_and_pressure_rest_at_0(tmp_path: Path, unit: str) -> None:
+    taxel.convert(Frames(np.full((100, 1, 2), 5.0), 10_000 * np.arange(100), unit=unit), tmp_path / "a.npz")
+    taken = rest(taxel.open(tmp_path / "a.npz"))
+    assert (taken.source, taken.tare.rest.any()) == ("unit", np.False_)

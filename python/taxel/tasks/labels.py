@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -16,6 +17,7 @@ from taxel._base.messages import counted, warn
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.detect.label_times import early
+from taxel.detect.recipes import spelling
 from taxel.labels import Labels, beside, trial_of
 from taxel.recording import Recording, kind_of_file
 from taxel.recording.cut import span_us
@@ -23,6 +25,7 @@ from taxel.recording.cut import span_us
 #: "notes" (the recordings' own notes), the path of a table, or times (us) by label, a mapping for each recording.
 GivenLabels: TypeAlias = str | os.PathLike[str] | Sequence[Mapping[str, Any]]
 
+_SIDES = {"left", "right"}
 #: How long after the last event of a board a label may be, us, as people mark late; and from which distance on, the
 #: window of a score, a warning names the label, as no detection can lie near it.
 _LATE_US, _NEAR_US = 1_000_000, 50_000
@@ -118,9 +121,11 @@ def _mapped(
 
 
 def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
-    """Warn of events of recordings that are not there: their names may be misspelt."""
-    known = {name for _, names in _named(table, recordings) for name in names}
-    strange = [name for name in table.recordings if name not in known]
+    """Warn of events of recordings that are not there, if their names seem to be misspelt ones of those that are."""
+    named = [names for _, names in _named(table, recordings)]
+    known = {name for names in named for name in names}
+    alike = {_letters(name) for names in named for name in names if name}
+    strange = [name for name in table.recordings if name not in known and _letters(name) in alike]
     if strange:
         count = counted(sum(row.recording in strange for row in table.rows), "event")
         there = few(dict.fromkeys(recording.title for recording in recordings))
@@ -129,6 +134,12 @@ def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
             f"not here; there {'is' if len(recordings) == 1 else 'are'} {there}",
             stacklevel=3,
         )
+
+
+def _letters(name: str) -> tuple[str, str]:
+    """Return the digits of a recording's name in their order, and its letters in any: misspelt names have the same."""
+    letters = spelling(Path(name).stem)
+    return "".join(filter(str.isdigit, letters)), "".join(sorted(filter(str.isalpha, letters)))
 
 
 def trial_name(recording: Recording) -> str:
@@ -148,10 +159,13 @@ def titles_of(recordings: Sequence[Recording]) -> str:
     return f"{few(dict.fromkeys(map(trial_name, recordings)))} of {recordings[0].path}"
 
 
-def _named(table: Labels, recordings: Sequence[Recording]) -> list[tuple[str, set[str | None]]]:
-    """Return the source of each recording, and the names by which the table may name it."""
-    trials = [(recording.path, trial_name(recording), recording.label) for recording in recordings]
-    return [(label, {table.named(path), table.named(path, trial, label), trial}) for path, trial, label in trials]
+def _named(table: Labels, recordings: Sequence[Recording]) -> list[tuple[set[str], set[str | None]]]:
+    """Return source and side of each recording, and the names by which the table may name it."""
+    trials = [(recording.path, trial_name(recording), recording.label, recording.side) for recording in recordings]
+    return [
+        ({label, side} - {""}, {table.named(path), table.named(path, trial, label), trial})
+        for path, trial, label, side in trials
+    ]
 
 
 def few(names: Iterable[str]) -> str:
@@ -189,15 +203,22 @@ def labelled_trials(source: GivenLabels, recordings: Sequence[Recording]) -> lis
 
 
 def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]) -> None:
-    """Refuse labels of a source that their recording does not have."""
+    """Refuse labels of a source that their recording does not have; say that those of the other side are left out."""
     names = _named(table, recordings)
+    left_out = Counter[str]()
     for row in table.rows:
-        labels = {label for label, names_of_label in names if row.recording in names_of_label}
-        if row.source and labels and row.source not in labels:
-            there = ", ".join(sorted(labels))
+        sources = set[str]().union(*(each for each, names_of_each in names if row.recording in names_of_each))
+        if not row.source or not sources or row.source in sources:
+            continue
+        if not (row.source in _SIDES and sources & _SIDES):
+            there = ", ".join(sorted(sources))
             raise refused(
                 argument, f" is {table.path}: {row.text} at {row.t} us is of source {row.source}; there is {there}"
             )
+        left_out[row.source] += 1
+    for side, count in left_out.items():
+        (here,) = _SIDES - {side}
+        warn(f"{table.path}: left out {counted(count, 'event')} of the {side}; what is here is {here}", stacklevel=3)
 
 
 def _noted(recording: Recording) -> dict[str, NDArray[np.int64]]:

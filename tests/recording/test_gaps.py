@@ -1,0 +1,128 @@
+"""Gaps of time stamps, and silences of an event camera: in the verdict, in info and in the table of a folder."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.shell import run
+
+import taxel
+from taxel import Array, Events, Frames
+
+BEGIN_US = 1_764_000_000_000_000
+
+
+def walk(*gaps: tuple[int, int], begin_us: int = 0) -> Frames:
+    """Return a minute of frames at 100 Hz without those between the times of gaps, us."""
+    t = np.arange(0, 60_000_000, 10_000)
+    kept = ~np.any([(t > first) & (t < end) for first, end in gaps], axis=0) if gaps else np.ones(len(t), bool)
+    values = np.random.default_rng(1).normal(9.0, 0.1, (int(kept.sum()), 3, 4))
+    return Frames(values, t[kept] + begin_us, unit="counts", array=Array(3, 4))
+
+
+def camera(rate: float, *gaps: tuple[float, float], seconds: float = 30.0, name: str = "event camera") -> Events:
+    """Return noise of a camera, whose events come by chance, without those in gaps, s."""
+    random = np.random.default_rng(2)
+    t = np.sort(random.uniform(0, seconds, int(rate * seconds)))
+    kept = ~np.any([(t > first) & (t < end) for first, end in gaps], axis=0) if gaps else np.ones(len(t), bool)
+    us = (t[kept] * 1e6).astype(np.int64)
+    x, y = (random.integers(0, size, len(us)) for size in (30, 20))
+    return Events(us, x, y, random.random(len(us)) < 0.75, array=Array(20, 30, name=name))
+
+
+def opened(table: Events | Frames, folder: Path) -> taxel.Recording:
+    taxel.convert(table, folder / "a.npz")
+    return taxel.open(folder / "a.npz")
+
+
+@pytest.mark.parametrize("begin_us", [0, BEGIN_US])
+def test_a_verdict_names_the_gaps_of_stamps(tmp_path: Path, begin_us: int) -> None:
+    verdict = opened(walk((20_000_000, 23_500_000), begin_us=begin_us), tmp_path).verdict
+    assert verdict == "the .npz does not say what was lost; 1 gap of 3.5 s at 20.0 s"
+    assert (verdict.status, verdict.noted) == ("unknown", {"gaps": 1, "gaps_us": 3_500_000})
+    assert taxel.Verdict.from_dict(json.loads(json.dumps(verdict.to_dict()))) == verdict
+
+
+def test_several_gaps_are_counted_and_the_longest_has_its_time(tmp_path: Path) -> None:
+    recording = opened(walk((5_000_000, 5_050_000), (20_000_000, 23_500_000), (40_000_000, 41_000_000)), tmp_path)
+    assert recording.verdict.endswith("; 3 gaps, 4.5 s together, the longest 3.5 s at 20.0 s")
+    facts = json.loads(run("info", tmp_path / "a.npz", "--json").stdout)
+    assert facts["gaps"] == {"count": 3, "total_us": 4_550_000, "longest_us": 3_500_000, "t_us": 20_000_000}
+    assert facts["verdict_details"]["noted"] == {"gaps": 3, "gaps_us": 4_550_000}
+    assert recording.between(0, 10e6).verdict.endswith("; 1 gap of 50 ms at 5.0 s")
+
+
+def test_one_frame_that_is_missing_is_no_gap(tmp_path: Path) -> None:
+    assert opened(walk((5_000_000, 5_020_000)), tmp_path).verdict == "the .npz does not say what was lost"
+
+
+@pytest.mark.parametrize("rate", [200.0, 13_000.0])
+@pytest.mark.parametrize("counts", [False, True])
+def test_a_camera_that_is_silent_for_longer_than_chance_has_a_gap(tmp_path: Path, rate: float, counts: bool) -> None:
+    for k, (gaps, said) in enumerate((([], ""), ([(12.0, 15.0)], "; 1 gap of 3.0 s at 12.0 s"))):
+        table: Events | Frames = camera(rate, *gaps)
+        if counts:
+            windows = table.t // 5000
+            values = np.bincount(windows, minlength=6000)[:, None, None]
+            table = Frames(values, 5000 * np.arange(len(values)), unit="events/5 ms")
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        assert opened(table, folder).verdict == f"the .npz does not say what was lost{said}"
+
+
+def test_silence_of_a_board_or_of_a_camera_without_noise_is_no_gap(tmp_path: Path) -> None:
+    for k, table in enumerate(
+        (
+            camera(13_000, (12.0, 15.0), name="mat"),
+            camera(13_000, (2.0, 6.0), (8.0, 14.0)),
+            # So few events are rarely less than seconds apart.
+            camera(3.0),
+        )
+    ):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        assert opened(table, folder).verdict == "the .npz does not say what was lost", k
+
+
+def test_the_table_of_a_folder_has_gaps_and_bad_taxels_and_no_verdict_that_says_nothing(tmp_path: Path) -> None:
+    whole = walk()
+    values = whole.values.copy()
+    # Touches of all taxels but one, which is always at the greatest value.
+    values += 20.0 * (np.arange(len(whole)) % 500 > 300)[:, None, None]
+    values[:, 1, 2] = 50.0
+    taxel.convert(Frames(values, whole.t, unit="counts", array=whole.array), tmp_path / "a.npz")
+    taxel.convert(walk(), tmp_path / "b.npz")
+    head, first, second, _ = run("info", tmp_path).stdout.splitlines()[1:5]
+    assert head.split()[-3:] == ["dead", "stuck", "noisy"]
+    assert first.split()[-3:] == ["0", "1", "0"]
+    assert second.split()[-3:] == ["0", "0", "0"]
+    taxel.convert(walk((20_000_000, 23_500_000)), tmp_path / "c.npz")
+    # taxel's own file states what was lost.
+    taxel.convert(walk(), tmp_path / "d.mcap")
+    head, *rows = run("info", tmp_path).stdout.splitlines()[1:6]
+    assert head.split()[-2:] == ["gaps", "verdict"]
+    assert rows[2].split()[-4:] == ["1", "(3.5", "s)", "unknown"]
+    assert rows[3].split()[-1] == "complete"
+
+
+def test_info_of_a_camera_has_its_rates_and_polarities_and_no_untouched_pixels(tmp_path: Path) -> None:
+    quiet, burst = camera(1000.0), camera(50_000.0, seconds=0.5)
+    table = (quiet + Events(burst.t + 10_000_000, burst.x, burst.y, burst.p, array=burst.array)).sorted()
+    taxel.convert(table, tmp_path / "a.npz")
+    facts = json.loads(run("info", tmp_path / "a.npz", "--json").stdout)
+    assert facts["on_share"] == pytest.approx(0.75, abs=0.01)
+    # The lowest tenth of Poisson counts of mean 100.
+    assert facts["events_per_s_rest"] == pytest.approx(870, abs=60)
+    shown = run("info", tmp_path / "a.npz").stdout
+    assert "other taxels" not in shown
+    assert " % on\n" in shown
+    assert "events/s in the quiet tenth of the time, " in shown
+    assert "on_share" not in json.loads(run("info", board(tmp_path), "--json").stdout)
+
+
+def board(folder: Path) -> Path:
+    taxel.convert(camera(100.0, name="mat"), folder / "board.npz")
+    return folder / "board.npz"
