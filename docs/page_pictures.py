@@ -29,7 +29,7 @@ from tests.test_start import Shell, blocks, waits_for_another
 #: What each page shows: the arguments of taxel view, and the readout that is chosen.
 SHOWN = {
     "start-board": (["ball.mcap"], "touch.json"),
-    "start-camera": (["skin.raw", "--polarity", "on"], "contact.json"),
+    "start-camera": (["skin.raw"], "burst.json"),
     "start-insole": (["walk.npz"], "gait.json"),
     "start-nothing": (["disc.npz"], ""),
     "start-numbers": (["mat.mcap"], "press.json"),

@@ -23,6 +23,8 @@ from tests.test_readme import README, shell_lines
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(DOCS.glob("start-*.md"))
+#: What the page of a camera makes of a file, and what is true of it.
+TOLD = ("told.csv", "unseen-kinds.csv")
 #: Commands that wait for another one beside them.
 LISTENING = ("taxel record", "taxel live")
 WAY = [
@@ -146,6 +148,13 @@ def test_the_readmes_way_works_as_printed(played: Played, monkeypatch: pytest.Mo
     for number, piece in enumerate(pieces):
         exec(compile(piece, f"README, piece {number}", "exec"), {"__name__": "readme"})
     assert os.path.getsize(folder / "ball.mcap") > 1_000_000
+
+
+def test_the_page_of_a_camera_tells_contacts_from_lifts(played: Played) -> None:
+    folder, _ = played(DOCS / "start-camera.md")
+    told, true = ([line.split(",") for line in (folder / name).read_text().split()[1:]] for name in TOLD)
+    assert [label for label, _ in told] == [label for label, _ in true]
+    assert all(abs(int(t) - int(at)) < 50_000 for (_, t), (_, at) in zip(told, true, strict=True))
 
 
 def test_each_page_is_named_where_a_reader_begins() -> None:

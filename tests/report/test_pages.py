@@ -69,7 +69,7 @@ def test_text_of_a_figure_is_text_in_the_page():
 
 def page(*figures):
     drawn = {"contact": {"potential": picture(figures[0]), "weights": picture(figures[1]), "errors": None}}
-    drawn["contact"]["moved"] = None
+    drawn["contact"] |= {"moved": None, "input": ""}
     return render(
         "report/listening.html.j2",
         title="a page",
@@ -80,10 +80,14 @@ def page(*figures):
         drawn=drawn,
         rows=[],
         beside=[],
-        begun=[],
+        together=[],
+        about=[],
+        most_open=4,
+        warnings=[],
+        printed=[],
         held_out=[],
-        outside=[],
         worst=[],
+        unclaimed=[],
         viewed=["'a walk.mcap'"],
         scored=False,
     )
@@ -152,7 +156,6 @@ def test_no_table_of_a_report_is_cut(tmp_path, name, width):
     score = {"events": 1500, "found": 1400, "missed": 100, "false": 100}
     score["error"] = score["delay"] = "-11.55 ± 105.4 (median -11.92, 95 % in -103.46 to 120.62)"
     row = {"recording": name, "label": "contact", "detections": 1500, "score": score}
-    moment = {"label": "contact", "t": 123_456_789.0, "title": "missed"}
     text = render(
         "report/listening.html.j2",
         title="t",
@@ -165,10 +168,14 @@ def test_no_table_of_a_report_is_cut(tmp_path, name, width):
         aligned={},
         rows=[row],
         held_out=[row],
-        worst=[(name, moment, 123.456789)],
-        begun=[(name, "2026-01-02 03:04:05 UTC")],
+        worst=[(name, "contact", 123.456789, "missed")],
+        unclaimed=[(name, 123.456789, "a load without a detection: 0.51 s, up to 83.1 counts")],
+        together=[],
+        about=[(name, ["Times are from 2026-01-02 03:04:05 UTC on."])],
+        most_open=4,
+        warnings=[f"{name}: rest: 4 taxels drifted above the tare by more than the noise floor"],
+        printed=["all  12  12"],
         viewed=[],
-        outside=[],
         beside=[("contact", "neuron", score), ("contact", "the area above 12 taxels for 3 ms", score)],
     )
     measured = (

@@ -21,7 +21,7 @@ from taxel.detections import Detections
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from taxel.detect import Outcome, PlainRule, Readout
     from taxel.tasks import Detected, Detecting
@@ -78,20 +78,28 @@ def detect(
     if out is not None:
         write_whole(out, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
     say_warnings(found.warnings)
+    printed = list(_lines(found, loaded, recordings, truth, given=tare is not None, lists=lists))
     if as_json:
         written = {"written": out, "report": None if report is None else report / "report.html"}
         files_written = {name: str(path) for name, path in written.items() if path is not None}
         say(json.dumps(_result(recordings, readout, found.to_dict()) | files_written))
     else:
-        _say_found(found, loaded, recordings, truth, given=tare is not None, lists=lists)
-        say(*[] if out is None else [f"written to {out}"])
+        say(*printed, *[] if out is None else [f"written to {out}"])
     if report is not None:  # last, so that nothing is lost where it fails
-        title = f"Detections of {readout} in {paths_text(recordings)}"
-        place = taxel.report.write_detections(report, loaded, found.outcomes, title=title, overwrite=overwrite)
+        remarks = [f"{each.outcome.name}: {remark}" for each in found.each for remark in each.remarks]
+        place = taxel.report.write_detections(
+            report,
+            loaded,
+            found.outcomes,
+            title=f"Detections of {readout} in {paths_text(recordings)}",
+            warnings=[*found.warnings, *remarks],
+            printed=printed,
+            overwrite=overwrite,
+        )
         say(*[] if as_json else [f"report: {place}"])
 
 
-def _say_found(
+def _lines(
     found: Detecting,
     readout: Readout | PlainRule,
     recordings: Sequence[Path],
@@ -99,23 +107,24 @@ def _say_found(
     *,
     given: bool,
     lists: bool,
-) -> None:
-    """Print score and detections; `given`: whether a tare is."""
+) -> Iterator[str]:
+    """Yield score and detections as lines; `given`: whether a tare is."""
     several = _are_several(recordings) or len(found.each) > 1
     if found.score is not None:
-        _print_score(found, readout.labels, truth, several=several)
+        yield from _score_lines(found, readout.labels, truth, several=several)
     for each in found.each:
         if found.score is None or lists or not several:
-            _print(each, given=given, named=several, rows=None if lists else _ROWS * (found.score is None))
+            rows = None if lists else _ROWS * (found.score is None)
+            yield from _detection_lines(each, given=given, named=several, rows=rows)
             if isinstance(readout, taxel.Readout):
-                say(each.outcome.outside_text)
+                yield each.outcome.outside_text
         else:
             outside = [each.outcome.outside_text] if each.outcome.are_mostly_outside else []
-            say(*(f"{each.outcome.name}: {remark}" for remark in (*each.remarks, *outside)))
+            yield from (f"{each.outcome.name}: {remark}" for remark in (*each.remarks, *outside))
     for outcome in found.outcomes:
-        say(*(f"{outcome.name}: " * several + line for line in outcome.causes_lines))
+        yield from (f"{outcome.name}: " * several + line for line in outcome.causes_lines)
     if found.score is not None and not lists:
-        say("--list prints the detections")
+        yield "--list prints the detections"
 
 
 def _are_several(recordings: Sequence[Path]) -> bool:
@@ -153,45 +162,45 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     return text.getvalue()
 
 
-def _print_score(found: Detecting, labels: Sequence[str], truth: str | None, *, several: bool) -> None:
-    """Print the score of all recordings, by label, and that of each."""
+def _score_lines(found: Detecting, labels: Sequence[str], truth: str | None, *, several: bool) -> Iterator[str]:
+    """Yield the score of all recordings, by label, and that of each."""
     from taxel.detect.scoring import score_rows  # noqa: PLC0415  a command loads what it needs
 
     count, left_out = len(found.each), len(found.left_out)
     read = f", in {count} of {count + left_out} recordings, as the others are left out" if left_out else ""
-    say(f"against {truth} (window {found.window_ms:g} ms){read}:", *repr(found.score).split("\n"))
+    yield f"against {truth} (window {found.window_ms:g} ms){read}:"
+    yield from repr(found.score).split("\n")
     for label, sources in found.unlabelled.items():
-        say(f"not scored, as no row of {truth} names it: {label} of {', '.join(sources)}")
+        yield f"not scored, as no row of {truth} names it: {label} of {', '.join(sources)}"
     if found.not_scored:
-        say(f"not scored, as the readout has {', '.join(labels)}: {', '.join(found.not_scored)}")
-    if not several:
-        return
-    say(*score_rows([(Path(outcome.name).name, outcome.score) for outcome in found.outcomes]))
+        yield f"not scored, as the readout has {', '.join(labels)}: {', '.join(found.not_scored)}"
+    if several:
+        yield from score_rows([(Path(outcome.name).name, outcome.score) for outcome in found.outcomes])
 
 
-def _print(each: Detected, *, given: bool, named: bool, rows: int | None) -> None:
-    """Print detections, with times from the recording's beginning on, and what may have kept others away.
+def _detection_lines(each: Detected, *, given: bool, named: bool, rows: int | None) -> Iterator[str]:
+    """Yield detections, with times from the recording's beginning on, and what may have kept others away.
 
     `rows`: how many at most; None for all.
     """
     found, begin_us = each.outcome.found, each.outcome.begin_us
     detections = Detections._of(found.label, found.t - begin_us, found.known - begin_us, found.slope)
     if named:
-        say(f"{each.outcome.name}:")
-    say(repr(detections))
+        yield f"{each.outcome.name}:"
+    yield repr(detections)
     if each.rest is not None and not given:
-        say(f"rest taken: {each.rest}; --tare gives another")
-    say(*each.remarks)
+        yield f"rest taken: {each.rest}; --tare gives another"
+    yield from each.remarks
     first = detections[:rows]
     if not len(first):
         return
     if begin_us:
-        say(f"times are from {begun(begin_us)} on")
+        yield f"times are from {begun(begin_us)} on"
     width = max(5, *(len(label) for label in detections.labels))
     # A plain rule has no slope; levels of frames come in steps, and may give one for all.
     sloped = len({f"{slope:.4g}" for slope in detections.slope}) > 1
-    say(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped)
+    yield f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped
     for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):
-        say(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13.4g}" * sloped)
+        yield f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13.4g}" * sloped
     if len(detections) > len(first):
-        say(f"... and {len(detections) - len(first)} more; --list prints all, --out and --json hold them")
+        yield f"... and {len(detections) - len(first)} more; --list prints all, --out and --json hold them"

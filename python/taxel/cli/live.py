@@ -6,7 +6,6 @@ import contextlib
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -143,10 +142,12 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
         tare.save(typed.save_tare, overwrite=options["overwrite"])
         console.print(f"tare written to {typed.save_tare}")
     if typed.report is not None and trained is not None and summary.path is not None:
-        _report(typed.report, trained, summary, tare if tare is not None else rest, overwrite=options["overwrite"])
+        printed = list(_summary_lines(summary, options["guard_frames"]))
+        given = tare if tare is not None else rest
+        _report(typed.report, trained, summary, given, printed, overwrite=options["overwrite"])
         console.print(f"report: {typed.report / 'report.html'}")
     _report_unsent(summary)
-    _print_summary(summary, options["guard_frames"], err=lines)
+    say(*_summary_lines(summary, options["guard_frames"]), err=lines)
     if typed.save_tare is not None and tare is None and not summary.nothing_came:
         seconds = summary.counters["seconds"]
         raise ProblemError(
@@ -185,7 +186,13 @@ def _show(
 
 
 def _report(
-    folder: Path, readout: Readout | PlainRule, summary: Summary, tare: Tare | float | None, *, overwrite: bool
+    folder: Path,
+    readout: Readout | PlainRule,
+    summary: Summary,
+    tare: Tare | float | None,
+    printed: list[str],
+    *,
+    overwrite: bool,
 ) -> None:
     """Write the report on a recording: its events and its detections."""
     import taxel  # noqa: PLC0415
@@ -198,27 +205,26 @@ def _report(
     example, outside = Example(recording, {}, rest), summary.counters["outside"]
     outcome = Outcome(str(summary.path), example, recording.detections, outside=outside)
     title = f"Live detections, recorded to {summary.path}"
-    write_detections(folder, readout, [outcome], title=title, overwrite=overwrite)
+    write_detections(folder, readout, [outcome], title=title, printed=printed, overwrite=overwrite)
 
 
-def _print_summary(summary: Summary, guard_frames: float, *, err: bool) -> None:
-    """Print what was detected, received and lost; to standard error where `err` is true."""
-    counters, tell = summary.counters, partial(say, err=err)
-    tell(f"{counted(counters['detections'], 'detection')}, {received(counters)} in {counters['seconds']:.1f} s")
+def _summary_lines(summary: Summary, guard_frames: float) -> Iterator[str]:
+    """Yield what was detected, received and lost."""
+    counters = summary.counters
+    yield f"{counted(counters['detections'], 'detection')}, {received(counters)} in {counters['seconds']:.1f} s"
     if counters["detections"]:
-        tell(f"from known to output: {delays(counters['report_latency'])}")
+        yield f"from known to output: {delays(counters['report_latency'])}"
     if counters["wrong"]:
         wrong = counted(counters["wrong"], "detection")
-        tell(f"{wrong} output too early: events arrived more than {guard_frames:g} frames late")
+        yield f"{wrong} output too early: events arrived more than {guard_frames:g} frames late"
     if counters["late"]:
-        tell(f"{counted(counters['late'], 'event')} out of order: read out on arrival, and recorded")
+        yield f"{counted(counters['late'], 'event')} out of order: read out on arrival, and recorded"
     if counters["events_dropped"]:
-        tell(f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow")
-    for why in doubts(counters):
-        tell(why)
+        yield f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow"
+    yield from doubts(counters)
     if summary.path is not None:
-        tell(f"recorded to {summary.path}")
-    tell(summary.verdict)
+        yield f"recorded to {summary.path}"
+    yield str(summary.verdict)
 
 
 def _report_unsent(summary: Summary) -> None:

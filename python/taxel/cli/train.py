@@ -151,6 +151,8 @@ def train(
             held_out=training.scored.scores if training.held_out else (),
             alignments=training.made.alignments,
             scored=training.scored,
+            warnings=training.warnings,
+            printed=training.lines(),
             overwrite=overwrite,
         )
         say(*[] if as_json else [f"report: {place}"])

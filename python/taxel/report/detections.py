@@ -15,6 +15,7 @@ from markupsafe import Markup
 from matplotlib import pyplot as plt
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from taxel._base.errors import refused
@@ -26,7 +27,7 @@ from taxel.array import Array
 from taxel.detect import Alignment, Judged, Outcome, PlainRule, Readout, Score
 from taxel.detect.detector import detector
 from taxel.detect.examples import array_of, padded_to
-from taxel.encode import Composite, Encoder
+from taxel.encode import Composite, ContactArea, Encoder, LocalLoad, Peak
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
@@ -53,8 +54,15 @@ _FRAMES = 15
 _VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
 #: Recordings of frames whose sums are drawn, and stretches of a curve, each with its greatest value.
 _MOST_SUMS, _STRETCHES = 4, 1000
-#: How much of a sum is drawn at most, and how much before its first event, us.
-_SHOWN_US, _BEFORE_US = 10_000_000, 1_000_000
+#: A load is where the sum, as the median of so long, us, rises by so many standard deviations of its noise above what
+#: it falls to around it (a rest may drift), until few are left; and by this part of the median of detected loads.
+_BIN_US, _DEVIATIONS, _FEW_DEVIATIONS, _PART_OF_LOADS = 50_000, 8.0, 3.0, 0.2
+#: What it falls to: this percentile of so many bins around. Loads less far apart than this are one, us.
+_FALLS_TO, _AROUND_BINS, _APART_US = 20.0, 201, 300_000
+#: Recordings whose details are shown without a click, at most.
+_MOST_OPEN = 4
+#: Weights below this part of the largest count as none.
+_NO_WEIGHT = 1e-6
 #: Maps of weights that are drawn a label, those with the largest weights first.
 _MAPS = 8
 _DETECTED, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
@@ -80,6 +88,8 @@ def write_detections(
     held_out: Sequence[Score] = (),
     alignments: Mapping[str, Alignment] | None = None,
     scored: Judged | None = None,
+    warnings: Sequence[str] = (),
+    printed: Sequence[str] = (),
     overwrite: bool = False,
 ) -> Path:
     """Write the detections of a readout in recordings as a page with pictures, ``report.html`` in a folder.
@@ -100,6 +110,10 @@ def write_detections(
         By how much labels were moved to what the sensor felt before they were learnt; examples are those of `listened`.
     scored : Judged, optional
         The scores of a training, and those of the plain rules beside it.
+    warnings : sequence of str
+        What may be wrong with the detections; the page shows these lines first.
+    printed : sequence of str
+        All other lines that the command prints.
     overwrite : bool
         Whether an existing report may be replaced.
 
@@ -144,16 +158,24 @@ def write_detections(
             for label in readout.labels
         ],
         worst=[
-            (listened[m.recording].name, m, (m.t - listened[m.recording].begin_us) / 1e6)
+            (listened[m.recording].name, label, (m.t - listened[m.recording].begin_us) / 1e6, m.title)
             for label in readout.labels
             for m in moments[label]
             if m.badness > 0
         ],
-        begun=[(outcome.name, begun(outcome.begin_us)) for outcome in listened if outcome.begin_us],
+        unclaimed=[
+            (outcome.name, (t - outcome.begin_us) / 1e6, what)
+            for outcome in listened
+            for t, what in _unclaimed(outcome)[:_MOMENTS]
+        ],
+        about=[(outcome.name, _about(outcome, readout)) for outcome in listened],
+        most_open=_MOST_OPEN,
+        together=_together(listened) if len(listened) > 1 else [],
+        warnings=warnings,
+        printed=printed,
         viewed=[quote(outcome.name) for outcome in listened if outcome.name.endswith(_VIEWED)][:_MOST_VIEWED],
         beside=_beside(readout.labels, scored),
         causes=[(outcome.name, line) for outcome in listened for line in outcome.causes_lines],
-        outside=[outcome for outcome in listened if isinstance(readout, Readout)],
         scored=any(outcome.score is not None for outcome in listened),
     )
     target.mkdir(parents=True, exist_ok=True)  # so late that nothing is left of one that is ended
@@ -179,13 +201,14 @@ def _of_neuron(
     label: str,
     moments: list[_Moment],
     alignment: Alignment | None,
-) -> dict[str, Markup | None]:
-    """Return the drawings of a label's neuron; a plain rule has none."""
+) -> dict[str, Markup | str | None]:
+    """Return the drawings of a label's neuron, and its input in words where it has a single one; a rule has none."""
     if isinstance(readout, PlainRule):
-        return {"potential": None, "weights": None}
+        return {"potential": None, "weights": None, "input": ""}
     return {
         "potential": _picture(_potential(readout, listened, label, moments, alignment)),
         "weights": _picture(_weights(readout, listened[0], label)),
+        "input": _only_input(readout, label),
     }
 
 
@@ -195,6 +218,37 @@ def _picture(figure: Figure | None) -> Markup | None:
     drawn = picture(figure)
     plt.close(figure)
     return drawn
+
+
+def _unclaimed(outcome: Outcome) -> list[tuple[float, str]]:
+    """Return when loads of frames begin that hold neither a detection nor a label, us, and how large they are."""
+    frames = recorded(outcome.example.source, hold=False)
+    if not isinstance(frames, Frames) or len(frames) < 3:
+        return []
+    stamps, each, unit = _pressed(outcome, frames)
+    _, begins = np.unique(stamps // _BIN_US, return_index=True)
+    t, total = stamps[begins], np.array([np.median(part) for part in np.split(each, begins[1:])])
+    around = np.pad(total, _AROUND_BINS // 2, mode="reflect" if len(total) > _AROUND_BINS else "edge")
+    above = total - np.percentile(sliding_window_view(around, _AROUND_BINS), _FALLS_TO, axis=-1)
+    # Loads change the sum in few bins, noise in all.
+    deviation = float(np.median(np.abs(np.diff(total)))) * 1.4826 / np.sqrt(2.0)
+    inside = np.flatnonzero(above > _FEW_DEVIATIONS * deviation)
+    stretches = np.split(inside, np.flatnonzero(np.diff(t[inside]) > _APART_US) + 1)
+    loads = [load for load in stretches if len(load) > 1 and above[load].max() > _DEVIATIONS * deviation]
+    claims = np.sort(np.concatenate([outcome.found.t, *map(np.asarray, outcome.example.labels.values())]))
+    edges = [(t[load[0]] - _APART_US, t[load[-1]] + _APART_US) for load in loads]
+    claimed = [bool(np.diff(np.searchsorted(claims, edge))[0]) for edge in edges]
+    peaks = [float(above[load].max()) for load in loads]
+    usual = [peak for peak, has_claim in zip(peaks, claimed, strict=True) if has_claim]
+    least = _PART_OF_LOADS * float(np.median(usual)) if usual else 0.0
+    return [
+        (
+            float(t[load[0]]),
+            f"a load without a detection: {(t[load[-1]] - t[load[0]]) / 1e6:.2f} s, up to {peak:.4g} {unit}",
+        )
+        for load, peak, has_claim in sorted(zip(loads, peaks, claimed, strict=True), key=lambda each: -each[1])
+        if not has_claim and peak > least
+    ]
 
 
 def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
@@ -210,22 +264,20 @@ def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
     )
     for axis, (outcome, frames) in zip(axes[:, 0], shown, strict=True):
         t, total, unit = _pressed(outcome, frames)
-        first, after = _shown(outcome, t)
-        begins = np.arange(first, after, 1 + (after - first) // _STRETCHES)
-        seconds, most = (t[begins] - outcome.begin_us) / 1e6, np.fmax.reduceat(total[:after], begins)
+        begins = np.arange(0, len(t), 1 + len(t) // _STRETCHES)
+        seconds, most = (t[begins] - outcome.begin_us) / 1e6, np.fmax.reduceat(total, begins)
         axis.plot(seconds, most, color=INK, linewidth=0.9, label=escaped(f"sum, {unit}"))
         for k, label in enumerate(labels):
             at = (outcome.found[label].t - outcome.begin_us) / 1e6
-            at = at[(at >= seconds[0]) & (at <= seconds[-1])]
             axis.plot(
                 at,
                 np.interp(at, seconds, most),
                 "o^sD"[k % 4],
+                markersize=3,
                 color=_DETECTED if k % 2 == 0 else _TRUE,
                 label=escaped(label),
             )
-        part = f", {seconds[0]:.1f} to {seconds[-1]:.1f} s" if after - first < len(total) else ""
-        axis.set_title(escaped(outcome.name) + part, fontsize=9)
+        axis.set_title(escaped(outcome.name), fontsize=9)
         axis.set_ylabel(escaped(unit))
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes[-1][0].set_xlabel("s")
@@ -239,14 +291,15 @@ def _pressed(outcome: Outcome, frames: Frames) -> tuple[NDArray[np.int64], NDArr
     return (pressed.t, pressed.total, pressed.unit) if pressed.force is None else (pressed.t, pressed.force, "N")
 
 
-def _shown(outcome: Outcome, t: NDArray[np.int64]) -> tuple[int, int]:
-    """Return from which time to which a sum is drawn: all of it if it is short, else around its first events."""
-    if int(t[-1] - t[0]) <= _SHOWN_US:
-        return 0, len(t)
-    events = [int(np.min(times)) for times in (outcome.found.t, *outcome.example.labels.values()) if len(times)]
-    begin = min(min(events, default=int(t[0])) - _BEFORE_US, int(t[-1]) - _SHOWN_US)
-    first = int(np.searchsorted(t, begin))
-    return first, int(np.searchsorted(t, t[first] + _SHOWN_US, side="right"))
+def _about(outcome: Outcome, readout: Readout | PlainRule) -> list[str]:
+    """Return what else is known of the detections in a recording."""
+    lines = [f"{outcome.outside_text}."] if isinstance(readout, Readout) else []
+    return [*lines, *([f"Times are from {begun(outcome.begin_us)} on."] if outcome.begin_us else [])]
+
+
+def _together(listened: Sequence[Outcome]) -> list[tuple[str, int, Score | None]]:
+    """Return the detections of each recording, and its score, of all labels together."""
+    return [(outcome.name, len(outcome.found), outcome.score) for outcome in listened]
 
 
 def _row(outcome: Outcome, label: str, score: Score | None) -> dict[str, Any]:
@@ -404,6 +457,40 @@ def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
         axis.set_ylabel("row")
     figure.colorbar(ScalarMappable(scale, "RdBu_r"), ax=axes, label="weight, mV")
     return figure
+
+
+def _only_input(readout: Readout, label: str) -> str:
+    """Return which level of which quantity is the only input of a neuron, a threshold; "" of another neuron."""
+    weights = np.asarray(readout.neurons[label].weights)
+    learnt = np.flatnonzero(np.abs(weights) > _NO_WEIGHT * np.abs(weights).max())
+    parts, delays = readout.encoder_of(label)._each(), readout.delays_ms
+    if len(learnt) != 1 or len(parts) != 1 or len(delays) != 1:
+        return ""
+    (encoder,) = parts
+    quantities = {
+        Peak: ["the peak, in units of noise,"],
+        ContactArea: ["the number of loaded taxels"],
+        LocalLoad: [
+            f"the largest sum over 3 x 3 taxels{_beside_mean(name)}, in units of noise,"
+            for name in getattr(encoder, "quantities", ())
+            if name.startswith("largest") and "mean of" not in name
+        ],
+    }
+    levels = getattr(encoder, "levels", ())
+    names = quantities.get(type(encoder), [])
+    if np.ndim(levels) != 1 or len(weights) != 2 * len(names) * len(levels):
+        return ""
+    falls, at = divmod(int(learnt[0]), len(names) * len(levels))
+    quantity, level = divmod(at, len(levels))
+    value = levels[level] * (getattr(encoder, "release", 1.0) if falls else 1.0)
+    way = "falls below" if falls else "rises to"
+    return f"The neuron has one input, and is a threshold: it fires as {names[quantity]} {way} {value:.4g}."
+
+
+def _beside_mean(name: str) -> str:
+    """Return above or below what a quantity of `LocalLoad` is, if that is a running mean: "largest below, 50 ms"."""
+    side, _, length = name.removeprefix("largest").partition(", ")
+    return f" {side.strip() or 'above'} running means of {length}" if length else ""
 
 
 def _channels(planes: list[tuple[str, NDArray[np.float64]]], array: Array) -> Figure:
