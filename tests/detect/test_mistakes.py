@@ -124,7 +124,7 @@ def test_training_says_from_when_on_labels_are_off(seed: int) -> None:
     (cause,) = evidence(made.example.source, {"contact": made.example.labels["contact"]}).causes({"contact": 20})
     begin_s = made.example.labels["contact"][10] / 1e6
     assert cause.kind == "shifted_labels"
-    assert f"10 of 20 lie 210 ms after what the sensor felt, all from {begin_s:.1f} s on" in cause.measured
+    assert f"10 of 20 lie 208 ms after what the sensor felt, all from {begin_s:.1f} s on" in cause.measured
     assert cause.advice == f"labels from {begin_s:.1f} s on 210 ms earlier"
 
 

@@ -264,9 +264,9 @@ class Training:
             delays_ms = [neurons[label].delay_ms for neurons in folds if label in neurons]
             if delays_ms and max(abs(neuron.delay_ms - ms) for ms in delays_ms) > _APART_MS:
                 yield (
-                    f"{label}: the readout that is written is known {neuron.delay_ms:.0f} ms after what the sensor felt, "
-                    f"those that were scored {min(delays_ms):.0f} to {max(delays_ms):.0f} ms, as the best age of a touch "
-                    "differs between the folds: the score is of theirs"
+                    f"{label}: the readout that is written is known {neuron.delay_ms:.0f} ms after what the sensor "
+                    f"felt, those that were scored {min(delays_ms):.0f} to {max(delays_ms):.0f} ms, as each chose the "
+                    "age of a touch on its own training data: the score is of theirs"
                 )
 
     def _levels(self) -> Iterator[str]:
