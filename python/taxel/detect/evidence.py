@@ -253,7 +253,7 @@ class Evidence:
             side, back = ("after", "earlier") if alike.ms > 0 else ("before", "later")
             distance = f"{abs(alike.ms):.0f} ms"
             measured = f"{count} of {len(times)} lie {distance} {side} what the sensor felt, all {stretch}"
-            advice = f"labels {stretch} {distance} {back}"
+            advice = f"labels {stretch} {abs(round(alike.ms, -1)):.0f} ms {back}"
             yield Cause("shifted_labels", (label,), min(2 * count, wrong), measured, advice)
 
     def _of_label(self, label: str, wrong: int) -> Iterator[Cause]:

@@ -22,6 +22,8 @@ from taxel.tasks.rest import GivenTare, check_tare
 
 #: Largest number of unpaired labels that a warning names.
 _NAMED = 5
+#: Readouts are known at other times whose delays differ by more, ms.
+_APART_MS = 10.0
 #: How a user gets the file of a plain rule, and uses it.
 _RULE_FILE = "--rule FILE writes it, for taxel detect --readout FILE"
 
@@ -217,7 +219,7 @@ class Training:
         lines += [*self._better(), *self._advised(), *self._aligned()]
         if self.options.shift_ms:
             lines.append(f"labels moved by {self.options.shift_ms:+g} ms before, as asked")
-        lines += self._kinds()
+        lines += [*self._kinds(), *self._known_apart()]
         if recipe is not None:
             about = self.made.recipe.about
             lines += ["", f"recipe {recipe}" + (f": {about}" if about else "")]
@@ -254,6 +256,18 @@ class Training:
                 f"{label}: learnt as a kind of touch, told at an age of the touch; its begin is called "
                 f"{recipes.names_of(recipe, 'contact')}; its end {recipes.names_of(recipe, 'lift')}"
             )
+
+    def _known_apart(self) -> Iterator[str]:
+        """Yield the labels that the readout that is written knows at another time than those that were scored."""
+        folds = [trained.readout.neurons for trained in self.scored.trained]
+        for label, neuron in self.readout.neurons.items():
+            delays_ms = [neurons[label].delay_ms for neurons in folds if label in neurons]
+            if delays_ms and max(abs(neuron.delay_ms - ms) for ms in delays_ms) > _APART_MS:
+                yield (
+                    f"{label}: the readout that is written is known {neuron.delay_ms:.0f} ms after what the sensor "
+                    f"felt, those that were scored {min(delays_ms):.0f} to {max(delays_ms):.0f} ms, as each chose the "
+                    "age of a touch on its own training data: the score is of theirs"
+                )
 
     def _levels(self) -> Iterator[str]:
         """Yield the levels that the training data gave, if they did."""

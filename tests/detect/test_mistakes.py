@@ -1,0 +1,171 @@
+"""Each situation of labels and detections that do not fit: what is measured first of the mistakes says what it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_label_times import ARRAY, touched
+
+import taxel
+from taxel import Detections, Frames, Tare
+from taxel.detect import Example, Outcome, Recipe, score
+from taxel.detect.cause import Cause, ordered
+from taxel.detect.evidence import Evidence
+from taxel.detect.examples import check_examples
+from taxel.detect.mistakes import causes_of
+
+Times = dict[str, np.ndarray]
+
+
+def outcome(frames: Frames, labels: Times, found: Times) -> Outcome:
+    """Return what was found in frames, scored against labels."""
+    example = Example(frames, labels, Tare.take(frames, stop_us=2_000_000))
+    times = np.concatenate(list(found.values()))
+    names = np.repeat(list(found), [len(t) for t in found.values()])
+    detections = Detections(names.tolist(), times.tolist(), times.tolist())
+    return Outcome("a.npz", example, detections, score(detections, labels))
+
+
+def late(seed: int) -> Outcome:
+    frames, truth = touched(seed, 20)
+    return outcome(frames, {label: t + 320_000 for label, t in truth.items()}, truth)
+
+
+def late_in_part(seed: int) -> Outcome:
+    frames, truth = touched(seed, 20, hold_s=(0.3, 0.45))
+    middle = truth["contact"][10]
+    return outcome(frames, {label: t + 210_000 * (t >= middle) for label, t in truth.items()}, truth)
+
+
+def nearly_late(seed: int) -> Outcome:
+    frames, truth = touched(seed, 20)
+    return outcome(frames, {label: t - 60_000 for label, t in truth.items()}, truth)
+
+
+def felt_late(seed: int) -> Outcome:
+    frames, truth = touched(seed, 20)
+    return outcome(frames, truth, truth | {"contact": truth["contact"] + 170_000})
+
+
+def alike(seed: int) -> Outcome:
+    frames, truth = touched(seed, 20, hold_s=(0.25, 0.45))
+    return outcome(frames, truth, truth | {"lift": np.sort(np.concatenate(list(truth.values())))})
+
+
+def misplaced(seed: int) -> Outcome:
+    frames, truth = touched(seed, 40)
+    random, moved = np.random.default_rng(seed), truth["contact"].copy()
+    wrong = random.choice(40, 6, replace=False)
+    moved[wrong] += np.rint(random.uniform(2e5, 4e5, 6) * random.choice([-1, 1], 6)).astype(int)
+    return outcome(frames, {"contact": np.sort(moved)}, {"contact": truth["contact"]})
+
+
+def gap(seed: int) -> Outcome:
+    frames, truth = touched(seed, 20)
+    begin = truth["contact"][5] - 100_000
+    inside = (frames.t >= begin) & (frames.t < begin + 4_000_000)
+    seen = {label: t[(t < begin) | (t >= begin + 4_000_000)] for label, t in truth.items()}
+    return outcome(Frames(frames.values[~inside], frames.t[~inside], unit="V", array=ARRAY), truth, seen)
+
+
+def noisy(seed: int) -> Outcome:
+    frames, truth = touched(seed, 12)
+    times = np.sort(np.random.default_rng(seed).integers(0, int(frames.t[-1]), 300))
+    return outcome(frames, {"contact": truth["contact"]}, {"contact": times})
+
+
+#: Each situation, with the kind of cause that comes first, what it says, and what helps.
+SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
+    "late": (late, "shifted_labels", "20 of 20 missed have a false detection 320 ms earlier", "labels 320 ms earlier"),
+    "late in part": (
+        late_in_part,
+        "shifted_labels",
+        "have a false detection 210 ms earlier, all from ",
+        " s on 210 ms",
+    ),
+    "nearly late": (nearly_late, "window", "20 of 20 missed have a false detection 60 to 60 ms", "--window-ms 60"),
+    "felt late": (felt_late, "shifted_labels", "170 ms later, while lift fits: contact is felt later there", ""),
+    "alike": (alike, "other_name", "20 of 20 false detections of lift lie within 100 ms of labels of contact", ""),
+    "misplaced": (misplaced, "unlabelled_loads", "6 of 6 false lie where a load begins or ends that has", "a look at"),
+    "gap": (gap, "gaps", "missed lie where the recording has no frames, as ", ""),
+    "noisy": (noisy, "many_false", "detections are false, of 12 labels: 2", ""),
+}
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("name", SITUATIONS)
+def test_what_lies_beside_most_mistakes_is_said_first(name: str, seed: int) -> None:
+    make, kind, measured, advice = SITUATIONS[name]
+    first, *_ = causes_of(make(seed), 50.0)
+    assert (first.kind, bool(first.advice)) == (kind, bool(advice)), first
+    assert measured in first.measured
+    assert advice in first.advice
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_of_few_mistakes_nothing_is_said(seed: int) -> None:
+    frames, truth = touched(seed, 20)
+    right = outcome(frames, truth, truth | {"contact": truth["contact"][1:]})
+    assert causes_of(right, 50.0) == ()
+    assert right.causes_lines == []
+
+
+def evidence(frames: Frames, labels: Times) -> Evidence:
+    example = Example(frames, labels, Tare.take(frames, stop_us=2_000_000))
+    return Evidence([example], check_examples([example]), Recipe.load("touch", labels=list(labels), noise_floor=0.02))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_training_says_from_when_on_labels_are_off(seed: int) -> None:
+    made = late_in_part(seed)
+    (cause,) = evidence(made.example.source, {"contact": made.example.labels["contact"]}).causes({"contact": 20})
+    begin_s = made.example.labels["contact"][10] / 1e6
+    assert cause.kind == "shifted_labels"
+    assert f"10 of 20 lie 208 ms after what the sensor felt, all from {begin_s:.1f} s on" in cause.measured
+    assert cause.advice == f"labels from {begin_s:.1f} s on 210 ms earlier"
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_labels_of_footfalls_that_overlap_are_not_called_wrong(seed: int) -> None:
+    """Steps at two places, each of which begins before the one before has ended: one load for the array."""
+    random = np.random.default_rng(seed)
+    begins = 3 + np.cumsum(random.uniform(0.4, 0.6, 12)) + 4.0 * (np.arange(12) // 4)
+    ends = begins + random.uniform(0.65, 0.75, 12)
+    t = np.arange(0, round(1e6 * (ends[-1] + 2)), 5000)
+    values = random.normal(0, 0.002, (len(t), 6, 6))
+    for k, (begin, end) in enumerate(zip(begins, ends, strict=True)):
+        values[(t >= 1e6 * begin) & (t < 1e6 * end), :3, 3 * (k % 2) : 3 * (k % 2) + 3] += random.uniform(0.5, 1.0)
+    labels = {"heel strike": np.rint(1e6 * begins).astype(np.int64), "toe off": np.rint(1e6 * ends).astype(np.int64)}
+    frames = Frames(values, t, unit="kPa", array=ARRAY)
+    (cause,) = evidence(frames, labels).causes({"heel strike": 12, "toe off": 12})[:1]
+    assert (cause.kind, "of another recording" in cause.measured) == ("overlapping_loads", False)
+    assert "9 of 12 labels of heel strike lie while another load lasts" in cause.measured
+
+
+def test_a_label_is_named_once_and_what_is_measured_of_nothing_is_no_advice() -> None:
+    parts = [Cause("unlabelled_source", ("slip",), 2, f"2 missed in {name}", "a column source") for name in "abc"]
+    (cause,) = ordered(parts)
+    assert (cause.labels, cause.mistakes, cause.measured) == (
+        ("slip",),
+        6,
+        "2 missed in a; 2 missed in b; 2 missed in c",
+    )
+    assert str(replace(cause, advice="")) == cause.measured
+
+
+@pytest.mark.parametrize("distance_ms", [0, 40, 55, 95, 105])
+def test_false_detections_beside_labels_are_counted_up_to_twice_the_window(distance_ms: int) -> None:
+    found = Detections(["a"] * 2, [1_000_000, 1_000_000 + 1000 * distance_ms], [2_000_000] * 2)
+    scored = score(found, {"a": [1_000_000]})
+    assert scored.false == 1
+    assert (scored.false_near, scored.false_beside) == (int(distance_ms <= 50), int(distance_ms <= 100))
+
+
+def test_names_of_grasps_and_of_steps_are_ends_of_touches() -> None:
+    known = taxel.detect.recipes
+    assert known.kinds("touch", ["grasp", "Griff", "release", "slip"]) == ("slip",)
+    assert known.kinds("touch", ["IC", "FO"]) == ()
+    assert known.kinds("event_counts", ["slip"]) == ()
