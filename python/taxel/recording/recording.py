@@ -361,7 +361,7 @@ class Recording:
         """What was lost at which stage: a line of text, with a status and numbers by cause (`taxel.Verdict`).
 
         That of a part is that of the whole file. Gaps of frames with times, and of the events of a camera, are those of
-        the part. The page *What the output means* lists statuses, causes and wordings; all else there is to know is in
+        the part, and are in it where the file does not say what was lost. The page *What the output means* lists statuses, causes and wordings; all else there is to know is in
         `remarks`.
         """
         each = self.sources if self.is_several else {self.label: self}
