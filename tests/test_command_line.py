@@ -235,6 +235,7 @@ def test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work(cap
 PRINTS_COMMANDS = """
 import sys
 from taxel.cli import main
+from taxel.cli.train import _of_label
 try:
     main(sys.argv[1:])
 finally:
@@ -327,6 +328,10 @@ def test_labels_of_a_recording_that_is_not_there_are_left_out_and_a_misspelt_one
         assert code == 0
         assert error.count("left out") == (said is not None), error
         assert said is None or said in error
+
+
+def test_the_file_of_the_rule_of_a_label_keeps_its_letters() -> None:
+    assert _of_label(Path("a/rule.json"), "Zehenablösung links/2").name == "rule.Zehenablösung_links_2.json"
 
 
 def test_each_option_of_opening_is_typed_by_its_name() -> None:

@@ -196,6 +196,7 @@ def test_info_counts_missing_values_readings_at_full_scale_and_gaps(tmp_path, ca
     assert facts["full_scale"] == {"value": 3300, "readings": counts.sum(), "taxels": np.count_nonzero(counts)}
     assert counts.any()
     # One frame left out is two intervals.
+    assert facts["gaps"].pop("text").startswith("2 gaps, ")
     assert facts["gaps"] == {"count": 2, "total_us": 70_000, "longest_us": 40_000, "t_us": 2_990_000}
     code, shown, _ = call(capsys, "info", tmp_path / "flawed.npz")
     assert code == 0

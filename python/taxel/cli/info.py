@@ -238,7 +238,7 @@ def _row(facts: dict[str, Any], *, with_gaps: bool, with_verdict: bool) -> tuple
     )
 
 
-def _gaps(gaps: dict[str, int] | None) -> str:
+def _gaps(gaps: dict[str, Any] | None) -> str:
     return "" if gaps is None else f"{gaps['count']} ({gaps['total_us'] / 1e6:.3g} s)"
 
 
@@ -323,7 +323,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield what frames lack: values, and loads beyond the sensor's range."""
+    """Yield what frames lack: values, times, and loads beyond the sensor's range."""
     if facts["missing"]["values"]:
         yield "missing values", f"{facts['missing']['values']} of {facts['missing']['of']}"
     if (full := facts["full_scale"]) is not None:
@@ -332,6 +332,8 @@ def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
             f"{counted(full['readings'], 'reading')} of {counted(full['taxels'], 'taxel')} {are} at {full['value']:g}"
         )
         yield "full scale", f"{readings}, the greatest value: larger loads may be cut off"
+    if (gaps := facts["gaps"]) is not None and "gaps" not in facts["verdict"].noted:
+        yield "gaps", gaps["text"]
 
 
 def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,10 +54,10 @@ class Gaps:
             return f"1 gap of {longest}"
         return f"{self.count} gaps, {_time(self.total_us)} together, the longest {longest}"
 
-    def to_dict(self) -> dict[str, int]:
-        """Return the numbers as JSON values."""
+    def to_dict(self) -> dict[str, Any]:
+        """Return text and numbers as JSON values."""
         numbers = {"count": self.count, "total_us": self.total_us}
-        return numbers | {"longest_us": self.longest_us, "t_us": self.t_us}
+        return {"text": str(self)} | numbers | {"longest_us": self.longest_us, "t_us": self.t_us}
 
 
 def _time(us: int) -> str:
@@ -84,13 +85,13 @@ def gaps_of(source: RecordedSource) -> Gaps | None:
 
 
 def with_gaps(verdict: Verdict, named: Mapping[str, Gaps | None]) -> Verdict:
-    """Return a verdict that also notes the gaps of each source, or those of the only one."""
+    """Return a verdict that notes the gaps of each source, or of the only one, where it does not know what was lost."""
     found: dict[str, tuple[str, Gaps]] = {}
     for name, gaps in named.items():
         if gaps is not None:
             found.setdefault(str(gaps), (name, gaps))
-    # Where frames that came live have silences, these are the same.
-    if not found or "silences" in verdict.noted:
+    # A recording that counts what was lost has the verdict that it had live, with its silences.
+    if not found or verdict.status != "unknown":
         return verdict
     # Sources of one clock have the same gaps.
     are_alike = len(found) == 1 and all(gaps is not None for gaps in named.values())

@@ -361,8 +361,8 @@ class Recording:
         """What was lost at which stage: a line of text, with a status and numbers by cause (`taxel.Verdict`).
 
         That of a part is that of the whole file. Gaps of frames with times, and of the events of a camera, are those of
-        the part. The page *What the output means* lists statuses, causes and wordings; all else there is to know is in
-        `remarks`.
+        the part, and are in it where the file does not say what was lost. The page *What the output means* lists
+        statuses, causes and wordings; all else there is to know is in `remarks`.
         """
         each = self.sources if self.is_several else {self.label: self}
         return with_gaps(verdict_of(self._contents.main), {name: source._gaps() for name, source in each.items()})
