@@ -127,7 +127,9 @@ class FeltLoads:
             return np.zeros(0, np.bool_)
         begins, ends = self._spans(self._quantity)
         load = np.searchsorted(begins, times + reach, side="right") - 1
-        load[(load >= 0) & (np.append(ends, 0)[load] < times - reach)] = -1
+        # A load without an end is a tare that does not fit.
+        lasting = np.append(ends % APART_US == APART_US // 2, False)[load]
+        load[(load >= 0) & ((np.append(ends, 0)[load] < times - reach) | lasting)] = -1
         inside = (load >= 0) & (times - np.append(begins, 0)[load] > reach) & (np.append(ends, 0)[load] - times > reach)
         several: NDArray[np.bool_] = inside & (np.bincount(load + 1)[load + 1] > 1)
         return several

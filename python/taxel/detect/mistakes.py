@@ -192,6 +192,8 @@ class Measured:
         measured = f"{count} of {len(left.missed)} missed have a false detection {distance}"
         # Several names of one clock have one advice.
         advice = f"labels {abs(round(alike.ms, -1)):.0f} ms {side}, if the clock of the recording is right"
+        if not stretch and abs(alike.ms) <= 2 * self._window_ms:
+            advice = ""  # as what rises slowly is felt late
         if stretch:
             measured, advice = f"{measured}, all {stretch}", advice.replace("labels", f"labels {stretch}", 1)
         elif fits := [name for name, part in self._scores.items() if name != label and 2 * part.found > part.events]:
@@ -255,7 +257,8 @@ class Measured:
             parts.append(f"{n} of {len(felt)} false {lie(n)} where a load begins or ends that has no label")
         if unfelt.any():
             n = int(unfelt.sum())
-            parts.append(f"{n} of {len(unfelt)} missed more than {WINDOW_MS:.0f} ms from where one does")
+            where = "one does" if parts else "a load begins or ends"
+            parts.append(f"{n} of {len(unfelt)} missed {lie(n)} more than {WINDOW_MS:.0f} ms from where {where}")
         times = np.sort(np.concatenate([left.missed[unfelt], left.false[felt]]))
         named = ", ".join(self._place(t) for t in times[:_NAMED])
         measured = f"{', and '.join(parts)}, as at {named}"
