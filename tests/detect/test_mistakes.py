@@ -13,9 +13,12 @@ import taxel
 from taxel import Detections, Frames, Tare
 from taxel.detect import Example, Outcome, Recipe, score
 from taxel.detect.cause import Cause, ordered
+from taxel.detect.causes import Mistakes
 from taxel.detect.evidence import Evidence
 from taxel.detect.examples import check_examples
+from taxel.detect.fitting import fit_aligned
 from taxel.detect.mistakes import causes_of
+from taxel.detect.scoring import score_together
 
 Times = dict[str, np.ndarray]
 
@@ -143,6 +146,23 @@ def test_labels_of_footfalls_that_overlap_are_not_called_wrong(seed: int) -> Non
     (cause,) = evidence(frames, labels).causes({"heel strike": 12, "toe off": 12})[:1]
     assert (cause.kind, "of another recording" in cause.measured) == ("overlapping_loads", False)
     assert "9 of 12 labels of heel strike lie while another load lasts" in cause.measured
+
+
+@pytest.mark.parametrize(("found", "is_cause"), [(0, False), (8, False), (18, True)])
+def test_a_source_is_a_cause_only_where_most_is_found_beside_it(found: int, is_cause: bool) -> None:
+    frames, truth = touched(1, 20)
+    tare, labels = Tare.take(frames, stop_us=2_000_000), {"contact": truth["contact"]}
+    examples = [Example(frames, labels, tare, "walk ", f"walk {foot}") for foot in ("left", "right")]
+    none = np.zeros(0, np.int64)
+    times = [labels["contact"][:found], none]
+    detections = [Detections(["contact"] * len(t), t, t) for t in times]
+    scores = [score(each, labels) for each in detections]
+    together = score_together(detections, [labels, labels], 50.0)
+    plan = Recipe.load("touch", labels=["contact"], noise_floor=0.02)
+    made = fit_aligned(examples[:1], plan, None)
+    mistakes = Mistakes(made, together, together, scores)
+    causes = mistakes.causes(Evidence(examples, check_examples(examples), plan))
+    assert ("unlabelled_source" in [cause.kind for cause in causes]) == is_cause
 
 
 def test_a_label_is_named_once_and_what_is_measured_of_nothing_is_no_advice() -> None:

@@ -246,10 +246,10 @@ class Evidence:
     def _part_off(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield by how much labels of a part of a recording are off."""
         alike = self.felt.part_off(label)
-        if alike is None or 4 * (count := int(alike.which.sum())) < wrong:
+        if alike is None or 4 * (count := int(alike.members.sum())) < wrong:
             return
         times = self.felt.times(label)
-        if stretch := stretch_of(times, alike.which, self.sound):
+        if stretch := stretch_of(times, alike.members, self.sound):
             side, back = ("after", "earlier") if alike.ms > 0 else ("before", "later")
             distance = f"{abs(alike.ms):.0f} ms"
             measured = f"{count} of {len(times)} lie {distance} {side} what the sensor felt, all {stretch}"

@@ -127,7 +127,9 @@ class FeltLoads:
             return np.zeros(0, np.bool_)
         begins, ends = self._spans(self._quantity)
         load = np.searchsorted(begins, times + reach, side="right") - 1
-        load[(load >= 0) & (np.append(ends, 0)[load] < times - reach)] = -1
+        # A load without an end is a tare that does not fit.
+        lasting = np.append(ends % APART_US == APART_US // 2, False)[load]
+        load[(load >= 0) & ((np.append(ends, 0)[load] < times - reach) | lasting)] = -1
         inside = (load >= 0) & (times - np.append(begins, 0)[load] > reach) & (np.append(ends, 0)[load] - times > reach)
         several: NDArray[np.bool_] = inside & (np.bincount(load + 1)[load + 1] > 1)
         return several
@@ -176,8 +178,8 @@ class FeltLoads:
         away = np.flatnonzero(~self.felt_at(times)[1])
         felt = (edge.t for edge in self._loads.edges(self._quantity, self._felt[self._quantity], 1.0, 1))
         found = [alike for edge in felt if (alike := same_distance(times[away], edge, WINDOW_MS)) is not None]
-        best = max(found, key=lambda alike: int(alike.which.sum()), default=None)
-        return None if best is None else Alike(best.ms, np.isin(np.arange(len(times)), away[best.which]))
+        best = max(found, key=lambda alike: int(alike.members.sum()), default=None)
+        return None if best is None else Alike(best.ms, np.isin(np.arange(len(times)), away[best.members]))
 
 
 def _distance(times: NDArray[np.int64], felt: Sequence[NDArray[np.int64]]) -> Off | None:
@@ -194,7 +196,7 @@ class Alike(NamedTuple):
     """Times that lie at one distance after others, ms, and which of the times they are."""
 
     ms: float
-    which: NDArray[np.bool_]
+    members: NDArray[np.bool_]
 
 
 def same_distance(times: NDArray[np.int64], others: NDArray[np.int64], beyond_ms: float) -> Alike | None:
@@ -213,9 +215,9 @@ def same_distance(times: NDArray[np.int64], others: NDArray[np.int64], beyond_ms
     if most < _LEAST or _by_chance(most, left, len(apart), _SAME_MS) > _CHANCE:
         return None
     here = slice(begin := counts.index(most), stops[begin])
-    which = np.zeros(len(times), np.bool_)
-    which[index[here]] = True
-    return Alike(float(np.median(apart[here])), which)
+    members = np.zeros(len(times), np.bool_)
+    members[index[here]] = True
+    return Alike(float(np.median(apart[here])), members)
 
 
 def _apart(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -181,10 +181,10 @@ class Measured:
     def _at_one_distance(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
         """Return by how much false detections precede or follow most of what is missed."""
         alike = same_distance(left.missed, left.false, self._window_ms)
-        if alike is None or 2 * (count := int(alike.which.sum())) <= len(left.missed):
+        if alike is None or 2 * (count := int(alike.members.sum())) <= len(left.missed):
             return None
         side = "earlier" if alike.ms > 0 else "later"
-        labels, missed = self._labels(label), left.missed[alike.which]
+        labels, missed = self._labels(label), left.missed[alike.members]
         distance, stretch = (
             f"{abs(alike.ms):.0f} ms {side}",
             stretch_of(labels, np.isin(labels, missed), self._examples),
@@ -192,17 +192,20 @@ class Measured:
         measured = f"{count} of {len(left.missed)} missed have a false detection {distance}"
         # Several names of one clock have one advice.
         advice = f"labels {abs(round(alike.ms, -1)):.0f} ms {side}, if the clock of the recording is right"
+        if not stretch and abs(alike.ms) <= 2 * self._window_ms:
+            advice = ""  # as what rises slowly is felt late
         if stretch:
             measured, advice = f"{measured}, all {stretch}", advice.replace("labels", f"labels {stretch}", 1)
         elif fits := [name for name, part in self._scores.items() if name != label and 2 * part.found > part.events]:
-            what = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
-            measured, advice = f"{measured}, while {what}: {label} is felt {side} there, as where taxels are dead", ""
+            fitting = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
+            measured += f", while {fitting}: {label} is felt {side} there, as where taxels are dead"
+            advice = ""
         expected = missed - round(to_us(alike.ms))
         detected = np.array([np.argmin(np.abs(left.false - t)) for t in expected])
         is_near = np.abs(left.false[detected] - expected) <= to_us(WINDOW_MS)
         false = _at(detected[is_near], left.false)
         cause = Cause("shifted_labels", (label,), count + int(false.sum()), measured, advice)
-        return cause, left.without(alike.which, false)
+        return cause, left.without(alike.members, false)
 
     def _overlapped(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
         """Return how many missed lie while a load lasts that holds several labels of the name."""
@@ -240,8 +243,8 @@ class Measured:
             return None
         reach = round(to_us(2 * self._window_ms))
         names = sorted({name for example in self._examples for name in example.labels})
-        every = np.sort(np.concatenate([self._labels(name) for name in names]))
-        beside = np.diff(np.searchsorted(every, [left.false - reach, left.false + reach]), axis=0)[0] > 0
+        labels = np.sort(np.concatenate([self._labels(name) for name in names]))
+        beside = np.diff(np.searchsorted(labels, [left.false - reach, left.false + reach]), axis=0)[0] > 0
         felt = self._felt.felt_at(left.false)[1] & ~beside
         if self._by_chance(int(felt.sum()), len(felt), self._felt.covered()):
             felt[:] = False
@@ -255,7 +258,8 @@ class Measured:
             parts.append(f"{n} of {len(felt)} false {lie(n)} where a load begins or ends that has no label")
         if unfelt.any():
             n = int(unfelt.sum())
-            parts.append(f"{n} of {len(unfelt)} missed more than {WINDOW_MS:.0f} ms from where one does")
+            where = "one does" if parts else "a load begins or ends"
+            parts.append(f"{n} of {len(unfelt)} missed {lie(n)} more than {WINDOW_MS:.0f} ms from where {where}")
         times = np.sort(np.concatenate([left.missed[unfelt], left.false[felt]]))
         named = ", ".join(self._place(t) for t in times[:_NAMED])
         measured = f"{', and '.join(parts)}, as at {named}"
@@ -284,12 +288,12 @@ def overlapping(label: str, count: int, labels: int, mistakes: int) -> Cause:
     return Cause("overlapping_loads", (label,), mistakes, measured, advice)
 
 
-def stretch_of(labels: NDArray[np.int64], which: NDArray[np.bool_], examples: Sequence[Example]) -> str:
+def stretch_of(labels: NDArray[np.int64], members: NDArray[np.bool_], examples: Sequence[Example]) -> str:
     """Return from when to when some of the labels (us, on one clock) lie in one recording; "" where it is no part.
 
     Nearly all labels between the first and the last of them must be among them.
     """
-    places = np.flatnonzero(which)
+    places = np.flatnonzero(members)
     if not len(places):
         return ""
     recording = np.rint(labels / APART_US).astype(int)
