@@ -21,6 +21,7 @@ import taxel
 from taxel.cli import app
 from taxel.cli._commands import OWN, plugins
 from taxel.cli._opening import FileOptions
+from taxel.cli.train import _of_label
 from taxel.live import send
 from taxel.recording.text_options import TYPED, TextOptions
 
