@@ -82,7 +82,9 @@ def draw_recording(browser: Any, name: str, picture: str) -> None:
         if readout:
             page.locator("#readout").select_option(readout)
             until(lambda: page.locator("#detection-list li").count(), "its detections")
-            page.locator("#notice-close").click()
+            page.wait_for_timeout(1000)
+            if page.locator("#notice-close").is_visible():
+                page.locator("#notice-close").click()
         page.mouse.move(700, 5)
         page.wait_for_timeout(3000)
         save(page, picture)
