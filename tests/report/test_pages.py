@@ -83,6 +83,7 @@ def page(*figures):
         begun=[],
         held_out=[],
         outside=[],
+        causes=[],
         worst=[],
         viewed=["'a walk.mcap'"],
         scored=False,
@@ -169,6 +170,7 @@ def test_no_table_of_a_report_is_cut(tmp_path, name, width):
         begun=[(name, "2026-01-02 03:04:05 UTC")],
         viewed=[],
         outside=[],
+        causes=[],
         beside=[("contact", "neuron", score), ("contact", "the area above 12 taxels for 3 ms", score)],
     )
     measured = (
