@@ -86,6 +86,7 @@ def page(*figures):
         warnings=[],
         printed=[],
         held_out=[],
+        causes=[],
         worst=[],
         unclaimed=[],
         viewed=["'a walk.mcap'"],
@@ -176,6 +177,7 @@ def test_no_table_of_a_report_is_cut(tmp_path, name, width):
         warnings=[f"{name}: rest: 4 taxels drifted above the tare by more than the noise floor"],
         printed=["all  12  12"],
         viewed=[],
+        causes=[],
         beside=[("contact", "neuron", score), ("contact", "the area above 12 taxels for 3 ms", score)],
     )
     measured = (

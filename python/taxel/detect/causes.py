@@ -101,6 +101,8 @@ class Mistakes:
         if not any(cause.kind in ("foreign_labels", "tare") for cause in known) and label not in evidence.felt_apart:
             causes += self._unpaired(evidence.sound, label)
         explained = max(sum(c.mistakes for c in where), max((c.mistakes for c in (*known, *causes)), default=0))
+        if any(cause.kind == "other_name" for cause in where) and (indistinct := list(self._indistinct(label, wrong))):
+            return [*(cause for cause in causes if cause.kind != "other_name"), *indistinct]
         # What a training may learn otherwise is for what nothing else explains.
         rest = self._rule(label, wrong) if 2 * explained >= wrong else self._of_learning(evidence, label, wrong)
         return [*causes, *rest]
@@ -188,22 +190,17 @@ class Mistakes:
 
     def _of_learning(self, evidence: Evidence, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the causes where labels and tares are right: inputs, kinds, too few examples; or that there is none."""
-        chance = _chance(label, self.scored, self.plain) if self.scored[label].events >= FIVE_FOLDS else ""
         if rules := list(self._rule(label, wrong)):
             yield from rules
             return
-        if lacks_neighbours(evidence.examples) and (self._touches or chance):
+        if lacks_neighbours(evidence.examples) and (self._touches or self._by_chance(label)):
             array = self.trained.readout.array
             size = "ROWSxCOLUMNSxMM" if array is None else f"{array.rows}x{array.columns}xMM"
             measured = "channels in a row at a known distance, MM mm, have neighbours; then the recipe touch fits"
             yield by_option("no_neighbours", label, wrong, measured, f"--array {size}")
             return
-        if chance and any(isinstance(encoder, Moments) for encoder in self.trained.recipe.encoder._each()):
-            measured = (
-                f"{chance}, from moments of the frame, as area and load, its centre, and how long a touch lasts; "
-                "taxel information says whether they differ otherwise, or labels are few or mixed up"
-            )
-            yield Cause("indistinct_kinds", (label,), wrong, measured, "other kinds")
+        if indistinct := list(self._indistinct(label, wrong)):
+            yield from indistinct
             return
         alone = self.learnt[label]
         if 2 * alone.rank[0] <= wrong:
@@ -215,6 +212,20 @@ class Mistakes:
             tries = f"--search {'tried' if self.searched else 'tries'} {points} sets of parameters"
             measured += f", and {tries}" if self.searched else f"; {tries}, which may or may not help"
         yield Cause("unknown", (label,), wrong, measured, "")
+
+    def _indistinct(self, label: str, wrong: int) -> Iterator[Cause]:
+        """Yield that neuron and rule tell no more of a kind of touch than chance would."""
+        moments = any(isinstance(encoder, Moments) for encoder in self.trained.recipe.encoder._each())
+        if moments and (chance := self._by_chance(label)):
+            measured = (
+                f"{chance}, from moments of the frame, as area and load, its centre, and how long a touch lasts; "
+                "taxel information says whether they differ otherwise, or labels are few or mixed up"
+            )
+            yield Cause("indistinct_kinds", (label,), wrong, measured, "other kinds")
+
+    def _by_chance(self, label: str) -> str:
+        """Return how many of a kind of touch are told, where that is as by chance and there are enough; else ""."""
+        return _chance(label, self.scored, self.plain) if self.scored[label].events >= FIVE_FOLDS else ""
 
     def _rule(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the plain rule if it halves the mistakes, or the recipe that has its inputs, if this one has not."""

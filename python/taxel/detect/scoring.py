@@ -90,12 +90,12 @@ class Score:
         Places of the reference events without a detection, and of the detections without an event.
     false_near : int, 0 or more
         How many of the false ones lie within the window of a reference event: the thesis' false positives (6.5.2).
-    false_beside : int, 0 or more
-        How many of the false ones lie within twice the window of a reference event.
     errors_ms, delays_ms : float64, shape (found,), ms
         `t` minus reference (negative is early) and `known` minus reference.
     by_label : dict of str to Score
         Empty in the score of one label.
+    false_beside : int, 0 or more
+        How many of the false ones lie within twice the window of a reference event.
     """
 
     label: str
