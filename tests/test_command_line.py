@@ -21,7 +21,6 @@ import taxel
 from taxel.cli import app
 from taxel.cli._commands import OWN, plugins
 from taxel.cli._opening import FileOptions
-from taxel.cli.train import _of_label
 from taxel.live import send
 from taxel.recording.text_options import TYPED, TextOptions
 
@@ -236,7 +235,6 @@ def test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work(cap
 PRINTS_COMMANDS = """
 import sys
 from taxel.cli import main
-from taxel.cli.train import _of_label
 try:
     main(sys.argv[1:])
 finally:
@@ -332,6 +330,8 @@ def test_labels_of_a_recording_that_is_not_there_are_left_out_and_a_misspelt_one
 
 
 def test_the_file_of_the_rule_of_a_label_keeps_its_letters() -> None:
+    from taxel.cli.train import _of_label
+
     assert _of_label(Path("a/rule.json"), "Zehenablösung links/2").name == "rule.Zehenablösung_links_2.json"
 
 

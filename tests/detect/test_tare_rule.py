@@ -72,7 +72,7 @@ def test_the_command_names_a_drift(tmp_path: Path, capsys) -> None:
         asked = ("detect", tmp_path / f"{name}.npz", "--readout", tmp_path / "rule.json", "--tare", 1)
         code, out, error = call(capsys, *asked)
         assert (code, "drifted" in out) == (0, said is not None), error
-        hint = json.loads(call(capsys, *asked, "--json")[1])["hint"]
+        [hint, *_] = json.loads(call(capsys, *asked, "--json")[1])["remarks"]
         assert hint is None if said is None else hint.startswith(said)
 
 

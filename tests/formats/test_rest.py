@@ -250,7 +250,7 @@ def test_a_recording_of_values_that_fall_in_which_nothing_is_detected_says_what_
         code, shown, _ = call(capsys, *command)
         assert code == 0
         code, as_json, _ = call(capsys, *command, "--json")
-        hint, found = (json.loads(as_json)[name] for name in ("hint", "detections"))
+        [hint], found = (json.loads(as_json)[name] for name in ("remarks", "detections"))
         assert bool(found) == finds
         if sign < 0:
             assert hint.startswith("rest: a quiet stretch")
@@ -275,12 +275,12 @@ def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_t
     rule = tmp_path / "rule.json"
     taxel.detect.PlainRule("area", 5, noise_floor=100.0).save(rule)
     command = ("detect", tmp_path / "palm.npz", "--readout", rule, "--tare", "0.9")
-    hint, found = (json.loads(call(capsys, *command, "--json")[1])[name] for name in ("hint", "detections"))
+    [hint], found = (json.loads(call(capsys, *command, "--json")[1])[name] for name in ("remarks", "detections"))
     assert found
     assert turns in hint
     assert hint in call(capsys, *command)[1]
     (tmp_path / "palm.layout.toml").write_text("falls = true\n")
-    assert json.loads(call(capsys, *command, "--json")[1])["hint"] is None
+    assert json.loads(call(capsys, *command, "--json")[1])["remarks"] == []
     assert "falls" not in call(capsys, "train", tmp_path / "palm.npz", "--folds", 0, "-o", tmp_path / "b.json")[2]
 
 

@@ -388,7 +388,7 @@ def test_a_definition_in_idl_opens_a_bag(tmp_path: Path) -> None:
         ({"topic": "/palm", "types": "nowhere"}, ProblemError, "nowhere: no folder with .msg or .idl files"),
         ({"topic": 3}, ProblemError, "topic is 3"),
         ({"topic": [3]}, ProblemError, "topic is 3"),
-        ({"topic": "/palm", "array": [3]}, ProblemError, "array is 3"),
+        ({"topic": "/palm", "array": [3]}, ProblemError, "array is \\[3\\]: must be a taxel.Array"),
     ],
 )
 def test_what_cannot_be_opened_is_one_clear_error(given, error, said, tmp_path) -> None:

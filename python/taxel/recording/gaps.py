@@ -69,7 +69,8 @@ def gaps_of(source: RecordedSource) -> Gaps | None:
 
     Silence of a board is none: it sends nothing where nothing changes.
     """
-    if source.untimed:
+    # A board's recording is not decoded for that.
+    if source.untimed or (source.has_events and not _may_be_of_camera(source)):
         return None
     table = source.table
     found = _missing(table.t) if isinstance(table, Frames) else None
@@ -107,8 +108,12 @@ def of_camera(source: RecordedSource) -> bool:
     table = source.table
     if isinstance(table, Frames):
         return are_counts(table.unit)
-    kinds = ("event_camera", "records")
-    return table.intensity is None and (source.origin.kind in kinds or table.array.name.startswith("event camera"))
+    return table.intensity is None and _may_be_of_camera(source)
+
+
+def _may_be_of_camera(source: RecordedSource) -> bool:
+    """Return whether events are of an event camera by the file's kind or the sensor's name."""
+    return source.origin.kind in ("event_camera", "records") or source.sensor.array.name.startswith("event camera")
 
 
 def _missing(t: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:

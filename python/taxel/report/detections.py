@@ -164,9 +164,9 @@ def write_detections(
             if m.badness > 0
         ],
         unclaimed=[
-            (outcome.name, (t - outcome.begin_us) / 1e6, what)
+            (outcome.name, (t - outcome.begin_us) / 1e6, text)
             for outcome in listened
-            for t, what in _unclaimed(outcome)[:_MOMENTS]
+            for t, text in _unclaimed(outcome)[:_MOMENTS]
         ],
         about=[(outcome.name, _about(outcome, readout)) for outcome in listened],
         most_open=_MOST_OPEN,
