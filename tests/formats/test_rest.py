@@ -250,14 +250,14 @@ def test_a_recording_of_values_that_fall_in_which_nothing_is_detected_says_what_
         code, shown, _ = call(capsys, *command)
         assert code == 0
         code, as_json, _ = call(capsys, *command, "--json")
-        [hint], found = (json.loads(as_json)[name] for name in ("remarks", "detections"))
+        remarks, found = (json.loads(as_json)[name] for name in ("remarks", "detections"))
         assert bool(found) == finds
         if sign < 0:
-            assert hint.startswith("rest: a quiet stretch")
-            assert "say falls = true in a layout file" in hint
-            assert hint in shown
+            assert remarks[0].startswith("rest: a quiet stretch")
+            assert "say falls = true in a layout file" in remarks[0]
+            assert remarks[0] in shown
         else:
-            assert hint is None
+            assert not remarks
             assert "falls" not in shown
 
 

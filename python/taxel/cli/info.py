@@ -193,11 +193,19 @@ def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:
     # Columns that say the same of each recording say nothing.
     with_gaps = any(facts["gaps"] for facts in sensors)
     with_verdict = any(facts["verdict"].status != "unknown" for facts in sensors)
-    head = ("recording", "array", "time (s)", "contents", "rate (1/s)", "notes", *_TAXELS)
+    head: tuple[str, ...] = ("recording", "array", "time (s)", "contents", "rate (1/s)", "notes", *_TAXELS)
     head += ("gaps",) * with_gaps + ("verdict",) * with_verdict
     contents = ", ".join(counted(total, noun) for noun, total in sums.items() if total)
     bad = [str(sum(len(facts["taxels"][name]) for facts in sensors)) for name in _TAXELS]
-    last = ("sum", "", f"{sum(facts['seconds'] for facts in sensors):.3f}", contents, "", str(notes.total()), *bad)
+    last: tuple[str, ...] = (
+        "sum",
+        "",
+        f"{sum(facts['seconds'] for facts in sensors):.3f}",
+        contents,
+        "",
+        str(notes.total()),
+        *bad,
+    )
     last += ("",) * (with_gaps + with_verdict)
     rows = [head, *(_row(facts, with_gaps=with_gaps, with_verdict=with_verdict) for facts in sensors), last]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

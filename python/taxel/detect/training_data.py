@@ -16,8 +16,9 @@ from taxel._core import ProblemError
 from taxel.detect.detector import _Detector
 from taxel.detect.examples import Example, check_examples
 from taxel.detect.floors import floor_of
-from taxel.detect.label_times import PEAK, TOUCH
+from taxel.detect.label_times import PEAK
 from taxel.detect.loads import Loads, clock_of, lacks_neighbours
+from taxel.detect.tares import TOUCH
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
@@ -242,4 +243,4 @@ def _noise(source: Events | Frames) -> float:
     values = (source.values[begin : begin + _FRAMES].astype(np.float64) for begin in begins)
     # Of independent noise two neighbours in time differ by twice its variance.
     squares = [float(np.nanmean(np.diff(stretch, axis=0) ** 2)) / 2.0 for stretch in values]
-    return float(np.quantile(squares, _QUIET)) ** 0.5
+    return float(np.sqrt(np.quantile(squares, _QUIET)))

@@ -130,7 +130,7 @@ def _silences(table: Events | Frames) -> tuple[NDArray[np.int64], NDArray[np.int
     """
     t, before = table.t, None
     if isinstance(table, Frames):
-        counts = np.nansum(table.values, axis=(1, 2), dtype=np.float64)
+        counts = np.asarray(np.nansum(table.values, axis=(1, 2), dtype=np.float64))
         t, before = t[counts > 0], np.concatenate([[0.0], np.cumsum(counts[counts > 0])])
     first, last = (int(t[0]), int(t[-1])) if len(t) else (0, 0)
     if last <= first:

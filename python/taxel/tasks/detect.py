@@ -235,8 +235,8 @@ def detect(
                 unknown_rests[recording.title] = error
         if not each and unknown_rests:
             raise next(iter(unknown_rests.values()))
-        for error in unknown_rests.values():
-            warn(f"left out: {error}", stacklevel=2)
+        for unknown_rest in unknown_rests.values():
+            warn(f"left out: {unknown_rest}", stacklevel=2)
     scored = [outcome for detected in each if (outcome := detected.outcome).score is not None]
     truths = [outcome.example.labels for outcome in scored]
     found = [outcome.example._known(outcome.found) for outcome in scored]

@@ -371,7 +371,7 @@ def _begun_loaded(source: Events | Frames) -> str:
     """
     if not isinstance(source, Frames) or are_counts(source.unit) or source.values.min(axis=0, initial=np.inf).any():
         return ""
-    sums = np.nansum(source.values, axis=(1, 2), dtype=np.float64)
+    sums = np.asarray(np.nansum(source.values, axis=(1, 2), dtype=np.float64))
     begin, (least, most) = np.median(sums[:_FIRST_FRAMES]), np.quantile(sums, (_LOWEST, 1 - _LOWEST))
     is_loaded = begin > 0 and begin >= _LOADED_TIMES * least and begin >= most / _LOADED_TIMES
     return f"; where trials begin loaded, {ZEROS_BEFORE} helps" if is_loaded else ""
