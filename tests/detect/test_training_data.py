@@ -146,3 +146,10 @@ def test_a_gap_is_named_and_a_recording_without_a_rest_stops_no_other(
     assert any("restless.npz" in warning and "rest of its taxels is not known" in warning for warning in found.warnings)
     with pytest.raises(taxel.ProblemError, match="rest of its taxels is not known"):
         taxel.tasks.detect(training.readout, taxel.open(restless))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_touches_far_weaker_than_those_of_the_training_are_none(
+    training: taxel.tasks.Training, tmp_path: Path, seed: int
+) -> None:
+    assert "no load is 0.1 times as strong as its touches" in remarks(training, made(tmp_path, seed, strength=12.0)[0])

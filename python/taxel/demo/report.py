@@ -32,7 +32,9 @@ _EVENT_BITS = 80
 
 def _load() -> float | None:
     """Return the machine's load of the last minute; None where the system keeps none."""
-    return None if sys.platform == "win32" else os.getloadavg()[0]
+    if sys.platform == "win32":
+        return None
+    return os.getloadavg()[0]
 
 
 def figures(

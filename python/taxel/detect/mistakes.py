@@ -198,7 +198,7 @@ class Measured:
             measured, advice = f"{measured}, all {stretch}", advice.replace("labels", f"labels {stretch}", 1)
         elif fits := [name for name, part in self._scores.items() if name != label and 2 * part.found > part.events]:
             fitting = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
-            measured += f", while {fitting}: {label} is felt {side} there, as where taxels are dead"
+            measured += f", while {fitting}: {label} is felt {side} there"
             advice = ""
         expected = missed - round(to_us(alike.ms))
         detected = np.array([np.argmin(np.abs(left.false - t)) for t in expected])

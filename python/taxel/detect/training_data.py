@@ -35,6 +35,8 @@ _LOOKS, _LOADED = 2000, 0.05
 _TOUCH = 0.1
 #: Noise and strength differ from these times on.
 _NOISIER, _WEAKER, _STRONGER = 1.5, 0.6, 1.7
+#: From so many times the noise on the loads are not compared.
+_MUCH_NOISE = 2.0
 #: So many touches tell something; this share fewer of them with a detection, or of the loaded taxels, is a difference.
 _LEAST, _FEWER = 5, 0.2
 #: Two detections are close at this part of the shortest time between labels; this share of close ones is a difference.
@@ -136,14 +138,17 @@ def _of_sensor(data: Mapping[str, Any], measured: _Measured, found: Detections, 
     touches = int(np.count_nonzero(are_touches))
     if any(size > most for size, most in zip(measured.loaded.shape, shape, strict=True)):
         parts.append("{} x {} taxels, where the training had {} x {}".format(*measured.loaded.shape, *shape))
-    if data["noise"] > 0.0:
-        noisier = measured.noise / data["noise"]
+    noisier = measured.noise / data["noise"] if data["noise"] > 0.0 else 1.0
+    if noisier > 1.0:
         if is_counts and noisier**2 >= _NOISIER:
             # The variance of events by chance is their number.
             parts.append(f"events at rest are {noisier**2:.2g} times as many")
         elif noisier >= _NOISIER:
             parts.append(f"the noise at rest is {noisier:.2g} times as strong")
-    if touches >= _LEAST:
+    if not touches and data["strength"]:
+        parts.append(f"no load is {_TOUCH:g} times as strong as its touches")
+    # Much noise makes loads of its own.
+    if touches >= _LEAST and noisier < _MUCH_NOISE:
         ratio = _usual(measured.peaks, _TOUCH * data["strength"]) / data["strength"] if data["strength"] else 1.0
         if not _WEAKER <= ratio <= _STRONGER:
             parts.append(f"touches are {ratio:.2g} times as strong")
