@@ -353,7 +353,7 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
     for name, taxels in facts["taxels"].items():
         yield f"{name} taxels", f"{len(taxels)}{at(taxels, len(taxels))}"
-    # Of a camera's pixels few see each touch.
+    # Each touch is seen by few pixels of a camera.
     if (untested := facts["taxels_untested"]) and "on_share" not in facts:
         # The places of most of an array say nothing.
         few = 2 * untested <= Array._from_geometry(facts["array"]).taxels

@@ -17,6 +17,7 @@ from taxel.detect.label_times import FeltLoads, same_distance
 from taxel.detect.scoring import APART_US, Mistake, Score, mistakes_of, score
 from taxel.detections import Detections
 from taxel.frames import Frames
+from taxel.recording.gaps import missing_frames
 from taxel.spikes import SpikeTrains, to_us
 
 #: From which share of the events on missed or false ones are many.
@@ -25,8 +26,8 @@ MANY = 0.05
 _CHANCE = 0.01
 #: A stretch of time has one distance where this share of its labels has it.
 _STRETCH = 0.8
-#: Frames lack for a time that is so many times as long as theirs, and at least that, us.
-_TIMES_FRAME, _GAP_US = 5, 200_000
+#: A gap in which a touch may be missed lasts that, us.
+_GAP_US = 200_000
 #: Detections are far too many that are false so many times as often as there are labels.
 _FAR_MORE = 2
 #: Fewer events missed and false are few.
@@ -49,7 +50,7 @@ def causes_of(outcome: Outcome, window_ms: float) -> tuple[Cause, ...]:
     outcome : Outcome
         Its labels are those that it is scored against.
     window_ms : float, ms
-        Of the score.
+        The window of the score.
     """
     scored, found = outcome.score, outcome.example._known(outcome.found)
     wrong = {} if scored is None else many_wrong(scored)
@@ -144,13 +145,12 @@ class Measured:
         inside, first = np.zeros(len(left.missed), np.bool_), ""
         for example, by in zip(self._examples, self._shifts, strict=True):
             t = example.source.t if isinstance(example.source, Frames) else np.empty(0, np.int64)
-            if len(t) < 2:
-                continue
-            steps = np.diff(t)
-            for k in np.flatnonzero(steps > max(_GAP_US, _TIMES_FRAME * np.median(steps))):
-                here = (left.missed > t[k] + by) & (left.missed < t[k + 1] + by)
-                if here.any() and not first:
-                    begin_s, end_s = ((edge - t[0]) / 1e6 for edge in t[k : k + 2])
+            for begin, end in zip(*(missing_frames(t) or ((), ())), strict=True):
+                here = (left.missed > begin + by) & (left.missed < end + by)
+                if end - begin < _GAP_US or not here.any():
+                    continue
+                if not first:
+                    begin_s, end_s = ((edge - t[0]) / 1e6 for edge in (begin, end))
                     first = f"{begin_s:.3f} to {end_s:.3f} s{_of(example, self._examples)}"
                 inside |= here
         count = int(inside.sum())

@@ -158,7 +158,7 @@ def _of_sensor(data: Mapping[str, Any], measured: _Measured, found: Detections, 
                 f"{missing} of {counted(touches, 'touch', 'touches')} have no detection, in the training "
                 f"{1.0 - data['detected']:.0%}"
             )
-        # Of counts the pixels that are loaded most are hot ones.
+        # Hot pixels are the most loaded ones of counts.
         if not is_counts and all(size <= most for size, most in zip(measured.loaded.shape, shape, strict=True)):
             touched = np.frombuffer(data["touched"].encode(), np.uint8).reshape(shape) == ord("1")
             never = int(np.count_nonzero(touched & ~_within(measured.reached, shape)))

@@ -73,7 +73,7 @@ def gaps_of(source: RecordedSource) -> Gaps | None:
     if source.untimed or (source.has_events and not _may_be_of_camera(source)):
         return None
     table = source.table
-    found = _missing(table.t) if isinstance(table, Frames) else None
+    found = missing_frames(table.t) if isinstance(table, Frames) else None
     if found is None:
         found = _silences(table) if of_camera(source) else None
     if found is None:
@@ -116,7 +116,7 @@ def _may_be_of_camera(source: RecordedSource) -> bool:
     return source.origin.kind in ("event_camera", "records") or source.sensor.array.name.startswith("event camera")
 
 
-def _missing(t: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+def missing_frames(t: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Return where frames are missing, as the times of the last before and of the first after."""
     apart = np.diff(t)
     at = np.flatnonzero(apart > _INTERVALS * np.median(apart)) if len(apart) else apart
