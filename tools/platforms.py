@@ -281,7 +281,8 @@ def test(part: Part, folder: Path, python: Callable[..., str]) -> str:
     )
     for step in steps:
         try:
-            counted = counted or str(step())
+            said = step()
+            counted = counted or str(said)
         except PlatformError as error:
             faults.append(str(error))
     if not (folder / "demo/report.html").exists():
