@@ -110,18 +110,14 @@ class Outcome(NamedTuple):
         return beginning_us(np.array([int(to_us(source.start))]) if isinstance(source, SpikeTrains) else source.t)
 
     @property
-    def are_mostly_outside(self) -> bool:
-        """Whether more than half of the detections have an input outside the range that it had in training."""
-        return self.outside is not None and 2 * self.outside > len(self.found)
-
-    @property
     def outside_text(self) -> str:
-        """How many detections have an input outside the range that it had in training, in words."""
+        """How many detections have an input outside the range that it had in training, in words; "" of none."""
+        if self.outside == 0:
+            return ""
         noun = "with an input outside what was seen in training"
         if self.outside is None:
             return f"detections {noun}: not known, as the readout's file does not hold it"
-        share = f" ({self.outside / len(self.found):.0%})" if len(self.found) else ""
-        return f"detections {noun}: {self.outside} of {len(self.found)}{share}"
+        return f"detections {noun}: {self.outside} of {len(self.found)} ({self.outside / len(self.found):.0%})"
 
     @property
     def causes_lines(self) -> list[str]:

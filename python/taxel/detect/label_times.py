@@ -120,6 +120,28 @@ class FeltLoads:
         """Return for how long something lies within 50 ms of the begin or end of a load, us, at most."""
         return sum(4 * round(to_us(WINDOW_MS)) * len(self._spans(quantity)[0]) for quantity in self._felt)
 
+    def without_label(
+        self, times: NDArray[np.int64], labels: NDArray[np.int64], reach: int, share: float
+    ) -> tuple[NDArray[np.bool_], int]:
+        """Return which times lie in loads without a label of one name, and how long these last, us.
+
+        None does where less than that share of the loads has one: then it is not of each load.
+
+        Parameters
+        ----------
+        times, labels : int64, us on the one clock
+        reach : int, us
+            How far before the begin and behind the end of a load labels and times belong to it.
+        share : float
+        """
+        begins, ends = self._spans(self._quantity)
+        has = np.searchsorted(labels, ends + reach, side="right") > np.searchsorted(labels, begins - reach)
+        if not has.any() or has.mean() < share:
+            return np.zeros(len(times), np.bool_), 0
+        begins, ends = begins[~has] - reach, ends[~has] + reach
+        inside = np.searchsorted(begins, times, side="right") > np.searchsorted(ends, times)
+        return inside, int(np.sum(ends - begins))
+
     def overlapped(self, label: str) -> NDArray[np.bool_]:
         """Return which labels of a name lie while a load lasts that holds two of them or more, far from its ends."""
         reach, times = round(to_us(WINDOW_MS)), self.times(label)

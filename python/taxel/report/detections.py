@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from taxel._base.errors import refused
 from taxel._base.files import write_whole
-from taxel._base.messages import escaped
+from taxel._base.messages import escaped, of_names
 from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -175,7 +175,7 @@ def write_detections(
         printed=printed,
         viewed=[quote(outcome.name) for outcome in listened if outcome.name.endswith(_VIEWED)][:_MOST_VIEWED],
         beside=_beside(readout.labels, scored),
-        causes=[(outcome.name, line) for outcome in listened for line in outcome.causes_lines],
+        causes=of_names([(outcome.name, line) for outcome in listened for line in outcome.causes_lines], len(listened)),
         scored=any(outcome.score is not None for outcome in listened),
     )
     target.mkdir(parents=True, exist_ok=True)  # so late that nothing is left of one that is ended
@@ -293,7 +293,7 @@ def _pressed(outcome: Outcome, frames: Frames) -> tuple[NDArray[np.int64], NDArr
 
 def _about(outcome: Outcome, readout: Readout | PlainRule) -> list[str]:
     """Return what else is known of the detections in a recording."""
-    lines = [f"{outcome.outside_text}."] if isinstance(readout, Readout) else []
+    lines = [f"{text}."] if (text := outcome.outside_text) and isinstance(readout, Readout) else []
     return [*lines, *([f"Times are from {begun(outcome.begin_us)} on."] if outcome.begin_us else [])]
 
 
