@@ -13,6 +13,7 @@ import numpy as np
 
 from taxel._base.arguments import column, instance, several, shown, text
 from taxel._base.errors import refused
+from taxel._base.messages import of_names
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -123,6 +124,13 @@ class Outcome(NamedTuple):
     def causes_lines(self) -> list[str]:
         """The first causes of what is missed and false, a line each: two at most."""
         return [f"{', '.join(cause.labels)}: {cause}" for cause in self.causes[:_LINES]]
+
+
+def causes_text(outcomes: Sequence[Outcome]) -> list[str]:
+    """Return the first causes of what is missed and false as lines, those of the sources of a recording once."""
+    titles = [outcome.example.group.strip() or outcome.name for outcome in outcomes]
+    lines = [(title, line) for title, each in zip(titles, outcomes, strict=True) for line in each.causes_lines]
+    return of_names(lines, len(set(titles)))
 
 
 def check_examples(examples: Sequence[Example]) -> list[Example]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from math import comb
+from math import lgamma
 from typing import NamedTuple
 
 import numpy as np
@@ -135,6 +135,9 @@ class FeltLoads:
         share : float
         """
         begins, ends = self._spans(self._quantity)
+        # A load that ends slowly flickers.
+        apart = begins[1:] - ends[:-1] > round(to_us(WINDOW_MS))
+        begins, ends = begins[np.append(True, apart)[: len(begins)]], ends[np.append(apart, True)[: len(ends)]]
         has = np.searchsorted(labels, ends + reach, side="right") > np.searchsorted(labels, begins - reach)
         if not has.any() or has.mean() < share:
             return np.zeros(len(times), np.bool_), 0
@@ -301,11 +304,22 @@ def _off(
     return Off(ms, len(alike), len(alike) - len(near), labels, within_ms)
 
 
+def chance_of(least: int, of: int, share: float) -> float:
+    """Return how probable it is that so many, at least, of some times lie in a share of all time."""
+    if share >= 1.0 or not least:
+        return 1.0
+    # Numbers of combinations may be too large for a float.
+    k = np.arange(least, of + 1)
+    ways = [lgamma(of + 1) - lgamma(m + 1) - lgamma(of - m + 1) for m in k.tolist()]
+    with np.errstate(divide="ignore"):
+        return float(np.exp(ways + k * np.log(share) + (of - k) * np.log1p(-share)).sum())
+
+
 def _by_chance(least: int, labels: int, pairs: int, spread_ms: float) -> float:
     """Return how probable it is that so many labels have pairs in one of the stretches of that length by chance."""
     stretches = 2 * _FARTHEST_MS / max(spread_ms, 1.0)
     share = min(1.0, pairs / labels / stretches)
-    return stretches * sum(comb(labels, k) * share**k * (1 - share) ** (labels - k) for k in range(least, labels + 1))
+    return stretches * chance_of(least, labels, share)
 
 
 def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple[Off, float]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from math import comb
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -14,7 +13,7 @@ from taxel._base.times import beginning_us
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.cause import Cause, by_option, lie, ordered
 from taxel.detect.examples import Example, Outcome, check_examples
-from taxel.detect.label_times import FeltLoads, same_distance
+from taxel.detect.label_times import FeltLoads, chance_of, same_distance
 from taxel.detect.scoring import APART_US, Mistake, Score, mistakes_of, score, score_together
 from taxel.detections import Detections
 from taxel.frames import Frames
@@ -176,21 +175,26 @@ class Measured:
         """Return what concerns missed and false events of some labels, each event once."""
         found: list[Cause] = []
         left = {label: _Times(*(self._wrong(label, is_missed=missed) for missed in (True, False))) for label in wrong}
-        shifts: list[_Shift] = []
+        # What differs from the training may be felt later.
+        differ = {label for label in wrong if self._differs(left[label])}
         for label in wrong:
-            # What differs from the training may be felt later.
-            differs = self._differs(left[label])
-            for part in (self._in_gaps, *([] if differs else [self._near])):
-                if (explained := part(label, left[label])) is not None:
-                    cause, left[label] = explained
-                    found.append(cause)
-            if (shift := self._at_one_distance(label, left[label])) is not None:
-                shifts.append(shift)
-        for cause, labels in self._shifted(shifts):
-            found.append(cause)
-            for shift in shifts:
-                if shift.label in labels:
+            if (gap := self._in_gaps(label, left[label])) is not None:
+                cause, left[label] = gap
+                found.append(cause)
+        shifts = [shift for label in wrong if (shift := self._at_one_distance(label, left[label])) is not None]
+        for group in self._groups(shifts):
+            is_near = abs(group[0].ms) <= 2 * self._window_ms
+            # What rises slowly is felt late, and what falls slowly early: a clock is off by the same for both.
+            if is_near and (len(group) == 1 or differ.intersection(shift.label for shift in group)):
+                continue
+            if (shifted := self._of_shift(group, is_near=is_near)) is not None:
+                found.append(shifted)
+                for shift in group:
                     left[shift.label] = left[shift.label].without_times(shift)
+        for label in wrong:
+            if label not in differ and (near := self._near(label, left[label])) is not None:
+                cause, left[label] = near
+                found.append(cause)
         for label in wrong:
             known = sum(cause.mistakes for cause in found if label in cause.labels)
             found += self._of_label(label, left[label], known)
@@ -224,11 +228,9 @@ class Measured:
         """Return in what the examples with most mistakes differ from the training."""
         members = [self._in_unlike(t) for t in left]
         places = np.unique(np.concatenate([_example_of(t)[here] for t, here in zip(left, members, strict=True)]))
-        each = [(self._examples[k].name, text) for k in places for text in self._differences[k]]
-        texts = of_names(each, len(self._examples))
-        measured = f"unlike the training: {'; '.join(texts)}"
+        measured = "; ".join(of_names([("", text) for k in places for text in self._differences[k]], 1))
         count = sum(int(here.sum()) for here in members)
-        advice = "a training that has such recordings too"
+        advice = "a training that has recordings like this one too"
         return Cause("unlike_training", (label,), count, measured, advice), left.without(*members)
 
     def _wrong(self, label: str, *, is_missed: bool) -> NDArray[np.int64]:
@@ -297,17 +299,15 @@ class Measured:
         false = left.false[np.unique(detected[is_near])]
         return _Shift(label, alike.ms, missed, false, len(left.missed))
 
-    def _shifted(self, shifts: Sequence[_Shift]) -> Iterator[tuple[Cause, tuple[str, ...]]]:
-        """Yield the cause of labels that lie at one distance from detections; names of one distance have one."""
+    def _groups(self, shifts: Sequence[_Shift]) -> Iterator[list[_Shift]]:
+        """Yield the shifts of names that lie at one distance, those of most labels first."""
         left = sorted(shifts, key=lambda shift: -len(shift.missed))
         while left:
-            group = [shift for shift in left if abs(shift.ms - left[0].ms) <= _SAME_MS]
-            left = [shift for shift in left if shift not in group]
-            if (cause := self._of_shift(group)) is not None:
-                yield cause, tuple(shift.label for shift in group)
+            yield [shift for shift in left if abs(shift.ms - left[0].ms) <= _SAME_MS]
+            left = [shift for shift in left if abs(shift.ms - left[0].ms) > _SAME_MS]
 
-    def _of_shift(self, group: Sequence[_Shift]) -> Cause | None:
-        """Return the cause that labels of some names lie at one distance from false detections."""
+    def _of_shift(self, group: Sequence[_Shift], *, is_near: bool) -> Cause | None:
+        """Return the cause that labels of some names lie at one distance from false detections, maybe near them."""
         names = tuple(shift.label for shift in group)
         missed, false = (np.sort(np.concatenate([shift[k] for shift in group])) for k in (2, 3))
         labels = np.sort(np.concatenate([self._labels(label) for label in names]))
@@ -325,40 +325,15 @@ class Measured:
             return cause(f"{measured}, all {stretch}", advice)
         fits = [name for name, part in self._scores.items() if name not in names and 2 * part.found > part.events]
         if fits:
-            if self._differs(_Times(missed, false)):
+            # Among far too many detections some lie at one distance.
+            wrong = sum(len(self._wrong(name, is_missed=False)) for name in names)
+            if self._differs(_Times(missed, false)) or wrong > len(labels):
                 return None
             fitting = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
             verb = "is" if len(names) == 1 else "are"
             return cause(f"{measured}, while {fitting}: {', '.join(names)} {verb} felt {side} there", "")
-        return self._of_clock(cause, ms, measured, labels, false)
-
-    def _of_clock(
-        self,
-        cause: Callable[..., Cause],
-        ms: float,
-        measured: str,
-        labels: NDArray[np.int64],
-        false: NDArray[np.int64],
-    ) -> Cause:
-        """Return the cause that all labels lie at one distance from detections: which of them what was felt fits."""
-        side, back, shift_ms, distance = "earlier", "later", -round(ms), f"{abs(ms):.0f} ms"
-        is_late, was = "late", "early"
-        if ms < 0:
-            side, back, is_late, was = back, side, was, is_late
-        fits = self._which_fits(labels, false)
-        if fits == "detections":
-            measured += "; the detections lie where loads begin or end, the labels do not"
-            return cause(measured, f"labels {distance} {side} (--shift-ms {shift_ms})", f"--shift-ms {shift_ms}")
-        if fits == "labels":
-            measured += f"; the labels lie where loads begin or end: those of the training were {was}"
-            advice = f"a training on labels {distance} {back} (taxel train --shift-ms {-shift_ms})"
-            return cause(measured, advice, kind="shifted_training")
-        if abs(ms) <= 2 * self._window_ms:
-            # As what rises slowly is felt late.
-            return cause(measured, "")
-        measured += f": either these labels are {is_late} or those of the training were {was}"
-        advice = f"a look at where a load begins (taxel view); --shift-ms {shift_ms} moves these labels"
-        return cause(measured, advice, f"--shift-ms {shift_ms}")
+        which = self._which_fits(labels, false)
+        return None if is_near and not which else _of_clock(cause, ms, measured, which)
 
     def _which_fits(self, labels: NDArray[np.int64], detections: NDArray[np.int64]) -> str:
         """Return whether the labels or the detections lie where loads begin or end; "" where neither or both do."""
@@ -447,8 +422,25 @@ class Measured:
     def _by_chance(self, count: int, among: int, covered_us: int) -> bool:
         """Whether as many times lie by chance in so much of the recordings."""
         share = min(1.0, covered_us / max(1, self._lasts_us))
-        ways = sum(comb(among, k) * share**k * (1 - share) ** (among - k) for k in range(count, among + 1))
-        return ways > _CHANCE
+        return chance_of(count, among, share) > _CHANCE
+
+
+def _of_clock(cause: Callable[..., Cause], ms: float, measured: str, fits: str) -> Cause:
+    """Return the cause that all labels lie at one distance from detections, of which one fits what was felt."""
+    side, back, shift_ms, distance = "earlier", "later", -round(ms), f"{abs(ms):.0f} ms"
+    is_late, was = "late", "early"
+    if ms < 0:
+        side, back, is_late, was = back, side, was, is_late
+    if fits == "detections":
+        measured += "; the detections lie where loads begin or end, the labels do not"
+        return cause(measured, f"labels {distance} {side} (--shift-ms {shift_ms})", f"--shift-ms {shift_ms}")
+    if fits == "labels":
+        measured += f"; the labels lie where loads begin or end: those of the training were {was}"
+        advice = f"a training on labels {distance} {back} (taxel train --shift-ms {-shift_ms})"
+        return cause(measured, advice, kind="shifted_training")
+    measured += f": either these labels are {is_late} or those of the training were {was}"
+    advice = f"a look at where a load begins (taxel view); --shift-ms {shift_ms} moves these labels"
+    return cause(measured, advice, f"--shift-ms {shift_ms}")
 
 
 def overlapping(label: str, count: int, labels: int, mistakes: int) -> Cause:
@@ -478,7 +470,7 @@ def stretch_of(labels: NDArray[np.int64], members: NDArray[np.bool_], examples: 
     begin_s, end_s = (_seconds(labels[k], examples) for k in (first, last))
     example = examples[recording[first]]
     if starts and ends:
-        return f"in {example.name}" if len(examples) > 1 else ""
+        return _of(example, examples).replace(" of", "in", 1)
     where = f"from {begin_s:.1f} to {end_s:.1f} s"
     if starts or ends:
         where = f"from {begin_s:.1f} s on" if ends else f"until {end_s:.1f} s"
@@ -518,7 +510,10 @@ def _seconds(t: int, examples: Sequence[Example]) -> float:
 
 
 def _of(example: Example, examples: Sequence[Example]) -> str:
-    return f" of {example.name}" if len(examples) > 1 else ""
+    if len(examples) == 1:
+        return ""
+    is_of_one = len({each.group for each in examples}) == 1
+    return f" of {example.name.removeprefix(example.group) if is_of_one else example.name}"
 
 
 def _at(places: NDArray[np.int64], times: NDArray[np.int64]) -> NDArray[np.bool_]:

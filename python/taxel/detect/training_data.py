@@ -177,7 +177,7 @@ def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *,
         if not _WEAKER <= ratio <= _STRONGER:
             yield f"touches are {ratio:.2g} times as strong"
     elif touches and len(measured.peaks) >= _LEAST:
-        yield f"loads are {_usual(measured.peaks) / strength:.2g} times as strong as its touches"
+        yield f"most loads are less than {_TOUCH:g} times as strong as its touches"
     # Hot pixels are the most loaded ones of counts.
     if touches >= _LEAST and not is_counts and not larger:
         touched = np.frombuffer(data["touched"].encode(), np.uint8).reshape(shape) == ord("1")

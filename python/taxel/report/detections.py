@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from taxel._base.errors import refused
 from taxel._base.files import write_whole
-from taxel._base.messages import escaped, of_names
+from taxel._base.messages import escaped
 from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import Alignment, Judged, Outcome, PlainRule, Readout, Score
 from taxel.detect.detector import detector
-from taxel.detect.examples import array_of, padded_to
+from taxel.detect.examples import array_of, causes_text, padded_to
 from taxel.encode import Composite, ContactArea, Encoder, LocalLoad, Peak
 from taxel.frames import Frames
 from taxel.recorded import recorded
@@ -175,7 +175,7 @@ def write_detections(
         printed=printed,
         viewed=[quote(outcome.name) for outcome in listened if outcome.name.endswith(_VIEWED)][:_MOST_VIEWED],
         beside=_beside(readout.labels, scored),
-        causes=of_names([(outcome.name, line) for outcome in listened for line in outcome.causes_lines], len(listened)),
+        causes=causes_text(listened),
         scored=any(outcome.score is not None for outcome in listened),
     )
     target.mkdir(parents=True, exist_ok=True)  # so late that nothing is left of one that is ended

@@ -301,9 +301,8 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
 
 def _at_fault(label: str, scored: Score, causes: Sequence[Cause]) -> str:
     """Return whether a bad score is one of the readout, or by labels and recording, as its causes say, of the score."""
-    count = sum(
-        cause.mistakes / len(cause.labels) for cause in causes if label in cause.labels and cause.kind in _OF_LABELS
-    )
+    of_labels = (cause for cause in causes if label in cause.labels and cause.kind in _OF_LABELS)
+    count = sum(cause.mistakes / len(cause.labels) for cause in of_labels if cause.advice or cause.kind == "gaps")
     return "score" if 2 * count >= scored.rank[0] else "readout"
 
 
