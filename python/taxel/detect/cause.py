@@ -33,11 +33,13 @@ class Cause:
     measured : str
         What was measured.
     advice : str
-        What helps: the option of ``taxel train`` with its value, where there is one; empty where nothing is known to.
+        What helps: the option of ``taxel train`` or ``taxel detect`` with its value, where there is one; empty where
+        nothing is known to.
     option : str
         That option, as it is typed; empty where none helps.
     arguments : mapping of str to value
-        The same in Python: fields of `taxel.tasks.TrainOptions`. Those of "changes" are added to the others.
+        The same in Python: fields of `taxel.tasks.TrainOptions` or `taxel.tasks.DetectOptions`. Those of "changes" are
+        added to the others.
 
     Raises
     ------

@@ -304,15 +304,15 @@ def _off(
     return Off(ms, len(alike), len(alike) - len(near), labels, within_ms)
 
 
-def chance_of(least: int, of: int, share: float) -> float:
-    """Return how probable it is that so many, at least, of some times lie in a share of all time."""
+def chance_of(least: int, total: int, share: float) -> float:
+    """Return how probable it is that so many of all times, at least, lie in a share of all time."""
     if share >= 1.0 or not least:
         return 1.0
     # Numbers of combinations may be too large for a float.
-    k = np.arange(least, of + 1)
-    ways = [lgamma(of + 1) - lgamma(m + 1) - lgamma(of - m + 1) for m in k.tolist()]
+    k = np.arange(least, total + 1)
+    ways = [lgamma(total + 1) - lgamma(m + 1) - lgamma(total - m + 1) for m in k.tolist()]
     with np.errstate(divide="ignore"):
-        return float(np.exp(ways + k * np.log(share) + (of - k) * np.log1p(-share)).sum())
+        return float(np.exp(ways + k * np.log(share) + (total - k) * np.log1p(-share)).sum())
 
 
 def _by_chance(least: int, labels: int, pairs: int, spread_ms: float) -> float:

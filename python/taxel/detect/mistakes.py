@@ -131,7 +131,7 @@ class _Shift(NamedTuple):
     ms: float
     missed: NDArray[np.int64]
     false: NDArray[np.int64]
-    of: int
+    total: int
     """How many were missed."""
 
 
@@ -315,10 +315,11 @@ class Measured:
         side = "earlier" if ms > 0 else "later"
         distance, stretch = f"{abs(ms):.0f} ms", stretch_of(labels, np.isin(labels, missed), self._examples)
         count = len(missed)
-        measured = f"{count} of {sum(shift.of for shift in group)} missed have a false detection {distance} {side}"
+        measured = f"{count} of {sum(shift.total for shift in group)} missed have a false detection {distance} {side}"
 
         def cause(measured: str, advice: str, option: str = "", kind: str = "shifted_labels") -> Cause:
-            return Cause(kind, names, count + len(false), measured, advice, option)
+            arguments = {"shift_ms": float(-round(ms))} if option else {}
+            return Cause(kind, names, count + len(false), measured, advice, option, arguments)
 
         if stretch:
             advice = f"labels {stretch} {abs(round(ms, -1)):.0f} ms {side}, if the clock of the recording is right"
@@ -329,13 +330,13 @@ class Measured:
             wrong = sum(len(self._wrong(name, is_missed=False)) for name in names)
             if self._differs(_Times(missed, false)) or wrong > len(labels):
                 return None
-            fitting = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
+            names_fit = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
             verb = "is" if len(names) == 1 else "are"
-            return cause(f"{measured}, while {fitting}: {', '.join(names)} {verb} felt {side} there", "")
-        which = self._which_fits(labels, false)
-        return None if is_near and not which else _of_clock(cause, ms, measured, which)
+            return cause(f"{measured}, while {names_fit}: {', '.join(names)} {verb} felt {side} there", "")
+        fitting = self._fitting(labels, false)
+        return None if is_near and not fitting else _of_clock(cause, ms, measured, fitting)
 
-    def _which_fits(self, labels: NDArray[np.int64], detections: NDArray[np.int64]) -> str:
+    def _fitting(self, labels: NDArray[np.int64], detections: NDArray[np.int64]) -> str:
         """Return whether the labels or the detections lie where loads begin or end; "" where neither or both do."""
         if not self._felt.are_known or not len(labels) or not len(detections):
             return ""

@@ -274,8 +274,9 @@ def _with_causes(each: Sequence[_Found], window_ms: float) -> Iterator[Detected]
     for detected, felt, _ in each:
         group = felt.example.group
         if group not in known:
-            scored = [other for other in each if other.felt.example.group == group and other.felt.score is not None]
-            outcomes, differences = [other.felt for other in scored], [other.differences for other in scored]
+            sources = [source for source in each if source.felt.example.group == group]
+            scored = [source for source in sources if source.felt.score is not None]
+            outcomes, differences = [source.felt for source in scored], [source.differences for source in scored]
             known[group] = causes_of(outcomes, window_ms, differences) if scored else ()
         yield replace(detected, outcome=detected.outcome._replace(causes=known[group]))
 
