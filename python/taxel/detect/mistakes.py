@@ -353,6 +353,10 @@ class Measured:
         inside = np.isin(left.missed, self._felt.times(label)[overlapped])
         if 2 * (count := int(inside.sum())) <= len(left.missed):
             return None
+        # Of loads that overlap the other edges are labelled too: without them a label more lies in a load.
+        names = {name for example in self._examples for name in example.labels} - {label}
+        if names and not any(2 * int(self._felt.overlapped(name).sum()) >= count for name in names):
+            return None
         cause = overlapping(label, int(overlapped.sum()), len(overlapped), count)
         return cause, left.without(inside, np.zeros(len(left.false), np.bool_))
 
