@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 
@@ -84,6 +84,47 @@ def three_digits(value: float, sign: str = "") -> str:
     ('0.123', '+1000', '1004', '-2e+06')
     """
     return f"{value:{sign}.0f}" if 999.5 <= abs(value) < 1e6 else f"{value:{sign}.3g}"
+
+
+#: Numbers in a text, and times among them.
+_NUMBER, _SECONDS = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)"), re.compile(r"\d s\b")
+
+
+def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
+    """Return texts, each of which is of a name, with the names before them: those that are of several once.
+
+    Texts that differ in numbers alone are one, with their ranges, unless these are times. A text that is of all names
+    says so; of a single name no name is said.
+
+    Parameters
+    ----------
+    named : sequence of (str, str)
+        Names and texts.
+    total : int
+        How many names there are.
+
+    Examples
+    --------
+    >>> of_names([("a", "2 of 4 lie far"), ("b", "3 of 4 lie far"), ("b", "noisy")], 2)
+    ['all 2: 2 to 3 of 4 lie far', 'b: noisy']
+    """
+    alike: dict[str, dict[str, list[str]]] = {}
+    for name, text in named:
+        key = text if _SECONDS.search(text) else _NUMBER.sub("\0", text)
+        alike.setdefault(key, {}).setdefault(text, []).append(name)
+    texts = []
+    for by_text in alike.values():
+        names = list(dict.fromkeys(name for each in by_text.values() for name in each))
+        who = f"all {total}" if len(names) == total else ", ".join(names)
+        texts.append(f"{who}: " * (total > 1) + _with_ranges(list(by_text)))
+    return texts
+
+
+def _with_ranges(texts: Sequence[str]) -> str:
+    """Return texts that differ in numbers alone as one, with the least and the largest of each."""
+    each = zip(*(_NUMBER.findall(text) for text in texts), strict=True)
+    ranges = iter([" to ".join(dict.fromkeys((min(n, key=float), max(n, key=float)))) for n in each])
+    return _NUMBER.sub(lambda _: next(ranges), texts[0])
 
 
 def first_line(error: BaseException) -> str:

@@ -12,6 +12,7 @@ import typer
 
 import taxel
 from taxel._base.files import check_writable, write_whole
+from taxel._base.messages import of_names
 from taxel._base.times import begun
 from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
@@ -49,6 +50,9 @@ def detect(
         ),
     ] = None,
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
+    shift_ms: Annotated[
+        float, typer.Option(help="Move all labels of --truth by so many ms before all else, as those of another clock.")
+    ] = 0.0,
     lists: Annotated[
         bool,
         typer.Option(
@@ -69,7 +73,7 @@ def detect(
         check_writable(out, overwrite=overwrite)
     if report is not None:
         try_report(report, overwrite=overwrite)
-    options = taxel.tasks.DetectOptions(tare, frame_us, window_ms)
+    options = taxel.tasks.DetectOptions(tare, frame_us, window_ms, shift_ms)
     loaded = taxel.detect.load(readout)
     with progress(as_json) as update:
         update(f"reading {paths_text(recordings)}", 0, 0)
@@ -86,13 +90,12 @@ def detect(
     else:
         say(*printed, *[] if out is None else [f"written to {out}"])
     if report is not None:  # last, so that nothing is lost where it fails
-        remarks = [f"{each.outcome.name}: {remark}" for each in found.each for remark in each.remarks]
         place = taxel.report.write_detections(
             report,
             loaded,
             found.outcomes,
             title=f"Detections of {readout} in {paths_text(recordings)}",
-            warnings=[*found.warnings, *remarks],
+            warnings=[*found.unreliable, *found.warnings, *_remarks(found)],
             printed=printed,
             overwrite=overwrite,
         )
@@ -111,20 +114,30 @@ def _lines(
     """Yield score and detections as lines; `given`: whether a tare is."""
     several = _are_several(recordings) or len(found.each) > 1
     if found.score is not None:
+        yield from found.unreliable
         yield from _score_lines(found, readout.labels, truth, several=several)
+    from taxel.detect.examples import causes_text  # noqa: PLC0415  a command loads what it needs
+
+    remarks = _remarks(found)
+    if isinstance(readout, taxel.Readout):
+        outside = [(outcome.name, text) for outcome in found.outcomes if (text := outcome.outside_text)]
+        remarks += of_names(outside, len(found.each))
     for each in found.each:
         if found.score is None or lists or not several:
             rows = None if lists else _ROWS * (found.score is None)
-            yield from _detection_lines(each, given=given, named=several, rows=rows)
-            if isinstance(readout, taxel.Readout):
-                yield each.outcome.outside_text
-        else:
-            outside = [each.outcome.outside_text] if each.outcome.are_mostly_outside else []
-            yield from (f"{each.outcome.name}: {remark}" for remark in (*each.remarks, *outside))
-    for outcome in found.outcomes:
-        yield from (f"{outcome.name}: " * several + line for line in outcome.causes_lines)
+            yield from _detection_lines(
+                each, remarks if len(found.each) == 1 else (), given=given, named=several, rows=rows
+            )
+    if len(found.each) > 1:
+        yield from remarks
+    yield from causes_text(found.outcomes)
     if found.score is not None and not lists:
         yield "--list prints the detections"
+
+
+def _remarks(found: Detecting) -> list[str]:
+    """Return the remarks on all recordings, those on several once."""
+    return of_names([(each.outcome.name, remark) for each in found.each for remark in each.remarks], len(found.each))
 
 
 def _are_several(recordings: Sequence[Path]) -> bool:
@@ -168,7 +181,8 @@ def _score_lines(found: Detecting, labels: Sequence[str], truth: str | None, *, 
 
     count, left_out = len(found.each), len(found.left_out)
     read = f", in {count} of {count + left_out} recordings, as the others are left out" if left_out else ""
-    yield f"against {truth} (window {found.window_ms:g} ms){read}:"
+    shift = f", labels moved by {found.shift_ms:+g} ms" if found.shift_ms else ""
+    yield f"against {truth} (window {found.window_ms:g} ms{shift}){read}:"
     yield from repr(found.score).split("\n")
     for label, sources in found.unlabelled.items():
         yield f"not scored, as no row of {truth} names it: {label} of {', '.join(sources)}"
@@ -178,8 +192,10 @@ def _score_lines(found: Detecting, labels: Sequence[str], truth: str | None, *, 
         yield from score_rows([(Path(outcome.name).name, outcome.score) for outcome in found.outcomes])
 
 
-def _detection_lines(each: Detected, *, given: bool, named: bool, rows: int | None) -> Iterator[str]:
-    """Yield detections, with times from the recording's beginning on, and what may have kept others away.
+def _detection_lines(
+    each: Detected, remarks: Sequence[str], *, given: bool, named: bool, rows: int | None
+) -> Iterator[str]:
+    """Yield detections, with times from the recording's beginning on, and before them what may have kept others away.
 
     `rows`: how many at most; None for all.
     """
@@ -190,7 +206,7 @@ def _detection_lines(each: Detected, *, given: bool, named: bool, rows: int | No
     yield repr(detections)
     if each.rest is not None and not given:
         yield f"rest taken: {each.rest}; --tare gives another"
-    yield from each.remarks
+    yield from remarks
     first = detections[:rows]
     if not len(first):
         return

@@ -11,10 +11,10 @@ from taxel._base.errors import refused
 
 #: The kinds of causes. Where two concern equally many mistakes the earlier comes first: the later may follow from it.
 KINDS = (
-    "falling_values", "shifted_labels", "few_labels", "unlabelled_source", "levels", "overlapping_loads",
-    "foreign_labels", "tare", "begun_loaded", "durations", "recipe", "window", "gaps", "unlabelled_time", "label_name",
-    "other_name", "unlabelled_loads", "plain_rule", "no_neighbours", "indistinct_kinds", "overfitting", "many_false",
-    "unknown",
+    "falling_values", "shifted_labels", "shifted_training", "few_labels", "unlabelled_source", "levels",
+    "overlapping_loads", "foreign_labels", "tare", "begun_loaded", "durations", "recipe", "window", "gaps",
+    "unlabelled_time", "label_name", "other_name", "unlabelled_loads", "unlike_training", "plain_rule", "no_neighbours",
+    "indistinct_kinds", "overfitting", "many_false", "unknown",
 )  # fmt: skip
 
 
@@ -33,11 +33,13 @@ class Cause:
     measured : str
         What was measured.
     advice : str
-        What helps: the option of ``taxel train`` with its value, where there is one; empty where nothing is known to.
+        What helps: the option of ``taxel train`` or ``taxel detect`` with its value, where there is one; empty where
+        nothing is known to.
     option : str
         That option, as it is typed; empty where none helps.
     arguments : mapping of str to value
-        The same in Python: fields of `taxel.tasks.TrainOptions`. Those of "changes" are added to the others.
+        The same in Python: fields of `taxel.tasks.TrainOptions` or `taxel.tasks.DetectOptions`. Those of "changes" are
+        added to the others.
 
     Raises
     ------

@@ -13,6 +13,7 @@ import numpy as np
 
 from taxel._base.arguments import column, instance, several, shown, text
 from taxel._base.errors import refused
+from taxel._base.messages import of_names
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -110,23 +111,26 @@ class Outcome(NamedTuple):
         return beginning_us(np.array([int(to_us(source.start))]) if isinstance(source, SpikeTrains) else source.t)
 
     @property
-    def are_mostly_outside(self) -> bool:
-        """Whether more than half of the detections have an input outside the range that it had in training."""
-        return self.outside is not None and 2 * self.outside > len(self.found)
-
-    @property
     def outside_text(self) -> str:
-        """How many detections have an input outside the range that it had in training, in words."""
+        """How many detections have an input outside the range that it had in training, in words; "" of none."""
+        if self.outside == 0:
+            return ""
         noun = "with an input outside what was seen in training"
         if self.outside is None:
             return f"detections {noun}: not known, as the readout's file does not hold it"
-        share = f" ({self.outside / len(self.found):.0%})" if len(self.found) else ""
-        return f"detections {noun}: {self.outside} of {len(self.found)}{share}"
+        return f"detections {noun}: {self.outside} of {len(self.found)} ({self.outside / len(self.found):.0%})"
 
     @property
     def causes_lines(self) -> list[str]:
         """The first causes of what is missed and false, a line each: two at most."""
         return [f"{', '.join(cause.labels)}: {cause}" for cause in self.causes[:_LINES]]
+
+
+def causes_text(outcomes: Sequence[Outcome]) -> list[str]:
+    """Return the first causes of what is missed and false as lines, those of the sources of a recording once."""
+    titles = [outcome.example.group.strip() or outcome.name for outcome in outcomes]
+    lines = [(title, line) for title, each in zip(titles, outcomes, strict=True) for line in each.causes_lines]
+    return of_names(lines, len(set(titles)))
 
 
 def check_examples(examples: Sequence[Example]) -> list[Example]:

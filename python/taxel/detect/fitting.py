@@ -402,7 +402,7 @@ class Fitting:
             how = received.latency_ms, ages, self._duration
             self.alignment = align(sources, label, label_times, *how, alone=_learns_one(received))
         self._names = [name_of(k, example) for k, example in enumerate(examples)]
-        self._sources = self._received(sources, received, quantities, followed, rank)
+        self._inputs, self._sources = sources, self._received(sources, received, quantities, followed, rank)
         felt = label_times if self.alignment is None else [self.alignment.felt(k) for k in range(len(label_times))]
         for name, times in zip(self._names, felt, strict=True):
             self._check_apart(name, times, neuron.refractory)
@@ -540,8 +540,8 @@ class Fitting:
         return score_together(found, truths, FOLLOWED_MS)
 
     def seen(self, cone: ConeR) -> dict[str, Any]:
-        """Return the range of the inputs of a fitted learner's neuron."""
-        return seen(self._sources, _core.neuron_memory_ms(cone.neuron_._json()), graded=self._graded)
+        """Return the range of the inputs of a fitted learner's neuron, those too that it does not learn from."""
+        return seen(self._inputs, _core.neuron_memory_ms(cone.neuron_._json()), graded=self._graded)
 
     def fit(self, recipe: Recipe) -> ConeR:
         """Fit the learner that a recipe describes, beginning at the fit before, if any; warnings name events."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from math import comb
+from math import lgamma
 from typing import NamedTuple
 
 import numpy as np
@@ -119,6 +119,31 @@ class FeltLoads:
     def covered(self) -> int:
         """Return for how long something lies within 50 ms of the begin or end of a load, us, at most."""
         return sum(4 * round(to_us(WINDOW_MS)) * len(self._spans(quantity)[0]) for quantity in self._felt)
+
+    def without_label(
+        self, times: NDArray[np.int64], labels: NDArray[np.int64], reach: int, share: float
+    ) -> tuple[NDArray[np.bool_], int]:
+        """Return which times lie in loads without a label of one name, and how long these last, us.
+
+        None does where less than that share of the loads has one: then it is not of each load.
+
+        Parameters
+        ----------
+        times, labels : int64, us on the one clock
+        reach : int, us
+            How far before the begin and behind the end of a load labels and times belong to it.
+        share : float
+        """
+        begins, ends = self._spans(self._quantity)
+        # A load that ends slowly flickers.
+        apart = begins[1:] - ends[:-1] > round(to_us(WINDOW_MS))
+        begins, ends = begins[np.append(True, apart)[: len(begins)]], ends[np.append(apart, True)[: len(ends)]]
+        has = np.searchsorted(labels, ends + reach, side="right") > np.searchsorted(labels, begins - reach)
+        if not has.any() or has.mean() < share:
+            return np.zeros(len(times), np.bool_), 0
+        begins, ends = begins[~has] - reach, ends[~has] + reach
+        inside = np.searchsorted(begins, times, side="right") > np.searchsorted(ends, times)
+        return inside, int(np.sum(ends - begins))
 
     def overlapped(self, label: str) -> NDArray[np.bool_]:
         """Return which labels of a name lie while a load lasts that holds two of them or more, far from its ends."""
@@ -279,11 +304,22 @@ def _off(
     return Off(ms, len(alike), len(alike) - len(near), labels, within_ms)
 
 
+def chance_of(least: int, total: int, share: float) -> float:
+    """Return how probable it is that so many of all times, at least, lie in a share of all time."""
+    if share >= 1.0 or not least:
+        return 1.0
+    # Numbers of combinations may be too large for a float.
+    k = np.arange(least, total + 1)
+    ways = [lgamma(total + 1) - lgamma(m + 1) - lgamma(total - m + 1) for m in k.tolist()]
+    with np.errstate(divide="ignore"):
+        return float(np.exp(ways + k * np.log(share) + (total - k) * np.log1p(-share)).sum())
+
+
 def _by_chance(least: int, labels: int, pairs: int, spread_ms: float) -> float:
     """Return how probable it is that so many labels have pairs in one of the stretches of that length by chance."""
     stretches = 2 * _FARTHEST_MS / max(spread_ms, 1.0)
     share = min(1.0, pairs / labels / stretches)
-    return stretches * sum(comb(labels, k) * share**k * (1 - share) ** (labels - k) for k in range(least, labels + 1))
+    return stretches * chance_of(least, labels, share)
 
 
 def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple[Off, float]]:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from math import comb
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.messages import counted
+from taxel._base.messages import counted, of_names
+from taxel._base.times import beginning_us
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.cause import Cause, by_option, lie, ordered
 from taxel.detect.examples import Example, Outcome, check_examples
-from taxel.detect.label_times import FeltLoads, same_distance
-from taxel.detect.scoring import APART_US, Mistake, Score, mistakes_of, score
+from taxel.detect.label_times import FeltLoads, chance_of, same_distance
+from taxel.detect.scoring import APART_US, Mistake, Score, mistakes_of, score, score_together
 from taxel.detections import Detections
 from taxel.frames import Frames
+from taxel.recorded import recorded
 from taxel.recording.gaps import missing_frames
 from taxel.spikes import SpikeTrains, to_us
 
@@ -28,6 +29,14 @@ _CHANCE = 0.01
 _STRETCH = 0.8
 #: A gap in which a touch may be missed lasts that, us.
 _GAP_US = 200_000
+#: Names of labels that lie as far from detections as others within this are moved together, ms.
+_SAME_MS = 50.0
+#: Labels or detections are those that lie where loads begin or end if this share more of them does than of the others.
+_FITS = 0.3
+#: Detections that are false lie in loads without a label where this share of all loads has one, ...
+_LABELLED = 0.5
+#: ... and, in a recording unlike the training, only where this share of the labels is found.
+_FOUND = 0.8
 #: Detections are far too many that are false so many times as often as there are labels.
 _FAR_MORE = 2
 #: Fewer events missed and false are few.
@@ -42,23 +51,57 @@ def many_wrong(scored: Score) -> dict[str, int]:
     return {label: part.rank[0] for label, part in scores if max(part.missed, part.false) > MANY * part.events}
 
 
-def causes_of(outcome: Outcome, window_ms: float) -> tuple[Cause, ...]:
-    """Return what concerns most of what a readout missed in an example, and what is false; none of few mistakes.
+def unreliable(label: str, scored: Score, labels: str, on: str = "this readout") -> str:
+    """Return that a score of a label is too bad to rely on; "" where it is not.
 
     Parameters
     ----------
-    outcome : Outcome
-        Its labels are those that it is scored against.
-    window_ms : float, ms
-        The window of the score.
+    label : str
+    scored : Score
+    labels : str
+        What its events are called.
+    on : str
+        What is not to be relied on.
     """
-    scored, found = outcome.score, outcome.example._known(outcome.found)
-    wrong = {} if scored is None else many_wrong(scored)
-    if scored is None or sum(wrong.values()) < _FEW:
+    if not scored.rank[0] or (scored.rank[0] < scored.events and 2 * scored.missed <= scored.events):
+        return ""
+    worth = ", no better than to detect nothing" if scored.rank[0] >= scored.events else ""
+    return (
+        f"{label}: do not rely on {on}: {scored.found} of {scored.events} {labels} found, {scored.false} false{worth}"
+    )
+
+
+def score_of(outcomes: Sequence[Outcome], window_ms: float) -> Score:
+    """Return the score of the detections in several examples as one."""
+    found = [outcome.example._known(outcome.found) for outcome in outcomes]
+    return score_together(found, [outcome.example.labels for outcome in outcomes], window_ms)
+
+
+def causes_of(
+    outcomes: Sequence[Outcome], window_ms: float, differences: Sequence[Sequence[str]] = ()
+) -> tuple[Cause, ...]:
+    """Return what concerns most of what a readout missed, and what is false; none of few mistakes.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+        Those of one recording, whose sources have one clock. Their labels are those that they are scored against.
+    window_ms : float, ms
+        The window of the scores.
+    differences : sequence of sequence of str
+        In what each differs from the training, as `taxel.detect.training_data.unlike` says.
+    """
+    scored = score_of(outcomes, window_ms)
+    wrong = many_wrong(scored)
+    if sum(wrong.values()) < _FEW:
         return ()
-    (example,) = check_examples([outcome.example])
-    mistakes = mistakes_of([found], [example.labels], [scored])
-    return ordered(Measured([example], mistakes, scored, window_ms).causes(wrong))
+    examples = check_examples([outcome.example for outcome in outcomes])
+    found = [example._known(outcome.found) for example, outcome in zip(examples, outcomes, strict=True)]
+    scores = [cast("Score", outcome.score) for outcome in outcomes]
+    mistakes = mistakes_of(found, [example.labels for example in examples], scores)
+    measured = Measured(examples, mistakes, scored, window_ms, differences=differences)
+    # That far too many are false is what `unreliable` says.
+    return ordered([cause for cause in measured.causes(wrong) if cause.kind != "many_false"])
 
 
 class _Times(NamedTuple):
@@ -67,9 +110,29 @@ class _Times(NamedTuple):
     missed: NDArray[np.int64]
     false: NDArray[np.int64]
 
+    @property
+    def total(self) -> int:
+        """How many there are."""
+        return len(self.missed) + len(self.false)
+
     def without(self, missed: NDArray[np.bool_], false: NDArray[np.bool_]) -> _Times:
         """Return the others than those that are explained."""
         return _Times(self.missed[~missed], self.false[~false])
+
+    def without_times(self, shift: _Shift) -> _Times:
+        """Return the others than those of a shift."""
+        return self.without(np.isin(self.missed, shift.missed), np.isin(self.false, shift.false))
+
+
+class _Shift(NamedTuple):
+    """How far the missed labels of a name lie behind false detections, ms, and which they are."""
+
+    label: str
+    ms: float
+    missed: NDArray[np.int64]
+    false: NDArray[np.int64]
+    total: int
+    """How many were missed."""
 
 
 class Measured:
@@ -85,6 +148,8 @@ class Measured:
     window_ms : float, ms
     felt : FeltLoads, optional
         When the examples were loaded.
+    differences : sequence of sequence of str
+        In what each of them differs from the training of the readout.
     """
 
     def __init__(
@@ -94,6 +159,7 @@ class Measured:
         scored: Score,
         window_ms: float,
         felt: FeltLoads | None = None,
+        differences: Sequence[Sequence[str]] = (),
     ) -> None:
         self._examples, self._window_ms = examples, window_ms
         self._scores = scored.by_label or {scored.label: scored}
@@ -103,18 +169,42 @@ class Measured:
         #: What the clock of each example is moved by, so that all are on one.
         self._shifts = [k * APART_US - first for k, (first, _) in enumerate(spans)]
         self._mistakes = mistakes
+        self._differences = {k: texts for k, texts in enumerate(differences) if texts}
 
     def causes(self, wrong: Mapping[str, int]) -> list[Cause]:
         """Return what concerns missed and false events of some labels, each event once."""
-        return [cause for label in wrong for cause in self._of_label(label)]
+        found: list[Cause] = []
+        left = {label: _Times(*(self._wrong(label, is_missed=missed) for missed in (True, False))) for label in wrong}
+        # What differs from the training may be felt later.
+        differ = {label for label in wrong if self._differs(left[label])}
+        for label in wrong:
+            if (gap := self._in_gaps(label, left[label])) is not None:
+                cause, left[label] = gap
+                found.append(cause)
+        shifts = [shift for label in wrong if (shift := self._at_one_distance(label, left[label])) is not None]
+        for group in self._groups(shifts):
+            is_near = abs(group[0].ms) <= 2 * self._window_ms
+            # What rises slowly is felt late, and what falls slowly early: a clock is off by the same for both.
+            if is_near and (len(group) == 1 or differ.intersection(shift.label for shift in group)):
+                continue
+            if (shifted := self._of_shift(group, is_near=is_near)) is not None:
+                found.append(shifted)
+                for shift in group:
+                    left[shift.label] = left[shift.label].without_times(shift)
+        for label in wrong:
+            if label not in differ and (near := self._near(label, left[label])) is not None:
+                cause, left[label] = near
+                found.append(cause)
+        for label in wrong:
+            known = sum(cause.mistakes for cause in found if label in cause.labels)
+            found += self._of_label(label, left[label], known)
+        return found
 
-    def _of_label(self, label: str) -> Iterator[Cause]:
-        """Yield what concerns a label's mistakes, first what explains both of a missed and a false one."""
-        left = _Times(*(self._wrong(label, is_missed=is_missed) for is_missed in (True, False)))
-        count = len(left.missed) + len(left.false)
-        parts = (self._in_gaps, self._near, self._at_one_distance, self._overlapped, self._at_others, self._unlabelled)
-        explained = 0
-        for part in parts:
+    def _of_label(self, label: str, left: _Times, explained: int) -> Iterator[Cause]:
+        """Yield what else concerns a label's mistakes, of which so many are explained."""
+        count = explained + left.total
+        parts = (self._overlapped, self._at_others, self._unlabelled)
+        for part in (self._unlabelled, self._unlike) if self._differs(left) else parts:
             found = part(label, left)
             if found is not None:
                 cause, left = found
@@ -126,6 +216,22 @@ class Measured:
             if events:
                 measured += f": {len(left.false) / events:.3g} times as many"
             yield Cause("many_false", (label,), len(left.false), measured, "")
+
+    def _differs(self, left: _Times) -> bool:
+        """Whether most of what is wrong lies in examples that differ from the training."""
+        return 0 < left.total < 2 * sum(int(self._in_unlike(t).sum()) for t in left)
+
+    def _in_unlike(self, t: NDArray[np.int64]) -> NDArray[np.bool_]:
+        return np.isin(_example_of(t), list(self._differences))
+
+    def _unlike(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
+        """Return in what the examples with most mistakes differ from the training."""
+        members = [self._in_unlike(t) for t in left]
+        places = np.unique(np.concatenate([_example_of(t)[here] for t, here in zip(left, members, strict=True)]))
+        measured = "; ".join(of_names([("", text) for k in places for text in self._differences[k]], 1))
+        count = sum(int(here.sum()) for here in members)
+        advice = "a training that has recordings like this one too"
+        return Cause("unlike_training", (label,), count, measured, advice), left.without(*members)
 
     def _wrong(self, label: str, *, is_missed: bool) -> NDArray[np.int64]:
         """Return the times of what is missed or false."""
@@ -141,23 +247,26 @@ class Measured:
         return np.sort(np.concatenate(each))
 
     def _in_gaps(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
-        """Return how many missed lie where a recording has no frames."""
-        inside, first = np.zeros(len(left.missed), np.bool_), ""
-        for example, by in zip(self._examples, self._shifts, strict=True):
-            t = example.source.t if isinstance(example.source, Frames) else np.empty(0, np.int64)
-            for begin, end in zip(*(missing_frames(t) or ((), ())), strict=True):
+        """Return how many missed lie where a recording has no frames, and how many false at the first ones behind."""
+        inside, behind, first = np.zeros(len(left.missed), np.bool_), np.zeros(len(left.false), np.bool_), ""
+        for k, (example, by) in enumerate(zip(self._examples, self._shifts, strict=True)):
+            for begin, end in long_gaps(example):
                 here = (left.missed > begin + by) & (left.missed < end + by)
-                if end - begin < _GAP_US or not here.any():
+                soon = _is_behind(left.false - by, begin, end)
+                if not (here.any() or soon.any()):
                     continue
                 if not first:
-                    begin_s, end_s = ((edge - t[0]) / 1e6 for edge in (begin, end))
-                    first = f"{begin_s:.3f} to {end_s:.3f} s{_of(example, self._examples)}"
+                    edges = " to ".join(f"{self._seconds(edge + by):.3f}" for edge in (begin, end))
+                    first = f"{edges} s{_of(self._examples[k], self._examples)}"
                 inside |= here
-        count = int(inside.sum())
-        if not count:
+                behind |= soon
+        missed, false = int(inside.sum()), int(behind.sum())
+        if not missed and not false:
             return None
-        measured = f"{count} of {len(left.missed)} missed {lie(count)} where the recording has no frames, as {first}"
-        return Cause("gaps", (label,), count, measured, ""), left.without(inside, np.zeros(len(left.false), np.bool_))
+        parts = [f"{missed} of {len(inside)} missed {lie(missed)} where the recording has no frames"] if missed else []
+        parts += [f"{false} of {len(behind)} false {lie(false)} at the first frames behind such a gap"] if false else []
+        measured = f"{', and '.join(parts)}, as {first}"
+        return Cause("gaps", (label,), missed + false, measured, ""), left.without(inside, behind)
 
     def _near(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
         """Return the window that pairs what is missed with what is false, if these are most mistakes."""
@@ -178,34 +287,63 @@ class Measured:
         detected, events = pairs.pairs.T
         return cause, left.without(_at(events, left.missed), _at(detected, left.false))
 
-    def _at_one_distance(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
-        """Return by how much false detections precede or follow most of what is missed."""
+    def _at_one_distance(self, label: str, left: _Times) -> _Shift | None:
+        """Return by how much most of what is missed lies behind false detections."""
         alike = same_distance(left.missed, left.false, self._window_ms)
-        if alike is None or 2 * (count := int(alike.members.sum())) <= len(left.missed):
+        if alike is None or 2 * int(alike.members.sum()) <= len(left.missed):
             return None
-        side = "earlier" if alike.ms > 0 else "later"
-        labels, missed = self._labels(label), left.missed[alike.members]
-        distance, stretch = (
-            f"{abs(alike.ms):.0f} ms {side}",
-            stretch_of(labels, np.isin(labels, missed), self._examples),
-        )
-        measured = f"{count} of {len(left.missed)} missed have a false detection {distance}"
-        # Several names of one clock have one advice.
-        advice = f"labels {abs(round(alike.ms, -1)):.0f} ms {side}, if the clock of the recording is right"
-        if not stretch and abs(alike.ms) <= 2 * self._window_ms:
-            advice = ""  # as what rises slowly is felt late
-        if stretch:
-            measured, advice = f"{measured}, all {stretch}", advice.replace("labels", f"labels {stretch}", 1)
-        elif fits := [name for name, part in self._scores.items() if name != label and 2 * part.found > part.events]:
-            fitting = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
-            measured += f", while {fitting}: {label} is felt {side} there"
-            advice = ""
+        missed = left.missed[alike.members]
         expected = missed - round(to_us(alike.ms))
         detected = np.array([np.argmin(np.abs(left.false - t)) for t in expected])
         is_near = np.abs(left.false[detected] - expected) <= to_us(WINDOW_MS)
-        false = _at(detected[is_near], left.false)
-        cause = Cause("shifted_labels", (label,), count + int(false.sum()), measured, advice)
-        return cause, left.without(alike.members, false)
+        false = left.false[np.unique(detected[is_near])]
+        return _Shift(label, alike.ms, missed, false, len(left.missed))
+
+    def _groups(self, shifts: Sequence[_Shift]) -> Iterator[list[_Shift]]:
+        """Yield the shifts of names that lie at one distance, those of most labels first."""
+        left = sorted(shifts, key=lambda shift: -len(shift.missed))
+        while left:
+            yield [shift for shift in left if abs(shift.ms - left[0].ms) <= _SAME_MS]
+            left = [shift for shift in left if abs(shift.ms - left[0].ms) > _SAME_MS]
+
+    def _of_shift(self, group: Sequence[_Shift], *, is_near: bool) -> Cause | None:
+        """Return the cause that labels of some names lie at one distance from false detections, maybe near them."""
+        names = tuple(shift.label for shift in group)
+        missed, false = (np.sort(np.concatenate([shift[k] for shift in group])) for k in (2, 3))
+        labels = np.sort(np.concatenate([self._labels(label) for label in names]))
+        ms = float(np.median([shift.ms for shift in group]))
+        side = "earlier" if ms > 0 else "later"
+        distance, stretch = f"{abs(ms):.0f} ms", stretch_of(labels, np.isin(labels, missed), self._examples)
+        count = len(missed)
+        measured = f"{count} of {sum(shift.total for shift in group)} missed have a false detection {distance} {side}"
+
+        def cause(measured: str, advice: str, option: str = "", kind: str = "shifted_labels") -> Cause:
+            arguments = {"shift_ms": float(-round(ms))} if option else {}
+            return Cause(kind, names, count + len(false), measured, advice, option, arguments)
+
+        if stretch:
+            advice = f"labels {stretch} {abs(round(ms, -1)):.0f} ms {side}, if the clock of the recording is right"
+            return cause(f"{measured}, all {stretch}", advice)
+        fits = [name for name, part in self._scores.items() if name not in names and 2 * part.found > part.events]
+        if fits:
+            # Among far too many detections some lie at one distance.
+            wrong = sum(len(self._wrong(name, is_missed=False)) for name in names)
+            if self._differs(_Times(missed, false)) or wrong > len(labels):
+                return None
+            names_fit = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
+            verb = "is" if len(names) == 1 else "are"
+            return cause(f"{measured}, while {names_fit}: {', '.join(names)} {verb} felt {side} there", "")
+        fitting = self._fitting(labels, false)
+        return None if is_near and not fitting else _of_clock(cause, ms, measured, fitting)
+
+    def _fitting(self, labels: NDArray[np.int64], detections: NDArray[np.int64]) -> str:
+        """Return whether the labels or the detections lie where loads begin or end; "" where neither or both do."""
+        if not self._felt.are_known or not len(labels) or not len(detections):
+            return ""
+        of_labels, of_detections = (float(self._felt.felt_at(times)[1].mean()) for times in (labels, detections))
+        if abs(of_labels - of_detections) < _FITS:
+            return ""
+        return "labels" if of_labels > of_detections else "detections"
 
     def _overlapped(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
         """Return how many missed lie while a load lasts that holds several labels of the name."""
@@ -214,6 +352,10 @@ class Measured:
         overlapped = self._felt.overlapped(label)
         inside = np.isin(left.missed, self._felt.times(label)[overlapped])
         if 2 * (count := int(inside.sum())) <= len(left.missed):
+            return None
+        # Of loads that overlap the other edges are labelled too: without them a label more lies in a load.
+        names = {name for example in self._examples for name in example.labels} - {label}
+        if names and not any(2 * int(self._felt.overlapped(name).sum()) >= count for name in names):
             return None
         cause = overlapping(label, int(overlapped.sum()), len(overlapped), count)
         return cause, left.without(inside, np.zeros(len(left.false), np.bool_))
@@ -238,24 +380,33 @@ class Measured:
         return cause, left.without(np.zeros(len(left.missed), np.bool_), at)
 
     def _unlabelled(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
-        """Return how many false lie where a load begins or ends without a label, and how many missed far from that."""
-        if not self._felt.are_known:
+        """Return how many false lie where a load has no label, and how many missed far from its begin and end."""
+        scored = self._scores[label]
+        if not self._felt.are_known or (self._differs(left) and scored.found < _FOUND * scored.events):
             return None
         reach = round(to_us(2 * self._window_ms))
         names = sorted({name for example in self._examples for name in example.labels})
         labels = np.sort(np.concatenate([self._labels(name) for name in names]))
         beside = np.diff(np.searchsorted(labels, [left.false - reach, left.false + reach]), axis=0)[0] > 0
-        felt = self._felt.felt_at(left.false)[1] & ~beside
+        felt, where = self._felt.felt_at(left.false)[1] & ~beside, "where a load begins or ends that has no label"
         if self._by_chance(int(felt.sum()), len(felt), self._felt.covered()):
             felt[:] = False
+        if 2 * int(felt.sum()) <= len(felt):
+            # What is told before a load has ended, as a release, lies within it.
+            within, covered_us = self._felt.without_label(left.false, self._labels(label), reach, _LABELLED)
+            within &= ~beside
+            if within.sum() > felt.sum() and not self._by_chance(int(within.sum()), len(within), covered_us):
+                felt, where = within, f"in a load that has no label of {label}"
         unfelt = ~self._felt.felt_at(left.missed)[1]
+        if self._differs(left):
+            unfelt[:] = False
         count = int(felt.sum()) + int(unfelt.sum())
-        if not count or 2 * count <= len(left.missed) + len(left.false):
+        if not count or 2 * count <= left.total:
             return None
         parts = []
         if felt.any():
             n = int(felt.sum())
-            parts.append(f"{n} of {len(felt)} false {lie(n)} where a load begins or ends that has no label")
+            parts.append(f"{n} of {len(felt)} false {lie(n)} {where}")
         if unfelt.any():
             n = int(unfelt.sum())
             where = "one does" if parts else "a load begins or ends"
@@ -268,14 +419,33 @@ class Measured:
         )
 
     def _place(self, t: int) -> str:
-        k = round(t / APART_US)
-        return f"{(t - k * APART_US) / 1e6:.3f} s{_of(self._examples[k], self._examples)}"
+        return f"{self._seconds(t):.3f} s{_of(self._examples[int(_example_of(t))], self._examples)}"
+
+    def _seconds(self, t: int) -> float:
+        return _seconds(t, self._examples)
 
     def _by_chance(self, count: int, among: int, covered_us: int) -> bool:
         """Whether as many times lie by chance in so much of the recordings."""
         share = min(1.0, covered_us / max(1, self._lasts_us))
-        ways = sum(comb(among, k) * share**k * (1 - share) ** (among - k) for k in range(count, among + 1))
-        return ways > _CHANCE
+        return chance_of(count, among, share) > _CHANCE
+
+
+def _of_clock(cause: Callable[..., Cause], ms: float, measured: str, fits: str) -> Cause:
+    """Return the cause that all labels lie at one distance from detections, of which one fits what was felt."""
+    side, back, shift_ms, distance = "earlier", "later", -round(ms), f"{abs(ms):.0f} ms"
+    is_late, was = "late", "early"
+    if ms < 0:
+        side, back, is_late, was = back, side, was, is_late
+    if fits == "detections":
+        measured += "; the detections lie where loads begin or end, the labels do not"
+        return cause(measured, f"labels {distance} {side} (--shift-ms {shift_ms})", f"--shift-ms {shift_ms}")
+    if fits == "labels":
+        measured += f"; the labels lie where loads begin or end: those of the training were {was}"
+        advice = f"a training on labels {distance} {back} (taxel train --shift-ms {-shift_ms})"
+        return cause(measured, advice, kind="shifted_training")
+    measured += f": either these labels are {is_late} or those of the training were {was}"
+    advice = f"a look at where a load begins (taxel view); --shift-ms {shift_ms} moves these labels"
+    return cause(measured, advice, f"--shift-ms {shift_ms}")
 
 
 def overlapping(label: str, count: int, labels: int, mistakes: int) -> Cause:
@@ -296,24 +466,59 @@ def stretch_of(labels: NDArray[np.int64], members: NDArray[np.bool_], examples: 
     places = np.flatnonzero(members)
     if not len(places):
         return ""
-    recording = np.rint(labels / APART_US).astype(int)
+    recording = _example_of(labels)
     first, last = places[0], places[-1]
     if recording[first] != recording[last] or len(places) < _STRETCH * (last - first + 1):
         return ""
     here = np.flatnonzero(recording == recording[first])
     starts, ends = first == here[0], last == here[-1]
-    begin_s, end_s = (float(labels[k] - recording[k] * APART_US) / 1e6 for k in (first, last))
+    begin_s, end_s = (_seconds(labels[k], examples) for k in (first, last))
     example = examples[recording[first]]
     if starts and ends:
-        return f"in {example.name}" if len(examples) > 1 else ""
+        return _of(example, examples).replace(" of", "in", 1)
     where = f"from {begin_s:.1f} to {end_s:.1f} s"
     if starts or ends:
         where = f"from {begin_s:.1f} s on" if ends else f"until {end_s:.1f} s"
     return where + _of(example, examples)
 
 
+def long_gaps(example: Example) -> list[tuple[int, int]]:
+    """Return the gaps in which a touch may be missed, as the times of the last frame before and the first one after."""
+    source = recorded(example.source, hold=False)
+    t = source.t if isinstance(source, Frames) else np.empty(0, np.int64)
+    edges = zip(*(each.tolist() for each in missing_frames(t) or ()), strict=True)
+    return [(begin, end) for begin, end in edges if end - begin >= _GAP_US]
+
+
+def behind_gaps(example: Example, found: Detections) -> NDArray[np.bool_]:
+    """Return which detections may have happened in a gap, as they lie in one or at the first frames behind it."""
+    behind = np.zeros(len(found), np.bool_)
+    for begin, end in long_gaps(example):
+        behind |= _is_behind(found.t, begin, end)
+    return behind
+
+
+def _is_behind(t: NDArray[np.int64], begin: int, end: int) -> NDArray[np.bool_]:
+    return (t > begin) & (t <= end + round(to_us(WINDOW_MS)))
+
+
+def _example_of(t: NDArray[np.int64] | int) -> NDArray[np.int64]:
+    """Return the places of the examples in which times on the one clock lie."""
+    return np.rint(np.asarray(t) / APART_US).astype(np.int64)
+
+
+def _seconds(t: int, examples: Sequence[Example]) -> float:
+    """Return a time on the one clock as text counts those of its example, s."""
+    k = int(_example_of(t))
+    first, _ = _span_us(examples[k])
+    return float(t - k * APART_US + first - beginning_us(np.array([first]))) / 1e6
+
+
 def _of(example: Example, examples: Sequence[Example]) -> str:
-    return f" of {example.name}" if len(examples) > 1 else ""
+    if len(examples) == 1:
+        return ""
+    is_of_one = len({each.group for each in examples}) == 1
+    return f" of {example.name.removeprefix(example.group) if is_of_one else example.name}"
 
 
 def _at(places: NDArray[np.int64], times: NDArray[np.int64]) -> NDArray[np.bool_]:

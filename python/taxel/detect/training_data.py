@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.messages import counted
+from taxel._base.messages import counted, three_digits
 from taxel._base.progress import reporting
 from taxel._core import ProblemError
 from taxel.detect.detector import _Detector
@@ -23,6 +23,7 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
+from taxel.recorded import recorded
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: A touch has a detection at most so far before its begin or after its end, ms.
@@ -111,60 +112,90 @@ def _apart_ms(examples: Sequence[Example]) -> dict[str, float]:
     return shortest
 
 
-def unlike(readout: _Detector, example: Example, found: Detections) -> str:
-    """Return in what a recording and its detections differ from the training; "" where nothing does or is not known.
+class Unlike(NamedTuple):
+    """In what a recording differs from the training."""
+
+    sensor: Sequence[str] = ()
+    """Noise, touches and taxels: what may keep detections away, or make false ones."""
+    detections: Sequence[str] = ()
+    """Touches without a detection, and detections that follow one another too soon or are of one label alone."""
+
+    def lines(self) -> list[str]:
+        """Return all as lines."""
+        return [f"unlike the training: {text}" for text in (*self.sensor, *self.detections)]
+
+
+def unlike(readout: _Detector, example: Example, found: Detections) -> Unlike:
+    """Return in what a recording and its detections differ from the training; nothing where that is not known.
 
     Parameters
     ----------
     readout : Readout or PlainRule
     example : Example
-        The recording, with its rest.
+        The recording, with its rest: without one only its noise and the detections are compared.
     found : Detections
     """
     data: dict[str, Any] | None = readout._parts.get("training")
     if data is None:
-        return ""
+        return Unlike()
     measured = _measured(example)
+    source = recorded(example.source, hold=False)
+    noise = 0.0 if isinstance(source, SpikeTrains) else _noise(source)
     is_counts = readout.unit is not None and are_counts(readout.unit)
-    parts = [] if measured is None else _of_sensor(data, measured, found, is_counts=is_counts)
-    parts += _of_detections(data["apart_ms"], readout.labels, found)
-    return f"unlike the training: {'; '.join(parts)}" if parts else ""
+    noisier = noise / data["noise"] if data["noise"] > 0.0 else 1.0
+    sensor, detections = list(_of_noise(noisier, is_counts=is_counts)), list[str]()
+    if measured is not None:
+        sensor += _of_touches(data, measured, noisier, is_counts=is_counts)
+        # Much noise makes loads of its own.
+        detections += _undetected(data, measured, found) if noisier < _MUCH_NOISE else []
+    return Unlike(sensor, [*detections, *_of_detections(data["apart_ms"], readout.labels, found)])
 
 
-def _of_sensor(data: Mapping[str, Any], measured: _Measured, found: Detections, *, is_counts: bool) -> list[str]:
-    """Return in what noise, touches and taxels differ."""
-    parts, shape = [], tuple(data["shape"])
+def _of_noise(noisier: float, *, is_counts: bool) -> Iterator[str]:
+    """Yield that the noise is so many times that of the training, if that is much more."""
+    if is_counts and noisier**2 >= _NOISIER:
+        # The variance of events by chance is their number.
+        yield f"events at rest are {noisier**2:.2g} times as many"
+    elif not is_counts and noisier >= _NOISIER:
+        yield f"the noise at rest is {noisier:.2g} times as strong"
+
+
+def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *, is_counts: bool) -> Iterator[str]:
+    """Yield in what touches and taxels differ."""
+    shape, strength = tuple(data["shape"]), data["strength"]
+    touches = int(np.count_nonzero(measured.peaks >= _TOUCH * strength))
+    larger = any(size > most for size, most in zip(measured.loaded.shape, shape, strict=True))
+    if larger:
+        yield "{} x {} taxels, where the training had {} x {}".format(*measured.loaded.shape, *shape)
+    if not touches and strength:
+        yield f"no load is {_TOUCH:g} times as strong as its touches"
+    # Much noise makes loads of its own.
+    if noisier >= _MUCH_NOISE or not strength:
+        return
+    if touches >= _LEAST:
+        ratio = _usual(measured.peaks, _TOUCH * strength) / strength
+        if not _WEAKER <= ratio <= _STRONGER:
+            yield f"touches are {ratio:.2g} times as strong"
+    elif touches and len(measured.peaks) >= _LEAST:
+        yield f"most loads are less than {_TOUCH:g} times as strong as its touches"
+    # Hot pixels are the most loaded ones of counts.
+    if touches >= _LEAST and not is_counts and not larger:
+        touched = np.frombuffer(data["touched"].encode(), np.uint8).reshape(shape) == ord("1")
+        never = int(np.count_nonzero(touched & ~_within(measured.reached, shape)))
+        if never >= max(1.0, _FEWER * np.count_nonzero(touched)):
+            yield f"{never} of {counted(int(touched.sum()), 'taxel')} that touches loaded are never loaded"
+
+
+def _undetected(data: Mapping[str, Any], measured: _Measured, found: Detections) -> Iterator[str]:
+    """Yield how many touches have no detection, if that is a larger share than in the training."""
     are_touches = measured.peaks >= _TOUCH * data["strength"]
     touches = int(np.count_nonzero(are_touches))
-    if any(size > most for size, most in zip(measured.loaded.shape, shape, strict=True)):
-        parts.append("{} x {} taxels, where the training had {} x {}".format(*measured.loaded.shape, *shape))
-    noisier = measured.noise / data["noise"] if data["noise"] > 0.0 else 1.0
-    if noisier > 1.0:
-        if is_counts and noisier**2 >= _NOISIER:
-            # The variance of events by chance is their number.
-            parts.append(f"events at rest are {noisier**2:.2g} times as many")
-        elif noisier >= _NOISIER:
-            parts.append(f"the noise at rest is {noisier:.2g} times as strong")
-    if not touches and data["strength"]:
-        parts.append(f"no load is {_TOUCH:g} times as strong as its touches")
-    # Much noise makes loads of its own.
-    if touches >= _LEAST and noisier < _MUCH_NOISE:
-        ratio = _usual(measured.peaks, _TOUCH * data["strength"]) / data["strength"] if data["strength"] else 1.0
-        if not _WEAKER <= ratio <= _STRONGER:
-            parts.append(f"touches are {ratio:.2g} times as strong")
-        missing = touches - int(np.count_nonzero(measured.detected(found.t) & are_touches))
-        if missing / touches >= 1.0 - data["detected"] + _FEWER:
-            parts.append(
-                f"{missing} of {counted(touches, 'touch', 'touches')} have no detection, in the training "
-                f"{1.0 - data['detected']:.0%}"
-            )
-        # Hot pixels are the most loaded ones of counts.
-        if not is_counts and all(size <= most for size, most in zip(measured.loaded.shape, shape, strict=True)):
-            touched = np.frombuffer(data["touched"].encode(), np.uint8).reshape(shape) == ord("1")
-            never = int(np.count_nonzero(touched & ~_within(measured.reached, shape)))
-            if never >= max(1.0, _FEWER * np.count_nonzero(touched)):
-                parts.append(f"{never} of {counted(int(touched.sum()), 'taxel')} that touches loaded are never loaded")
-    return parts
+    missing = touches - int(np.count_nonzero(measured.detected(found.t) & are_touches))
+    if touches >= _LEAST and missing / touches >= 1.0 - data["detected"] + _FEWER:
+        yield (
+            f"{missing} of {counted(touches, 'touch', 'touches')} have no detection, in the training "
+            f"{1.0 - data['detected']:.0%}"
+        )
 
 
 def _of_detections(apart_ms: Mapping[str, float], labels: Sequence[str], found: Detections) -> list[str]:
@@ -175,7 +206,8 @@ def _of_detections(apart_ms: Mapping[str, float], labels: Sequence[str], found: 
         close = int(np.count_nonzero(to_ms(np.diff(t)) < _CLOSE * shortest))
         if close > max(2.0, _MANY * len(t)):
             parts.append(
-                f"{close} of {len(t)} detections of {label} follow another one within {_CLOSE * shortest:.3g} ms, half "
+                f"{close} of {len(t)} detections of {label} follow another one within "
+                f"{three_digits(_CLOSE * shortest)} ms, half "
                 "the shortest time between its labels"
             )
     counts = {label: sum(each == label for each in found.label) for label in labels}

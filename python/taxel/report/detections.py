@@ -26,7 +26,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import Alignment, Judged, Outcome, PlainRule, Readout, Score
 from taxel.detect.detector import detector
-from taxel.detect.examples import array_of, padded_to
+from taxel.detect.examples import array_of, causes_text, padded_to
 from taxel.encode import Composite, ContactArea, Encoder, LocalLoad, Peak
 from taxel.frames import Frames
 from taxel.recorded import recorded
@@ -175,7 +175,7 @@ def write_detections(
         printed=printed,
         viewed=[quote(outcome.name) for outcome in listened if outcome.name.endswith(_VIEWED)][:_MOST_VIEWED],
         beside=_beside(readout.labels, scored),
-        causes=[(outcome.name, line) for outcome in listened for line in outcome.causes_lines],
+        causes=causes_text(listened),
         scored=any(outcome.score is not None for outcome in listened),
     )
     target.mkdir(parents=True, exist_ok=True)  # so late that nothing is left of one that is ended
@@ -293,7 +293,7 @@ def _pressed(outcome: Outcome, frames: Frames) -> tuple[NDArray[np.int64], NDArr
 
 def _about(outcome: Outcome, readout: Readout | PlainRule) -> list[str]:
     """Return what else is known of the detections in a recording."""
-    lines = [f"{outcome.outside_text}."] if isinstance(readout, Readout) else []
+    lines = [f"{text}."] if (text := outcome.outside_text) and isinstance(readout, Readout) else []
     return [*lines, *([f"Times are from {begun(outcome.begin_us)} on."] if outcome.begin_us else [])]
 
 

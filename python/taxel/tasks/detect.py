@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isnan
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,12 +16,12 @@ from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, recipes, score
+from taxel.detect.cause import Cause
 from taxel.detect.detector import detector
-from taxel.detect.mistakes import causes_of
+from taxel.detect.mistakes import behind_gaps, causes_of, score_of, unreliable
 from taxel.detect.readout import run_counting
-from taxel.detect.scoring import score_together
 from taxel.detect.tares import count_drifted
-from taxel.detect.training_data import unlike
+from taxel.detect.training_data import Unlike, unlike
 from taxel.encode import ContactArea, Moments
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
@@ -31,9 +31,12 @@ from taxel.recording import Recording
 from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
-from taxel.tasks.labels import GivenLabels, few, references, sources_without, titles_of
+from taxel.tare import Tare
+from taxel.tasks.labels import GivenLabels, check_shift, few, moved, references, sources_without, titles_of
 from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, rest
 
+#: Causes of a bad score that are of labels or of the recording, not of the readout.
+_OF_LABELS = ("shifted_labels", "window", "gaps", "unlabelled_loads", "overlapping_loads")
 #: No event.
 _NONE = np.empty(0, np.int64)
 
@@ -51,6 +54,8 @@ class DetectOptions:
         Length of the board's frame. Default: by the registers or the frames, else 192.
     window_ms : float, ms
         Largest distance of a detection from its event.
+    shift_ms : float, ms
+        By how much labels of the truth are moved before all else, as those of another clock; later is positive.
 
     Raises
     ------
@@ -65,12 +70,14 @@ class DetectOptions:
     tare: GivenTare | None = None
     frame_us: float | None = None
     window_ms: float = 50.0
+    shift_ms: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse values that no recordings could make valid, before these are read."""
         check_tare(self.tare)
         finite("frame_us", 1.0 if self.frame_us is None else self.frame_us, "us", least=1.0, most=3.6e9)
         finite("window_ms", self.window_ms, "ms", least=0.0)
+        check_shift(self.shift_ms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +92,8 @@ class Detected:
     rest : TakenRest, optional
         Which rest was taken; None where the readout needs none.
     remarks : tuple of str
-        What may keep detections away or make false ones: values that fall from their rest, a drifted rest, and in what
-        the recording differs from the training.
+        What may keep detections away or make false ones: gaps, values that fall from their rest, a drifted rest, and in
+        what the recording differs from the training.
     """
 
     recording: Recording
@@ -130,7 +137,9 @@ class Detecting:
         The labels of the truth that the readout does not have.
     unlabelled : mapping of str to tuple of str
         The sources that no row of the truth names, by label, where rows name sources: they are not scored for it.
-    window_ms : float, ms
+    window_ms, shift_ms : float, ms
+    unreliable : tuple of str
+        The labels whose score is too bad to rely on, in all recordings or in some.
     warnings : tuple of str
     left_out : tuple of str
         The recordings of other arrays than the readout's, beside those that fit, and those without a known rest.
@@ -141,6 +150,8 @@ class Detecting:
     not_scored: tuple[str, ...]
     unlabelled: Mapping[str, tuple[str, ...]]
     window_ms: float
+    shift_ms: float = 0.0
+    unreliable: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
 
@@ -154,12 +165,13 @@ class Detecting:
         result: dict[str, Any] = {
             "recordings": [each.to_dict() for each in self.each],
             "left_out": list(self.left_out),
-            "warnings": list(self.warnings),
+            "warnings": [*self.unreliable, *self.warnings],
         }
         if self.score is None:
             return result
         unlabelled = {label: list(sources) for label, sources in self.unlabelled.items()}
-        return result | {"window_ms": self.window_ms, "score": self.score.to_dict(), "unlabelled": unlabelled}
+        asked = {"window_ms": self.window_ms, "shift_ms": self.shift_ms}
+        return result | asked | {"score": self.score.to_dict(), "unlabelled": unlabelled}
 
 
 def detect(
@@ -217,40 +229,82 @@ def detect(
     update = reporting(progress)
     opened = sensors_of(recordings)
     with collected() as warnings:
-        events = [None] * len(opened) if truth is None else references(truth, opened, "truth")
+        events = [] if truth is None else references(truth, opened, "truth")
         if truth is not None and not any(events):
             raise refused("truth", f" is {truth}: names no event in {titles_of(opened)}")
         unlabelled = {} if truth is None else sources_without(truth, opened, events)
+        each_labelled = [
+            None if truth is None else moved(events[k], recording, options.shift_ms)
+            for k, recording in enumerate(opened)
+        ]
         left_out = _of_other_arrays(readout, opened)
-        each: list[Detected] = []
+        found: list[_Found] = []
         unknown_rests: dict[str, UnknownRestError] = {}
-        for recording, labelled in zip(opened, events, strict=True):
+        for recording, labelled in zip(opened, each_labelled, strict=True):
             if left_out and not readout._accepts(recording.array):
                 continue
             update(f"detecting in {recording.title}", 0, 0)
             without = {label for label, sources in unlabelled.items() if recording.label in sources}
             try:
-                each.append(_detected(readout, recording, labelled, without, options))
+                found.append(_detected(readout, recording, labelled, without, options))
             except UnknownRestError as error:
                 unknown_rests[recording.title] = error
-        if not each and unknown_rests:
+        if not found and unknown_rests:
             raise next(iter(unknown_rests.values()))
         for unknown_rest in unknown_rests.values():
             warn(f"left out: {unknown_rest}", stacklevel=2)
+        each = tuple(_with_causes(found, options.window_ms))
     scored = [outcome for detected in each if (outcome := detected.outcome).score is not None]
-    truths = [outcome.example.labels for outcome in scored]
-    found = [outcome.example._known(outcome.found) for outcome in scored]
-    together = score_together(found, truths, options.window_ms) if truths else None
-    unknown = sorted(
-        {label for labels_of in events if labels_of is not None for label in labels_of} - set(readout.labels)
-    )
+    together = score_of(scored, options.window_ms) if scored else None
+    unknown = sorted({label for labels_of in events for label in labels_of} - set(readout.labels))
     for label in unknown:
         if alike := [name for name in readout.labels if recipes.spelling(name) == recipes.spelling(label)]:
             warnings.append(
                 f"truth has {shown(label)}, the readout {shown(alike[0])}: must be spelt alike to be scored"
             )
     names = (*(recording.title for recording in left_out), *unknown_rests)
-    return Detecting(tuple(each), together, tuple(unknown), unlabelled, options.window_ms, tuple(warnings), names)
+    bad = () if together is None else tuple(_unreliable(scored, together, options.window_ms))
+    how = options.window_ms, options.shift_ms
+    return Detecting(each, together, tuple(unknown), unlabelled, *how, bad, tuple(warnings), names)
+
+
+def _with_causes(each: Sequence[_Found], window_ms: float) -> Iterator[Detected]:
+    """Yield what was detected with the causes of what is missed and false: sources of a recording have the same."""
+    known: dict[str, tuple[Cause, ...]] = {}
+    for detected, felt, _ in each:
+        group = felt.example.group
+        if group not in known:
+            sources = [source for source in each if source.felt.example.group == group]
+            scored = [source for source in sources if source.felt.score is not None]
+            outcomes, differences = [source.felt for source in scored], [source.differences for source in scored]
+            known[group] = causes_of(outcomes, window_ms, differences) if scored else ()
+        yield replace(detected, outcome=detected.outcome._replace(causes=known[group]))
+
+
+def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) -> Iterator[str]:
+    """Yield the labels whose score is too bad to rely on, in all recordings or else in some."""
+    groups: dict[str, list[Outcome]] = {}
+    for outcome in outcomes:
+        groups.setdefault(outcome.example.group, []).append(outcome)
+    scores = {group: score_of(members, window_ms).by_label for group, members in groups.items()}
+    for label, of_all in together.by_label.items():
+        causes = [cause for members in groups.values() for cause in members[0].causes]
+        if text := unreliable(label, of_all, "labels", f"this {_at_fault(label, of_all, causes)} here"):
+            yield text
+            continue
+        for group, members in groups.items() if len(groups) > 1 else ():
+            of_group = scores[group].get(label)
+            if of_group is not None:
+                fault = _at_fault(label, of_group, members[0].causes)
+                text = unreliable(label, of_group, "labels", f"this {fault} in {group.strip()}")
+                yield from [text] if text else []
+
+
+def _at_fault(label: str, scored: Score, causes: Sequence[Cause]) -> str:
+    """Return whether a bad score is one of the readout, or by labels and recording, as its causes say, of the score."""
+    of_labels = (cause for cause in causes if label in cause.labels and cause.kind in _OF_LABELS)
+    count = sum(cause.mistakes / len(cause.labels) for cause in of_labels if cause.advice or cause.kind == "gaps")
+    return "score" if 2 * count >= scored.rank[0] else "readout"
 
 
 def _of_other_arrays(readout: Readout | PlainRule, recordings: Sequence[Recording]) -> list[Recording]:
@@ -267,13 +321,21 @@ def _of_other_arrays(readout: Readout | PlainRule, recordings: Sequence[Recordin
     return others
 
 
+class _Found(NamedTuple):
+    """What was detected in a recording, the same with a rest for what was felt, and in what the sensor differs."""
+
+    detected: Detected
+    felt: Outcome
+    differences: Sequence[str]
+
+
 def _detected(
     readout: Readout | PlainRule,
     recording: Recording,
     labels: Mapping[str, Any] | None,
     without: Collection[str],
     options: DetectOptions,
-) -> Detected:
+) -> _Found:
     if recording.verdict.status in ("damaged", "unfinished", "lost", "nothing arrived"):
         # Detections may lack or have wrong times.
         warn(f"{recording.title}: {recording.verdict}", stacklevel=3)
@@ -285,11 +347,24 @@ def _detected(
     # Labels that the readout does not have do not count as missed.
     named = () if labels is None else tuple(label for label in readout.labels if label not in without)
     true = {} if labels is None else {label: labels.get(label, _NONE) for label in named}
-    example = Example(recording, true, tare, unlabelled=tuple(without))
+    title = recording.title
+    example = Example(recording, true, tare, title.removesuffix(recording.label), title, tuple(without))
     scored = score(example._known(found), true, options.window_ms) if true else None
-    outcome = Outcome(recording.title, example, found, scored, outside)
-    outcome = outcome._replace(causes=causes_of(outcome, options.window_ms))
-    return Detected(recording, outcome, taken, tuple(_remarks(recording, outcome, readout)))
+    outcome = Outcome(title, example, found, scored, outside)
+    felt = outcome if tare is not None else outcome._replace(example=example._replace(tare=_quiet(recording)))
+    remarks, differs = _remarks(recording, felt, readout)
+    return _Found(Detected(recording, outcome, taken, tuple(remarks)), felt, differs.sensor)
+
+
+def _quiet(recording: Recording) -> Tare | None:
+    """Return the rest of frames whose readout needs none, to measure what was felt; None where it is not known."""
+    if recording.has_events or not recording.timed:
+        return None
+    try:
+        with collected():
+            return rest(recording).tare
+    except ProblemError:
+        return None
 
 
 def _check_unit(readout: Readout | PlainRule, recording: Recording) -> None:
@@ -337,23 +412,33 @@ def noise_floors(readout: Readout | PlainRule) -> list[float]:
     return [float(part.noise_floor) for part in readout.encoder._each() if isinstance(part, ContactArea | Moments)]
 
 
-def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRule) -> Iterator[str]:
-    """Yield what may keep detections away or make false ones."""
-    if gaps := recording._gaps():
-        yield f"{gaps}: nothing is detected in there"
-    source, tare = recorded(outcome.example.source, hold=False), outcome.example.tare
+def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRule) -> tuple[list[str], Unlike]:
+    """Return what may keep detections away or make false ones, and of it in what differs from the training."""
+    lines, source, tare = list(_of_gaps(recording, outcome)), recorded(recording, hold=False), outcome.example.tare
     if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
         # What else is measured is measured upside down.
-        yield f"rest: {quiet.text(getattr(outcome.example.source, 'path', None))}"
-        return
+        return [*lines, f"rest: {quiet.text(recording.path)}"], Unlike()
     floors = noise_floors(readout)
     if tare is not None and floors and not isinstance(source, SpikeTrains):
         count = count_drifted(source, tare, max(floors))
         if count:
-            yield (
+            lines.append(
                 f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that touches "
                 "may seem not to end, and others be missed: take a tare between touches nearer to them "
                 "(taxel cut RECORDING FILE --from S --to S, --tare FILE)"
             )
-    if difference := unlike(readout, outcome.example, outcome.found):
-        yield difference
+    differs = unlike(readout, outcome.example, outcome.found)
+    return [*lines, *differs.lines()], differs
+
+
+def _of_gaps(recording: Recording, outcome: Outcome) -> Iterator[str]:
+    """Yield where the recording has gaps, and which detections may have happened in one."""
+    if gaps := recording._gaps():
+        yield f"{gaps}: nothing is detected in there"
+        behind = outcome.found[behind_gaps(outcome.example, outcome.found)]
+        if len(behind):
+            at = [
+                f"{label} at {(t - outcome.begin_us) / 1e6:.3f} s"
+                for label, t in zip(behind.label, behind.t, strict=True)
+            ]
+            yield f"may have happened in a gap, as it ends just before: {few(at)}"

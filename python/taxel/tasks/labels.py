@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import column, mapping, several, shown
+from taxel._base.arguments import column, finite, mapping, several, shown
 from taxel._base.errors import refused
 from taxel._base.messages import counted, warn
 from taxel._base.times import beginning_us, begun
@@ -21,6 +21,7 @@ from taxel.detect.recipes import spelling
 from taxel.labels import Labels, beside, trial_of
 from taxel.recording import Recording, kind_of_file
 from taxel.recording.cut import span_us
+from taxel.spikes import to_us
 
 #: "notes" (the recordings' own notes), the path of a table, or times (us) by label, a mapping for each recording.
 GivenLabels: TypeAlias = str | os.PathLike[str] | Sequence[Mapping[str, Any]]
@@ -75,6 +76,29 @@ def references(
     _warn_of_strangers(table, recordings)
     events = _from_beginnings([table.times(recording) for recording in recordings], recordings, str(table.path))
     return [_within(table, each, recording, argument) for each, recording in zip(events, recordings, strict=True)]
+
+
+def check_shift(shift_ms: float) -> None:
+    """Refuse a move of labels that is no number of ms within 41 days."""
+    finite("shift_ms", shift_ms, "ms", least=-3.6e9, most=3.6e9)
+
+
+def moved(
+    events: Mapping[str, NDArray[np.int64]], recording: Recording, shift_ms: float
+) -> dict[str, NDArray[np.int64]]:
+    """Return the labels of a recording so much later; those that then lie outside it are left out."""
+    if not shift_ms:
+        return dict(events)
+    first, last = span_us(recording)
+    moved = {label: times + round(to_us(shift_ms)) for label, times in events.items()}
+    inside = {label: times[(times >= first) & (times <= last)] for label, times in moved.items()}
+    outside = sum(map(len, events.values())) - sum(map(len, inside.values()))
+    if outside:
+        lie = "lies" if outside == 1 else "lie"
+        warn(
+            f"{counted(outside, 'label')} of {recording.title} {lie} outside it when moved by {shift_ms:g} ms: left out"
+        )
+    return inside
 
 
 def sources_without(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
 from taxel._base.errors import helped, refused
-from taxel._base.messages import collected, counted, warn
+from taxel._base.messages import collected, warn
 from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
@@ -33,11 +33,10 @@ from taxel.events import Events
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.analysis.rest import BY_UNIT
-from taxel.recording.cut import span_us
 from taxel.recording.opening import sensors_of
-from taxel.spikes import SpikeTrains, to_us
+from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
-from taxel.tasks.labels import GivenLabels, labelled_trials, references, sources_without, titles_of
+from taxel.tasks.labels import GivenLabels, labelled_trials, moved, references, sources_without, titles_of
 from taxel.tasks.rest import GivenTare, given_tare, tare_before, tare_if_any
 from taxel.tasks.train_result import Training, TrainOptions
 
@@ -116,7 +115,7 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
                 "counts (window_ms=5, --count-ms 5) are trained by event_counts"
             )
     unlabelled = sources_without(labels, opened, labelled)
-    labelled = [_moved(events, each, options.shift_ms) for events, each in zip(labelled, opened, strict=True)]
+    labelled = [moved(events, each, options.shift_ms) for events, each in zip(labelled, opened, strict=True)]
     names = sorted({label for events in labelled for label in events})
     without = [{label for label in names if each.label in unlabelled.get(label, ())} for each in opened]
     # A source without any label takes no part.
@@ -137,24 +136,6 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
     return replace(_Work(opened, examples, options, update).training(plan), unlabelled=unlabelled)
-
-
-def _moved(
-    events: Mapping[str, NDArray[np.int64]], recording: Recording, shift_ms: float
-) -> dict[str, NDArray[np.int64]]:
-    """Return labels so much later; those that then lie outside the recording are left out."""
-    if not shift_ms:
-        return dict(events)
-    first, last = span_us(recording)
-    moved = {label: times + round(to_us(shift_ms)) for label, times in events.items()}
-    inside = {label: times[(times >= first) & (times <= last)] for label, times in moved.items()}
-    outside = sum(map(len, events.values())) - sum(map(len, inside.values()))
-    if outside:
-        lie = "lies" if outside == 1 else "lie"
-        warn(
-            f"{counted(outside, 'label')} of {recording.title} {lie} outside it when moved by {shift_ms:g} ms: left out"
-        )
-    return inside
 
 
 def _named(labels: GivenLabels) -> str:

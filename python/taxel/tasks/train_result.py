@@ -13,11 +13,13 @@ from taxel._base.times import beginning_us
 from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained, recipes
 from taxel.detect.cause import Cause
 from taxel.detect.levels import LEAST_LEVELS
+from taxel.detect.mistakes import unreliable
 from taxel.detect.recipe import change_values, with_floor
 from taxel.detect.scoring import score_rows
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.spikes import to_ms
+from taxel.tasks.labels import check_shift
 from taxel.tasks.rest import GivenTare, check_tare
 
 #: Largest number of unpaired labels that a warning names.
@@ -79,7 +81,7 @@ class TrainOptions:
         check_tare(self.tare)
         flag("search", self.search)
         flag("labels_as_given", self.labels_as_given)
-        finite("shift_ms", self.shift_ms, "ms", least=-3.6e9, most=3.6e9)
+        check_shift(self.shift_ms)
         finite("window_ms", self.window_ms, "ms", least=0.0)
         if self.folds is not None and integer("folds", self.folds, 0) == 1:
             raise refused("folds", " is 1: must be 2 or more, or 0 for none")
@@ -343,17 +345,10 @@ class Training:
     def unreliable(self) -> Iterator[str]:
         """Yield the labels of which the readout misses most, or detects no more than one of nothing; what may help."""
         for label in self.readout.labels:
-            score = self.scored.together[label]
-            if score.rank[0] < score.events and 2 * score.missed <= score.events:
-                continue
-            worth = ", no better than to detect nothing" if score.rank[0] >= score.events else ""
-            first = next((cause for cause in self.causes if label in cause.labels), None)
-            helps = f"; what may help is {first.advice}" if first is not None and first.advice else ""
             labels = "labels that it was trained on" if self.why else "held-out labels"
-            yield (
-                f"{label}: do not rely on this readout: {score.found} of {score.events} {labels} found, {score.false} "
-                f"false{worth}{helps}"
-            )
+            if text := unreliable(label, self.scored.together[label], labels):
+                first = next((cause for cause in self.causes if label in cause.labels), None)
+                yield text + (f"; what may help is {first.advice}" if first is not None and first.advice else "")
 
     def _aligned(self) -> Iterator[str]:
         """Yield by how much labels were moved to what the sensor felt, and which found no pair."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taxel.clock import doubt
 from taxel.events import Events
@@ -25,6 +26,9 @@ _AT_TOP, _LEVELS = 3, 50
 _TIMES, _BELOW = 2, 3
 #: At most so many places of taxels are listed that were not touched enough: a large sensor may have millions.
 _PLACES = 100
+
+#: Frames have noise where most taxels change in this share of them.
+_CHANGES = 0.2
 
 
 def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
@@ -90,15 +94,18 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     # Above the rest of readings that fall is nothing but noise.
     facts["pressure"] = None if pressed is None or pressed.rest.falls else _pressure(pressed)
     of_taxels = health(table)
+    # Noise changes the readings of taxels that work, touched or not.
+    is_noisy = isinstance(table, Frames) and np.median(of_taxels.activity) >= _CHANGES * len(table)
+    unchanging = of_taxels.untested & (of_taxels.activity == 0) & is_noisy
     return facts | {
         "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
         "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
         "registers": None if recording.registers is None else recording.registers._held,
         "taxels": of_taxels.named(),
         "taxels_untested": int(np.count_nonzero(of_taxels.untested)),
-        "taxels_untested_at": [
-            (int(k % array.columns), int(k // array.columns)) for k in np.flatnonzero(of_taxels.untested)[:_PLACES]
-        ],
+        "taxels_untested_at": _places(of_taxels.untested),
+        "taxels_unchanging": int(np.count_nonzero(unchanging)),
+        "taxels_unchanging_at": _places(unchanging),
         "counts": recording.counts,
         "truncated": recording.truncated,
         "rebuilt": recording.rebuilt,
@@ -107,6 +114,11 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "verdict_details": recording.verdict.to_dict(),
         "remarks": list(recording.remarks),
     }
+
+
+def _places(taxels: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return column and row of the first of some taxels."""
+    return [(int(x), int(y)) for y, x in np.argwhere(taxels)[:_PLACES]]
 
 
 def _pressure(pressed: Series) -> dict[str, Any] | None:

@@ -1,0 +1,147 @@
+"""What `taxel detect` says of drawn situations: first a verdict, then what is the matter; nothing of a right one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from shell import call
+
+import taxel
+from taxel.tasks import TrainOptions
+
+Labels = dict[str, NDArray[np.int64]]
+SIZES = {"taxel": ((1, 1), 100.0), "channels": ((1, 8), 60.0), "grid": ((16, 16), 50.0)}
+
+
+def drawn(
+    shape: tuple[int, int], rate: float, seed: int, *, gain: float = 1.0, noise: float = 2.0, dead: int = 0
+) -> tuple[taxel.Frames, Labels]:
+    """Return 25 touches on counts that rest at 500, and when each began and ended; some columns may be dead."""
+    random = np.random.default_rng(seed)
+    lasting, apart = random.uniform(0.35, 0.8, 25), random.uniform(0.5, 1.0, 25)
+    begins = 3 + np.cumsum(apart) + np.append(0, np.cumsum(lasting[:-1]))
+    t = np.arange(round((begins[-1] + lasting[-1] + 2) * rate)) / rate
+    values = 500 + noise * random.standard_normal((len(t), *shape))
+    for begin, end in zip(begins, begins + lasting, strict=True):
+        envelope = np.clip((t - begin) / 0.02, 0, 1) * np.clip(1 - (t - end) / 0.01, 0, 1)
+        place = np.zeros(shape)
+        if shape[0] > 1:
+            y, x = random.choice([2, 9], 2)
+            place[y : y + 4, x : x + 4] = 1
+        else:
+            place[:] = np.exp(-((np.arange(shape[1]) - random.uniform(2, 6) * (shape[1] > 1)) ** 2) / 4)
+        values += gain * 300 * random.uniform(0.7, 1.3) * envelope[:, None, None] * place
+    values[:, :, :dead] = 500
+    frames = taxel.Frames(np.round(values), np.rint(1e6 * t).astype(np.int64), unit="counts", array=taxel.Array(*shape))
+    us = np.rint(1e6 * (begins + random.normal(0, 0.005, 25))).astype(np.int64)
+    return frames, {"contact": us, "lift": us + np.rint(1e6 * lasting).astype(np.int64)}
+
+
+@dataclass
+class Trained:
+    """The size that a readout is of, and its file."""
+
+    shape: tuple[int, int]
+    rate: float
+    file: Path
+
+    def told(self, capsys: Any, place: Path, frames: taxel.Frames, labels: Labels | None, *words: Any) -> list[str]:
+        """Return what the command prints, without scores and detections."""
+        taxel.convert(frames, place / "a.npz", overwrite=True)
+        rows = [f"{label},{t}\n" for label, times in (labels or {}).items() for t in times]
+        (place / "a.csv").write_text("label,t_us\n" + "".join(rows))
+        truth = [] if labels is None else ["--truth", place / "a.csv"]
+        code, out, _ = call(capsys, "detect", place / "a.npz", "--readout", self.file, "--tare", 2.0, *truth, *words)
+        assert code == 0
+        said = ("do not rely", "what may help", "unlike", "gap", "outside", "missed", "false ")
+        return [
+            line
+            for line in out.splitlines()
+            if any(part in line for part in said) and "events  found" not in line and not line.startswith("against")
+        ]
+
+
+@pytest.fixture(scope="module", params=SIZES)
+def trained(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Trained:
+    shape, rate = SIZES[request.param]
+    place = tmp_path_factory.mktemp(request.param)
+    frames, labels = drawn(shape, rate, 1)
+    taxel.convert(frames, place / "training.npz")
+    training = taxel.train(taxel.open(place / "training.npz"), [labels], TrainOptions(folds=0))
+    return Trained(shape, rate, training.readout.save(place / "readout.json"))
+
+
+def test_nothing_is_said_of_a_right_recording(trained: Trained, tmp_path: Path, capsys: Any) -> None:
+    for seed in (1, 2):
+        frames, labels = drawn(trained.shape, trained.rate, seed)
+        assert trained.told(capsys, tmp_path, frames, labels) == []
+        assert trained.told(capsys, tmp_path, frames, None) == []
+
+
+@pytest.mark.parametrize("late_ms", [242, -90])
+def test_labels_of_another_clock_are_moved_by_the_option_that_is_named(
+    trained: Trained, tmp_path: Path, capsys: Any, late_ms: int
+) -> None:
+    frames, labels = drawn(trained.shape, trained.rate, 4)
+    late = {label: t + 1000 * late_ms for label, t in labels.items()}
+    *verdicts, cause = trained.told(capsys, tmp_path, frames, late)
+    assert [line.partition(", ")[0] for line in verdicts] == [
+        f"{label}: do not rely on this score here: 0 of 25 labels found" for label in labels
+    ]
+    assert "contact, lift: what may help is labels" in cause
+    assert "the detections lie where loads begin or end, the labels do not" in cause
+    option = cause.partition("(")[2].partition(")")[0].split()
+    assert float(option[1]) == pytest.approx(-late_ms, abs=30)
+    assert trained.told(capsys, tmp_path, frames, late, *option) == []
+
+
+def test_a_stretch_of_labels_missing_ones_and_those_of_nothing_are_named(
+    trained: Trained, tmp_path: Path, capsys: Any
+) -> None:
+    frames, labels = drawn(trained.shape, trained.rate, 5)
+    random, since = np.random.default_rng(5), labels["contact"][15]
+    [line] = trained.told(capsys, tmp_path, frames, {k: t - 300_000 * (t >= since) for k, t in labels.items()})
+    assert f"contact, lift: what may help is labels from {(since - 300_000) / 1e6:.1f} s on 3" in line
+    fewer = {label: np.sort(random.choice(t, 20, replace=False)) for label, t in labels.items()}
+    [line] = trained.told(capsys, tmp_path, frames, fewer)
+    assert line.startswith("contact, lift: what may help is a look at these labels: 5 of 5 false lie ")
+    middles = labels["contact"] + (labels["lift"] - labels["contact"]) // 2
+    more = labels | {"contact": np.sort(np.append(labels["contact"], middles[::5]))}
+    [line] = trained.told(capsys, tmp_path, frames, more)
+    assert line.startswith("contact: what may help is a look at these labels: 5 of 5 missed lie more than 50 ms from")
+
+
+def test_what_differs_from_the_training_is_said_once_and_is_the_cause(
+    trained: Trained, tmp_path: Path, capsys: Any
+) -> None:
+    frames, labels = drawn(trained.shape, trained.rate, 6, gain=0.3)
+    weak = trained.told(capsys, tmp_path, frames, labels)
+    assert len([line for line in weak if "touches are 0.3" in line or "touches are 0.2" in line]) >= 1
+    assert not any("look at these labels" in line for line in weak)
+    if trained.shape == (1, 1):
+        return
+    dead = 6 if trained.shape[0] > 1 else 3
+    frames, labels = drawn(trained.shape, trained.rate, 7, dead=dead)
+    lines = trained.told(capsys, tmp_path, frames, labels)
+    assert any("that touches loaded are never loaded" in line for line in lines)
+    assert not any("look at these labels" in line for line in lines)
+
+
+def test_a_gap_and_what_it_holds_are_named(trained: Trained, tmp_path: Path, capsys: Any) -> None:
+    frames, labels = drawn(trained.shape, trained.rate, 8)
+    begin = labels["contact"][8] - 200_000
+    end = labels["contact"][9] + 100_000
+    kept = (frames.t < begin) | (frames.t >= end)
+    cut = taxel.Frames(frames.values[kept], frames.t[kept], unit="counts", array=frames.array)
+    lines = trained.told(capsys, tmp_path, cut, labels)
+    behind = cut.t[cut.t >= end][0]
+    assert "1 gap of " in lines[0]
+    assert lines[1].startswith(
+        f"may have happened in a gap, as it ends just before: contact at {behind / 1e6:.3f}"[:-2]
+    )
+    assert "missed lie where the recording has no frames, and 1 of 1 false lies at the first frames" in lines[-1]
