@@ -44,7 +44,7 @@ def test_a_class_is_named_as_it_is_imported(kind):
 
 def test_the_words_of_status_are_one_list():
     page = (Path(__file__).parents[1] / "docs/errors.md").read_text()
-    section = page[page.index("## How a fit ended") : page.index("## On the command line")]
+    section = page[page.index("## How a fit ended") : page.index("## What a recording lost")]
     listed = {row[0]: row[1] for row in re.findall(r"^\| `(\w+)` \|[^|]*\|([^|]*)\|$", section, re.MULTILINE)}
     listed.pop("status_")
     assert set(listed) == set(get_args(Status))

@@ -169,7 +169,7 @@ def test_a_row_that_the_problem_does_not_have_is_one_clear_error():
             problem.row(row)
     with pytest.raises(ProblemError, match="a slope is asked for in continuous time only"):
         refuted(time="grid").problem_.slope(0, 0)
-    with pytest.raises(ProblemError, match="no point of the grid"):
+    with pytest.raises(ProblemError, match="not a point of the grid"):
         refuted(time="grid").problem_.silence(0, 0.25)
 
 

@@ -209,7 +209,7 @@ def test_a_reader_that_comes_late_hears_what_is_said_from_then_on(tmp_path: Path
         ("nowhere", taxel.ProblemError, "must be serial:PLACE, lines:PATH, lines+tcp:HOST:PORT or lines+udp:HOST:PORT"),
         ("lines+udp:9000", taxel.ProblemError, "must be a host and a port"),
         ("serial:/dev/null,baud=fast", taxel.ProblemError, "'fast'".replace("'", '"')),
-        ("lines:/dev/null", taxel.ProblemError, "/dev/null: is no named pipe; mkfifo makes one"),
+        ("lines:/dev/null", taxel.ProblemError, "/dev/null: is not a named pipe; mkfifo creates it"),
         ("lines:/no/such/pipe", FileNotFoundError, "/no/such/pipe"),
         ("serial:/no/such/line", OSError, "/no/such/line"),
         (7, taxel.ProblemError, "send is 7"),

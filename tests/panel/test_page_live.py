@@ -245,7 +245,7 @@ def test_a_refused_value_stays_typed_with_its_reason_until_escape(page: Any) -> 
     until(lambda: period.get_attribute("aria-invalid") == "false" and period.input_value() == "4.00", "all are written")
     period.fill("nonsense")
     period.press("Enter")
-    shows(page, "register-step_period-reason", "nonsense is no number")
+    shows(page, "register-step_period-reason", "nonsense is not a number")
     period.press("Escape")
     assert period.input_value() == "4.00"
     page.locator("#preset").select_option("5.2 kHz")
@@ -290,7 +290,7 @@ def test_recordings_count_down_go_on_by_themselves_and_overwrite_nothing(page: A
     assert (live.folder / "auto1.mcap").read_bytes() == before
     record_form(page, name="auto", index="one")
     press(page, "r")
-    shows(page, "record-reason", "index: one is no number")
+    shows(page, "record-reason", "index: one is not a number")
 
 
 def test_looking_back_while_live_holds_the_view_and_not_the_board(page: Any) -> None:

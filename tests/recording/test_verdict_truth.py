@@ -831,7 +831,7 @@ def test_what_two_generations_of_a_file_lost_adds_up(tmp_path: Path) -> None:
 def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
     counts = {"received": 5, "recorded": 5, "missing": 0, "decoder": {"resets": 2}}
     verdict = Verdict._of({"counts": counts})
-    assert verdict == "nothing lost but for what resets hide; 2 resets of the board"
+    assert verdict == "nothing lost except what resets hide; 2 resets of the board"
     assert verdict.status == "complete after arrival"
     assert Verdict._of({"counts": counts | {"decoder": {}}}) == "nothing lost"
     lost = Verdict._of({"counts": counts | {"missing": 3}})

@@ -17,6 +17,6 @@ pub fn cap() -> PyResult<()> {
     match std::env::var("TAXEL_INSTRUCTIONS") {
         Ok(name) => Instructions::cap(&name).map_err(core),
         Err(std::env::VarError::NotPresent) => Ok(()),
-        Err(std::env::VarError::NotUnicode(_)) => Err(core(problem!("TAXEL_INSTRUCTIONS is no text"))),
+        Err(std::env::VarError::NotUnicode(_)) => Err(core(problem!("TAXEL_INSTRUCTIONS is not text"))),
     }
 }

@@ -233,7 +233,7 @@ impl Header {
             }
             names.push(&source.name);
             if !source.sources.is_empty() {
-                return Err(problem!("source {:?}: holds sources of its own", source.name));
+                return Err(problem!("source {:?}: contains sources itself", source.name));
             }
             source.check()?;
         }

@@ -203,7 +203,7 @@ fn bytes_of_another_baud_rate_and_a_line_without_an_end_are_no_answer() {
             over.store(true, Ordering::Relaxed);
             let is_port = error.starts_with('/');
             let why =
-                if is_port { "bytes came that are no text: is its baud rate 115200?" } else { "is this the board's" };
+                if is_port { "bytes came that are not text: is its baud rate 115200?" } else { "is this the board's" };
             assert!(error.contains(why), "{error}");
         });
     });

@@ -338,7 +338,7 @@ export class Board {
     const waiting = [...this.controls.values()].filter(({ wanted }) => wanted !== null);
     if (!waiting.length) return true;
     const spoilt = waiting.filter(({ wanted }) => Number.isNaN(wanted));
-    for (const control of spoilt) control.refuse(`${control.input.value.trim() || "nothing"} is no number`);
+    for (const control of spoilt) control.refuse(`${control.input.value.trim() || "nothing"} is not a number`);
     if (spoilt.length) return false;
     const broken = refused(this.wanted());
     for (const control of waiting) {

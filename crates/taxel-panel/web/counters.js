@@ -11,7 +11,7 @@ const LOSSES = {
   kernel: "messages that the socket's buffer had no room for",
   queue: "datagrams that found no room before the decoder",
   wire: "datagrams that never arrived whole",
-  damaged: "bytes that were no words",
+  damaged: "bytes that were not words",
   outside: "taxels outside the array",
   readout: "events that found no room before the readout",
   panel: "events that only this panel's curves and its view of the past lack",

@@ -284,7 +284,7 @@ export class Labels {
     time.onchange = () => {
       const wanted = readTime(time.value);
       if (Number.isFinite(wanted)) this.change(time, { type: "move", label_id, t_us: wanted }, heldTime);
-      else this.refused(time, heldTime, new Error(`${time.value} is no number of ${timeUnit()}`));
+      else this.refused(time, heldTime, new Error(`${time.value} is not a number of ${timeUnit()}`));
     };
     go.onclick = () => {
       this.chosen = label_id;

@@ -71,7 +71,7 @@ export class Recorder {
     }
     part("record-reason", HTMLElement).hidden = true;
     for (const [id, field] of /** @type {const} */ ([["record-index", "index"], ["record-countdown", "countdown"], ["record-length", "length"]])) {
-      if (Number.isNaN(this.number(id))) return this.refuse(`${field}: ${part(id, HTMLInputElement).value.trim()} is no number`);
+      if (Number.isNaN(this.number(id))) return this.refuse(`${field}: ${part(id, HTMLInputElement).value.trim()} is not a number`);
     }
     const label = part("record-label", HTMLInputElement).value.trim();
     const format = /** @type {"mcap" | "lsa"} */ (part("record-format", HTMLSelectElement).value);

@@ -52,7 +52,7 @@ function fall(opened) {
 /** The same of the live source. @param {Hello | null} hello @param {Counters | null} counters @returns {string} */
 function liveFall(hello, counters) {
   if (!counters?.falls || !hello?.lines) return "";
-  return "The values fall from their rest, so that no pressure is shown. If less means more pressure, turn them: the source is read anew with “falls=true”.";
+  return "The values fall from their rest, so that no pressure is shown. If less means more pressure, turn them: the source is read again with “falls=true”.";
 }
 
 /** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */

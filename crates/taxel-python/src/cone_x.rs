@@ -35,7 +35,7 @@ fn target_index(target: f64) -> PyResult<usize> {
     if target >= 0.0 && target.fract() == 0.0 && target < 2f64.powi(53) {
         Ok(target as usize)
     } else {
-        Err(core(problem!("target {target}: must be a whole number from 0 on")))
+        Err(core(problem!("target {target}: must be a whole number, 0 or more")))
     }
 }
 

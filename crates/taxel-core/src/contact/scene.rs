@@ -174,7 +174,7 @@ impl Scene {
         if self.surface == Surface::Columns {
             if self.cells_per_pitch > 1 {
                 return Err(Error::scene(format!(
-                    "scene: cells_per_pitch is {}: must be 1 with surface \"columns\", which are no cells; take \"layer\"",
+                    "scene: cells_per_pitch is {}: must be 1 with surface \"columns\", which have no cells; use \"layer\"",
                     self.cells_per_pitch
                 )));
             }

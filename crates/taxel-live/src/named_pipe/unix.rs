@@ -15,7 +15,7 @@ use crate::{Error, Result};
 /// `File` if it cannot be opened, `Core(Problem)` if it is no pipe.
 pub(crate) fn open_to_write(path: &Path) -> Result<Option<File>> {
     if !std::fs::metadata(path).map_err(Error::file(path))?.file_type().is_fifo() {
-        return Err(problem!("{}: is no named pipe; mkfifo makes one", path.display()).into());
+        return Err(problem!("{}: is not a named pipe; mkfifo creates it", path.display()).into());
     }
     match File::options().write(true).custom_flags(libc::O_NONBLOCK).open(path) {
         Ok(file) => Ok(Some(file)),

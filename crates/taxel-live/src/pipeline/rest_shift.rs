@@ -81,7 +81,7 @@ impl RestShift {
         let gap_s = self.longest_ns as f64 / 1e9;
         Some(format!(
             "after a gap of {gap_s:.1} s {} of {} taxels rest elsewhere than by the tare, by up to {farthest} {unit}, so that \
-             presses are missed: with nothing on the sensor, zero all on the page, or start anew with --tare SECONDS",
+             presses are missed: with nothing on the sensor, zero all on the page, or start again with --tare SECONDS",
             shifted.len(),
             values.len()
         ))
@@ -124,7 +124,7 @@ mod tests {
                 line.starts_with("after a gap of 2.4 s 76 of 144 taxels rest elsewhere than by the tare, by up to 3"),
                 "{line}"
             );
-            assert!(line.contains("start anew with --tare SECONDS"), "{line}");
+            assert!(line.contains("start again with --tare SECONDS"), "{line}");
         }
     }
 

@@ -421,7 +421,7 @@ impl Reader {
             all.add(&message);
             if !message.topic.is_data() && message.topic != Topic::Pressure {
                 size += limits::OBJECTS * message.data.len();
-                self.fits("notes, detections and the like", size)?;
+                self.fits("notes, detections and similar", size)?;
             }
             Ok(())
         })?;

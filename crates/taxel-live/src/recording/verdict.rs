@@ -335,9 +335,9 @@ impl Verdict {
         } else if knows {
             "nothing lost".to_owned()
         } else if hidden && counted_by_kernel {
-            "nothing lost but for what resets hide".to_owned()
+            "nothing lost except what resets hide".to_owned()
         } else if hidden {
-            "nothing lost but for what resets hide or the kernel dropped uncounted".to_owned()
+            "nothing lost except what resets hide or the kernel dropped uncounted".to_owned()
         } else if !counted_by_kernel {
             UNCOUNTED.to_owned()
         } else {
@@ -372,7 +372,7 @@ impl Verdict {
             verdict.noted.insert("silences_of_other_computer".to_owned(), bridged.silences);
             verdict.noted.insert("restarts_of_other_computer".to_owned(), bridged.restarts);
             pieces.push(format!(
-                "the other computer was silent for a second or more {}, and began anew {}",
+                "the other computer was silent for a second or more {}, and began again {}",
                 counted(bridged.silences, "time"),
                 counted(bridged.restarts, "time")
             ));

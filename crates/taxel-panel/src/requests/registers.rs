@@ -190,7 +190,7 @@ pub(crate) async fn delete_preset(hub: &Hub, name: &str) -> Answer {
     read_presets(hub).await?;
     if hub.presets().presets.remove(name).is_none() {
         let built_in = PRESETS.iter().any(|preset| preset.name == name);
-        let why = if built_in { "is built in" } else { "is no preset of yours" };
+        let why = if built_in { "is built in" } else { "is not a preset of yours" };
         return Err(Refusal::of_field("name", format!("{name} {why}")));
     }
     write_presets(hub, turn).await

@@ -400,7 +400,7 @@ impl ConeRProblem {
         if same {
             Ok(())
         } else {
-            Err(problem!("neuron, delta_t_ms, margin and horizon are in the rows: lay them out anew"))
+            Err(problem!("neuron, delta_t_ms, margin and horizon are in the rows: lay them out again"))
         }
     }
 

@@ -388,7 +388,7 @@ impl Statement {
         }
         if self.neuron.time == Time::Grid && !self.is_point(example, t) {
             return Err(problem!(
-                "pattern {pattern}: {t} ms is no point of the grid, {start} + k {} ms",
+                "pattern {pattern}: {t} ms is not a point of the grid, {start} + k {} ms",
                 self.neuron.step_ms
             ));
         }
