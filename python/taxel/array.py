@@ -304,7 +304,7 @@ class Array:
             try:
                 first, last, _ = chosen.indices(size)
             except TypeError:
-                raise refused(name, f" is {shown(chosen)}: a slice goes from one whole number to another") from None
+                raise refused(name, f" is {shown(chosen)}: a slice must be from one whole number to another") from None
             limits.append((first, last))
         return limits[0], limits[1]
 

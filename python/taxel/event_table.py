@@ -128,7 +128,9 @@ def _us(location: str, name: str, cell: str, separator: str) -> int:
     if math.isnan(number):
         number, unit = seconds_of(cell), "s"
     elif not unit:
-        raise FormatError(f"{location}: {name} is {shown(cell)}, of no unit; name its column as '{name} [s]' or (ms)")
+        raise FormatError(
+            f"{location}: {name} is {shown(cell)}; its unit is not known; name its column as '{name} [s]' or (ms)"
+        )
     us = number * _US[unit]
     if not math.isfinite(us):
         raise FormatError(

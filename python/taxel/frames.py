@@ -73,7 +73,7 @@ class Frames(FrozenColumns):
             raise refused("t", f"[{k + 1}] is {self.t[k + 1]} us, not after t[{k}] = {self.t[k]} us")
         self.unit = text("unit", unit)
         if not unit:
-            raise refused("unit", " is '': must say what the values are in")
+            raise refused("unit", " is '': must be the unit of the values")
         self.array = Array(*self.values.shape[1:]) if array is None else instance("array", array, Array)
         if self.array.shape != self.values.shape[1:]:
             raise ProblemError(f"frames have shape {self.values.shape[1:]}: the array has {self.array.shape}")
@@ -190,7 +190,7 @@ class Frames(FrozenColumns):
         columns, rows = self.array.region(x, y)
         values = self.values[:, slice(*rows), slice(*columns)]
         if 0 in values.shape[1:]:
-            raise ProblemError(f"region {x}, {y}: no taxel of {self.array!r} lies in it")
+            raise ProblemError(f"region {x}, {y}: no taxel of {self.array!r} is in it")
         return Frames(values, self.t, unit=self.unit, array=self.array._part(x, y))
 
     @cached_property

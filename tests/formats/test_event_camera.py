@@ -276,7 +276,7 @@ def test_strong_bursts_are_told_from_weaker_ones(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"region": "0:65,0:48"}, "region '0:65,0:48': must lie within the sensor's 64 columns and 48 rows"),
+        ({"region": "0:65,0:48"}, "region '0:65,0:48': must be within the sensor's 64 columns and 48 rows"),
         ({"region": "9:9,0:48"}, "region '9:9,0:48': columns 9:9 holds none"),
         ({"region": "0:9,40:4"}, "region '0:9,40:4': rows 40:4: the first must be below the last"),
         ({"region": "1,2"}, "region is '1,2': must be columns and rows A:B,C:D"),

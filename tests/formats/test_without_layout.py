@@ -141,7 +141,7 @@ def test_tables_as_programs_write_them_open_by_the_layout_that_is_printed(
     begin = {"time (ms)": 0, "clock": 0}.get(time, 1_714_557_600_000_000)
     np.testing.assert_allclose(frames.t - begin, t * 1e6, atol=1)
     assert frames.unit == ("counts" if units is None else units.strip("[]"))
-    left = {"index": ("columns that are no taxels: column 1",), "texts": ("columns that are no taxels: who, note",)}
+    left = {"index": ("columns that are not taxels: column 1",), "texts": ("columns that are not taxels: who, note",)}
     assert recording.lost == left.get(more, ())
 
 
@@ -219,7 +219,7 @@ def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: 
         ("leave_out = [4]", r"a\.csv: 3 columns; leave_out is 4"),
         ("leave_out = [0]", "leave_out is 0: must be a whole number from 1"),
         ('leave_out = "who"', "leave_out is 'who': must be a list of columns"),
-        ('leave_out = ["time", "who"]\ntime_column = "time"', "column 'time' is time_column, and left out"),
+        ('leave_out = ["time", "who"]\ntime_column = "time"', "column 'time' is the time_column, and is left out"),
         (
             'leave_out = ["who"]\ntime_column = "time"\ntime_unit = "iso"',
             r"line 3: time is 'noon'; must be as 2024-05-01T",

@@ -74,7 +74,9 @@ def shapes(path: str | os.PathLike[str]) -> dict[str, tuple[int, ...]]:
             return found
         # As in `read_arrays`.
         except Exception as error:
-            raise FormatError(f"{path}: no whole {Path(path).suffix} ({first_line(error)}); write it again") from None
+            raise FormatError(
+                f"{path}: not a whole {Path(path).suffix} ({first_line(error)}); write it again"
+            ) from None
 
 
 def fields_of(path: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -129,7 +131,9 @@ def read_array(path: str | os.PathLike[str], dtype: DTypeLike | None = None) -> 
             if dtype is not None and stored_as.kind not in "biuf":
                 raise FormatError(f"{path}: {stored_as} of shape {shape}; must be a NumPy array of numbers")
             if size > stored:
-                raise FormatError(f"{path}: says that it holds {size} bytes ({shape}, {stored_as}); there are {stored}")
+                raise FormatError(
+                    f"{path}: states that it holds {size} bytes ({shape}, {stored_as}); there are {stored}"
+                )
             unpacked(str(path), _kept(shape, stored_as, dtype))
             file.seek(0)
             return _read(file, dtype, str(path))
@@ -222,7 +226,9 @@ def _arrays(
             unpacked(location, total)
             stored = archive.getinfo(members[name]).file_size - begin
             if size != stored:
-                raise FormatError(f"{location}: says that it holds {size} bytes ({shape}, {dtype}); there are {stored}")
+                raise FormatError(
+                    f"{location}: states that it holds {size} bytes ({shape}, {dtype}); there are {stored}"
+                )
         for name in there:
             with archive.open(members[name]) as array:
                 columns[name] = _read(array, dtypes.get(name), f"{path}: {name}")

@@ -287,7 +287,7 @@ def window(unit: str, start: object, stop: object) -> tuple[float, float]:
     """Return an interval of time whose start is not after its stop; either may be infinite."""
     first, last = number("start", start, unit), number("stop", stop, unit)
     if not first <= last:
-        raise ProblemError(f"window {plain(first)} to {plain(last)} {unit}: start must not lie after stop")
+        raise ProblemError(f"window {plain(first)} to {plain(last)} {unit}: start must not be after stop")
     return first, last
 
 

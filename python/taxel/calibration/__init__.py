@@ -101,7 +101,7 @@ class Calibration(Saved):
             checked_text("reading_unit", reading_unit),
         )
         if not reading_unit or reading_unit in UNITS:
-            raise refused("reading_unit", f" is {reading_unit!r}: must say what is read: ticks, counts")
+            raise refused("reading_unit", f" is {reading_unit!r}: must be the unit of the readings: ticks, counts")
         if isinstance(curve, PointCurve) and curve.x.ndim == 3 and curve.x.shape[1:] != array.shape:
             raise refused("readings", f" are of {curve.x.shape[1:]} taxels: the array has {array.shape}")
         calibration.gain = _by_taxel("gain", how.get("gain", 1.0), array)
@@ -279,7 +279,7 @@ class Calibration(Saved):
         checked_text("unit", unit, UNITS)
         measured = [instance("loads", load, Load) for load in several("loads", loads)]
         if not measured:
-            raise refused("loads", " is empty: lay at least one known load on the array")
+            raise refused("loads", " is empty: must hold at least one known load")
         array, reading_unit = instance("frames", measured[0].frames, Frames).array, measured[0].frames.unit
         curve: Curve = Power(1.0)
         if start is not None:

@@ -73,7 +73,7 @@ class _Command(TyperCommand):
         except FileExistsError as error:
             if error.filename is None:
                 raise
-            replace = "give --overwrite, or name another" if "overwrite" in self._options() else "name another"
+            replace = "give --overwrite, or another name" if "overwrite" in self._options() else "give another name"
             raise FileExistsError(errno.EEXIST, f"exists already; {replace}", error.filename) from error
 
     def _options(self) -> dict[str, Any]:

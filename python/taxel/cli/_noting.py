@@ -73,7 +73,7 @@ def _read(
                 write(label)
                 report(f"noted: {label}")
             except (Error, OSError) as error:
-                report(f"not noted: {error}")
+                report(f"note not saved: {error}")
         if not typed:
             return
 

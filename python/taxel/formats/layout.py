@@ -203,7 +203,7 @@ class PrintedFrames:
     def __post_init__(self) -> None:
         for name in ("place", "time"):
             if getattr(self, name) is not None and "," in text(name, getattr(self, name)):
-                raise refused(name, f" is {shown(getattr(self, name))}: must hold no comma")
+                raise refused(name, f" is {shown(getattr(self, name))}: must not contain a comma")
         if self.baud is not None:
             integer("baud", self.baud, 1)
         _check_end(self)
@@ -288,7 +288,7 @@ class Layout:
             # Readings are subtracted from it, and values of frames have 32 bits.
             object.__setattr__(self, "falls", finite("falls", self.falls, least=-VALUE, most=VALUE))
         if self.unit is not None and not text("unit", self.unit):
-            raise refused("unit", " is '': must say what the readings are in")
+            raise refused("unit", " is '': must be the unit of the readings")
         if self.rate_hz is not None:
             finite("rate_hz", self.rate_hz, "Hz", least=1e-9, most=1e6)
         if self.zeros_before_s is not None:
@@ -396,7 +396,9 @@ class Layout:
         shape = (self.rows, self.columns) if self.rows is not None else (1, taxels) if stated is None else stated.shape
         rows, columns = (integer(name, n, 1, 65_535) for name, n in zip(("rows", "columns"), shape, strict=True))
         if stated is not None and rows * columns != stated.rows * stated.columns:
-            raise ProblemError(f"says {rows} x {columns} taxels; the recording holds {stated.rows} x {stated.columns}")
+            raise ProblemError(
+                f"states {rows} x {columns} taxels; the recording holds {stated.rows} x {stated.columns}"
+            )
         places, is_mirrored = self.places, bool(self.side and side and self.side != side)
         if places is not None and is_mirrored:
             places = Places(-places.x, places.y, places.area, places.unit)
@@ -468,7 +470,7 @@ def _known(before: str, values: Mapping[str, Any], names: list[str]) -> None:
             (f" in [{table}]" for table, group in _TABLES.items() if not before and unknown in _keys(group)), ""
         )
         of_size = as_size(values[unknown])
-        hint = f"; a size is said by {of_size}" if of_size else f"; it stands{inner}" if inner else ""
+        hint = f"; a size is given by {of_size}" if of_size else f"; it belongs{inner}" if inner else ""
         raise ProblemError(f"unknown key {before}{unknown}{hint}; there are {', '.join(names)}")
 
 

@@ -217,13 +217,15 @@ def number(cell: str, path: Path, line: int, noun: str, *, unmarked: bool = Fals
     FormatError : no finite number (names file, line and column)
     """
     text, noun = cell.strip(), short(noun)
-    remedy = f"; if it marks a missing value, say in a layout file: [table] missing = {shown(text)}" if unmarked else ""
+    remedy = (
+        f"; if it marks a missing value, write in a layout file: [table] missing = {shown(text)}" if unmarked else ("")
+    )
     try:
         value = float_of(text)
     except ValueError:
         if _DECIMAL_COMMA.fullmatch(text):
             problem = f"has a decimal comma ({shown(text)}); "
-            problem += "say in a layout file: [table] decimal = ','" if unmarked else "export with decimal points"
+            problem += "write in a layout file: [table] decimal = ','" if unmarked else "export with decimal points"
         else:
             problem = f"is {shown(text)}, not a number" if text else "is empty, not a number"
             problem += remedy

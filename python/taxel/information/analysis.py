@@ -283,7 +283,9 @@ class _Answering(Question):
         # Recordings of a trial each may stand in any order.
         ordered = len({id(trial.source) for trial in self.trials}) < len(self.trials)
         if ordered and runs == len(np.unique(self.labels)) and len(self.labels) > 2 * runs:
-            self.notes.append("each label's trials lie together: a drift of the sensor would count as the label's")
+            self.notes.append(
+                "each label's trials are recorded together: a drift of the sensor would count as the label's"
+            )
         if not self.ended:
             self.notes.append("trials have no end of their own: how long a touch lasts is known within the window only")
 

@@ -166,7 +166,7 @@ class Answer:
         lines = []
         if estimate.bits <= self.zero.level:
             lines.append(
-                "not told from nothing: labels shuffled before training give as much "
+                "not distinguishable from 0 bits: labels shuffled before training give as much "
                 f"(95 % below {self.zero.level:.2f})"
             )
         guessed, least = _guessing(estimate)
@@ -177,7 +177,7 @@ class Answer:
             )
         if not self.empty:
             lines += [
-                f"{c.name} alone tells {c.found.bits:.2f} bits: the answer may be about that"
+                f"{c.name} alone gives {c.found.bits:.2f} bits: the answer may be about this measurement only"
                 for c in self.controls
                 if c.found is not None and c.found.interval[0] > 0 and c.found.bits >= _NEAR * estimate.bits
             ]

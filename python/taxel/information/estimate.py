@@ -177,14 +177,16 @@ def estimate(
         raise refused("responses", f" has shape {array.shape}: must be ({len(truth)},), one a label, or draws of it")
     share = number("confidence", confidence)
     if not 0 < share < 1:
-        raise refused("confidence", f" is {shown(confidence)}: must lie between 0 and 1")
+        raise refused("confidence", f" is {shown(confidence)}: must be between 0 and 1")
     rounds, random = integer("redraws", redraws, 2), np.random.default_rng(integer("seed", seed, 0))
     if (truth.dtype.kind == "U") != (answered.dtype.kind == "U"):
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers")
     classes = np.unique(np.concatenate([distinct(truth), distinct(answered.ravel())]))
     row, column = numbered(classes, truth), numbered(classes, answered)
     if len(np.unique(row)) < 2:
-        raise refused("labels", f" are all {shown(truth[0].item())}: must be two at least, or there is nothing to tell")
+        raise refused(
+            "labels", f" are all {shown(truth[0].item())}: must be two at least, or there is nothing to distinguish"
+        )
     belongs = None if groups is None else belonging(groups, len(truth))
     cells = row * len(classes) + column
     counts = _tables(cells, np.ones((1, len(truth)), np.int64), len(classes))[0]

@@ -86,7 +86,7 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
     a, b = instance("cheap", cheap, Estimate).local, instance("dear", dear, Estimate).local
     part = number("share", share)
     if not 0 < part < 1:
-        raise refused("share", f" is {shown(share)}: must lie between 0 and 1")
+        raise refused("share", f" is {shown(share)}: must be between 0 and 1")
     if len(a) != len(b):
         raise ProblemError(f"estimates of {len(a)} and {len(b)} trials: must be of the same")
     belongs = np.arange(len(a)) if groups is None else belonging(groups, len(a))

@@ -84,7 +84,7 @@ class LabelledTrial:
         if self.stop_us is not None:
             object.__setattr__(self, "stop_us", integer("stop_us", self.stop_us))
             if not self.stop_us > self.start_us:
-                raise ProblemError(f"{self.name}: stop {self.stop_us} us does not lie after start {self.start_us} us")
+                raise ProblemError(f"{self.name}: stop {self.stop_us} us is not after start {self.start_us} us")
 
     @property
     def array(self) -> Array:
@@ -139,7 +139,7 @@ def read_trials(
         recording.path for recording in opened if not {str(recording.path), recording.name, _stem(recording)} & names
     ]
     if unnamed:
-        raise ProblemError(f"{file}: says nothing of {unnamed[0]}; name it, or leave the recording out")
+        raise ProblemError(f"{file}: does not name {unnamed[0]}; add it, or leave the recording out")
     sources = {id(recording): _source(recording) for recording in opened}
     spans = {key: _span(source) for key, source in sources.items()}
     clocks = (
@@ -275,7 +275,7 @@ def _inside(trial: LabelledTrial, recording: str, span: tuple[int, int] | None, 
     end = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
     if span is None or trial.start_us > span[1] or end < span[0]:
         content = "nothing" if span is None else f"{span[0]} to {span[1]} us"
-        raise ProblemError(f"{trial.name}: t_us {trial.start_us} lies outside {recording}, which holds {content}")
+        raise ProblemError(f"{trial.name}: t_us {trial.start_us} is outside {recording}, which holds {content}")
 
 
 def _apart(trials: list[LabelledTrial], window_us: int) -> None:
@@ -287,7 +287,7 @@ def _apart(trials: list[LabelledTrial], window_us: int) -> None:
         for trial, after in pairwise(sorted(trials_of_source, key=lambda trial: trial.start_us)):
             before, apart = trial.name.split(", ")[-1], after.start_us - trial.start_us
             if apart == 0:
-                raise ProblemError(f"{after.name}: begins where {before} does; a touch must stand there once")
+                raise ProblemError(f"{after.name}: begins where {before} does; each touch must be listed once")
             if trial.stop_us is None and apart < window_us:
                 raise refused(
                     "window_ms",

@@ -11,8 +11,9 @@ __all__ = ["WIRE", "kilobits_per_second"]
 
 #: What the rates refer to, printed beside them.
 WIRE = (
-    "wire version 2: 2 bytes an event (kind 0), 4 with a value (kind 2); a datagram for each time at which something "
-    "changed, 24 bytes of its own, nothing held back; UDP and IP would add 28 a datagram; promises, states and totals "
+    "wire version 2: 2 bytes for each event (kind 0), 4 with a value (kind 2); a datagram for each time at which "
+    "something changed, with 24 bytes of header, sent at once; UDP and IP would add 28 bytes to each datagram; "
+    "promises, states and totals "
     "are not counted"
 )
 

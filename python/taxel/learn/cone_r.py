@@ -433,7 +433,7 @@ def _warn(cone: ConeR) -> None:
         more = f" and {len(cone.unreachable_) - 5} more" if len(cone.unreachable_) > 5 else ""
         within = f"within {_shown(cone.lb)} to {_shown(cone.ub)} mV"
         warn(
-            f"no weights {within} bring {listed}{more} to the threshold; the rest was fitted",
+            f"no weights {within} raise {listed}{more} to the threshold; the rest was fitted",
             stacklevel=4,
         )
     if cone.refires_:
@@ -447,7 +447,7 @@ def _warn(cone: ConeR) -> None:
         )
     if cone.status_ != "solved":
         warn(
-            f"the objective is only proven to lie within {cone.gap_:.1e} of its least value (tolerance "
+            f"the objective is only proven to be within {cone.gap_:.1e} of its least value (tolerance "
             f"{cone.tolerance:.1e})",
             stacklevel=4,
         )

@@ -1,7 +1,7 @@
 """The lab streaming layer: its streams as sources of a recording, and detections as one of its streams.
 
-Its library listens on every address of the machine, TCP and UDP from port 16572 on, and taxel cannot change that: so
-it is loaded only if a stream is named, and then with a warning.
+Its library listens on every address of the machine, TCP and UDP, at port 16572 and above. taxel cannot change that, so it
+loads the library only if a stream is named, and then warns.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ def _pylsl() -> Any:
     except ImportError:
         raise ImportError(f"pylsl is not installed: {installing('lsl')}") from None
     warn(
-        "the lab streaming layer listens on all addresses of this machine, TCP and UDP from port 16572 on", stacklevel=3
+        "the lab streaming layer listens on all addresses of this machine, TCP and UDP, at port 16572 and above",
+        stacklevel=3,
     )
     return pylsl
 

@@ -312,7 +312,7 @@ def _folder_and_name(path: Path, options: TextOptions) -> tuple[Path, str]:
     try:
         path.name.encode()
     except UnicodeEncodeError:
-        raise ProblemError(f"{path}: its name is no UTF-8, which the page cannot hold; rename it") from None
+        raise ProblemError(f"{path}: its name is not UTF-8, so the page cannot show it; rename it") from None
     return path.parent, path.name
 
 

@@ -120,8 +120,8 @@ class Slices(Mapping[str, RecordedSource]):
         source = self._slices[name]
         if self._apart():
             raise ProblemError(
-                f"{self._origin.path}: a slice by one clock, and its sources ({', '.join(self)}) have each its own; "
-                "say on_clock(name) before between"
+                f"{self._origin.path}: a slice by one clock, but its sources ({', '.join(self)}) have different "
+                f"clocks; call on_clock(name) before between"
             )
         return source
 

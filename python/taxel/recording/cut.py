@@ -104,7 +104,7 @@ def region(contents: Contents, columns: slice, rows: slice) -> Contents:
             for name, chosen in (("columns", columns), ("rows", rows))
             if chosen != slice(None)
         )
-        raise ProblemError(f"{bounds}: no taxel lies there; there are {array.columns} columns and {array.rows} rows")
+        raise ProblemError(f"{bounds}: no taxel is there; there are {array.columns} columns and {array.rows} rows")
     if (bottom - top, right - left) == array.shape:
         return contents
     refuse_several(contents.main)

@@ -101,8 +101,8 @@ class OpenOptions(SharedOptions):
 
 def _no_camera(path: Path) -> ProblemError:
     return ProblemError(
-        f"{path}: holds no events without intensities, as an event camera's file does; region, bin, window_ms and "
-        "polarity are of these"
+        f"{path}: not a file of an event camera (events without intensities); region, bin, window_ms and polarity "
+        f"are only for such files"
     )
 
 
@@ -260,14 +260,14 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
             case recognition.ForeignFile():
                 assert layout is not None  # one without is refused
                 if options.topics.are_given:
-                    raise ProblemError(f"{path}: no ROS bag; topic, field, types and ros are of one")
+                    raise ProblemError(f"{path}: not a ROS bag; topic, field, types and ros are only for ROS bags")
                 array = None if options.array is None else Array._given(options.array)
                 contents = Contents.single(read_foreign(path, layout, array))
                 if array is not None and not contents.main.has_events:
                     contents = Contents.single(_on_given(contents.main, array))
             case recognition.TaxelFile(kind):
                 if options.topics.are_given:
-                    raise ProblemError(f"{path}: a .{kind}; topic, field, types and ros are of a ROS bag")
+                    raise ProblemError(f"{path}: a .{kind}; topic, field, types and ros are only for ROS bags")
                 array = None if options.array is None else Array._given(options.array)
                 if kind == "records" and array is None and layout is not None:
                     array = layout.grid()
@@ -277,7 +277,7 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
         return [Recording(with_sidecars(_of_camera(contents, path, options.reduction, layout)))]
     except MemoryError:
         raise helped(
-            FormatError(f"{path}: needs more memory than there is ({limits.available()} bytes are available)"),
+            FormatError(f"{path}: needs more memory than is available ({limits.available()} bytes)"),
             "limit",
             "larger",
         ) from None
@@ -409,8 +409,8 @@ def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
         beside = ", ".join(file.name for file in recorded[:3]) + " ..." * (len(recorded) > 3)
         warn(
-            f"{folder}: {names} left out, as beside recordings ({beside}) tables and arrays are not read: convert "
-            "them, or keep them in a folder of their own",
+            f"{folder}: {names} left out, as tables and arrays are not read in a folder with recordings ({beside}): "
+            f"convert them, or move them to a separate folder",
             stacklevel=6,
         )
 
@@ -424,7 +424,7 @@ def _add_labels(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Record
     unknown = [name for name in labels.recordings if name not in known]
     if unknown:
         names = ", ".join(str(name) for name, _ in pairs[:8])
-        raise FormatError(f"{table}: {unknown[0]} is no recording of this folder; there are {names}")
+        raise FormatError(f"{table}: {unknown[0]} is not a recording of this folder; there are {names}")
     # The feet of one trial are one recording.
     count = len({trial_of(str(name), recording.label) for name, recording in pairs})
     if count > 1 and any(not row.recording for row in labels.rows):
@@ -505,7 +505,7 @@ def _recording_of(trial: Trial, path: Path, kind: str, given_layout: str | os.Pa
 def _beside_frames(trial: Trial) -> tuple[str, ...]:
     """Return the line of `lost` for what a file holds of a trial beside its taxels, times and reference events."""
     names = [*trial.series, *trial.unread]
-    return (f"columns that are no taxels: {', '.join(names)}",) if names else ()
+    return (f"columns that are not taxels: {', '.join(names)}",) if names else ()
 
 
 def join_feet(opened: Sequence[Recording]) -> list[Recording]:

@@ -110,7 +110,7 @@ class Recording:
         """
         events = self._contents.main.table
         if not isinstance(events, Events):
-            raise ProblemError(f"{self.path}: holds frames and no events; ask for frames()")
+            raise ProblemError(f"{self.path}: holds frames and no events; call frames()")
         return events
 
     def frames(self, rate_hz: float | None = None) -> Frames:
@@ -319,7 +319,7 @@ class Recording:
         """
         columns = self._contents.main.columns
         if columns is None:
-            raise ProblemError(f"{self.path}: source {self.label!r} is no stream of numbers, so it has no columns")
+            raise ProblemError(f"{self.path}: source {self.label!r} is not a stream of numbers, so it has no columns")
         return list(columns)
 
     @property
@@ -346,14 +346,14 @@ class Recording:
         if self.is_stream:
             why = f"source {self.label!r} is a stream of numbers, which has lines and no datagrams"
         elif self.kind == "mcap":
-            why = "a part of the sensor has no datagrams; those of the file are of the whole"
+            why = "a part of the sensor has no datagrams; the datagrams of the file belong to the whole sensor"
         else:
             why = f"the {kind_of_file(self.kind)} holds no datagrams; only .mcap does"
         raise ProblemError(f"{self.path}: {why}")
 
     @property
     def counts(self) -> dict[str, Any]:
-        """The numbers of what was received and lost, by cause."""
+        """The numbers of the counts of received and lost data, by cause."""
         return dict(self._contents.main.losses.counts())
 
     @property
@@ -457,7 +457,7 @@ class Recording:
         if recording is None:
             return f"{bounds} of {self.title}"
         t = recording._contents.main.table.t
-        return f"{bounds}: {recording.title} " + (f"lies from {t.min()} to {t.max()} us" if len(t) else "is empty")
+        return f"{bounds}: {recording.title} " + (f"is from {t.min()} to {t.max()} us" if len(t) else "is empty")
 
     def at_rate(self, rate_hz: float) -> Recording:
         """Return the same recording of numbered frames with times: so many frames a second, the first at 0.

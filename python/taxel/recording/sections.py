@@ -93,7 +93,7 @@ class Sensor:
     def losses(self) -> list[str]:
         """Return what a file without this section does not hold, but for the array."""
         lines = [f"the side ({self.side})"] * bool(self.side)
-        return lines + [f"where the heel lies ({self.heel})"] * bool(self.heel)
+        return lines + [f"where the heel is ({self.heel})"] * bool(self.heel)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,7 @@ class Timing:
 
     def losses(self) -> list[str]:
         """Return what a file without this section does not hold, but for arrival times."""
-        return [f"by whose clock times are ({self.clock_of})"] * (self.clock_of is not None)
+        return [f"the clock of the times ({self.clock_of})"] * (self.clock_of is not None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,14 +195,14 @@ class Losses:
     def losses(self) -> list[str]:
         """Return what a file without this section does not hold, one line each."""
         counts = self.counts.holds()
-        lines = ["what was received and lost, by cause"] * counts
+        lines = ["the counts of received and lost data, by cause"] * counts
         # With counts, this is what they say.
-        lines += ["what was lost, in one line"] * (not counts and self.verdict() is not None)
+        lines += ["the summary of losses"] * (not counts and self.verdict() is not None)
         return lines + [f"the remark: {line}" for line in self.remarks] + self.damage()
 
     def damage(self) -> list[str]:
         """Return what a file that does not state its damage lacks."""
-        return ["that its end is missing"] * self.truncated + ["what reading had to put up with"] * self.rebuilt.holds()
+        return ["that its end is missing"] * self.truncated + ["the remarks on reading it"] * self.rebuilt.holds()
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +241,7 @@ class FrameTable:
         lines = ["that its frames have no times"] * self.untimed
         lines += [] if self.turned is None else [f"that its readings were turned (falls = {self.turned:g})"]
         return lines + (
-            [] if self.frame_us is None else [f"that a readout took its frames to last {self.frame_us:g} us"]
+            [] if self.frame_us is None else [f"the length of a frame that a readout assumed, {self.frame_us:g} us"]
         )
 
 
@@ -275,7 +275,7 @@ class Wire:
     def losses(self, *, with_times: bool = False) -> list[str]:
         """Return what a file without this section does not hold; the other fields say how bytes are encoded."""
         lines = ["raw datagrams" + " with their arrival times" * with_times] * self.datagrams.holds()
-        return lines + ["raw bytes (words that are no events)"] * (self.payload is not None and self.payload.size > 0)
+        return lines + ["raw bytes (words that are not events)"] * (self.payload is not None and self.payload.size > 0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -294,7 +294,7 @@ def _pressed(outcome: Outcome, frames: Frames) -> tuple[NDArray[np.int64], NDArr
 def _about(outcome: Outcome, readout: Readout | PlainRule) -> list[str]:
     """Return what else is known of the detections in a recording."""
     lines = [f"{outcome.outside_text}."] if isinstance(readout, Readout) else []
-    return [*lines, *([f"Times are from {begun(outcome.begin_us)} on."] if outcome.begin_us else [])]
+    return [*lines, *([f"Times are counted from {begun(outcome.begin_us)}."] if outcome.begin_us else [])]
 
 
 def _together(listened: Sequence[Outcome]) -> list[tuple[str, int, Score | None]]:

@@ -190,13 +190,13 @@ def _bodies(described: Any, folder: Path) -> Any:
                 if isinstance(kinds, Mapping) and len(kinds) > 1:
                     raise SceneError(f"bodies[{n}].{part} is {' and '.join(kinds)}: must be one of them")
             if "mass_g" in body and "material" in body:
-                raise SceneError(f"bodies[{n}] has mass_g and material: must have one of both")
+                raise SceneError(f"bodies[{n}] has mass_g and material: must have only one of them")
         shape: Any = body.get("shape") if isinstance(body, Mapping) else None
         relief = shape.get("height_map") if isinstance(shape, Mapping) else None
         if isinstance(relief, Mapping) and "file" in relief:
             where = f"bodies[{n}].shape.height_map"
             if "heights_mm" in relief:
-                raise SceneError(f"{where} has heights_mm and a file: must have one of both")
+                raise SceneError(f"{where} has heights_mm and a file: must have only one of them")
             file = folder / text(f"{where}.file", relief["file"])
             try:
                 rows = read_text(file, DESCRIPTION).replace(",", " ").splitlines()

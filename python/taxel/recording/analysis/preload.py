@@ -46,8 +46,8 @@ def free_of_preload(recording: Recording, rest: Rest) -> tuple[tuple[int, int] |
 
 def _line(recording: Recording, rest: Rest, *, found: bool) -> str:
     """Return the line on a tare beside a rest with something on the array, where a time without it was found or not."""
-    without = "so the tare is of a time without it"
-    lacks = "and there is no other rest, so the tare holds it; give a tare's file"
+    without = "so the tare is measured in a time without it"
+    lacks = "and there is no other rest, so the tare includes it; give a tare's file"
     return f"{recording.path}: the rest is {rest}, {without if found else lacks}"
 
 

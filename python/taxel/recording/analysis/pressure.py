@@ -521,7 +521,7 @@ def _measured(recording: Recording, tare: Tare | None) -> Rest | None:
     if tare is not None:
         if tare.array.shape != recording.array.shape:
             measured, stated = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
-            raise ProblemError(f"the tare is of {measured} taxels, {recording.path} of {stated}")
+            raise ProblemError(f"the tare has {measured} taxels, {recording.path} has {stated}")
         return Rest("tare", tare.rest.reshape(-1))
     calibration = recording.calibration
     if calibration is None or calibration.rest is None:

@@ -103,7 +103,7 @@ class Rest:
             "tare": "the given tare",
             "calibration": "the calibration's",
             "unit": "0, as the values are force or pressure",
-            "none": "not known, as no half second was quiet with nothing on it; a tare can be given",
+            "none": "not known, as no half second was both quiet and without load; a tare can be given",
         }
         text = words.get(self.source, "")
         if self.quiet_us is not None:
@@ -119,8 +119,8 @@ class Rest:
         """Return what to do of values that fall; of the recording of a path it names the layout file."""
         layout, turning = Rest.turning(path)
         if layout:
-            return f"values fall from their rest as {layout} turns them: leave falls out of it, if that is wrong"
-        return f"values fall from their rest: if less means more pressure, say {turning}"
+            return f"values fall from their rest as {layout} turns them: if that is wrong, leave falls out of it"
+        return f"values fall from their rest: if less means more pressure, write {turning}"
 
     @staticmethod
     def turning(path: Path | None = None) -> tuple[str, str]:

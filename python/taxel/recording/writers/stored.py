@@ -86,7 +86,7 @@ def _storable(source: RecordedSource, ending: str, path: Path) -> RecordedSource
     )
     alone = source.sensor.calibration.holds() and not beside.holds()
     return with_losses(
-        stored, lambda: [*lines, *["the calibration, a file of its own: lay a copy beside the new one"] * alone]
+        stored, lambda: [*lines, *["the calibration, a separate file: put a copy beside the new file"] * alone]
     )
 
 
