@@ -39,7 +39,7 @@ WORDS = {
     r"\bcomes? along\b": "is included",
     r"\bin the place of\b": "instead of",
     r"\bof (?:its|their|his|an) own\b|\bown one\b": "separate; its",
-    r"\b(?:other|another|this|that|each) one\b": "name the thing",
+    r"\b(?:other|another|this|(?<!so )that|each) one\b(?! of)": "name the thing",
     r"\bfrom [\w.]+(?: \w+)? on\b": "after, since, ... or later",
     r"\bstands?\b(?! for)": "is",
     r"\bbrings?\b": "gives, adds",

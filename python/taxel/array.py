@@ -28,7 +28,7 @@ class Places:
     Parameters
     ----------
     x, y : float64, shape (rows, columns) or (taxels,), in `unit`
-        To the right and downwards from any origin; finite. What is given for a taxel that does not exist is not used.
+        To the right and downwards from any origin; finite. Values for a taxel that does not exist are not used.
     area : float64, of the same shape, in the square of `unit`, above 0, optional
         The area of each taxel, if it is known.
     unit : {"mm"}, optional
@@ -228,11 +228,11 @@ class Array:
 
     @property
     def _has_neighbours(self) -> bool:
-        """Whether taxels are known to lie side by side: a single row or column without a pitch is channels."""
+        """Whether taxels are known to be side by side: a single row or column without a pitch is channels."""
         return self.pitch_mm is not None or 1 not in self.shape or self.shape == (1, 1)
 
     def _padded(self, shape: tuple[int, int]) -> Array:
-        """Return a grid of which this one is the first rows and columns."""
+        """Return a larger grid, whose first rows and columns are this array."""
         return Array(*shape, self.pitch_mm, name=self.name)
 
     @property
@@ -241,7 +241,7 @@ class Array:
         return self.exists is None and self.places is None and 1 not in self.shape
 
     def _holds(self, array: Array) -> bool:
-        """Whether a smaller sensor can be this one's first rows and columns."""
+        """Whether a smaller sensor can be the first rows and columns of this array."""
         are_grids = self._is_whole_grid and array._is_whole_grid
         return are_grids and array.rows <= self.rows and array.columns <= self.columns
 
@@ -432,7 +432,7 @@ class Array:
         return True
 
     def _part(self, x: slice, y: slice) -> Array:
-        """Return a rectangle of columns `x` and rows `y`, which holds a taxel, as a sensor of its own."""
+        """Return a rectangle of columns `x` and rows `y`, which holds a taxel, as a separate sensor."""
         (left, right), (top, bottom) = self.region(x, y)
         rows, columns = slice(top, bottom), slice(left, right)
         exists = None if self.exists is None else self.exists[rows, columns]
@@ -521,8 +521,8 @@ def _places_beside(
 ) -> Places | None:
     """Return the places of arrays side by side; None unless all have them in one unit.
 
-    Arrays that stand apart from left to right keep their places, as those of two feet in one system of coordinates;
-    others are set half a width apart.
+    Arrays that do not overlap from left to right keep their places, for example those of two feet in one system of
+    coordinates; others are set half a width apart.
     """
     places = [array.places for array in arrays if array.places is not None]
     if len(places) < len(arrays) or len({sensor.unit for sensor in places}) > 1:
@@ -555,7 +555,7 @@ def of_size(size: str, *, of_wire: bool = True) -> Array:
 
     Raises
     ------
-    ProblemError : the text is no such size
+    ProblemError : the text is not such a size
     """
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})(?:x(\d{1,4}(?:\.\d{1,6})?))?", size, re.ASCII)
     if match is None:

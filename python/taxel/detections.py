@@ -216,7 +216,7 @@ class Detections(FrozenColumns):
 
         Raises
         ------
-        ProblemError : a start that lies after the stop, or is no number
+        ProblemError : a start after the stop, or a time that is not a number
 
         Examples
         --------
@@ -282,7 +282,7 @@ class Detections(FrozenColumns):
 
         Raises
         ------
-        ProblemError : something that is no detection
+        ProblemError : something that is not a detection
 
         Examples
         --------

@@ -116,7 +116,7 @@ class Cable:
     Raises
     ------
     OSError : the port or the server cannot be opened, or another program has opened the port
-    DeviceError : the place is no serial port
+    DeviceError : the place is not a serial port
     ProblemError : an invalid place, baud rate or timeout
 
     Notes

@@ -33,7 +33,7 @@ def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
     ----------
     table : HeaderTable
     separator : str
-        What separates its cells: if it is no comma, numbers may have decimal commas.
+        Separator of its cells: unless it is a comma, numbers may have decimal commas.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def _us(location: str, name: str, cell: str, separator: str) -> int:
 
 
 def _number(cell: str, separator: str) -> float:
-    """Return the number of a cell, with a decimal comma where that is no separator; NaN of a text."""
+    """Return the number of a cell, with a decimal comma unless that is the separator; NaN for a text."""
     try:
         return float_of(cell if separator == "," else cell.replace(",", "."))
     except ValueError:

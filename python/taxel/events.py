@@ -59,7 +59,7 @@ class Events(FrozenColumns):
     p : bool, shape (events,)
         Polarity: more pressure (true) or less.
     array : Array
-        The sensor; every event must lie on it.
+        The sensor; every event must be on it.
     intensity : uint16, shape (events,), ticks, optional
         The held value that arrived with each change (1/300 us of the board's counter).
     present : bool, shape (events,), optional
@@ -140,7 +140,7 @@ class Events(FrozenColumns):
 
         Raises
         ------
-        ProblemError : a start that lies after the stop, or is no number
+        ProblemError : a start after the stop, or a time that is not a number
 
         Examples
         --------

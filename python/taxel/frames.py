@@ -160,7 +160,7 @@ class Frames(FrozenColumns):
 
         Raises
         ------
-        ProblemError : a start that lies after the stop, or is no number
+        ProblemError : a start after the stop, or a time that is not a number
 
         Examples
         --------
@@ -204,9 +204,9 @@ class Frames(FrozenColumns):
     def held(self) -> Frames:
         """Return the frames with each missing value (NaN) filled by the last one that the taxel read.
 
-        No news is no change, as of a board that sends only changes. Before its first value a taxel reads that one; a
-        taxel without any reads 0. Encoders, trainings, readouts and tares of a `Recording` do this themselves, with a
-        warning that counts the values; from frames they need it done.
+        A missing value means no change, as with a board that sends only changes. Before its first value a taxel reads
+        that value; a taxel without any value reads 0. Encoders, trainings, readouts and tares of a `Recording` do this
+        themselves, with a warning that counts the values; from frames they need it done.
 
         Returns
         -------
@@ -246,7 +246,7 @@ class Frames(FrozenColumns):
 
         Raises
         ------
-        ProblemError : a level that is no number, or taxels whose area is not known (`loaded` counts them)
+        ProblemError : a level that is not a number, or taxels whose area is not known (`loaded` counts them)
 
         Examples
         --------
@@ -277,7 +277,7 @@ class Frames(FrozenColumns):
 
         Raises
         ------
-        ProblemError : a level that is no number
+        ProblemError : a level that is not a number
 
         Examples
         --------

@@ -161,7 +161,7 @@ class Labels:
     def times(self, recording: Recorded) -> dict[str, NDArray[np.int64]]:
         """Return the events of a `taxel.Recording` by label, us on its own clock; empty if the table does not name it.
 
-        A recording that began in mid-stream counts from its first stamp, which lies a whole number of wraps of the
+        A recording that began in mid-stream counts from its first stamp, which is a whole number of wraps of the
         board's clock (6.5536 s each) behind the board's time. The number follows from the host's time if both have it.
 
         Parameters

@@ -225,7 +225,7 @@ def test_without_one_nothing_is_called_newton(tmp_path):
     recording = taxel.open(tmp_path / "press.npz")
     assert recording.calibration is None
     with pytest.raises(
-        ProblemError, match="there is no calibration beside it, .*; taxel calibrate makes a calibration"
+        ProblemError, match=r"there is no calibration beside it, .*; taxel calibrate makes a calibration"
     ):
         recording.calibrated()
 

@@ -160,7 +160,7 @@ def read_arrays(
     wanted : names of arrays; others are ignored
     texts : dict from the names of those that hold one text to how many characters it may have
     dtypes : dict from name to dtype
-        What numbers are converted to, piece by piece as they are read. What a float cannot hold becomes infinite.
+        What numbers are converted to, piece by piece as they are read. Values too large for a float become infinite.
     chosen : function of a dict from name to shape
         Which of those that there are are read; it may refuse them by their shapes before any is read.
 

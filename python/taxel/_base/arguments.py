@@ -356,7 +356,7 @@ def _first_changed(received: NDArray[Any], array: NDArray[Any]) -> tuple[int, ..
 
 
 def _refuse_others(name: str, values: NDArray[Any]) -> None:
-    """Refuse entries of an array of objects that NumPy converts although they are no numbers: texts, None, spans."""
+    """Refuse entries of an array of objects that NumPy converts although they are not numbers: texts, None, spans."""
     if any(issubclass(kind, _NO_NUMBERS) for kind in set(map(type, values.flat))):
         index, value = next((at, entry) for at, entry in np.ndenumerate(values) if isinstance(entry, _NO_NUMBERS))
         where = f"[{', '.join(map(str, index))}]" if index else ""

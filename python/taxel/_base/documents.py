@@ -162,7 +162,7 @@ def of_json(location: str, text: str, most: int = BY_HAND, *, room: int = UNPACK
 
     Raises
     ------
-    FormatError : not JSON, as NaN and Infinity are not, a key that stands twice in an object, too long, or nested too
+    FormatError : not JSON, as NaN and Infinity are not, a key that is twice in an object, too long, or nested too
         deeply
     """
     _check_length(location, text, most)

@@ -1,7 +1,7 @@
 """Makes errors whose argument and remedy are data, and the line that shows them.
 
 An error that has an argument (`Error.argument`) names it once: before its text, or, with a remedy (`Error.hint`),
-within the remedy. The command line puts its option in the place of the argument.
+within the remedy. The command line puts its option instead of the argument.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ _NO_LINK = (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS)
 
 
 def beside(path: Path, name: str) -> Path:
-    """Return the place of a file of this name in the folder that a file or folder lies in.
+    """Return the place of a file of this name in the folder of a file or folder.
 
     Examples
     --------

@@ -52,7 +52,7 @@ def _nothing(port: int, seconds: float) -> str:
 
 
 class _Check:
-    """One check, as it goes on."""
+    """One check while it runs."""
 
     def __init__(self, say: Callable[[Finding], object] | None) -> None:
         self.say, self.findings = say, list[Finding]()

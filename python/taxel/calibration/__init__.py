@@ -51,7 +51,7 @@ class Calibration(Saved):
     rest : float64, shape (rows, columns), or None
         What taxels read without a load, where it is known; NaN where it is not, and such taxels give 0.
     floor : float, in readings
-        The noise floor: a reading that is no more than this above rest is no load.
+        The noise floor: a reading that is no more than this above rest is not a load.
     date : str
         The day, as 2026-11-21.
     residual : float or None
@@ -198,7 +198,7 @@ class Calibration(Saved):
         ----------
         array : Array
         readings : float64, shape (points,) or (points, rows, columns), above rest, rising
-            The same for all taxels but for their gains, or what each reads under the same values.
+            The same for all taxels except for their gains, or the readings of each taxel under the same values.
         values : float64, shape (points,), in `unit`, rising
             A first point (0, 0) is added. Beyond the last point the last value holds.
         unit : {"N", "kPa"}
@@ -249,14 +249,14 @@ class Calibration(Saved):
         loads : list of Load, one or more
             All of one array and in one unit of readings.
         unit : {"N", "kPa"}
-            Of the calibration. Between N and kPa stands the area of each taxel.
+            Unit of the calibration. To convert between N and kPa, the area of each taxel must be known.
         start : Calibration, optional
             The calibration whose curve (a law, a table) is fitted; else a power of the reading.
         exponent : float, above 0, optional
             Of the value by the reading's conductance or count, not to be fitted. Left out, it is 1 (of a law, its own)
             where all loads are alike.
         each : bool
-            A gain of its own for each taxel that a load determines: uniform pressure (kPa), or a load on one
+            A separate gain for each taxel that a load determines: uniform pressure (kPa), or a load on one
             taxel. The others keep the common one.
         rest : Tare or float64, shape (rows, columns), in the unit of the readings, optional
             That of `start`, or 0, where it is left out.
@@ -287,7 +287,7 @@ class Calibration(Saved):
             same(array, start.array, "start")
             if (start.reading_unit, start.unit) != (reading_unit, unit):
                 raise ProblemError(
-                    f"start turns {start.reading_unit} into {start.unit}: must turn {reading_unit} into {unit}"
+                    f"start converts {start.reading_unit} to {start.unit}: must convert {reading_unit} to {unit}"
                 )
             curve, rest = start._curve, start.rest if rest is None else rest
         fitted = cls._made(array, curve, unit, reading_unit, {"rest": rest, "floor": floor, "date": date, "note": note})
@@ -447,7 +447,7 @@ class Calibration(Saved):
 
     @staticmethod
     def beside(recording: str | os.PathLike[str]) -> Path | None:
-        """Return the file of the calibration that lies beside a recording; None where there is none.
+        """Return the file of the calibration beside a recording; None if there is none.
 
         Parameters
         ----------

@@ -51,7 +51,7 @@ class Load(NamedTuple):
 
 
 class CalibratedArray(NamedTuple):
-    """What is calibrated: its array, the units of its readings and of the result, its rest, and the floor above it."""
+    """Sensor to calibrate: its array, the units of its readings and of the result, its rest, and the floor above it."""
 
     array: Array
     reading_unit: str

@@ -79,7 +79,7 @@ def _read(
 
 
 def _keys(typed: str) -> list[str]:
-    """Return a label for each key: its letter, "mark" for space and return; none for arrow keys and the like."""
+    """Return a label for each key: its letter, "mark" for space and return; none for arrow keys and similar."""
     if typed.startswith("\x1b"):
         return []
     return [

@@ -105,7 +105,7 @@ class FileOptions:
 
     @property
     def opener(self) -> TextOptions:
-        """What opens files by these options."""
+        """Opener of files with these options."""
         from taxel.recording.text_options import TYPED, TextOptions  # noqa: PLC0415  the command line starts quickly
 
         names = {typed: name for name, typed in TYPED.items()}

@@ -294,7 +294,7 @@ def _pairs(option: str, assignments: Iterable[str], known: Collection[str]) -> d
 
 
 def _number(option: str, name: str, value: str) -> float:
-    """Return a number as it was typed: 2 is no 2.0 in an error."""
+    """Return a number as it was typed: an error shows 2, not 2.0."""
     try:
         number = float_of(value)
     except ValueError:

@@ -164,7 +164,7 @@ def train(
 
 
 def _trained(opened: Sequence[Recording], labels: str, options: TrainOptions, *, as_json: bool) -> Training:
-    """Train; where nearly no label lies near anything felt, ask first on a terminal."""
+    """Train; if almost no label is near anything that the sensor felt, ask first on a terminal."""
     try:
         with progress(as_json) as update:
             return taxel.train(opened, labels, options, progress=update)

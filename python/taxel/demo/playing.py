@@ -1,4 +1,4 @@
-"""The demo while it runs: the board in a process of its own, the host here."""
+"""The demo while it runs: the board in a separate process, the host here."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Composite(Encoder):
 
     Raises
     ------
-    ProblemError : no part, a part that is no encoder, or an invalid parameter of one (names it)
+    ProblemError : no part, a part that is not an encoder, or an invalid parameter of a part (names it)
 
     Examples
     --------

@@ -30,7 +30,7 @@ class Moments(Tared):
     each moment in the order area, total, peak, x, y. During a touch it fires at every sample with the value
     log(1 + moment), of a displacement log(1 + its size) with its sign; where the value is 0 there is no spike. With
     `centre` four more follow: the column of the centre, from -1 for the first to 1 for the last, its square, its row
-    and that one's square, as they are. With `ages_ms` the last trains are one an age. During a touch, at every sample,
+    and the row's square, as they are. With `ages_ms` the last trains are one an age. During a touch, at every sample,
     one of them fires: that of the largest of the ages that the touch has reached. Age is counted from the encoder's own
     onset, the first sample at which area is above 0. A sample is a frame, or of events the state every `period_ms` from
     the first stamp.

@@ -1,4 +1,4 @@
-"""Encoder of the peak: the largest deviation of a taxel in units of its own noise."""
+"""Encoder of the peak: the largest deviation of a taxel in units of its noise."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _DEFAULT = defaults("peak")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Peak(Tared):
-    """Fire as the largest deviation of a taxel from its rest reaches and leaves levels, in units of its own noise.
+    """Fire as the largest deviation of a taxel from its rest reaches and leaves levels, in units of its noise.
 
     With u a value less its rest, divided by the taxel's standard deviation in the tare (at least `least_noise`), the
     peak is the largest u, and where several are 4 or more, the root of the sum of their squares; at least 0. It depends

@@ -87,7 +87,7 @@ class Skin(Tared):
         Density of each type, afferents per cm^2 of taxels; 0 excludes a type.
     sa1_field_mm2, fa1_field_mm2, sa2_field_mm2, fa2_field_mm2 : float, mm^2, above 0
         Area of the receptive field of each type: a disc, whose taxels are averaged with Gaussian weights; its edge is
-        at two standard deviations. If no centre of a taxel lies in it, the field is the taxel at its position.
+        at two standard deviations. If no centre of a taxel is in it, the field is the taxel at its position.
     range : float, in the sensor's unit, above 0
         The largest pressure; 150 ticks is the ramp of the board's 5.2 kHz preset.
     seed : int, 0 or more

@@ -76,7 +76,7 @@ def trials(path: str | Path, format: str | None = None, **how: Any) -> Iterator[
     format : str, optional
         One of `FORMATS`; default: recognised by the files' names and first bytes.
     **how
-        Further arguments of its own: the `reduction` of an event camera's files.
+        Further arguments of the format: the `reduction` of an event camera's files.
 
     Yields
     ------

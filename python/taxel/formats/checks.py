@@ -32,7 +32,7 @@ def files_at(path: str | Path, files: Callable[[Path], list[Path]], noun: str) -
     Raises
     ------
     FormatError : there is none (says `noun` they are)
-    ProblemError : `path` is no path
+    ProblemError : `path` is not a path
     """
     file = Path(checked_path("path", path))
     found = files(file)

@@ -41,7 +41,7 @@ class Table:
     separator : str
         Between cells; " " stands for any number of blanks.
     decimal : {".", ","}
-        What stands before the decimals of a number.
+        Character before the decimals of a number.
     skip_lines : int, 0 or more
         Lines before the names of the columns, or before the numbers if there are no names.
     columns : list of str, optional
@@ -54,7 +54,7 @@ class Table:
     missing : str, optional
         A cell without a value; default: every cell is a number.
     leave_out : list of str or int
-        The columns that are no taxels, by name or number from 1, which may hold texts. All others are taxels.
+        The columns that are not taxels, by name or number from 1, which may hold texts. All others are taxels.
     frame_lines : int, 1 or more, optional
         Lines a frame, of which the first has its time; default: 1.
     frame_end : {"blank"}, optional
@@ -113,7 +113,7 @@ class Table:
         return not (self.frame_lines is None and self.frame_end is None and self.frame_begin is None)
 
     def is_between(self, line: str) -> bool:
-        """Whether a line holds no numbers, but stands between frames."""
+        """Whether a line holds no numbers, but separates frames."""
         return not line.strip() or (self.frame_begin is not None and line.lstrip().startswith(self.frame_begin))
 
 
@@ -212,7 +212,7 @@ class PrintedFrames:
                 _column(name, column)
 
     def options(self) -> dict[str, str]:
-        """Return the keys of the source that are stated, but for its place."""
+        """Return the keys of the source that are stated, except its place."""
         stated = {name: getattr(self, name) for name in ("baud", "time", "frame_lines", "frame_end")}
         listed = {name: ":".join(map(str, getattr(self, name))) for name in ("columns", "leave_out")}
         return {name: str(value) for name, value in (stated | listed).items() if value not in (None, "")}
@@ -235,7 +235,7 @@ class Layout:
     side : {"left", "right"}, optional
         The foot or hand that the sensor is of. For a recording of the other foot the places are mirrored.
     heel : {"top", "bottom"}, optional
-        At which rows, or at which end of the places, the heel lies.
+        Rows, or end of the places, at which the heel is.
     falls : bool or float, optional
         Whether readings fall with pressure, and are turned: to their negative, or, of a number, to that number less the
         reading.
@@ -492,5 +492,5 @@ def as_size(value: object) -> str:
 
 @cache
 def load_packaged(name: str) -> Layout:
-    """Return the layout that comes along for a format whose source says where its sensors are."""
+    """Return the layout that taxel includes for a format whose source states where its sensors are."""
     return Layout.read(Path(__file__).parent / "layouts" / f"{name}.layout.toml")

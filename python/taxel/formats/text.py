@@ -121,9 +121,9 @@ def _up_to(path: Path, most: int) -> Iterator[bytes]:
 
 
 def before(content: Iterator[str], ends: Callable[[str], bool]) -> tuple[list[str], str | None]:
-    """Take the lines before the first one that `ends` returns true for, and that one; the others are left.
+    """Take the lines up to the first line for which `ends` returns true, which is included; the others are left.
 
-    None stands for that one where no line of the first 1 MiB is.
+    None stands for that line where there is none in the first 1 MiB.
     """
     taken, left = list[str](), _HEAD
     for line in content:
@@ -161,7 +161,7 @@ def beginning(path: Path, most: int = _BEGINNING) -> list[str]:
 
 
 def first_bytes(path: Path, count: int) -> bytes:
-    """Read the beginning of a file; nothing of what is no file, as a folder may hold pipes, sockets and folders too."""
+    """Read the beginning of a file; nothing of anything else, as a folder may hold pipes, sockets and folders too."""
     try:
         with open_file(path) as file:
             return file.read(count)

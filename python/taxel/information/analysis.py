@@ -287,7 +287,7 @@ class _Answering(Question):
                 "each label's trials are recorded together: a drift of the sensor would count as the label's"
             )
         if not self.ended:
-            self.notes.append("trials have no end of their own: how long a touch lasts is known within the window only")
+            self.notes.append("trials have no stop_us: the length of a touch is known within the window only")
 
 
 def _about(spikes: SampledEvents, window: float, values: bool) -> tuple[float, float, float]:

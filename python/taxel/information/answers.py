@@ -26,7 +26,7 @@ class Point:
     period_ms, window_ms : float, ms
     taxels : int, 1 or more
     kind : {"all", "random", "pooled"}
-        All taxels that ever send an event, some of them drawn anew in each draw, or the means of squares of all.
+        All taxels that ever send an event, some of them, drawn again in each draw, or the means of squares of all.
     found : Estimate
     events : float, 0 or more
         A trial, to the window.

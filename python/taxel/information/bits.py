@@ -51,7 +51,7 @@ def confusion_matrix(
 
     Raises
     ------
-    ProblemError : no trials, unequal lengths, or what stands in no class
+    ProblemError : no trials, unequal lengths, or an entry that is in no class
 
     Examples
     --------
@@ -249,13 +249,14 @@ def corrected(counts: ArrayLike) -> NDArray[np.float64]:
 def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: int = 0) -> float:
     """Return the mutual information in bits, extrapolated from half and a quarter of the trials to endlessly many.
 
-    A second estimate beside `panzeri_treves`. Their agreement is no proof: both err alike where trials are few.
+    A second estimate beside `panzeri_treves`. Their agreement does not prove them right: both err alike where trials
+    are few.
 
     Parameters
     ----------
     counts : int, shape (labels, responses), 0 or more
     repetitions : int, 1 or more
-        How often the trials are dealt out anew.
+        Number of times the trials are dealt out.
     seed : int, 0 or more
 
     Returns

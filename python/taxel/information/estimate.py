@@ -64,7 +64,7 @@ class Estimate:
     local : float64, shape (trials,), bits
         What each trial's answer gave, the mean over draws.
     trials_for_tenth : int, 0 or more
-        How many trials would bring the interval (95 %) to a tenth of a bit either way.
+        Number of trials that would narrow the interval (95 %) to a tenth of a bit either way.
     warnings : tuple of str
         By the number of trials a label and by the interval.
     """
@@ -112,7 +112,7 @@ class ZeroTest:
     shuffled : tuple of float, bits
         Corrected bits, one a shuffle.
     level : float, bits
-        Below it lie 95 % of them: what is not above it is not told from nothing.
+        95 % of them are below it: an estimate that is not above it cannot be distinguished from 0 bits.
     p : float, from 0 to 1
         How often, under the shuffle, as much as was found comes out; never below 1 / (shuffles + 1).
 
@@ -160,7 +160,7 @@ def estimate(
 
     Raises
     ------
-    ProblemError : one label, unequal lengths, or what is no label
+    ProblemError : one label, unequal lengths, or an entry that is not a label
 
     Examples
     --------
@@ -244,7 +244,7 @@ def zero_test(
     Parameters
     ----------
     answer : function of labels, shape (trials,)
-        Trains anew on these labels and returns the responses, shape (trials,).
+        Trains again on these labels and returns the responses, shape (trials,).
     labels : labels, shape (trials,)
     found : float, bits
         The estimate with the true labels.

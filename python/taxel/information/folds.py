@@ -36,7 +36,7 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
 
     Raises
     ------
-    ProblemError : one label, fewer trials or groups than can be dealt out, or a label all of whose trials lie in one
+    ProblemError : one label, fewer trials or groups than can be dealt out, or a label all of whose trials are in one
         group (it could never be both trained and tested)
 
     Examples
@@ -91,7 +91,7 @@ class TrialFold:
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Labelled trials dealt out to folds, and the training trials of each fold to folds of their own.
+    """Labelled trials dealt out to folds, and the training trials of each fold to inner folds.
 
     Attributes
     ----------

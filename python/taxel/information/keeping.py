@@ -72,8 +72,8 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
     -----
     d = i_cheap - share * i_dear by trial, i being log2 p(response | label) / p(response); bounds at 90 %, one-sided, by
     Student's t; i_dear itself is tested against 0 in the same way. Near the edge the rule "within one standard error"
-    takes too cheap a setting in 44 to 70 % of simulated cases, this one in at most 13 % (from 40 trials a label on); it
-    leaves many open instead.
+    takes too cheap a setting in 44 to 70 % of simulated cases, this rule in at most 13 % (with 40 trials a label or
+    more); it leaves many open instead.
 
     Examples
     --------

@@ -41,8 +41,8 @@ class Nested:
     Attributes
     ----------
     responses : labels, shape (trials,)
-    folds : int64, shape (trials,), from 0 on
-        In which each trial was tested.
+    folds : int64, shape (trials,), counted from 0
+        Fold in which each trial was tested.
     chosen : dict from fold to (int, float)
         Which matrix and which ridge (or how many neighbours) that fold's training trials chose among themselves.
     missing : tuple of (fold, class)

@@ -198,7 +198,7 @@ class Question:
         return [Matrices(grams, [size] * len(taus)) for size, *grams in zip(sizes, *by_tau, strict=True)]
 
     def _parameter_columns(self) -> dict[str, NDArray[np.generic]]:
-        """Return the columns of parameters that can stand in for the labels; the notes name the others."""
+        """Return the columns of parameters that can be used like labels; the notes name the others."""
         columns = {}
         for name in self.trials[0].parameters:
             column = np.array([trial.parameters.get(name, "") for trial in self.trials])

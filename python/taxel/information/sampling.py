@@ -37,7 +37,7 @@ STEP_US = 100
 class HeldValues:
     """Return what every taxel holds at any time: the last frame, or the last intensity that came.
 
-    Events without intensities count as steps of one, up or down, from their beginning on.
+    Events without intensities count as steps of one, up or down, from the beginning of the recording.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class SampledEvents:
         return len(self.first_us)
 
     def bins_to(self, window_us: float) -> NDArray[np.int64]:
-        """Return how many bins of each trial lie within so much time after the contact and before the trial's end."""
+        """Return how many bins of each trial are within so much time after the contact and before the trial's end."""
         stop = np.minimum(window_us, self.length_us)
         with np.errstate(invalid="ignore"):
             bins = np.ceil((stop - self.first_us) / self.period_us - 1e-9)

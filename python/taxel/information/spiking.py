@@ -240,7 +240,7 @@ def readout_responses(
     spikes : SampledEvents
     window_us : float, us
     labels : labels, shape (trials,)
-    folds : int64, shape (trials,), from 0 on
+    folds : int64, shape (trials,), counted from 0
 
     Returns
     -------

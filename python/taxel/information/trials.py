@@ -40,7 +40,7 @@ class LabelledTrial:
     Parameters
     ----------
     source : Events or Frames
-        The recording it lies in; trials of one recording share it.
+        The recording of the trial; trials of one recording share it.
     label : str
     start_us : int, us
         The touch begins at the first event at or after it.
@@ -51,11 +51,11 @@ class LabelledTrial:
     parameters : mapping of str to str
         What else is known: radius, height, slant ...
     name : str
-        Where it lies, for errors.
+        Place of the trial, for errors.
 
     Raises
     ------
-    ProblemError : a source of another kind, an empty label, or an end that does not lie after the start
+    ProblemError : a source of another kind, an empty label, or an end that is not after the start
 
     Examples
     --------
@@ -114,7 +114,7 @@ def read_trials(
 
     Raises
     ------
-    FormatError : a column is missing, or a cell that is no number (names file and line)
+    FormatError : a column is missing, or a cell that is not a number (names file and line)
     ProblemError : recordings and table do not match, a recording is there twice or has no times, a start outside its
         recording, trials without an end, trials that overlap, or the host's time of another run
     """
@@ -172,7 +172,7 @@ def read_trials(
 
 
 def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> list[LabelledTrial]:
-    """Take each note of recordings as one trial from its time on; its text is the label.
+    """Take each note of recordings as a trial that begins at its time; its text is the label.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> lis
 
 
 def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | None = None) -> list[LabelledTrial]:
-    """Take each recording as one trial from its beginning on; its folder's name is the label.
+    """Take each recording as one trial, from its beginning; its folder's name is the label.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a setting costs on the wire while the sensor is touched."""
+"""Cost of a setting on the wire while the sensor is touched."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def kilobits_per_second(spikes: SampledEvents, window_us: float, *, values: bool
 
     Notes
     -----
-    Up to 32 767 places an event is one word, so its size does not depend on where it lies.
+    Up to 32 767 places an event is one word, so its size does not depend on its place.
     """
     inside = spikes.bin < spikes.bins_to(window_us)[spikes.trial]
     word = 4 if values else 2

@@ -100,7 +100,7 @@ class ConeR(SpikeLearner):
     unreachable_ : list of (pattern, target)
         Targets at which no weights within the bounds reach the threshold; the other targets are fitted.
     refires_ : int
-        Output spikes on the training patterns within `tau` of another one, with no target between.
+        Output spikes on the training patterns within `tau` of another output spike, with no target between.
     neuron_ : Neuron
         The trained neuron: a copy with ``time="grid"``.
 
@@ -379,8 +379,8 @@ def _weighed(name: str, count: int, trains: str) -> None:
     if count > _MOST_TRAINS:
         raise refused(
             name,
-            f": {count} {trains}, at most {_MOST_TRAINS} can be weighed, as memory goes with the square and time "
-            "with the cube of them; take an encoder that pools taxels (taxel train --recipe touch, or --encoder "
+            f": {count} {trains}, at most {_MOST_TRAINS} can be weighed, as memory grows with their square and time "
+            f"with their cube; take an encoder that pools taxels (taxel train --recipe touch, or --encoder "
             "contact_area), fewer levels, or a part of the array",
         )
 

@@ -103,7 +103,7 @@ def locked_at_once(folder: Path) -> Iterator[bool]:
 
     Raises
     ------
-    ProblemError, OSError : as of `locked`, but for the time
+    ProblemError, OSError : as of `locked`, except the time limit
     """
     turn = _turn(folder)
     if not turn.lock.acquire(blocking=False):

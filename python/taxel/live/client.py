@@ -55,7 +55,7 @@ _CURVES = np.dtype([("force", "<u4"), ("area", "<u4"), ("x", "<f4"), ("y", "<f4"
 class Subject:
     """Name the sensor or recording that is shown.
 
-    A new object of the same name means that time begins anew, as after a reset of the board.
+    A new object of the same name means that time begins again, as after a reset of the board.
 
     Attributes
     ----------
@@ -298,7 +298,7 @@ class PanelClient:
             self._restart()
 
     def _restart(self) -> None:
-        """Begin time anew."""
+        """Begin time again."""
         self._time = self._curves_until = _NO_TIME
         self._full, self._full_change = _Scale(), _Scale()
 

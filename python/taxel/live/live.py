@@ -43,8 +43,8 @@ _WAIT_S = 0.5
 class Live:
     """Receive a board's datagrams, record them and read them out, as they arrive.
 
-    A context manager, and an iterator of detections that ends when `stop` was called. It works in threads of its own:
-    one receives, decodes and records, one encodes and reads out, and while it records a third receives. A queue that is
+    A context manager, and an iterator of detections that ends when `stop` was called. It works in separate threads: one
+    receives, decodes and records, one encodes and reads out, and while it records a third receives. A queue that is
     full drops data, and counts it.
 
     Parameters
@@ -191,7 +191,7 @@ class Live:
             inlet.begin(partial(self._core.sample, _stream_name(source)))
 
     def _again(self, **changed: Any) -> Live:
-        """Return another one that works alike, with other options; it receives from the same place by default."""
+        """Return another `Live` that works alike, with other options; by default it receives from the same place."""
         host, port = self._listened_on
         options = replace(self._options, **{"host": host, "port": port, "remote": None, **changed})
         return Live(**{field.name: getattr(options, field.name) for field in fields(options)})
@@ -225,7 +225,7 @@ class Live:
         return self._core.is_over()
 
     def copies(self) -> _core.Copies:
-        """Return what copies everything that arrives from now on, for other computers.
+        """Return an object that copies all data that arrive after this call, for other computers.
 
         Its ``next(timeout)`` returns the next copy, or None: ("parcel", bytes) for datagrams, ("frame", JSON) ten
         times a second, ("detection", JSON); ``is_over()`` says whether the pipeline has ended and all were taken.
@@ -393,7 +393,7 @@ class Live:
         self._core.sample(text("name", name), row.tolist(), arrival)
 
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
-        """Use the values that taxels hold now as their rest from now on: for taxels that drift.
+        """Use the present values of taxels as their rest from this time: for taxels that drift.
 
         The new rest of a taxel of frames, which are noisy, is the median of its last second. An encoder with a tare
         reads the taxels above that rest; the recording contains the zeroing, with the rests before and after, and
@@ -455,7 +455,7 @@ class Live:
     def record(
         self, path: str | os.PathLike[str], *, compression: str = "none", overwrite: bool = False
     ) -> Summary | None:
-        """Record what arrives from now on, of all sources, beginning with the registers and the held values.
+        """Record what arrives after this call, from all sources, beginning with the registers and the held values.
 
         The previous recording ends with what arrived before: each datagram, and each line, belongs to one of the two.
 

@@ -1,7 +1,7 @@
 """The lab streaming layer: its streams as sources of a recording, and detections as one of its streams.
 
-Its library listens on every address of the machine, TCP and UDP, at port 16572 and above. taxel cannot change that, so it
-loads the library only if a stream is named, and then warns.
+Its library listens on every address of the machine, TCP and UDP, at port 16572 and above. taxel cannot change that, so
+it loads the library only if a stream is named, and then warns.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class LslInlet:
         self._thread: threading.Thread | None = None
 
     def begin(self, receive: Callable[[list[float], int], object]) -> None:
-        """Call `receive` with time stamp and values, and their arrival (ns since 1970), in a thread of its own."""
+        """Call `receive` with time stamp and values, and their arrival (ns since 1970), in a separate thread."""
 
         def run() -> None:
             while not self._ends.is_set():

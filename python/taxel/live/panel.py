@@ -31,7 +31,7 @@ from taxel.tare import Tare
 class Panel:
     """Serve the live panel, until it is stopped. A context manager.
 
-    A thread of its own serves all clients. One that reads slowly, or never, delays neither the others nor what is
+    A separate thread serves all clients. A client that reads slowly, or never, delays neither the others nor what is
     received and recorded. The protocol is documented, so any program may be a client; `PanelClient` is one.
 
     Parameters
@@ -174,7 +174,7 @@ class Panel:
 
         Raises
         ------
-        ProblemError : as `listen`; a text that is no source, or lines that do not fit what it says
+        ProblemError : as `listen`; a text that is not a source, or lines that do not fit it
         OSError : the place cannot be opened; the source before stays in use
 
         Examples
@@ -197,7 +197,7 @@ class Panel:
             self._attach(after)
 
     def delta_intensity(self, on: bool) -> None:
-        """Interpret intensities as differences from the previous value, or as values, from now on.
+        """Interpret intensities as differences from the previous value, or as values, from this time.
 
         Earlier events were decoded the other way, so they are discarded: time, values, a readout and its tare restart,
         on the same address.
@@ -220,7 +220,7 @@ class Panel:
             self._attach(before._again(differences=on))
 
     def read_out(self, readout: str | os.PathLike[str]) -> None:
-        """Read the board out with another readout from now on: time, values and past restart, on the same address.
+        """From this time, read the board out with another readout: time, values and past restart, on the same address.
 
         A readout that needs a tare uses that of the board, if there is one; else the values that the taxels hold now
         are their rest, so the sensor must be unloaded.
@@ -252,7 +252,7 @@ class Panel:
             self._attach(after)
 
     def _attach(self, live: Live) -> None:
-        """Show another `Live` from now on."""
+        """Show another `Live` from this time."""
         self._core.attach(live._core)
         self._live = live
 
@@ -298,7 +298,7 @@ class Panel:
 def _folder_and_name(path: Path, options: TextOptions) -> tuple[Path, str]:
     """Return the folder of a recording and its name there; of a folder its first recording.
 
-    The server indexes it when a client opens it; what is no recording is refused now.
+    The server indexes it when a client opens it; a file that is not a recording is refused now.
     """
     if is_folder(path):
         files = recordings_in(path, options.layout)

@@ -79,12 +79,12 @@ class Source:
         Parameters
         ----------
         frame : int, shape (rows, columns) or flat, 0 to 2**bits - 1
-            Readings that are no whole numbers are scaled before: ``np.rint(readings / full * (2**bits - 1))``, `full`
+            Readings that are not whole numbers are scaled before: ``np.rint(readings / full * (2**bits - 1))``, `full`
             the greatest reading.
 
         Raises
         ------
-        ProblemError : another shape, or a value that is no whole number of that many bits (names the taxel)
+        ProblemError : another shape, or a value that is not a whole number of that many bits (names the taxel)
         OSError : the system refuses to send
         """
         ticks = np.minimum(self._whole(frame) >> self.shift, self.registers.ramp)

@@ -11,7 +11,7 @@ _DEFAULT = defaults("van_rossum")
 def van_rossum(a: Pattern, b: Pattern, *, tau: float, normalisation: str = _DEFAULT.normalisation) -> float:
     """Return the Euclidean distance of two spike trains smoothed by an exponential.
 
-    Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on; the squared difference is integrated over all time,
+    Each spike becomes ``exp(-(t - t_i) / tau)`` after its time; the squared difference is integrated over all time,
     in closed form, and the root taken. The distance of equal trains is exactly 0.
 
     Parameters

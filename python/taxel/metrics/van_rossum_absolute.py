@@ -18,7 +18,7 @@ def van_rossum_absolute(
 ) -> float:
     """Return the absolute difference of two smoothed spike trains, summed over time.
 
-    Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on, as for `van_rossum`; but the absolute difference, as
+    Each spike becomes ``exp(-(t - t_i) / tau)`` after its time, as for `van_rossum`; but the absolute difference, as
     printed in 5.10, is summed over time instead of its square.
 
     Parameters

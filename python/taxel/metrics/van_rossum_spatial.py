@@ -23,7 +23,7 @@ def van_rossum_spatial(
 ) -> float:
     """Return the Euclidean distance of two patterns smoothed in time and over the array.
 
-    Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on (5.8) and adds ``exp(-d / sigma)`` times that to the
+    Each spike becomes ``exp(-(t - t_i) / tau)`` after its time (5.8) and adds ``exp(-d / sigma)`` times that to the
     taxel at distance d (5.11). The squared differences are integrated over all time, in closed form, and summed over
     taxels; the root of that is the distance. The distance of equal patterns is exactly 0.
 

@@ -17,7 +17,7 @@ def victor_purpura_multi_unit(a: SpikeTrains, b: SpikeTrains, *, q: float, k: fl
     Parameters
     ----------
     a, b : SpikeTrains with equally many trains
-        Signed ones are split into ON and OFF, which are trains of their own.
+        Signed trains are split into ON and OFF, which are separate trains.
     q : float, 1/ms, 0 or more; infinite: only spikes at exactly the same time match
     k : float, 0 or more
 

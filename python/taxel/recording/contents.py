@@ -1,4 +1,4 @@
-"""What a recording holds: of each source a header in common, and a board's events, frames, or a stream of numbers."""
+"""Contents of a recording: for each source a common header, and a board's events, frames, or a stream of numbers."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def cut(
     start_us, stop_us : float, us
         The interval to keep, by the board's clock: ``start_us <= t < stop_us``.
     columns, rows : slice, optional
-        The rectangle to keep, within the array; it becomes a sensor of its own, whose columns and rows count from 0.
+        The rectangle to keep, within the array; it becomes a separate sensor, whose columns and rows count from 0.
         With all columns and rows the recording is unchanged.
     label : str, optional
         Cut around each note of this text; the result is one recording a note, and may be empty.
@@ -87,7 +87,7 @@ def _bounds(chosen: slice) -> str:
 
 
 def region(contents: Contents, columns: slice, rows: slice) -> Contents:
-    """Return the part of a recording within a rectangle, as a sensor of its own; unchanged if that is all.
+    """Return the part of a recording within a rectangle, as a separate sensor; unchanged if that is all.
 
     Raises
     ------

@@ -53,7 +53,7 @@ def times_at(number: NDArray[np.int64], rate_hz: float) -> NDArray[np.int64]:
 
     Raises
     ------
-    ProblemError : a time that does not lie within 142 years of 0
+    ProblemError : a time that is not within 142 years of 0
     """
     us = number * (1e6 / rate_hz)
     if len(us) and np.abs(us).max() > TIME_US:

@@ -75,8 +75,8 @@ def apply_layout(contents: Contents, layout: Layout, *, given: bool) -> Contents
     contents : Contents
     layout : Layout
     given : bool
-        Whether it was named for this recording; else it lies beside it, and fills only what a file that states its
-        sensor lacks.
+        Whether it was named for this recording; else it is beside it, and fills only what a file that states its sensor
+        lacks.
 
     Raises
     ------

@@ -204,7 +204,7 @@ class _Merging:
         )
 
     def marks(self) -> sections.Marks:
-        """Merge what happened at a time; a note with its name stands at the beginning of each recording."""
+        """Merge what happened at a time; a note with its name is at the beginning of each recording."""
         changes, notes, found = list[tuple[BoardChange, ...]](), list[Note](), list[Any]()
         for source, table, shift in zip(self.sources, self.tables, self.shifts, strict=True):
             marks, d = source.marks, source.marks.detections()
@@ -327,7 +327,7 @@ def _same_clock(a: Clock | None, b: Clock | None) -> bool:
 def _of_files(sources: Sequence[RecordedSource], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
     """Return name and verdict of each file or merged recording of which there are parts.
 
-    Stretches of one recording, in memory or in files of their own, have the losses of the whole, which count once;
+    Stretches of one recording, in memory or in separate files, have the losses of the whole, which count once;
     sources of one file share its damage.
     """
     files: dict[str, Any] = {}
@@ -415,7 +415,7 @@ def _events(tables: list[Events], shifts: list[int], array: Array, lefts: list[i
 
 
 def _side_by_side(filled: NDArray[Any], columns: Iterable[tuple[NDArray[Any], int]]) -> NDArray[Any]:
-    """Fill values of a whole sensor with those of its parts, each from a column on; return them."""
+    """Fill values of a whole sensor with those of its parts, each beginning at a column; return them."""
     for values, left in columns:
         filled[..., : values.shape[-2], left : left + values.shape[-1]] = values
     return filled

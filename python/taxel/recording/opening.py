@@ -77,12 +77,12 @@ class OpenOptions(SharedOptions):
 
     @property
     def topics(self) -> Topics:
-        """What of a ROS bag is opened."""
+        """Topics of a ROS bag that are opened."""
         return Topics(self.topic, self.field, self.types, self.ros)
 
     @property
     def reduction(self) -> Reduction:
-        """What is read of the events of a camera."""
+        """Selection of the events of a camera."""
         return Reduction(self.region, self.bin, self.window_ms, self.polarity)
 
     def how(self, path: Path, name: str, layout: Layout | None) -> dict[str, Reduction]:
@@ -119,8 +119,8 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
         that `taxel.formats` reads, with one trial; or a ROS bag.
     array : Array, or list of Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
-        a larger one if events lie outside it. A .mcap holds its own, which is kept. Of a ROS bag rows and
-        columns, for messages that do not state them.
+        a larger one if events are outside it. The array in a .mcap is kept. For a ROS bag: rows and columns, for
+        messages that do not state them.
     layout : path, optional
         The layout file that says what the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
         ``layout.toml`` beside it, if there is one.
@@ -398,7 +398,7 @@ def _size(table: object) -> int:
 
 
 def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path], options: OpenOptions) -> None:
-    """Warn of tables and arrays with a layout that are left out beside recordings, but for those converted to one."""
+    """Warn of tables and arrays with a layout that are left out beside recordings, unless they were converted."""
     stems = {file.stem for file in recorded}
     left = [
         file.name
@@ -549,7 +549,7 @@ def sensors(recording: Recording) -> list[Recording]:
 
 
 def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordings") -> list[Recording]:
-    """Return each sensor of recordings as one of its own; refuse what is no recording."""
+    """Return each sensor of recordings as a separate recording; refuse anything except recordings."""
     entries = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
     if not len(entries):
         raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")

@@ -88,7 +88,7 @@ class ForeignFile:
 
 @dataclass(frozen=True)
 class Refusal:
-    """No recording, and why; a companion is a file of taxel that may lie beside recordings."""
+    """Reason why a file is not a recording; a companion is a file of taxel that may be beside recordings."""
 
     error: FormatError
     is_companion: bool = False
@@ -182,7 +182,7 @@ def is_recording(path: Path, layout: GivenLayout = None) -> bool:
 
 
 def check_recording(path: Path, layout: GivenLayout = None) -> None:
-    """Refuse a path that is no recording by its name, its first bytes, and its layout file.
+    """Refuse a path that is not a recording by its name, its first bytes, and its layout file.
 
     Raises
     ------
@@ -281,7 +281,7 @@ def natural_order(path: Path) -> list[tuple[bool, int, str]]:
 
 
 def _companion(path: Path, *, has_layout: bool) -> str:
-    """Return what a file of taxel is that may lie beside recordings, as the end of an error; "" of another file."""
+    """Return what a file of taxel is that may be beside recordings, as the end of an error; "" of another file."""
     if path.suffix.lower() == ".csv" and is_label_table(path):
         return ", line 1: a table of labels (docs/command-line.md), not a recording"
     if are_spike_trains(path) and not has_layout:

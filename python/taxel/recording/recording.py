@@ -138,7 +138,7 @@ class Recording:
         """The sources of the file by name, in their order in the file, each with its own clock.
 
         Each is a recording that every function accepts. A file of one board has one source. In a file of one board and
-        streams of numbers (an IMU) the events, frames and other attributes are those of the board, but for the verdict,
+        streams of numbers (an IMU) the events, frames and other attributes are those of the board, except the verdict,
         which is of all; in a file of several boards they raise an error that names the sources.
 
         Raises
@@ -203,7 +203,7 @@ class Recording:
 
         Raises
         ------
-        ProblemError : no calibration lies beside it, or one of another array
+        ProblemError : no calibration is beside it, or a calibration of another array
         """
         return calibrate(self._contents.main, rate_hz, rest).table
 
@@ -214,7 +214,7 @@ class Recording:
 
     @property
     def heel(self) -> str:
-        """Where on the sensor the heel lies, "top" or "bottom"; "" if not stated."""
+        """Place of the heel on the sensor, "top" or "bottom"; "" if not stated."""
         return self._contents.main.sensor.heel
 
     @property
@@ -358,7 +358,7 @@ class Recording:
 
     @property
     def verdict(self) -> Verdict:
-        """What was lost at which stage: a line of text, with a status and numbers by cause (`taxel.Verdict`).
+        """Losses at each stage: a line of text, with a status and numbers by cause (`taxel.Verdict`).
 
         That of a part is that of the whole file. Gaps of frames with times, and of the events of a camera, are those of
         the part, and are in it where the file does not say what was lost. The page *What the output means* lists
@@ -369,7 +369,7 @@ class Recording:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What else there is to know, one line each: whose times it has, what was left out, what it was converted from.
+        """Further facts, one line each: the clock of its times, what was left out, what it was converted from.
 
         `.mcap`, `.npz` and `.h5` store it.
 
@@ -429,7 +429,7 @@ class Recording:
 
         Raises
         ------
-        ProblemError : a start that lies after the stop, or is no number
+        ProblemError : a start after the stop, or a time that is not a number
 
         Examples
         --------
@@ -468,7 +468,7 @@ class Recording:
 
         Raises
         ------
-        ProblemError : it has times of its own (`timed`), or a rate that is invalid
+        ProblemError : it has times (`timed`), or the rate is invalid
 
         Examples
         --------

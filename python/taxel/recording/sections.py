@@ -1,4 +1,4 @@
-"""The sections of a recording: what a function does with a field follows from the type of the section it stands in.
+"""The sections of a recording: what a function does with a field follows from the type of its section.
 
 Each function (`between`, `merge`, `convert` ...) has a rule for every type in `Section`: the type checker demands it.
 """
@@ -81,7 +81,7 @@ class Sensor:
     side : {"left", "right", ""}
         The foot or hand that the sensor is of.
     heel : {"top", "bottom", ""}
-        Where on the sensor the heel lies.
+        Place of the heel on the sensor.
     calibration : Calibration
     """
 
@@ -91,7 +91,7 @@ class Sensor:
     calibration: Once[Calibration | None] = _NONE
 
     def losses(self) -> list[str]:
-        """Return what a file without this section does not hold, but for the array."""
+        """Return what a file without this section does not hold, except the array."""
         lines = [f"the side ({self.side})"] * bool(self.side)
         return lines + [f"where the heel is ({self.heel})"] * bool(self.heel)
 
@@ -149,7 +149,7 @@ class Timing:
     clock_of : str
         The name of the clock of all times, if it is not the source's own.
     interval : (int, int), us
-        The first time and the end of a slice. A slice that is written to a file becomes a recording of its own.
+        The first time and the end of a slice. A slice that is written to a file becomes a separate recording.
     """
 
     clock: Once[Clock | None] = _NONE
@@ -162,7 +162,7 @@ class Timing:
         return clock if clock is not None and len(clock.board_us) else None
 
     def losses(self) -> list[str]:
-        """Return what a file without this section does not hold, but for arrival times."""
+        """Return what a file without this section does not hold, except arrival times."""
         return [f"the clock of the times ({self.clock_of})"] * (self.clock_of is not None)
 
 
@@ -237,7 +237,7 @@ class FrameTable:
     frame_us: float | None = None
 
     def losses(self) -> list[str]:
-        """Return what a file without this section does not hold, but for the frames."""
+        """Return what a file without this section does not hold, except the frames."""
         lines = ["that its frames have no times"] * self.untimed
         lines += [] if self.turned is None else [f"that its readings were turned (falls = {self.turned:g})"]
         return lines + (

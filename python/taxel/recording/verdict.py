@@ -35,7 +35,7 @@ class Verdict(str):
         What could not be used, of the bytes that came and of the file, by cause; damage of a file of several sources
         counts once.
     noted : dict of int
-        What is no loss of its own: repeated datagrams, repaired values, resets of the board and others.
+        Events that are not losses: repeated datagrams, repaired values, resets of the board and others.
     doubtful_after_us : int, us, or None
         The time after which times are doubtful; of several parts the earliest.
     steps_back : list of dict of int
@@ -100,7 +100,7 @@ class Verdict(str):
         return self._of({"later": [shift, self._held]})
 
     def _noting(self, texts: Iterable[str], noted: Mapping[str, int]) -> Self:
-        """Return the same verdict with more texts at its end, and more that is no loss of its own."""
+        """Return the same verdict with more texts at its end, and more events that are not losses."""
         return self._from(
             {**self._held, "text": "; ".join([str(self), *texts]), "noted": {**self._held["noted"], **noted}}
         )
@@ -112,17 +112,17 @@ class Verdict(str):
 
     @property
     def lost(self) -> dict[str, int]:
-        """What was lost, by cause."""
+        """Losses by cause."""
         return dict(self._held["lost"])
 
     @property
     def damaged(self) -> dict[str, int]:
-        """What could not be used, by cause."""
+        """Data that could not be used, by cause."""
         return dict(self._held["damaged"])
 
     @property
     def noted(self) -> dict[str, int]:
-        """What is no loss of its own, by cause."""
+        """Events that are not losses, by cause."""
         return dict(self._held["noted"])
 
     @property

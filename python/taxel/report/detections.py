@@ -510,7 +510,7 @@ def _channels(planes: list[tuple[str, NDArray[np.float64]]], array: Array) -> Fi
 
 
 def _name_inputs(axis: Axes, encoder: Encoder, array: Array, delays: int) -> None:
-    """Name the inputs of bars by the encoder, or by the parts of a composite one, which are told apart by lines."""
+    """Name the inputs of bars by the encoder, or by the parts of a composite encoder, which are separated by lines."""
     names = sorted(encoder.parts) if isinstance(encoder, Composite) else [encoder.name.replace("_", " ")]
     counts = [part.trains(array) * (2 if part.signed else 1) for part in encoder._each()] * delays
     ends = np.cumsum(counts) - 0.5

@@ -2,7 +2,7 @@
 
 A scene says what happens to the bodies. `play` plays acts to a board as fast as it goes, `emulate` in real time over
 UDP: acts, a recording again, or the frames of any other sensor. `Board` is the board alone, a frame at a time.
-`taxel.simulate.circuit` is what lies between touch and board: fabric, lines, converter.
+`taxel.simulate.circuit` simulates what is between touch and board: fabric, lines, converter.
 """
 
 from taxel.simulate import circuit

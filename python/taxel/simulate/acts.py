@@ -1,4 +1,4 @@
-"""What the emulated board is shown: silence, bodies, frames."""
+"""Acts that the emulated board is shown: silence, bodies, frames."""
 
 from __future__ import annotations
 
@@ -128,8 +128,8 @@ class Scene:
           dashpot_ms.
         - ``surface``: "layer", foam bonded to the board, for any bodies; or "columns", for one ball that moves straight
           up and down on foam with poisson up to 0.1: the fastest.
-        - ``cells_per_pitch``: how many cells of the layer lie along the pitch of taxels; usually 1, more for a touch
-          narrower than two taxels.
+        - ``cells_per_pitch``: how many cells of the layer there are along the pitch of taxels; usually 1, more for a
+          touch narrower than two taxels.
         - ``slant_deg``, ``downhill_deg``: how far the array is tilted, and which way; ``lead_ms``, ``tail_ms``.
 
     Raises
@@ -181,7 +181,7 @@ class Scene:
         Raises
         ------
         SceneError : an array too small to keep 36 mm from its edge
-        ProblemError : a seed or an index that is no whole number
+        ProblemError : a seed or an index that is not a whole number
 
         Examples
         --------
@@ -251,7 +251,7 @@ class Scene:
         Raises
         ------
         SceneError : a parameter of the scene that is invalid, a body off the array, or more than 2e7 steps
-        ProblemError : a step that is no number
+        ProblemError : a step that is not a number
 
         Examples
         --------
@@ -297,7 +297,7 @@ def _only(body: object, part: str) -> str:
 def _replaced(
     noun: str, before: Mapping[str, Any], changes: Mapping[str, Any], more: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Return parameters with some changed; parts are merged to any depth, but for one of several kinds."""
+    """Return parameters with some changed; parts are merged to any depth, except a part that has several kinds."""
     merged = dict(before)
     for name, change in changes.items():
         if name not in before and name not in more:
@@ -331,7 +331,7 @@ class FrameSequence:
 
     Raises
     ------
-    ProblemError : values that are no frames, or outside 0 to 1
+    ProblemError : values that are not frames, or outside 0 to 1
 
     Examples
     --------

@@ -103,7 +103,7 @@ def fitting(preset: str | None, array: Array) -> Registers:
 
 
 def pattern(frame: int, *, array: Array | None = None, ramp: int = 150) -> NDArray[np.uint16]:
-    """Return what a board whose register `pattern` is set reads, in the place of its comparators' values.
+    """Return what a board whose register `pattern` is set reads, instead of its comparators' values.
 
     Parameters
     ----------
@@ -164,9 +164,9 @@ class Board:
         first. Left out, each taxel reads by itself. The converter's times are the registers'.
     asynchronous : bool
         Each taxel compares by itself with what it sent last; nothing is scanned, and stamps are of 1 us, so the
-        registers must hold version 2 of the wire (thesis 4.5, Table 7.1). It tells each step of ``noise_floor + 1``
-        ticks when it reaches it. What it reads between two frames lies on a straight line, so events leave a frame
-        after they happened, with the time at which they did. Such taxels share no lines: no `circuit`.
+        registers must hold version 2 of the wire (thesis 4.5, Table 7.1). It sends each step of ``noise_floor + 1``
+        ticks when it reaches it. Its readings between two frames are on a straight line, so events leave a frame after
+        they happened, with the time at which they did. Such taxels share no lines: no `circuit`.
 
     Raises
     ------
@@ -176,7 +176,7 @@ class Board:
     -----
     +
 
-    What a new value is compared with (`previous`) is open in thesis 4.3; the board's own rule stands in `docs/wire.md`.
+    What a new value is compared with (`previous`) is open in thesis 4.3; the board's own rule is in `docs/wire.md`.
 
     Examples
     --------
@@ -247,7 +247,7 @@ class Board:
     def reset(self) -> None:
         """Reset it, in a new session.
 
-        Registers are those of a board at reset, with the version of the wire that this one had at first; values, time
+        Registers are those of a board at reset, with the version of the wire that this board had at first; values, time
         and the counts of its status lines are 0. Datagrams that wait are still sent; the one that is being filled is
         discarded, with the events held in it.
         """

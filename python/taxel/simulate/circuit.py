@@ -243,7 +243,8 @@ class Divider(_Lines):
 
     Notes
     -----
-    Thesis 3.4.2 and Appendix 1, figure 1.1. There rows are driven and columns are read: its array is this one turned.
+    Thesis 3.4.2 and Appendix 1, figure 1.1. There rows are driven and columns are read, so its array is this array
+    turned.
 
     Examples
     --------
@@ -298,7 +299,7 @@ class Converter(Value):
     settle_us : float, us, from 0 to 1000000
         Time constant of a comparator's input: the default settles to 2 % in 0.2 us (thesis 4.4.1).
     amplifier_us : float, us, from 0 to 1000000
-        Time constant of the amplifiers, what a column leaves for the next; 0: none. 0.705 if the board's 15 pF lie
+        Time constant of the amplifiers, what a column leaves for the next; 0: none. 0.705 if the board's 15 pF are
         across its 47 kOhm, which no text states.
     discharge_us : float, us, from 0 to 1000000
         Time constant with which the ramp falls back (a guess).
@@ -368,7 +369,7 @@ class Converter(Value):
         return _core.converter_ticks(self._json(), shape, checked.ravel()).reshape(checked.shape)
 
     def ramp_volts(self, ticks: ArrayLike) -> Values:
-        """Return where the ramp stands after so many ticks.
+        """Return the voltage of the ramp after so many ticks.
 
         Parameters
         ----------
@@ -441,12 +442,12 @@ class Converter(Value):
 
 
 class Converted(NamedTuple):
-    """Hold frames that were converted one after the other, each with a ramp of its own.
+    """Hold frames that were converted one after the other, each with a separate ramp.
 
     Attributes
     ----------
     t_us : float64, shape (frames,), us
-        When each began; a column is read with the voltages at the time of its own conversion.
+        When each began; a column is read with the voltages at the time when it is converted.
     ramp : uint32, shape (frames,), ticks
         How long its ramp took.
     ticks : float64, shape (frames, rows, columns), ticks
@@ -467,7 +468,7 @@ class AdaptiveRamp(Value):
 
     After a frame the taxel that moved farthest sets the length of the next ramp, which lets it move by `moves_ticks`
     of that ramp within the frame, so that a reading is about as much too old as too coarse. Without any move the ramp
-    takes twice its time, up to the gentlest. What a step and a column take beside their ramp stays.
+    takes twice its time, up to the gentlest. The time that a step and a column take beside their ramp stays the same.
 
     Parameters
     ----------
@@ -489,7 +490,7 @@ class AdaptiveRamp(Value):
     Notes
     -----
     The thesis calls for a steep slope during gross movements and a gentle one during fine control, and states no rule:
-    this one is ours. ``taxel study adaptive_ramp`` shows what it gains.
+    this rule is ours. ``taxel study adaptive_ramp`` shows what it gains.
 
     Examples
     --------

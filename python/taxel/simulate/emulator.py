@@ -28,7 +28,7 @@ __all__ = ["EmulatorReport", "Played", "emulate", "play", "truth"]
 
 
 class Played(NamedTuple):
-    """What a host decoded of a board's datagrams.
+    """Data that a host decoded from a board's datagrams.
 
     Attributes
     ----------
@@ -185,8 +185,8 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
     version_2 : Version2, optional
         How the board speaks version 2.
     circuit : Circuit, optional
-        Lines that the taxels share, settling, comparators with hysteresis; by default each taxel is read by itself. Of
-        acts its voltage and resistor must be the sensor's. The converter's times are those of the registers, and flaws
+        Lines that the taxels share, settling, comparators with hysteresis; by default each taxel is read by itself. With
+        acts, its voltage and resistor must be those of the sensor. The converter's times are those of the registers, and flaws
         are applied after it. The report has the frame rate that one core reached.
     asynchronous : bool
         Each taxel compares by itself, as in `Board`; no circuit, and version 2 of the wire (``wire=2``).

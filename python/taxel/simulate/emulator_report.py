@@ -1,4 +1,4 @@
-"""What an emulated board has done so far."""
+"""Report of what an emulated board has done so far."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _QUANTILES = {"p50": "median", "p99": "99 %", "max": "at most"}
 
 @dataclass(frozen=True)
 class EmulatorReport:
-    """What an emulated board has done so far.
+    """Report of what an emulated board has done so far.
 
     Attributes
     ----------

@@ -28,7 +28,7 @@ class Pressed(NamedTuple):
     pressure_kpa : float64, shape (rows, columns), kPa
         On the layer's face, by taxel, shape (rows, columns); nowhere negative.
     base_kpa : float64, shape (rows, columns), kPa
-        At the layer's base, where the taxels lie; beside the body a bonded base is also pulled, a little.
+        At the layer's base, where the taxels are; beside the body a bonded base is also pulled, a little.
     force_n : float, N
         All of the pressure on the face.
     """
@@ -47,9 +47,10 @@ class Layer:
         What differs from the usual foam: modulus_kpa, thickness_mm, poisson, yield_strain, densification_strain,
         exponent (losses are of motion: see `Scene`).
     array : Array, optional
-        The taxels that lie beneath; the thesis' where it is left out.
+        The taxels beneath; default: the thesis' array.
     cells_per_pitch : int, 1 to 16
-        How many cells of the layer lie along the pitch of taxels: more than one for a touch narrower than two taxels.
+        How many cells of the layer there are along the pitch of taxels: more than one for a touch narrower than two
+        taxels.
     tolerance : float, above 0
         A solution ends when no pressure moves by more than this share of the largest.
 
@@ -101,7 +102,7 @@ class Layer:
 
     @property
     def cells_mm(self) -> NDArray[np.float64]:
-        """Where the cells lie: y and x from the first taxel, each as `press` takes what has sunk there."""
+        """Places of the cells: y and x from the first taxel, each as `press` takes what has sunk there."""
         y, x = self._core.cells_mm()
         return np.stack(np.meshgrid(y, x, indexing="ij"))
 

@@ -24,7 +24,7 @@ class Pipe:
     """Play frames of any other sensor to the board as they come: from a pipe, after a line that describes them.
 
     The line is JSON: ``{"rows": 16, "columns": 8, "rate": 100, "bits": 12}``, and may name ``pitch_mm`` and ``name``.
-    Behind it stand frames: uint16, little-endian, row by row. The board's clock is the pipe's: a frame is one over
+    After it come frames: uint16, little-endian, row by row. The board's clock is the pipe's: a frame is one over
     `rate` long.
 
     Parameters

@@ -179,7 +179,7 @@ def _known(location: str, table: object, names: tuple[str, ...] | list[str]) -> 
 
 
 def _bodies(described: Any, folder: Path) -> Any:
-    """Return bodies with the height maps that lie in files."""
+    """Return bodies with the height maps that are in files."""
     if not isinstance(described, list):
         raise SceneError(f"bodies is {json.dumps(described, default=str)}: must be written [[bodies]], once a body")
     bodies = []

@@ -17,7 +17,7 @@ __all__ = ["Faults", "Flaws"]
 
 @dataclass(frozen=True)
 class Flaws:
-    """Set the flaws of taxels; each is 0 where it is left out, and is drawn from a seed of its own.
+    """Set the flaws of taxels; each is 0 where it is left out, and is drawn from a separate seed.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Flaws:
 
     Raises
     ------
-    ProblemError : a size outside its range, a seed for no flaw, or a seed that is no whole number
+    ProblemError : a size outside its range, a seed for no flaw, or a seed that is not a whole number
 
     Examples
     --------
@@ -95,7 +95,7 @@ class Faults:
 
     Raises
     ------
-    ProblemError : a share that is none, shares that are more than 1 together, or a seed that is no whole number
+    ProblemError : a share outside 0 to 1, shares that are more than 1 together, or a seed that is not a whole number
 
     Examples
     --------

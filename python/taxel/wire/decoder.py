@@ -49,8 +49,8 @@ def decode(
         separately, so that an intensity never belongs to a change of the datagram before.
     columns : Columns, optional
         Memory to reuse, with room for ``len(data) // 5 + 2`` events, of version 2 for ``len(data) // 2 + 32``: the
-        events are views of it, valid until it is filled again. By default, and with pairing "taxel", they have memory
-        of their own.
+        events are views of it, valid until it is filled again. By default, and with pairing "taxel", they have separate
+        memory.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def decode(
 
     Raises
     ------
-    ProblemError : an invalid argument; damage in the bytes is no error
+    ProblemError : an invalid argument; damage in the bytes is not an error
 
     Notes
     -----
@@ -124,7 +124,7 @@ class Decoder:
     Notes
     -----
     Table 5.4, and the page *Wire version 2*. Time of version 1 is unwrapped into 64 bits: a stamp up to 0.1 s behind
-    the latest time is a step back, which is counted and stays in the events; any other stamp lies ahead, so that pauses
+    the latest time is a step back, which is counted and stays in the events; any other stamp is ahead, so that pauses
     of up to 6.45 s are unwrapped correctly. For longer pauses arrival times are needed (`push`).
 
     Examples

@@ -46,7 +46,7 @@ class CountWindows:
         self._values = np.zeros((count, *array.shape), np.float32)
 
     def add(self, t: NDArray[np.int64], x: NDArray[np.uint16], y: NDArray[np.uint16]) -> bool:
-        """Count events; return whether all lie in the windows."""
+        """Count events; return whether all are in the windows."""
         window = t // self._window_us - self._begin
         if len(window) and not 0 <= window.min() <= window.max() < len(self._values):
             return False

@@ -1,4 +1,4 @@
-"""What is read of the events of a camera: a region, taxels of several pixels, a polarity, counts in windows."""
+"""Selection of the events of a camera: a region, taxels of several pixels, a polarity, counts in windows."""
 
 from __future__ import annotations
 

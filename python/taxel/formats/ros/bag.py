@@ -90,7 +90,7 @@ class Bag:
         return {connection.topic for connection in self.reader.connections}
 
     def undefined(self, name: str) -> str:
-        """Return the name of a type that is not defined: this one, or one that it is made of; "" if none."""
+        """Return the name of a type that is not defined: this type, or a type that it is made of; "" if none."""
         if name not in self.store.fielddefs:
             return name
         from rosbags.interfaces import Nodetype  # noqa: PLC0415  an extra
@@ -115,7 +115,7 @@ class Bag:
         return decode(data, connection.msgtype)
 
     def _check_digest(self, sent: Connection) -> None:
-        """Refuse a definition that was given for messages of another one, if the bag holds the digest of its own."""
+        """Refuse a given definition whose digest differs from that of the messages' own, if the bag holds it."""
         if sent.msgdef.data or not sent.digest:
             return
         digest = self.store.generate_msgdef(sent.msgtype)[1] if self.is_ros1 else self.store.hash_rihs01(sent.msgtype)

@@ -223,7 +223,7 @@ class Touches(NamedTuple):
 
 
 class TaxelStatistics(NamedTuple):
-    """Statistics of each taxel's events and held values; whole numbers, shape (rows, columns) but for touches."""
+    """Statistics of each taxel's events and held values; whole numbers, shape (rows, columns) except touches."""
 
     activity: NDArray[np.int64]
     """Number of events."""

@@ -62,7 +62,7 @@ def _free(frames: Frames, rest: Rest) -> NDArray[np.int64]:
 
 
 def _later(frames: Frames, free: NDArray[np.int64]) -> tuple[int, int] | None:
-    """Return the first quiet stretch from the first of these frames on, us, unless something lies on the array."""
+    """Return the first quiet stretch after the first of these frames, us, unless the array is loaded in it."""
     later = of_quiet(frames.between(frames.t[free[0]], np.inf))
     return None if later.preload_at else later.quiet_us
 

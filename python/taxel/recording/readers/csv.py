@@ -292,7 +292,7 @@ def _whole(path: Path, first: int, body: bytes, times: NDArray[np.float64]) -> N
 
 
 def _line_number(body: bytes, row: int) -> int:
-    """Return the number of the line, from 0 on, of a row of numbers; empty lines are not rows."""
+    """Return the number of the line, counted from 0, of a row of numbers; empty lines are not rows."""
     rows = -1
     for k, line in enumerate(body.split(b"\n")):
         rows += bool(line.strip())

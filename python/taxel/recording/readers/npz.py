@@ -168,7 +168,7 @@ def read_records(path: Path, array: Array | None) -> RecordedSource:
 
 
 def around(x: NDArray[Any], y: NDArray[Any]) -> Array:
-    """Return the thesis' array, or a larger one if events lie outside it."""
+    """Return the thesis' array, or a larger array if events are outside it."""
     thesis = Array.thesis()
     if not len(x):
         return thesis

@@ -57,7 +57,7 @@ class Readings:
 
 @dataclass(frozen=True, eq=False)
 class _Head:
-    """Hold what stands above the numbers of a table, and how its lines are read."""
+    """Hold the lines above the numbers of a table, and how its lines are read."""
 
     path: Path
     how: Table
@@ -76,7 +76,7 @@ class _Head:
 
     @classmethod
     def read(cls, path: Path, how: Table, taxels: int | None) -> _Head:
-        """Read what stands above the numbers; `taxels` are those of a line, if the layout says them.
+        """Read the lines above the numbers; `taxels` are those of a line, if the layout states them.
 
         Raises
         ------
@@ -184,7 +184,7 @@ def read_table(path: Path, layout: Layout) -> Readings:
 
     Raises
     ------
-    FormatError : it is not what the layout says, or a cell is no number (names line and column)
+    FormatError : it differs from the layout, or a cell is not a number (names line and column)
     """
     how = layout.table or Table()
     taxels = None if layout.rows is None or layout.columns is None else layout.rows * layout.columns
@@ -374,7 +374,7 @@ def _seconds(cell: str, path: Path, line: int) -> str:
 
 
 def _with_points(texts: list[str], time: int | None, names: Sequence[str], path: Path, line: int) -> list[str]:
-    """Return the cells of a line with points for decimal commas, but for a time that is a text."""
+    """Return the cells of a line with points for decimal commas, except a time that is a text."""
     texts = list(texts)
     if time is not None:
         texts[time] = ""

@@ -187,7 +187,7 @@ class _TextTable:
         return np.array([_number(row[column], self.decimal) for row in self.body])
 
     def called(self, column: int) -> str:
-        """Return how a layout names a column: by its name, or by its number from 1 without one of its own."""
+        """Return how a layout names a column: by its name, or, without a name, by its number from 1."""
         name = self.names[column] if self.names else ""
         return _quote(name) if name and list(self.names).count(name) == 1 else str(column + 1)
 
@@ -266,7 +266,7 @@ class _TextTable:
         return bool((np.diff(numbers[:: self.lines_of(numbers)]) == 1).all())
 
     def left_out(self, time: int | None) -> list[int]:
-        """Return which columns are no taxels: of texts, other times, another unit than most, and numbers of lines."""
+        """Return which columns are not taxels: texts, other times, another unit than most, and numbers of lines."""
         times = [] if time is None else times_of(self.names)
         left = {k for k, is_numeric in enumerate(self.numeric) if not is_numeric or k in times or self._is_empty(k)}
         left |= {0} if self.counts else set()
@@ -335,7 +335,7 @@ class _Fit:
 
 
 def _numbers_columns(rows: Sequence[Sequence[str]], numeric: Sequence[bool], decimal: str, *, below: bool) -> bool:
-    """Return whether the first line of numbers numbers the columns, from 0 on as programs do; `below`: another line."""
+    """Return whether the first line of numbers numbers the columns, from 0 as programs do; `below`: another line."""
     first, *rest = rows[below:]
     cells = [cell for cell in first if cell]
     if not rest or not _FEWEST < len(cells) >= len(numeric) - 1 or cells != [str(k) for k in range(len(cells))]:
@@ -437,7 +437,7 @@ def _fits(row: Sequence[str], numeric: Sequence[bool], decimal: str) -> bool:
 
 
 def _size(taxels: int, names: Sequence[str]) -> list[str]:
-    """Return the lines that say rows and columns of so many taxels, a grid only where their names are no words."""
+    """Return the lines that state rows and columns of so many taxels, a grid only where their names are not words."""
     words = any(names) and not all(_NUMBERED.fullmatch(name) for name in names)
     rows = next(rows for rows in range(math.isqrt(taxels), 0, -1) if not taxels % rows)
     columns = taxels // rows
