@@ -47,6 +47,19 @@ class Clock:
         The earliest time at which each datagram could be sent, by the source's clock: the end of its frame, if known.
     arrived_ns : int64, shape (n,), ns since 1970
         Its arrival time by the host's clock.
+
+    Raises
+    ------
+    ProblemError : no datagrams, when the drift or a time is asked for
+
+    Examples
+    --------
+    >>> board_us = np.arange(0, 100_000, 1000)
+    >>> clock = Clock(board_us, 5_000_000 + 1000 * board_us)
+    >>> clock
+    Clock(drift +0.0 ppm, delays 0 us median, 0 us 99 %)
+    >>> int(clock.host_ns(1500))
+    6500000
     """
 
     board_us: NDArray[np.int64]

@@ -46,6 +46,10 @@ class Tare(Saved):
     note : str
         Board and day of the measurement.
 
+    Raises
+    ------
+    ProblemError : the class is called; use `take`, `load` or `from_json`
+
     Examples
     --------
     >>> frames = Frames([[[50.0]], [[53.0]], [[53.0]]], [0, 1000, 3000], unit="ticks")

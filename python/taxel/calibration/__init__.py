@@ -61,6 +61,10 @@ class Calibration(Saved):
         The loads of a fit: each load, its unit, and what the calibration makes of the frames under it.
     note : str
 
+    Raises
+    ------
+    ProblemError : the class is called; use `law`, `table`, `fit`, `load` or `from_json`
+
     Examples
     --------
     >>> array = Array(1, 2, pitch_mm=10.0, name="two")

@@ -42,6 +42,11 @@ class Load(NamedTuple):
     Raises
     ------
     ProblemError : values that are invalid, when `Calibration.fit` gets it
+
+    Examples
+    --------
+    >>> Load(Frames([[[20.0, 10.0]]], [0]), 3.0).unit
+    'N'
     """
 
     frames: Frames

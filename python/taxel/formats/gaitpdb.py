@@ -49,8 +49,8 @@ def trials(path: str | Path) -> Iterator[Trial]:
     Yields
     ------
     Trial
-        Channels 0 to 7 are sensors 1 to 8 (heel to front) of either foot, at the places that the source states, without a
-        unit; ``series["total"]`` is the total force in N.
+        Channels 0 to 7 are sensors 1 to 8 (heel to front) of either foot, at the places that the source states,
+        without a unit; ``series["total"]`` is the total force in N.
 
     Raises
     ------

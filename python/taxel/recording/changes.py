@@ -20,6 +20,11 @@ class Zeroing:
         The rest after it.
     before : float, ticks, optional
         The rest before, if it was known.
+
+    Examples
+    --------
+    >>> Zeroing(5000, 3, 2, rest=120.0, before=100.0)
+    Zeroing(t=5000, x=3, y=2, rest=120.0, before=100.0)
     """
 
     t: int

@@ -44,7 +44,11 @@ class Verdict(str):
     stretch_of : str or None
         Of a stretch of a recording a name of the whole, whose losses these are: `merge` counts them once.
     parts : dict of Verdict
-        Of several sources or merged recordings that of each, by name; else empty.
+        For several sources or merged recordings, the verdict of each, by name; else empty.
+
+    Raises
+    ------
+    ProblemError : the class is called; a verdict comes from `taxel.open` or `from_dict`
 
     Examples
     --------

@@ -185,9 +185,9 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
     version_2 : Version2, optional
         How the board speaks version 2.
     circuit : Circuit, optional
-        Lines that the taxels share, settling, comparators with hysteresis; by default each taxel is read by itself. With
-        acts, its voltage and resistor must be those of the sensor. The converter's times are those of the registers, and flaws
-        are applied after it. The report has the frame rate that one core reached.
+        Lines that the taxels share, settling, comparators with hysteresis; by default each taxel is read by itself.
+        With acts, its voltage and resistor must be those of the sensor. The converter's times are those of the
+        registers, and flaws are applied after it. The report has the frame rate that a single core reached.
     asynchronous : bool
         Each taxel compares by itself, as in `Board`; no circuit, and version 2 of the wire (``wire=2``).
     flaws : Flaws, optional

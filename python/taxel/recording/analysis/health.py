@@ -76,7 +76,13 @@ class Health:
         Number of events (or changes of the frame) at each taxel.
     dead, stuck, noisy : bool, shape (rows, columns)
     untested : bool, shape (rows, columns)
-        Not touched enough to say: neither named nor seen to work.
+        Taxels that were not touched enough to say whether they work.
+
+    Examples
+    --------
+    >>> from taxel.frames import Frames
+    >>> health(Frames([[[0.0, 5.0]], [[0.0, 7.0]], [[0.0, 5.0]]], [0, 10_000, 20_000]))
+    Health(2 taxels: 0 dead, 0 stuck, 0 noisy, 2 not touched enough to say)
     """
 
     array: Array
