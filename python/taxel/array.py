@@ -23,7 +23,7 @@ __all__ = ["Array", "Places", "of_size"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Places:
-    """Hold the place of each taxel of a sensor whose taxels are not evenly apart.
+    """Hold the place of each taxel of a sensor whose taxels are not evenly spaced.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Places:
 
     Raises
     ------
-    ProblemError : `x`, `y` and `area` of different shapes, or another unit
+    ProblemError : `x`, `y` and `area` have different shapes, or the unit is not one of these
 
     Examples
     --------
@@ -103,7 +103,7 @@ class Places:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Array:
-    """Describe a sensor: rows, columns, how far apart or where its taxels are, and which of them exist.
+    """Describe a sensor: rows, columns, the pitch or the places of its taxels, and which of them exist.
 
     A taxel's index is ``row * columns + column``; x is the column, y the row.
 
@@ -111,15 +111,15 @@ class Array:
     ----------
     rows, columns : int, 1 or more
     pitch_mm : float or (float, float), mm, above 0, optional
-        Distance between the centres of neighbouring taxels, or that between rows and that between columns. Default:
-        unknown. Without it nothing is in mm.
+        Distance between the centres of neighbouring taxels, or two distances: between rows and between columns.
+        Default: unknown. Without it no result is in mm.
     exists : bool, shape (rows, columns), optional
         Which taxels exist; default: all.
     name : str
     places : Places, optional
         The place of each taxel, instead of a pitch.
     names : sequence of str, one a taxel, row by row, optional
-        What each taxel is called, such as a column of a table; "" for one without a name.
+        The name of each taxel, such as a column of a table; "" for one without a name.
 
     Raises
     ------
@@ -129,8 +129,8 @@ class Array:
     Notes
     -----
     A grid, with rows and columns both above 1, has a map even if its pitch is unknown: its centre of pressure is in
-    columns and rows, its contact area a number of taxels. A single row or column with neither pitch nor places are
-    channels: they have curves, and no map, centre or area.
+    columns and rows, its contact area a number of taxels. The taxels of a single row or column with neither pitch nor
+    places are channels: they have curves, but no map, centre or area.
 
     Examples
     --------
@@ -189,7 +189,7 @@ class Array:
 
     @classmethod
     def _given(cls, array: object) -> Array:
-        """Return a given array; where it is two numbers, as a shape, say what makes an array of them."""
+        """Return a given array; where it is two numbers, as a shape, the error shows how to make an array of them."""
         if isinstance(array, tuple | list) and len(array) == 2 and all(type(side) is int for side in array):
             wanted = f"must be taxel.Array({array[0]}, {array[1]}), of so many rows and columns"
             raise refused("array", f" is {shown(array)}: {wanted}")
@@ -290,7 +290,7 @@ class Array:
 
         Raises
         ------
-        ProblemError : no slices of whole numbers, or one with a step
+        ProblemError : not slices of whole numbers, or a slice with a step
 
         Examples
         --------
@@ -357,7 +357,7 @@ class Array:
     def centre_unit(self) -> str | None:
         """The unit of a centre of pressure: "mm", "taxels" (columns and rows) or "places" (those without a unit).
 
-        None of channels, which have no centre.
+        None for channels, which have no centre.
         """
         if self.places is not None:
             return self.places.unit or "places"

@@ -180,7 +180,7 @@ class Frames(FrozenColumns):
 
         Raises
         ------
-        ProblemError : no slices of whole numbers, one with a step, or no taxel
+        ProblemError : not slices of whole numbers, a slice with a step, or a rectangle without a taxel
 
         Examples
         --------
@@ -206,7 +206,7 @@ class Frames(FrozenColumns):
 
         A missing value means no change, as with a board that sends only changes. Before its first value a taxel reads
         that value; a taxel without any value reads 0. Encoders, trainings, readouts and tares of a `Recording` do this
-        themselves, with a warning that counts the values; from frames they need it done.
+        themselves, with a warning that counts the values. For `Frames`, call this method first.
 
         Returns
         -------
@@ -306,8 +306,8 @@ class Frames(FrozenColumns):
         -------
         float64, shape (n, 2), mm
             x to the right and y downwards from the middle of the taxel in the first column and row; NaN if no taxel
-            counts. In columns and rows ("taxels") on a grid of unknown pitch; of places in their unit and from their
-            origin.
+            counts. On a grid of unknown pitch it is in columns and rows ("taxels"); with places, in their unit and from
+            their origin.
 
         Raises
         ------
@@ -343,7 +343,7 @@ class Frames(FrozenColumns):
         return np.asarray(self.values > np.float64(finite("above", above)))
 
     def to_pandas(self) -> Any:
-        """Return a table of one row a frame, indexed by its time ``t_us``, and one column a taxel, ``(row, column)``.
+        """Return a table: a row for each frame, indexed by ``t_us``, and a column for each taxel, ``(row, column)``.
 
         Raises
         ------

@@ -273,9 +273,12 @@ def test_a_layout_names_a_data_set_in_a_group_by_its_path(tmp_path: Path) -> Non
     ("layout", "said"),
     [
         ('array = "2x3"', "unknown key array; a size is given by rows = 2, columns = 3; there are"),
-        ('array = "palm"', r"unknown key array; it stands in \[data\]; there are"),
-        ('[data]\narray = "2x3x4.5"', r"the layout says \[data\] array: a size is given by rows = 2, .*pitch_mm = 4.5"),
-        ('[data]\ntime = "when"', r"the layout says \[data\] time: leave it out"),
+        ('array = "palm"', r"unknown key array; it belongs in \[data\]; there are"),
+        (
+            '[data]\narray = "2x3x4.5"',
+            r"the layout states \[data\] array: a size is given by rows = 2, .*pitch_mm = 4.5",
+        ),
+        ('[data]\ntime = "when"', r"the layout states \[data\] time: leave it out"),
     ],
 )
 def test_a_size_or_a_name_where_none_belongs_is_told_where_it_does(tmp_path: Path, layout: str, said: str) -> None:
@@ -356,7 +359,7 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
         ("zeros_before_s = 0", "zeros_before_s is 0: must be from 1e-06 to 60"),
         ("table = 3", "table"),
         ("[table]\nseparator = ', '", "separator is ', ': must be one character"),
-        ("[table]\nskip_lines = 40", "no line after 40 skipped ones"),
+        ("[table]\nskip_lines = 40", "no line after the 40 skipped lines"),
         ("[table]\ntime_column = 'when'", "no column 'when' of times"),
         ("[table]\ntime_column = 9", "6 columns; time_column is 9"),
         ("rows = [", "not TOML"),
@@ -373,7 +376,7 @@ def test_a_layout_that_makes_no_sense_is_refused_in_one_line(tmp_path: Path, lay
 @pytest.mark.parametrize("head", ["", "heel, N\n"])
 def test_a_table_of_another_separator_is_named(tmp_path: Path, stated: str, there: str, head: str) -> None:
     head = head.replace(", ", there)
-    with pytest.raises(FormatError, match=r"line 1: one column by the separator .*say in the layout"):
+    with pytest.raises(FormatError, match=r"line 1: one column by the separator .*write in the layout"):
         table(tmp_path, head + lines(VALUES, there), f'rate_hz = 50\n[table]\nseparator = "{stated}"')
 
 
@@ -406,8 +409,12 @@ def test_a_name_with_a_comma_over_one_column_is_a_name(tmp_path: Path) -> None:
             "states 3 x 2 taxels; the file states 2 x 3",
         ),
         (Frames(VALUES[:, None], [0, 1, 2], unit="N"), "unit = 'kPa'", "states unit kPa; one.npz is in N"),
-        (Frames(VALUES[:, None], [0, 10_000, 20_000]), "rate_hz = 50", "says 50 Hz; the times of one.npz make 100 Hz"),
-        (Frames(VALUES[:, None], [0, 1, 2], array=Array(1, 6, 3.0)), "pitch_mm = 4", "the file says 3 mm apart"),
+        (
+            Frames(VALUES[:, None], [0, 10_000, 20_000]),
+            "rate_hz = 50",
+            "states 50 Hz; the times of one.npz make 100 Hz",
+        ),
+        (Frames(VALUES[:, None], [0, 1, 2], array=Array(1, 6, 3.0)), "pitch_mm = 4", "the file states 3 mm apart"),
     ],
 )
 def test_a_layout_that_contradicts_the_file_is_refused_where_it_is_given(
@@ -591,5 +598,5 @@ def test_zeros_before_frames_without_times_or_before_events_are_refused(tmp_path
     events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     taxel.convert(events, tmp_path / "board.mcap")
     (tmp_path / "given.toml").write_text("zeros_before_s = 0.5")
-    with pytest.raises(FormatError, match=r"holds events; .* and zeros_before_s are of frames"):
+    with pytest.raises(FormatError, match=r"holds events; .* and zeros_before_s are for frames"):
         taxel.open(tmp_path / "board.mcap", layout=tmp_path / "given.toml")

@@ -470,7 +470,7 @@ def test_a_folder_of_bags_opens_as_a_folder_of_trials(tmp_path: Path) -> None:
     opened = taxel.open_all(tmp_path, topic="/palm", array=PALM_ARRAY)
     assert [one.name for one in opened] == ["gra0.bag", "gra1.db3", "gra2.mcap", "gra3"]
     assert [len(one.notes) for one in opened] == [0, 1, 0, 0]
-    with pytest.raises(FormatError, match=r"gra0\.bag: a ROS bag, of which a topic"):
+    with pytest.raises(FormatError, match=r"gra0\.bag: a ROS bag: choose one of its topics"):
         taxel.open_all(tmp_path)
 
 

@@ -47,7 +47,7 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     said = done.stdout
     assert "60 trials, 2 labels x" in said
     assert "full: 1 ms, 2 taxels, to 60 ms 1.00 of 1.00 bits" in said
-    assert said.splitlines()[4].startswith("in brackets: where the bits lie when these trials")
+    assert said.splitlines()[4].startswith("in brackets: the range of the bits in 95 % of new draws of these trials")
     assert "<- cheapest" in said
     assert "10 ms " in said
     assert "wire version" in said
@@ -199,12 +199,12 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
         (
             GOOD.replace("group\n", "group,\n").replace("u\n", "u,9\n"),
             [],
-            "line 2: '9' stands in a column without a name",
+            "line 2: '9' is in a column without a name",
         ),
         ("\n\n", [], "labels.csv: holds nothing; must be recording,t_us,label"),
         (GOOD, ["--periods", "fast"], "must be numbers, as 1,2,5"),
         (GOOD, ["--periods", "0"], "--periods is [0.0]: must be whole us"),
-        (GOOD, ["--windows", "1000"], "--windows is [1000.0]: must lie in"),
+        (GOOD, ["--windows", "1000"], "--windows is [1000.0]: must be in"),
         (GOOD, ["--pools", "40"], "--pools is [40]: the array is"),
         (GOOD, ["--folds", "1"], "--folds is 1: must be a whole number from 2"),
         (GOOD, ["--taxels", "1.5"], "--taxels 1.5: must be whole numbers"),

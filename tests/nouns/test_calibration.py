@@ -262,7 +262,10 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
             lambda: Calibration.fit([Load(frames(1.0), 1.0), Load(frames(1.0, "ticks"), 1.0)]),
             "frames of load 2: in ticks; the calibration takes counts",
         ),
-        (lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]), "reading_unit is 'N': must say what is read"),
+        (
+            lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]),
+            "reading_unit is 'N': must be the unit of the readings",
+        ),
         (lambda: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"), r"readings\[1\] is 1: must rise"),
         (lambda: Calibration.table(ARRAY, [1.0], [1.0, 2.0], unit="N"), "1 reading and 2 values"),
         (

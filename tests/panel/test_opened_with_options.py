@@ -116,7 +116,7 @@ def test_a_refused_bag_is_named_once_on_the_page(tmp_path):
     with viewed(tmp_path, "mat.npz") as page:
         refused = page.ask("open", name="grasp.bag")
         assert (refused["type"], refused["field"]) == ("refused", "name")
-        assert refused["reason"].startswith(f"{tmp_path / 'grasp.bag'}: a ROS bag, of which a topic")
+        assert refused["reason"].startswith(f"{tmp_path / 'grasp.bag'}: a ROS bag: choose one of its topics")
 
 
 def test_a_folder_of_bags_is_shown_by_options_that_hold_for_each(capsys, tmp_path):

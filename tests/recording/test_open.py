@@ -68,7 +68,7 @@ def npz(**columns: object) -> bytes:
         ("a.txt", b"hello", "no recording; there are .mcap, .lsa, .npz, .csv, .h5"),
         ("a.h5", b"\x89HDF\r\n\x1a\n", "not a whole HDF5 file"),
         ("a.h5", b"hello", "not with the magic of HDF5 (89 48 44 46)"),
-        ("a.bag", b"#ROSBAG V2.0", "a ROS bag, of which a topic, or [ros] in a layout file, is opened"),
+        ("a.bag", b"#ROSBAG V2.0", "a ROS bag: choose one of its topics, or write [ros] in a layout file"),
     ],
 )
 def test_a_wrong_file_is_one_line_with_place_and_remedy(tmp_path: Path, name: str, content: bytes, said: str) -> None:

@@ -150,7 +150,8 @@ class Calibration(Saved):
         ramp : float, ticks
             How long the board's ramp lasts (its register `ramp_time`).
         sensor : mapping, optional
-            What differs from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm ...
+            Parameters that differ from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm
+            ...
         unit : {"N", "kPa"}
         gain : float or float64, shape (rows, columns)
         rest : Tare or float64 of the array's shape, optional

@@ -168,8 +168,8 @@ def lines(answer: Answer) -> list[str]:
         f"{100 * full.found.right:.0f} % right"
         + "".join(f"; frames {e.bits:.2f}" for p, e in answer.frames.items() if p == full.period_ms)
         + "".join(f"; {name} {e.bits:.2f}" for name, e in answer.classifiers.items()),
-        "in brackets: the range of the bits in 95 % of draws, where these trials, or whole groups, are drawn again; "
-        "with few trials the truth is outside it more often than that",
+        "in brackets: the range of the bits in 95 % of new draws of these trials, or of whole groups; with few "
+        "trials the truth is outside it more often than that",
     ]
     text += [f"warning: {warning}" for warning in answer.warnings]
     text += ["", _row("period", "bits", "events", "mb/event", "kb/s", "silent", "95 % of the full?")]

@@ -17,16 +17,16 @@ __all__ = ["Split", "TrialFold", "folds", "split"]
 
 
 def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None, seed: int = 0) -> NDArray[np.int64]:
-    """Deal trials out to folds, each label as evenly as can be; trials of a group are never split.
+    """Deal trials out to folds, each label as evenly as possible; trials of a group are never split.
 
     Parameters
     ----------
     labels : labels, shape (trials,)
-        Texts or whole numbers; two at least.
+        Texts or whole numbers; at least two different labels.
     count : int, 2 or more
-        Folds; fewer where there are fewer groups.
+        Number of folds; fewer if there are fewer groups.
     groups : labels, shape (trials,), optional
-        What must not be split between folds: a person, a session, the variants of one trial.
+        Trials that must not be split between folds: of a person, a session, the variants of one trial.
     seed : int, 0 or more
 
     Returns
@@ -81,7 +81,7 @@ class TrialFold:
     ----------
     test, train : int64
     inner : tuple of int64
-        Empty where a label of the training trials cannot be dealt out.
+        Empty if a label of the training trials cannot be dealt out.
     """
 
     test: NDArray[np.int64]

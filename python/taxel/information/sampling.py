@@ -84,9 +84,9 @@ class SampledEvents:
     trial, taxel, bin : int64, shape (spikes,)
         In the order of bins; bin 0 holds each trial's first event.
     value : float32, shape (spikes,)
-        +1 or -1, or with more bits the step.
+        +1 or -1; with more bits, the step.
     first_us : float64, shape (trials,), us
-        When the first event comes after the true contact; infinite in a silent trial.
+        Time from the true contact to the first event; infinite in a silent trial.
     length_us : float64, shape (trials,), us
         From the true contact to the trial's end.
     """
@@ -202,9 +202,9 @@ def spikes_of(
     contact_us : float64, shape (trials,), us
         The true contact; NaN where there is none, and the trial is silent.
     window_us : float, us
-        How far after it to look.
+        Time after the contact that counts.
     random : numpy.random.Generator
-        Of the phases.
+        Source of the random phases.
     pool : int
         Squares of so many by so many taxels are averaged into one.
 

@@ -34,8 +34,8 @@ _KNOWN = (*_COLUMNS, "stop_us", "group", "host_ns")
 class LabelledTrial:
     """Hold one trial: a stretch of a recording, its label and its group.
 
-    Its label is that of the whole stretch, which a classifier tells from others; a `taxel.detect.Example` has the times
-    of labelled events, at which a neuron learns to fire.
+    Its label belongs to the whole stretch, which a classifier distinguishes from others. A `taxel.detect.Example` has
+    the times of labelled events, at which a neuron learns to fire.
 
     Parameters
     ----------
@@ -47,9 +47,10 @@ class LabelledTrial:
     stop_us : int, us, optional
         The trial's end (exclusive): nothing after it is used, and the length of the touch is known.
     group : str
-        What must not be split between folds (person, session, pose); every trial by itself where it is empty.
+        Trials of a group (person, session, pose) are not split between folds; if it is empty, the trial is a group by
+        itself.
     parameters : mapping of str to str
-        What else is known: radius, height, slant ...
+        Further known values: radius, height, slant ...
     name : str
         Place of the trial, for errors.
 
@@ -100,13 +101,13 @@ def read_trials(
     Parameters
     ----------
     table : path
-        A .csv with a header line, its columns in any order. A recording is named by its path, name or stem; where
-        one is given the column may be absent. ``t_us`` is where to begin to look for the touch; ``host_ns`` settles it
-        where the recording began in mid-stream, as for `Labels`.
+        A .csv with a header line, its columns in any order. A recording is named by its path, name or stem; with a
+        single recording the column may be absent. The search for the touch begins at ``t_us``; ``host_ns`` decides if
+        the recording began in mid-stream, as for `Labels`.
     recordings : sequence of Recording
-        All of them must be named, and no other.
+        The table must name all of them, and no others.
     window_ms : float, ms, above 0, optional
-        The length of trials without ``stop_us``; needed where there are such.
+        The length of trials without ``stop_us``; needed if there are such trials.
 
     Returns
     -------
@@ -177,9 +178,9 @@ def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> lis
     Parameters
     ----------
     recordings : sequence of Recording
-        Notes written while it was recorded, or set in the panel; those without the board's time are left out.
+        Their notes were written while recording, or set in the panel; notes without the board's time are left out.
     window_ms : float, ms, above 0
-        How long after the touch to look.
+        Time after the touch that counts.
 
     Returns
     -------
@@ -214,7 +215,7 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
     ----------
     recordings : sequence of Recording
     window_ms : float, ms, above 0, optional
-        How long after the first event to look; to the end where it is left out.
+        Time after the first event that counts. Default: to the end.
 
     Returns
     -------

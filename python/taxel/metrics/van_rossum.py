@@ -17,7 +17,7 @@ def van_rossum(a: Pattern, b: Pattern, *, tau: float, normalisation: str = _DEFA
     Parameters
     ----------
     a, b : float64, shapes (n,) and (m,), ms, ascending; or SpikeTrains with equally many trains
-        Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
+        Either may be empty. For patterns, the sum over trains; signed trains are split into ON and OFF.
     tau : float, ms, above 0
     normalisation : {"spike", "tau", "none"}
         Divisor of the integral: ``tau / 2``, so that the distance of one additional spike is 1, as in elephant; `tau`,

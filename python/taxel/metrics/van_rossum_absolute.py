@@ -24,7 +24,7 @@ def van_rossum_absolute(
     Parameters
     ----------
     a, b : float64, shapes (n,) and (m,), ms, ascending; or SpikeTrains with equally many trains
-        Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
+        Either may be empty. For patterns, the sum over trains; signed trains are split into ON and OFF.
     tau : float, ms, above 0
     window : (start, stop), ms, optional
         The interval of the sum, 0 to T in 5.10; default: all time.

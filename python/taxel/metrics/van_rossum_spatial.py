@@ -30,8 +30,8 @@ def van_rossum_spatial(
     Parameters
     ----------
     a, b : SpikeTrains with one train a taxel, or several for each
-        Signed ones are split into ON and OFF. If each taxel has several trains (all of one kind, then all of the next),
-        each kind is smoothed separately.
+        Signed trains are split into ON and OFF. If each taxel has several trains (all of one kind, then all of the
+        next), each kind is smoothed separately.
     array : Array
         The positions of the taxels; those that do not exist must have no spikes and are ignored.
     tau : float, ms, above 0

@@ -101,8 +101,8 @@ class OpenOptions(SharedOptions):
 
 def _no_camera(path: Path) -> ProblemError:
     return ProblemError(
-        f"{path}: not a file of an event camera (events without intensities); region, bin, window_ms and polarity "
-        f"are only for such files"
+        f"{path}: holds no events without intensities, as files of event cameras do; region, bin, window_ms and "
+        f"polarity are only for such events"
     )
 
 
