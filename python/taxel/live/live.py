@@ -41,11 +41,11 @@ _WAIT_S = 0.5
 
 
 class Live:
-    """Receive a board's datagrams, record them and read them out, as they arrive.
+    """Receive a board's datagrams; record and read them out as they arrive.
 
-    A context manager, and an iterator of detections that ends when `stop` was called. It works in separate threads: one
-    receives, decodes and records, one encodes and reads out, and while it records a third receives. A queue that is
-    full drops data, and counts it.
+    It is a context manager, and an iterator of detections that ends after `stop` was called. It works in separate
+    threads: one receives, decodes and records, one encodes and reads out, and while it records a third receives. A
+    queue that is full drops data, and counts it.
 
     Parameters
     ----------
@@ -227,8 +227,8 @@ class Live:
     def copies(self) -> _core.Copies:
         """Return an object that copies all data that arrive after this call, for other computers.
 
-        Its ``next(timeout)`` returns the next copy, or None: ("parcel", bytes) for datagrams, ("frame", JSON) ten
-        times a second, ("detection", JSON); ``is_over()`` says whether the pipeline has ended and all were taken.
+        Its ``next(timeout)`` returns the next copy, or None: ("parcel", bytes) for datagrams, ("frame", JSON) ten times
+        a second, ("detection", JSON); ``is_over()`` is true if the pipeline has ended and all copies were taken.
         """
         return self._core.copy()
 
@@ -306,7 +306,8 @@ class Live:
     def frame(self) -> NDArray[np.uint16] | NDArray[np.float32]:
         """Values that the taxels hold, in `unit`, shape (rows, columns), ten times a second.
 
-        Those of a board without any event so far are 0; those of frames of numbers are NaN before the first one.
+        For a board, a taxel without any event so far is 0; for frames of numbers, values are NaN before the first
+        frame.
         """
         if self.frame_us is None:
             return self._core.frame().reshape(self.array.shape)
@@ -349,11 +350,11 @@ class Live:
         Parameters
         ----------
         name : str
-            Of the source, as in `sources`.
+            Name of the source, as in `sources`.
 
         Raises
         ------
-        ProblemError : no other board of that name
+        ProblemError : no other board has that name
 
         Examples
         --------
@@ -370,16 +371,16 @@ class Live:
     def sample(self, name: str, values: ArrayLike, arrived_ns: int | None = None) -> None:
         """Record numbers of a source whose values a program passes.
 
-        Of a source with an array they are those of a line of a frame.
+        For a source with an array, they are those of a line of a frame.
 
         Parameters
         ----------
         name : str
-            Of the source, as in `sources`.
+            Name of the source, as in `sources`.
         values : float, shape (columns,), each in the unit of its column (s, m/s2 ...)
             One for each column, with its own time stamp; NaN where a value is missing.
         arrived_ns : int, ns since 1970, optional
-            When they arrived. Default: now.
+            Time of their arrival. Default: now.
 
         Raises
         ------
@@ -457,14 +458,15 @@ class Live:
     ) -> Summary | None:
         """Record what arrives after this call, from all sources, beginning with the registers and the held values.
 
-        The previous recording ends with what arrived before: each datagram, and each line, belongs to one of the two.
+        The previous recording ends with the data that arrived before: each datagram, and each line, belongs to one of
+        the two.
 
         Parameters
         ----------
         path : path
             A new file, as `record` of the constructor.
         compression : {"none", "lz4", "zstd"}
-            Of a `.mcap`.
+            Compression of a `.mcap`.
         overwrite : bool
             Whether an existing file may be replaced.
 

@@ -44,11 +44,12 @@ class LslInlet:
     Attributes
     ----------
     columns : list of str
-        Its time stamp, `t_s`, s of the sender's clock, then its channels, by their labels if it has some.
+        First its time stamp, `t_s` (s of the sender's clock), then its channels, named by their labels if there are
+        any.
 
     Raises
     ------
-    ProblemError : no stream of that name within 3 s, or one of texts
+    ProblemError : no stream of that name within 3 s, or a stream of texts
     ImportError : pylsl is not installed (``pip install 'taxel[lsl]'``)
     """
 

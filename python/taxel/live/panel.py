@@ -29,7 +29,7 @@ from taxel.tare import Tare
 
 
 class Panel:
-    """Serve the live panel, until it is stopped. A context manager.
+    """Serve the live panel until it is stopped; a context manager.
 
     A separate thread serves all clients. A client that reads slowly, or never, delays neither the others nor what is
     received and recorded. The protocol is documented, so any program may be a client; `PanelClient` is one.
@@ -37,8 +37,8 @@ class Panel:
     Parameters
     ----------
     shows : Live or path
-        A live board; or a recording to show first, any file or folder that `taxel.open` reads: of a folder its first
-        recording. Others of the folder can be opened too.
+        A live board; or a recording to show first, any file or folder that `taxel.open` reads; from a folder, its first
+        recording. The page can open the other recordings of the folder.
     control : str, optional
         The board's serial line ("COM3", "/dev/ttyACM0", host:port), with which the page reads and sets registers.
     folder : path, optional
@@ -46,14 +46,14 @@ class Panel:
     port : int, 0 to 65535
         The TCP port; 0 finds a free one, see `url`.
     host : str
-        The address of this machine to listen on. On any but loopback every user with the token of the panel's address
-        can see the board and set registers, over a connection that is not encrypted.
+        The address of this machine to listen on. On any address except loopback, every user with the token of the
+        panel's address can see the board and set registers, over a connection that is not encrypted.
     opens : function of a path, optional
-        Opens the recording that is shown first, or of a folder each of its files, and returns its trials, and must heed
-        `options`; default: `TextOptions.open_joined`.
+        Opens the recording that is shown first, or each file of a folder, and returns its trials; it must use
+        `options`. Default: `TextOptions.open_joined`.
     options : taxel.recording.text_options.TextOptions, optional
-        What the files do not hold themselves; the page trains on a file by them too. Labels of frames that have times
-        by its `rate_hz` are saved in numbers of frames.
+        Facts that the files do not hold; the page uses them for training too. If `rate_hz` gives the times of frames,
+        labels are saved as numbers of frames.
 
     Raises
     ------
@@ -170,7 +170,7 @@ class Panel:
         Parameters
         ----------
         source : str
-            "serial:/dev/ttyACM0,array=16x16" ...; of a board "board:127.0.0.1:5208".
+            For example "serial:/dev/ttyACM0,array=16x16"; for a board "board:127.0.0.1:5208".
 
         Raises
         ------
@@ -222,7 +222,7 @@ class Panel:
     def read_out(self, readout: str | os.PathLike[str]) -> None:
         """From this time, read the board out with another readout: time, values and past restart, on the same address.
 
-        A readout that needs a tare uses that of the board, if there is one; else the values that the taxels hold now
+        A readout that needs a tare uses the tare of the board, if there is one; else the present values of the taxels
         are their rest, so the sensor must be unloaded.
 
         Parameters
@@ -233,7 +233,7 @@ class Panel:
         Raises
         ------
         ProblemError : as `listen`; the readout does not fit the board
-        FormatError : the file holds no readout
+        FormatError : the file is not a readout
         OSError : there is no such file; another program has opened the port in the meantime
         """
         with self._restarting:

@@ -46,7 +46,7 @@ def convert(
     compression: str = "none",
     overwrite: bool = False,
 ) -> list[str]:
-    """Write a recording as another kind of file, named by the target's ending.
+    """Write a recording as the kind of file that the target's ending names.
 
     Parameters
     ----------
@@ -55,15 +55,15 @@ def convert(
     frames_hz : float, Hz, optional
         Write frames at this rate (.mcap, .npz, .csv, .h5) instead of events.
     compression : {"none", "lz4", "zstd"}
-        Of a .mcap.
+        Compression of a .mcap.
     overwrite : bool
         Whether an existing file may be replaced.
 
     Returns
     -------
     list of str
-        A line for each kind of information that was lost: `Recording.lost` of the source, and what the target cannot
-        hold; empty if nothing is lost.
+        A line for each kind of information that was lost: `Recording.lost` of the source, and the information that the
+        target cannot hold; empty if nothing is lost.
 
     Raises
     ------

@@ -39,15 +39,15 @@ def cut(
         The rectangle to keep, within the array; it becomes a separate sensor, whose columns and rows count from 0.
         With all columns and rows the recording is unchanged.
     label : str, optional
-        Cut around each note of this text; the result is one recording a note, and may be empty.
+        Cut around each note with this text; the result has one recording for each note, and may be empty.
     before_us, after_us : float, us
         Time to keep before and after the note.
 
     Returns
     -------
     list of Recording
-        One recording, or one a note. Times do not change. Its `lost` lists what a part by region cannot hold
-        (datagrams); its registers are those of the whole sensor.
+        One recording, or one for each note. Times do not change. `Recording.lost` lists the information that a part by
+        region cannot hold (datagrams); its registers are those of the whole sensor.
 
     Raises
     ------

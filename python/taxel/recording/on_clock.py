@@ -32,7 +32,7 @@ Times = Callable[[NDArray[np.int64]], NDArray[np.int64]]
 
 
 def on_clock(contents: Contents, name: str) -> Contents:
-    """Return the same recording with the times of all sources by the clock of one of them, or of the host.
+    """Return the same recording with the times of all sources by the clock of a single source, or of the host.
 
     Raises
     ------

@@ -110,35 +110,37 @@ def _no_camera(path: Path) -> ProblemError:
 def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     r"""Open a recording.
 
-    `taxel.open` is this function; `taxel.open_all` opens those of a folder.
+    `taxel.open` is this function; `taxel.open_all` opens all recordings of a folder.
 
     Parameters
     ----------
     path : path
-        A .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged; a file of another format
+        A .mcap, .lsa, .npz, .csv or .h5 that taxel wrote, finished or not, whole or damaged; a file of another format
         that `taxel.formats` reads, with one trial; or a ROS bag.
     array : Array, or list of Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
         a larger one if events are outside it. The array in a .mcap is kept. For a ROS bag: rows and columns, for
         messages that do not state them.
     layout : path, optional
-        The layout file that says what the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
+        The layout file with the facts that the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
         ``layout.toml`` beside it, if there is one.
     topic, field : str, or list of str, optional
-        What of a ROS bag is opened as frames: a topic, and the path of a field of its messages, as "left.taxels"
-        (default: the only one with numbers). Of lists each entry becomes a source, with its own `array` if that is a
-        list too.
+        For a ROS bag: the topic that is opened as frames, and the path of a field of its messages, for example
+        "left.taxels" (default: the only field with numbers). If they are lists, each entry becomes a source, with its
+        own `array` if that is a list too.
     types, ros : path and str, optional
-        For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, as "humble".
+        For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, for example
+        "humble".
     region, bin, window_ms, polarity : str, int, float (ms) and str, optional
-        What is read of an event camera's file, or of other events without intensities: columns and rows as
-        "100:420,60:300", of which the last are not included; the side of the square of pixels that becomes a taxel;
-        frames of counts, one each `window_ms`, at the window's begin; and "on" or "off" events alone, not "both".
+        For an event camera's file, or other events without intensities. `region`: columns and rows, for example
+        "100:420,60:300", where the last are not included. `bin`: side of the square of pixels that becomes a taxel.
+        `window_ms`: read frames of counts, each over a window of this length, at its beginning. `polarity`: only "on"
+        or "off" events, or "both".
     limit : int, bytes, 1 or more, optional
-        How much may be read into memory; default: three quarters of what is available, and at most the sizes of
-        docs/files.md.
+        Most bytes that may be read into memory; default: three quarters of the available memory, and at most the sizes
+        in docs/files.md.
     pairing : {"direct", "taxel"}
-        Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
+        The change that an intensity belongs to: the change directly before it, or the latest change of that taxel.
     differences : bool
         Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
 
@@ -154,12 +156,12 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
 
     Notes
     -----
-    At most half as much memory as the arrays take is used beside them, and 256 MiB. A .mcap is read where its parts are
-    first used.
+    Besides the arrays, at most half as much memory as they take, and 256 MiB, is used. Parts of a .mcap are read when
+    they are first used.
 
-    A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
-    is described in `taxel.recording.writers.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`)
-    become notes of a file of frames that it names.
+    A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column for each taxel. The layout of
+    a .h5 is described in `taxel.recording.writers.h5`. The reference events of a ``labels.csv`` in a folder
+    (`taxel.Labels`) become notes of the files of frames that the table names.
 
     Examples
     --------
@@ -192,15 +194,15 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     Parameters
     ----------
     path : path
-        A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as of `taxel.open`.
+        A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as for `taxel.open`.
     array, layout, topic, field, types, ros
-        As of `taxel.open`.
+        As in `taxel.open`.
     region, bin, window_ms, polarity : str, int, float (ms) and str, optional
-        As of `taxel.open`.
+        As in `taxel.open`.
     limit : int, bytes, 1 or more, optional
-        As of `taxel.open`, for all recordings together.
+        As in `taxel.open`, for all recordings together.
     pairing, differences
-        As of `taxel.open`.
+        As in `taxel.open`.
 
     Returns
     -------
@@ -210,7 +212,7 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
 
     Raises
     ------
-    FormatError : a folder without a recording; else as of `taxel.open`
+    FormatError : a folder without a recording; else as for `taxel.open`
     OSError : the file does not exist, or cannot be read
 
     Notes
@@ -242,7 +244,7 @@ def _open(path: Path, options: OpenOptions) -> list[Recording]:
 
 
 def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
-    """Open a file, or a ROS bag: of a file of another format all trials."""
+    """Open a file or a ROS bag; from a file of another format, open all trials."""
     text("pairing", options.pairing, ("direct", "taxel"))
     flag("differences", options.differences)
     layout = recognition.layout_of(path, options.layout)

@@ -149,7 +149,7 @@ class Recording:
         return {name: self if len(sources) == 1 else Recording(Contents(sources[name], sources)) for name in sources}
 
     def on_clock(self, name: str) -> Recording:
-        """Return the same recording with the times of all sources by the clock of one of them, or of the host.
+        """Return the same recording with the times of all sources by the clock of a single source, or of the host.
 
         No other function converts times between clocks (`clock`): without this call each source has its own.
 
@@ -209,7 +209,7 @@ class Recording:
 
     @property
     def side(self) -> str:
-        """The foot or hand that the sensor is of, "left" or "right"; "" if not stated."""
+        """The foot or hand of the sensor, "left" or "right"; "" if not stated."""
         return self._contents.main.sensor.side
 
     @property
@@ -224,7 +224,7 @@ class Recording:
 
     @property
     def interval(self) -> tuple[int, int] | None:
-        """The first time and the end of a slice, us; None of a whole file."""
+        """The first time and the end of a slice, us; None for a whole file."""
         interval = self._contents.main.timing.interval
         return None if interval is None else interval()
 
@@ -245,7 +245,7 @@ class Recording:
 
     @property
     def label(self) -> str:
-        """The name of the source within its file, as "left"; "" for a file of several sensors as a whole."""
+        """The name of the source within its file, such as "left"; "" for a file of several sensors as a whole."""
         return self._contents.main.origin.label
 
     @property
@@ -360,9 +360,9 @@ class Recording:
     def verdict(self) -> Verdict:
         """Losses at each stage: a line of text, with a status and numbers by cause (`taxel.Verdict`).
 
-        That of a part is that of the whole file. Gaps of frames with times, and of the events of a camera, are those of
-        the part, and are in it where the file does not say what was lost. The page *What the output means* lists
-        statuses, causes and wordings; all else there is to know is in `remarks`.
+        A part of a file has the verdict of the whole file. Only gaps of frames with times, and gaps in the events of a
+        camera, are those of the part; they are in the verdict if the file does not state what was lost. The page *What
+        the output means* lists statuses, causes and wordings; `remarks` has further facts.
         """
         each = self.sources if self.is_several else {self.label: self}
         return with_gaps(verdict_of(self._contents.main), {name: source._gaps() for name, source in each.items()})
@@ -407,7 +407,7 @@ class Recording:
 
     @property
     def truncated(self) -> bool:
-        """Whether what came last is missing: the writer was killed, or the file was cut within its data."""
+        """Whether the last data are missing: the writer was killed, or the file was cut within its data."""
         return self._contents.main.losses.truncated
 
     @property
@@ -460,7 +460,7 @@ class Recording:
         return f"{bounds}: {recording.title} " + (f"is from {t.min()} to {t.max()} us" if len(t) else "is empty")
 
     def at_rate(self, rate_hz: float) -> Recording:
-        """Return the same recording of numbered frames with times: so many frames a second, the first at 0.
+        """Return the same recording of numbered frames with times: `rate_hz` frames per second, the first at 0.
 
         Parameters
         ----------
@@ -491,7 +491,7 @@ class Recording:
 
         Raises
         ------
-        ProblemError : something that is no `taxel.Note`
+        ProblemError : something that is not a `taxel.Note`
         """
         more = tuple(instance("notes", note, Note) for note in several("notes", notes))
         return Recording(with_notes(self._contents, more))

@@ -1,4 +1,4 @@
-"""How an emulated board works: each option once, for `emulate`, the command line and Rust."""
+"""Options of an emulated board, each defined once for `emulate`, the command line and Rust."""
 
 from __future__ import annotations
 

@@ -52,13 +52,13 @@ class SceneFile:
     ----------
     scene : Scene
     seed : int, 0 or more
-        Draws the taxels' spread and their noise.
+        Seed of the taxels' spread and noise.
     preset : str or None
         The board's registers, as in `play`.
     tare_ms : float, ms
     array : Array
     sensor : mapping of str to float
-        What differs from the usual taxels, as in `play`.
+        Parameters that differ from the usual taxels, as in `play`.
 
     Examples
     --------
@@ -95,7 +95,7 @@ class SceneFile:
         Parameters
         ----------
         path : path of a .toml
-            The keys of a `Scene`, and beside them ``seed``, ``preset``, ``tare_ms``, ``array`` (rows, columns,
+            The keys of a `Scene`, and also ``seed``, ``preset``, ``tare_ms``, ``array`` (rows, columns,
             pitch_mm) and ``taxels`` (as `sensor` of `play`). The heights of a height map may be a ``file`` beside it:
             rows of numbers in mm, with commas or blanks between them.
 
@@ -158,7 +158,7 @@ class SceneFile:
         return fitting(self.preset, self.array)
 
     def acts(self) -> list[Act]:
-        """Return silence for the tare, the scene, and a little silence: what `play` and `emulate` take."""
+        """Return silence for the tare, the scene, and a little silence: as `play` and `emulate` take them."""
         return [Silence(self.tare_ms + _BEFORE_MS), self.scene, Silence(_AFTER_MS)]
 
     @property
@@ -168,7 +168,7 @@ class SceneFile:
 
 
 def _known(location: str, table: object, names: tuple[str, ...] | list[str]) -> None:
-    """Refuse a key that is not known, with the one that was meant."""
+    """Refuse an unknown key, and name the key that was probably meant."""
     if not isinstance(table, Mapping):
         raise SceneError(f"{location} is {json.dumps(table, default=str)}: must be a table")
     for name in table:

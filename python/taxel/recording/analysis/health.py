@@ -118,10 +118,10 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     """Return which taxels are dead, stuck or noisy, each compared with its neighbours.
 
     A recording cannot show whether taxels work in a region that was never touched: a taxel is named dead or stuck only
-    if its neighbours were touched three times or more, or if it always reads the greatest value of all. One that was
-    touched less and did nothing is *untested*. States of wire version 2 (`Events.repaired`) and the values held at the
-    beginning count as held values, but not as changes of the taxel. Without neighbours, as in one channel, no taxel is
-    named.
+    if its neighbours were touched three times or more, or if it always reads the greatest value of all. A taxel that
+    was touched less and did nothing is *untested*. States of wire version 2 (`Events.repaired`) and the values held at
+    the beginning count as held values, but not as changes of the taxel. Without neighbours, as in one channel, no taxel
+    is named.
 
     Parameters
     ----------
