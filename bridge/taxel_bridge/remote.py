@@ -234,7 +234,7 @@ class Remote(RemoteBoard):
 
     def _messages(self, what: str) -> Iterator[dict[str, Any]]:
         if self.in_use:
-            raise ProblemError("remote: is in use already; make another one")
+            raise ProblemError("remote: is in use already; make another remote board")
         with_taxel_errors(self._zenoh.listen, self.name, what)
         while not self._ending.is_set():
             message = with_taxel_errors(self._zenoh.take, _POLL_S)

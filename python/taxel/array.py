@@ -23,12 +23,12 @@ __all__ = ["Array", "Places", "of_size"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Places:
-    """Hold the place of each taxel of a sensor whose taxels are not evenly apart.
+    """Hold the place of each taxel of a sensor whose taxels are not evenly spaced.
 
     Parameters
     ----------
     x, y : float64, shape (rows, columns) or (taxels,), in `unit`
-        To the right and downwards from any origin; finite. What is given for a taxel that does not exist is not used.
+        To the right and downwards from any origin; finite. Values for a taxel that does not exist are not used.
     area : float64, of the same shape, in the square of `unit`, above 0, optional
         The area of each taxel, if it is known.
     unit : {"mm"}, optional
@@ -36,7 +36,7 @@ class Places:
 
     Raises
     ------
-    ProblemError : `x`, `y` and `area` of different shapes, or another unit
+    ProblemError : `x`, `y` and `area` have different shapes, or the unit is not one of these
 
     Examples
     --------
@@ -103,7 +103,7 @@ class Places:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Array:
-    """Describe a sensor: rows, columns, how far apart or where its taxels are, and which of them exist.
+    """Describe a sensor: rows, columns, the pitch or the places of its taxels, and which of them exist.
 
     A taxel's index is ``row * columns + column``; x is the column, y the row.
 
@@ -111,15 +111,15 @@ class Array:
     ----------
     rows, columns : int, 1 or more
     pitch_mm : float or (float, float), mm, above 0, optional
-        Distance between the centres of neighbouring taxels, or that between rows and that between columns. Default:
-        unknown. Without it nothing is in mm.
+        Distance between the centres of neighbouring taxels, or two distances: between rows and between columns.
+        Default: unknown. Without it no result is in mm.
     exists : bool, shape (rows, columns), optional
         Which taxels exist; default: all.
     name : str
     places : Places, optional
         The place of each taxel, instead of a pitch.
     names : sequence of str, one a taxel, row by row, optional
-        What each taxel is called, such as a column of a table; "" for one without a name.
+        The name of each taxel, such as a column of a table; "" for one without a name.
 
     Raises
     ------
@@ -129,8 +129,8 @@ class Array:
     Notes
     -----
     A grid, with rows and columns both above 1, has a map even if its pitch is unknown: its centre of pressure is in
-    columns and rows, its contact area a number of taxels. A single row or column with neither pitch nor places are
-    channels: they have curves, and no map, centre or area.
+    columns and rows, its contact area a number of taxels. The taxels of a single row or column with neither pitch nor
+    places are channels: they have curves, but no map, centre or area.
 
     Examples
     --------
@@ -189,7 +189,7 @@ class Array:
 
     @classmethod
     def _given(cls, array: object) -> Array:
-        """Return a given array; where it is two numbers, as a shape, say what makes an array of them."""
+        """Return a given array; where it is two numbers, as a shape, the error shows how to make an array of them."""
         if isinstance(array, tuple | list) and len(array) == 2 and all(type(side) is int for side in array):
             wanted = f"must be taxel.Array({array[0]}, {array[1]}), of so many rows and columns"
             raise refused("array", f" is {shown(array)}: {wanted}")
@@ -228,11 +228,11 @@ class Array:
 
     @property
     def _has_neighbours(self) -> bool:
-        """Whether taxels are known to lie side by side: a single row or column without a pitch is channels."""
+        """Whether taxels are known to be side by side: a single row or column without a pitch is channels."""
         return self.pitch_mm is not None or 1 not in self.shape or self.shape == (1, 1)
 
     def _padded(self, shape: tuple[int, int]) -> Array:
-        """Return a grid of which this one is the first rows and columns."""
+        """Return a larger grid, whose first rows and columns are this array."""
         return Array(*shape, self.pitch_mm, name=self.name)
 
     @property
@@ -241,7 +241,7 @@ class Array:
         return self.exists is None and self.places is None and 1 not in self.shape
 
     def _holds(self, array: Array) -> bool:
-        """Whether a smaller sensor can be this one's first rows and columns."""
+        """Whether a smaller sensor can be the first rows and columns of this array."""
         are_grids = self._is_whole_grid and array._is_whole_grid
         return are_grids and array.rows <= self.rows and array.columns <= self.columns
 
@@ -290,7 +290,7 @@ class Array:
 
         Raises
         ------
-        ProblemError : no slices of whole numbers, or one with a step
+        ProblemError : not slices of whole numbers, or a slice with a step
 
         Examples
         --------
@@ -304,7 +304,7 @@ class Array:
             try:
                 first, last, _ = chosen.indices(size)
             except TypeError:
-                raise refused(name, f" is {shown(chosen)}: a slice goes from one whole number to another") from None
+                raise refused(name, f" is {shown(chosen)}: a slice must be from one whole number to another") from None
             limits.append((first, last))
         return limits[0], limits[1]
 
@@ -357,7 +357,7 @@ class Array:
     def centre_unit(self) -> str | None:
         """The unit of a centre of pressure: "mm", "taxels" (columns and rows) or "places" (those without a unit).
 
-        None of channels, which have no centre.
+        None for channels, which have no centre.
         """
         if self.places is not None:
             return self.places.unit or "places"
@@ -432,7 +432,7 @@ class Array:
         return True
 
     def _part(self, x: slice, y: slice) -> Array:
-        """Return a rectangle of columns `x` and rows `y`, which holds a taxel, as a sensor of its own."""
+        """Return a rectangle of columns `x` and rows `y`, which holds a taxel, as a separate sensor."""
         (left, right), (top, bottom) = self.region(x, y)
         rows, columns = slice(top, bottom), slice(left, right)
         exists = None if self.exists is None else self.exists[rows, columns]
@@ -521,8 +521,8 @@ def _places_beside(
 ) -> Places | None:
     """Return the places of arrays side by side; None unless all have them in one unit.
 
-    Arrays that stand apart from left to right keep their places, as those of two feet in one system of coordinates;
-    others are set half a width apart.
+    Arrays that do not overlap from left to right keep their places, for example those of two feet in one system of
+    coordinates; others are set half a width apart.
     """
     places = [array.places for array in arrays if array.places is not None]
     if len(places) < len(arrays) or len({sensor.unit for sensor in places}) > 1:
@@ -555,7 +555,7 @@ def of_size(size: str, *, of_wire: bool = True) -> Array:
 
     Raises
     ------
-    ProblemError : the text is no such size
+    ProblemError : the text is not such a size
     """
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})(?:x(\d{1,4}(?:\.\d{1,6})?))?", size, re.ASCII)
     if match is None:

@@ -35,11 +35,11 @@ def doubt(drift_ppm: float, delay_us: float, median_us: float = 0.0) -> str | No
 class Clock:
     """Convert between the clock of a source (a board or a stream) and the clock of the host.
 
-    A datagram arrives late by its network delay, and seldom early. A line below the points *arrival time less own time*
-    is therefore the offset between the clocks plus the shortest delay; the two cannot be separated. The line is a
-    quantile regression in which one point in a hundred may lie below it, as the very shortest delays are outliers. Its
-    slope is the drift. Over more than 32 s the line is fitted again and again, each time to the last 64 s; between the
-    midpoints of two such intervals time is interpolated linearly.
+    A datagram arrives late by its network delay, and seldom early. A line below the points *arrival time minus the
+    source's time* is therefore the offset between the clocks plus the shortest delay; the two cannot be separated. The
+    line is a quantile regression in which one point in a hundred may be below it, as the very shortest delays are
+    outliers. Its slope is the drift. Over more than 32 s the line is fitted again and again, each time to the last 64
+    s; between the midpoints of two such intervals time is interpolated linearly.
 
     Parameters
     ----------
@@ -47,6 +47,19 @@ class Clock:
         The earliest time at which each datagram could be sent, by the source's clock: the end of its frame, if known.
     arrived_ns : int64, shape (n,), ns since 1970
         Its arrival time by the host's clock.
+
+    Raises
+    ------
+    ProblemError : no datagrams, when the drift or a time is asked for
+
+    Examples
+    --------
+    >>> board_us = np.arange(0, 100_000, 1000)
+    >>> clock = Clock(board_us, 5_000_000 + 1000 * board_us)
+    >>> clock
+    Clock(drift +0.0 ppm, delays 0 us median, 0 us 99 %)
+    >>> int(clock.host_ns(1500))
+    6500000
     """
 
     board_us: NDArray[np.int64]

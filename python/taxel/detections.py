@@ -43,18 +43,18 @@ class Detection(NamedTuple):
     label : str
     t : int, us
         Time of the event by the board's clock: the crossing less the encoder's latency and the trained delay. Where the
-        recipe aligned its labels (`taxel.detect.Recipe`), the event is what the sensor felt of it.
+        recipe aligned its labels (`taxel.detect.Recipe`), the event is the time at which the sensor felt it.
     known : int, us
         Earliest time of detection: the end of the board's frame in which the potential crosses the threshold.
     slope : float, mV/ms
-        Slope of the potential as it comes to the threshold; on a grid its mean over the last step. The steeper,
-        the less noise moves `t`. NaN if unknown.
+        Slope of the potential as it reaches the threshold; on a grid its mean over the last step. The steeper the
+        slope, the less noise moves `t`. NaN if unknown.
     reported : int, us, optional
         Time of the report, by the host's clock less the estimated offset between the clocks.
     reported_ns : int, ns since 1970, optional
         The same by the host's clock, for a detection that is reported live.
     repaired : bool
-        Whether it may rest on values that states of wire version 2 repaired after a loss.
+        Whether it may depend on values that states of wire version 2 repaired after a loss.
 
     Examples
     --------
@@ -94,7 +94,7 @@ class Detections(FrozenColumns):
     reported : int64, shape (n,), us, optional
         Time of the report, by the host's clock less the estimated offset.
     repaired : bool, shape (n,), optional
-        Whether it may rest on values that states of wire version 2 repaired after a loss: the event may have happened
+        Whether it may depend on values that states of wire version 2 repaired after a loss: the event may have happened
         before `t`. Default: none.
 
     Raises
@@ -216,7 +216,7 @@ class Detections(FrozenColumns):
 
         Raises
         ------
-        ProblemError : a start that lies after the stop, or is no number
+        ProblemError : a start after the stop, or a time that is not a number
 
         Examples
         --------
@@ -260,7 +260,7 @@ class Detections(FrozenColumns):
         return pandas.DataFrame(dict(zip(names, columns, strict=True)))
 
     def to_numpy(self) -> NDArray[np.void]:
-        """Return one record a detection: ``label t known slope``; ``reported`` if known, ``repaired`` if any is."""
+        """Return a record for each detection: ``label t known slope``; ``reported`` if known, ``repaired`` if any."""
         width = max(1, self.label.dtype.itemsize // 4)
         fields: list[tuple[str, Any]] = [("label", f"U{width}"), ("t", "<i8"), ("known", "<i8"), ("slope", "<f8")]
         if self.reported is not None:
@@ -282,7 +282,7 @@ class Detections(FrozenColumns):
 
         Raises
         ------
-        ProblemError : something that is no detection
+        ProblemError : something that is not a detection
 
         Examples
         --------
@@ -412,7 +412,7 @@ class Detections(FrozenColumns):
 
         Raises
         ------
-        ProblemError : no such event, or one without `known` (us)
+        ProblemError : not such an event, or an event without `known` (us)
         """
         notes = getattr(events, "array_annotations", None)
         if notes is None or "known" not in notes:

@@ -116,7 +116,7 @@ class Cable:
     Raises
     ------
     OSError : the port or the server cannot be opened, or another program has opened the port
-    DeviceError : the place is no serial port
+    DeviceError : the place is not a serial port
     ProblemError : an invalid place, baud rate or timeout
 
     Notes
@@ -502,7 +502,7 @@ class Device:
         if now.replace(record=target.record) != target:
             wrong = [n for n, (a, b) in enumerate(zip(now.words, target.words, strict=True)) if a != b and n != 7]
             differing = ", ".join(f"REG{n} is 0x{now.words[n]:08X}, not 0x{target.words[n]:08X}" for n in wrong)
-            raise DeviceError(f"{self.cable.place}: the board holds something else than was written: {differing}")
+            raise DeviceError(f"{self.cable.place}: the board holds other values than were written: {differing}")
         self._set = target
         return now
 

@@ -33,7 +33,7 @@ def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
     ----------
     table : HeaderTable
     separator : str
-        What separates its cells: if it is no comma, numbers may have decimal commas.
+        Separator of its cells: unless it is a comma, numbers may have decimal commas.
 
     Raises
     ------
@@ -128,7 +128,9 @@ def _us(location: str, name: str, cell: str, separator: str) -> int:
     if math.isnan(number):
         number, unit = seconds_of(cell), "s"
     elif not unit:
-        raise FormatError(f"{location}: {name} is {shown(cell)}, of no unit; name its column as '{name} [s]' or (ms)")
+        raise FormatError(
+            f"{location}: {name} is {shown(cell)}; its unit is not known; name its column as '{name} [s]' or (ms)"
+        )
     us = number * _US[unit]
     if not math.isfinite(us):
         raise FormatError(
@@ -139,7 +141,7 @@ def _us(location: str, name: str, cell: str, separator: str) -> int:
 
 
 def _number(cell: str, separator: str) -> float:
-    """Return the number of a cell, with a decimal comma where that is no separator; NaN of a text."""
+    """Return the number of a cell, with a decimal comma unless that is the separator; NaN for a text."""
     try:
         return float_of(cell if separator == "," else cell.replace(",", "."))
     except ValueError:

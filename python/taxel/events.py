@@ -59,7 +59,7 @@ class Events(FrozenColumns):
     p : bool, shape (events,)
         Polarity: more pressure (true) or less.
     array : Array
-        The sensor; every event must lie on it.
+        The sensor; every event must be on it.
     intensity : uint16, shape (events,), ticks, optional
         The held value that arrived with each change (1/300 us of the board's counter).
     present : bool, shape (events,), optional
@@ -140,7 +140,7 @@ class Events(FrozenColumns):
 
         Raises
         ------
-        ProblemError : a start that lies after the stop, or is no number
+        ProblemError : a start after the stop, or a time that is not a number
 
         Examples
         --------
@@ -163,7 +163,7 @@ class Events(FrozenColumns):
 
         Raises
         ------
-        ProblemError : no slices of whole numbers, or one with a step
+        ProblemError : not slices of whole numbers, or a slice with a step
 
         Examples
         --------
@@ -199,7 +199,7 @@ class Events(FrozenColumns):
     @overload
     def __getitem__(self, chosen: slice | ArrayLike) -> Events: ...
     def __getitem__(self, chosen: int | slice | ArrayLike) -> Event | Events:
-        """Return one event by its number, or the chosen ones (slice, mask or numbers) with the markers of their time.
+        """Return one event by its number, or the chosen events (slice, mask or numbers) with the markers of their time.
 
         That time begins with the first chosen event and ends before the event that follows the last one; it has no end
         if no event follows, and no beginning if the very first event is chosen. Adjacent slices therefore hold each
@@ -275,7 +275,7 @@ class Events(FrozenColumns):
         return table
 
     def to_numpy(self) -> NDArray[np.void]:
-        """Return one record an event: ``t x y p``, with ``intensity present`` and ``repaired`` if there are any."""
+        """Return a record for each event: ``t x y p``, with ``intensity present`` and ``repaired`` if there are any."""
         fields: list[tuple[str, Any]] = [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "?")]
         if self.intensity is not None:
             fields += [("intensity", "<u2"), ("present", "?")]

@@ -73,7 +73,7 @@ class Frames(FrozenColumns):
             raise refused("t", f"[{k + 1}] is {self.t[k + 1]} us, not after t[{k}] = {self.t[k]} us")
         self.unit = text("unit", unit)
         if not unit:
-            raise refused("unit", " is '': must say what the values are in")
+            raise refused("unit", " is '': must be the unit of the values")
         self.array = Array(*self.values.shape[1:]) if array is None else instance("array", array, Array)
         if self.array.shape != self.values.shape[1:]:
             raise ProblemError(f"frames have shape {self.values.shape[1:]}: the array has {self.array.shape}")
@@ -160,7 +160,7 @@ class Frames(FrozenColumns):
 
         Raises
         ------
-        ProblemError : a start that lies after the stop, or is no number
+        ProblemError : a start after the stop, or a time that is not a number
 
         Examples
         --------
@@ -180,7 +180,7 @@ class Frames(FrozenColumns):
 
         Raises
         ------
-        ProblemError : no slices of whole numbers, one with a step, or no taxel
+        ProblemError : not slices of whole numbers, a slice with a step, or a rectangle without a taxel
 
         Examples
         --------
@@ -190,7 +190,7 @@ class Frames(FrozenColumns):
         columns, rows = self.array.region(x, y)
         values = self.values[:, slice(*rows), slice(*columns)]
         if 0 in values.shape[1:]:
-            raise ProblemError(f"region {x}, {y}: no taxel of {self.array!r} lies in it")
+            raise ProblemError(f"region {x}, {y}: no taxel of {self.array!r} is in it")
         return Frames(values, self.t, unit=self.unit, array=self.array._part(x, y))
 
     @cached_property
@@ -204,9 +204,9 @@ class Frames(FrozenColumns):
     def held(self) -> Frames:
         """Return the frames with each missing value (NaN) filled by the last one that the taxel read.
 
-        No news is no change, as of a board that sends only changes. Before its first value a taxel reads that one; a
-        taxel without any reads 0. Encoders, trainings, readouts and tares of a `Recording` do this themselves, with a
-        warning that counts the values; from frames they need it done.
+        A missing value means no change, as with a board that sends only changes. Before its first value a taxel reads
+        that value; a taxel without any value reads 0. Encoders, trainings, readouts and tares of a `Recording` do this
+        themselves, with a warning that counts the values. For `Frames`, call this method first.
 
         Returns
         -------
@@ -246,7 +246,7 @@ class Frames(FrozenColumns):
 
         Raises
         ------
-        ProblemError : a level that is no number, or taxels whose area is not known (`loaded` counts them)
+        ProblemError : a level that is not a number, or taxels whose area is not known (`loaded` counts them)
 
         Examples
         --------
@@ -277,7 +277,7 @@ class Frames(FrozenColumns):
 
         Raises
         ------
-        ProblemError : a level that is no number
+        ProblemError : a level that is not a number
 
         Examples
         --------
@@ -306,8 +306,8 @@ class Frames(FrozenColumns):
         -------
         float64, shape (n, 2), mm
             x to the right and y downwards from the middle of the taxel in the first column and row; NaN if no taxel
-            counts. In columns and rows ("taxels") on a grid of unknown pitch; of places in their unit and from their
-            origin.
+            counts. On a grid of unknown pitch it is in columns and rows ("taxels"); with places, in their unit and from
+            their origin.
 
         Raises
         ------
@@ -343,7 +343,7 @@ class Frames(FrozenColumns):
         return np.asarray(self.values > np.float64(finite("above", above)))
 
     def to_pandas(self) -> Any:
-        """Return a table of one row a frame, indexed by its time ``t_us``, and one column a taxel, ``(row, column)``.
+        """Return a table: a row for each frame, indexed by ``t_us``, and a column for each taxel, ``(row, column)``.
 
         Raises
         ------

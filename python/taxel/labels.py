@@ -63,11 +63,11 @@ class Note:
         In a table of several recordings (`Labels`) the path, name or stem of the file, or the name of a trial of a file
         with several; else "".
     source : str
-        The source of the recording that it is of, as "left"; "" for all of them.
+        The source of the recording that the event belongs to, for example "left"; "" for all sources.
     replaces : int, us, optional
-        Time of the recording's own note that a label replaces, which then counts no more.
+        Time of the recording's own note that a label replaces; the note then no longer counts.
     others : tuple of (str, str)
-        The columns of its table that taxel does not know, as a `comment`, and what they say of it.
+        The columns of its table that taxel does not know, such as `comment`, and their texts.
 
     Examples
     --------
@@ -90,22 +90,23 @@ class Labels:
     Parameters
     ----------
     path : path
-        A CSV ``recording,source,label,t_us,host_ns,replaces_us``, its columns in any order, with commas, semicolons or
-        tabs between; all but `label` and `t_us` may be absent. A label without a source is of all sources of its
-        recording; a source that was a topic of a ROS bag may have the topic's name,
-        and one of a known side that side's, left or right. A row with `replaces_us` stands for
-        the recording's own note of that time; one without a label says that this note is none. Other columns are kept
-        (`Note.others`). An empty text has no labels. Without `t_us` a column of times by its name is read: numbers in
-        the unit that the name states ("Zeit [s]", "t_ms"), or dates, which count from 1970; without `label` one of
-        that name in capitals, of the name event, Ereignis, name, marker or annotation, or the only column of texts.
-        Without `recording` that column is one of texts of the name trial, Versuch, file, filename, Datei or Aufnahme.
+        A CSV ``recording,source,label,t_us,host_ns,replaces_us``, with its columns in any order, separated by commas,
+        semicolons or tabs; all except `label` and `t_us` may be absent. A label without a source belongs to all sources
+        of its recording. A source that was a topic of a ROS bag may have the topic's name; a source of a known side may
+        have the name of the side, left or right. A row with `replaces_us` replaces the recording's own note of that
+        time; if it has no label, it removes that note. Other columns are kept (`Note.others`). An empty text has no
+        labels. Tables of other programs are read too. Without `t_us`, times are in a column whose name shows that:
+        numbers in the unit that the name states ("Zeit [s]", "t_ms"), or dates, which count from 1970. Without `label`,
+        labels are in a column of that name in capitals, in one of the names event, Ereignis, name, marker or
+        annotation, or in the only column of texts. Without `recording`, recordings are in a column of texts of the name
+        trial, Versuch, file, filename, Datei or Aufnahme.
 
     Attributes
     ----------
     path : Path
     rows : tuple of Note
     removed : tuple of Note
-        The rows without a label, each with the time of a note that counts no more.
+        The rows without a label, each with the time of a note that no longer counts.
 
     Raises
     ------
@@ -142,13 +143,13 @@ class Labels:
         ----------
         recording : path
         trial : str
-            Of a file with several trials the name of one, which the table may have instead.
+            In a file with several trials, the name of a trial, which the table may have instead.
         source : str
-            Of a recording with several sources the name of one, which the table may have behind any of these.
+            In a recording with several sources, the name of a source, which the table may have after any of these.
 
         Raises
         ------
-        ProblemError : `recording` is not a path, or `trial` or `source` no text
+        ProblemError : `recording` is not a path, or `trial` or `source` is not a text
         """
         text("trial", trial)
         text("source", source)
@@ -159,9 +160,9 @@ class Labels:
         return next((name for name in (*of_source, *possible) if name in names), None)
 
     def times(self, recording: Recorded) -> dict[str, NDArray[np.int64]]:
-        """Return the events of a `taxel.Recording` by label, us on its own clock; empty if the table does not name it.
+        """Return the events of a `taxel.Recording` by label, us on its clock; empty if the table does not name it.
 
-        A recording that began in mid-stream counts from its first stamp, which lies a whole number of wraps of the
+        A recording that began in mid-stream counts from its first stamp, which is a whole number of wraps of the
         board's clock (6.5536 s each) behind the board's time. The number follows from the host's time if both have it.
 
         Parameters

@@ -56,8 +56,8 @@ class Neuron(Value):
     rearm : float, above 0 and at most 1, optional
         After a spike no further one until the potential was below `rearm` times the threshold at some grid point, the
         threshold being the one in force there; default: no such condition. Only with `time` "grid". In the refractory
-        time the sum of the inputs is compared, as far as `after_spike` leaves any, with `rearm` times `theta_0`; with
-        "reset" nothing is left, so that the next point already fulfils the condition.
+        time the sum of the inputs is compared, if `after_spike` leaves any, with `rearm` times `theta_0`. With "reset"
+        no input is left, so that the next point already fulfils the condition.
 
     Raises
     ------
@@ -104,7 +104,7 @@ class Neuron(Value):
         ----------
         weights : float64, shape (trains,), mV
         trains : SpikeTrains
-            Unsigned; graded, whose values multiply the weights; or signed ones split into ON and OFF
+            Unsigned; graded, whose values multiply the weights; or signed trains split into ON and OFF
             (`SpikeTrains.split_by_sign`).
         threshold : float, above 0
             A factor on the threshold (a readout's `run_threshold`), and so on the potential that `rearm` stands for.
@@ -115,7 +115,7 @@ class Neuron(Value):
 
         Raises
         ------
-        ProblemError : not one weight a train, or a value that is not finite
+        ProblemError : not one weight for each train, or a value that is not finite
 
         Notes
         -----
@@ -145,11 +145,12 @@ class Neuron(Value):
         Returns
         -------
         SpikeTrains
-            One train a neuron, with the window of `trains`: the spikes that `run` returns for that row of weights.
+            One train for each neuron, with the window of `trains`: the spikes that `run` returns for that row of
+            weights.
 
         Raises
         ------
-        ProblemError : not one weight a neuron and train, or a value that is not finite (names neuron and train)
+        ProblemError : not one weight for each neuron and train, or a value that is not finite (names neuron and train)
 
         Notes
         -----
@@ -202,7 +203,7 @@ class Neuron(Value):
 
         Raises
         ------
-        ProblemError : times that do not ascend, or not one weight a train
+        ProblemError : times that do not ascend, or not one weight for each train
 
         Examples
         --------

@@ -46,6 +46,10 @@ class Tare(Saved):
     note : str
         Board and day of the measurement.
 
+    Raises
+    ------
+    ProblemError : the class is called; use `take`, `load` or `from_json`
+
     Examples
     --------
     >>> frames = Frames([[[50.0]], [[53.0]], [[53.0]]], [0, 1000, 3000], unit="ticks")
@@ -101,7 +105,9 @@ class Tare(Saved):
             noun, why = ("event" if isinstance(x, Events) else "frame"), getattr(given, "_why_empty", str)()
             raise refused("tare", f": there is no {noun}{why}")
         if isinstance(x, Events | Frames) and window[1] is not None and x.t.min() >= window[1]:
-            raise ProblemError(f"tare to {stop_us} us: nothing came before it, but from {x.t.min()} to {x.t.max()} us")
+            raise ProblemError(
+                f"tare to {stop_us} us: no events are before it; they are from {x.t.min()} to {x.t.max()} us"
+            )
         if isinstance(x, Events):
             return cls.from_json(_core.tare_of_events(x._parts(), *window, note))
         if isinstance(x, Frames):

@@ -136,7 +136,7 @@ def test_recordings_of_other_arrays_are_left_out_where_one_fits(
     names = ", ".join(str(tmp_path / f"{k}.npz") for k in (1, 2, 3))
     warning = f"left out 4 recordings of other arrays than the 8 x 8 taxels that the readout was trained on: {names}"
     assert (code, f"taxel: warning: {warning} and 1 more" in error.splitlines()) == (0, True), error
-    assert "(window 10 ms), in 1 of 5 recordings, as the others are left out:" in said.splitlines()[0]
+    assert "(window 10 ms), in 1 of 5 recordings (the others are left out):" in said.splitlines()[0]
     code, said, _ = call(capsys, *arguments, "--json")
     found = json.loads(said)
     assert (code, [Path(each["recording"]).name for each in found["recordings"]]) == (0, ["9.npz"])
@@ -157,7 +157,7 @@ def test_how_labels_name_trials_of_a_file_is_said_in_short_lines(tmp_path: Path,
     assert (code, "must have the column recording, with names as subj900/00" in error) == (2, True), error
     code, _, error = call(capsys, "info", file, "--picture", tmp_path / "p.png")
     assert code == 2
-    assert f"a picture or a table is of one: taxel convert {file} FOLDER writes each to a file of its own" in error
+    assert f"a picture or a table is of one: taxel convert {file} FOLDER writes each to a separate file" in error
     assert call(capsys, "convert", file, tmp_path / "each")[0] == 0
     code, _, error = call(capsys, "info", tmp_path / "each", "--picture", tmp_path / "p.png")
     assert (code, "a picture or a table is of one: name its file" in error) == (2, True), error
@@ -711,20 +711,20 @@ def test_times_since_1970_are_written_from_the_beginning_on(folder: Path, traine
     truths = ("--truth", tmp_path / "truth.csv")
     arguments = ("detect", walk, "--readout", trained, "--tare", folder / "tare.json", *truths)
     code, out, _ = call(capsys, *arguments, "--list", "--report", tmp_path / "page")
-    assert (code, out.count("times are from 2023-11-14 22:13:20.000 UTC on")) == (0, 1)
+    assert (code, out.count("times are counted from 2023-11-14 22:13:20.000 UTC")) == (0, 1)
     assert "17000000" not in out
     found = json.loads(call(capsys, *arguments, "--json")[1])["detections"]
     assert len(found) == 12
     assert all(one["t_us"] > 1_700_000_000_000_000 for one in found)
     written = [
         line.split()[1:3]
-        for line in out.partition("times are from")[2].splitlines()
+        for line in out.partition("times are counted from")[2].splitlines()
         if line.startswith(("contact  ", "lift  "))
     ]
     of = [[one[name] - 1_700_000_000_000_000 for name in ("t_us", "known_us")] for one in found]
     assert written[: len(found)] == [[f"{us / 1000:.3f}" for us in each] for each in of]
     page = (tmp_path / "page" / "report.html").read_text()
-    assert "Times are from " in page
+    assert "Times are counted from " in page
     assert "2023-11-14 22:13:20.000 UTC" in page
     assert not re.search(r"17000000\d\d\.", page)
     assert any(f"<td>{(t + 9000 - int(events.t[0])) / 1e6:.4f}</td>" in page for t in truth["lift"]), "the worst"

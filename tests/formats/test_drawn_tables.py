@@ -124,7 +124,7 @@ def test_drawn_events_open_by_the_layout_that_is_printed_of_them(order, named, p
         ("1 2\n3 4\n\n1 2\n3 x\n", 'frame_end = "blank"', "line 5: column 2 is 'x', not a number"),
         ("0 2\n0 4\n\n0 2\n0 3\n", "frame_lines = 2\ntime_column = 1", "line 4: time 0 s does not ascend"),
         ("1714562289.75 2 3\n1714562289.73 4 3\n", "time_column = 1", r"562289\.73 s does not ascend from \d+\.75 s"),
-        ("1 2\n3 4\n", "rows = 2\ncolumns = 2\n[table]", "2 columns; .* says 2 x 2 taxels; if 2 lines are"),
+        ("1 2\n3 4\n", "rows = 2\ncolumns = 2\n[table]", "2 columns; .* states 2 x 2 taxels; if 2 lines are"),
         ("1 2\n", 'frame_lines = 2\nframe_end = "blank"', "frame_end is given, and so is frame_lines: give one"),
         ("1 2\n", 'frame_end = "line"', "frame_end is 'line': must be one of 'blank'"),
         ("1 2\n", 'decimal = " "', "decimal is ' ': must be"),
@@ -158,7 +158,7 @@ def test_a_last_frame_without_all_lines_is_left_out_and_said(tmp_path: Path) -> 
         tmp_path, "1,2\n3,4\n,\n5,6\n7,8\n,\n9,9\n", 'rows = 2\ncolumns = 2\n[table]\nframe_end = "blank"\n'
     )
     assert recording.frames().values.tolist() == [[[1, 2], [3, 4]], [[5, 6], [7, 8]]]
-    assert recording.lost == ("lines at the end that make no whole frame: 1 of 2",)
+    assert recording.lost == ("lines at the end that are not a whole frame: 1 of 2",)
 
 
 @pytest.mark.parametrize("skip_lines", [0, 1, 2, 3])

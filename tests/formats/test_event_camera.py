@@ -156,7 +156,11 @@ def test_a_table_named_dat_is_a_table(tmp_path: Path) -> None:
             "states EVT4; EVT2 and EVT3",
         ),
         ("evt3", lambda data: data.replace(b"% evt 3.0\n% format EVT3;", b"% form "), "states no version"),
-        ("evt2", lambda data: data.replace(b"64x48", b"").replace(b"EVT2;height=48", b"EVT2"), "says no size; give it"),
+        (
+            "evt2",
+            lambda data: data.replace(b"64x48", b"").replace(b"EVT2;height=48", b"EVT2"),
+            "states no size; add a line",
+        ),
         ("evt2", lambda data: data.replace(b"64", b"16"), "not a whole file of an event camera .*x="),
     ],
 )
@@ -180,7 +184,7 @@ def test_an_aedat_that_ends_anywhere_is_named(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="empty; must be AEDAT 4"):
         taxel.open(path)
     path.write_bytes(b"#!AER-DAT2.0\r\n" + data[14:])
-    with pytest.raises(FormatError, match=r"its header states AEDAT 2; AEDAT 4 is read"):
+    with pytest.raises(FormatError, match=r"its header states AEDAT 2; only AEDAT 4 is read"):
         taxel.open(path)
 
 
@@ -276,7 +280,7 @@ def test_strong_bursts_are_told_from_weaker_ones(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"region": "0:65,0:48"}, "region '0:65,0:48': must lie within the sensor's 64 columns and 48 rows"),
+        ({"region": "0:65,0:48"}, "region '0:65,0:48': must be within the sensor's 64 columns and 48 rows"),
         ({"region": "9:9,0:48"}, "region '9:9,0:48': columns 9:9 holds none"),
         ({"region": "0:9,40:4"}, "region '0:9,40:4': rows 40:4: the first must be below the last"),
         ({"region": "1,2"}, "region is '1,2': must be columns and rows A:B,C:D"),
@@ -299,7 +303,7 @@ def test_the_options_are_of_events_without_intensities_alone(tmp_path: Path) -> 
     one = {"array": taxel.Array(4, 4), "intensity": [7]}
     taxel.convert(Events([0], [0], [0], [True], **one), tmp_path / "b.npz")
     for place in (tmp_path / "a.npz", tmp_path, tmp_path / "b.npz"):
-        with refused("holds no events without intensities, as an event camera's file does; region, bin, window_ms and"):
+        with refused("holds no events without intensities, as files of event cameras do; region, bin, window_ms and"):
             taxel.open_all(place, bin=2)
 
 
@@ -338,10 +342,10 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: 
         (
             "a.aedat",
             b"#!AER-DAT2.0\r\n",
-            r"\(AEDAT 2\), not with a recording; of event cameras .raw, .dat, .aedat4 are read",
+            r"\(AEDAT 2\), not with a recording; taxel reads these files of event cameras: .raw, .dat, .aedat4",
         ),
         ("a.aedat", b"#!AER-DAT4.0\r\n", r"AEDAT 4\), .*; name it .aedat4"),
-        ("a.dat", b"", "is empty: no recording"),
+        ("a.dat", b"", "is empty: not a recording"),
     ],
 )
 def test_what_is_no_file_of_a_camera_names_those(name: str, begins: bytes, said: str, tmp_path: Path) -> None:
@@ -351,7 +355,7 @@ def test_what_is_no_file_of_a_camera_names_those(name: str, begins: bytes, said:
 
 
 def test_too_many_frames_name_a_larger_window(tmp_path: Path) -> None:
-    with refused(r"frames of 48 x 64 taxels \(less by --region, by a larger --bin, or by a larger window", FormatError):
+    with refused(r"frames of 48 x 64 taxels \(fewer with --region, a larger --bin, or a larger window", FormatError):
         taxel.open(write(tmp_path / "a.raw", some_rows()), window_ms=0.001, limit=10_000)
 
 

@@ -138,7 +138,7 @@ def test_readings_that_fall_are_turned_once(tmp_path: Path) -> None:
 
 def test_frames_that_would_come_after_the_times_of_files_are_refused(tmp_path: Path) -> None:
     table(tmp_path, lines(np.ones((5, 6))), "rate_hz = 1e-9")
-    with pytest.raises(FormatError, match=r"1e-09 Hz: frame 9 comes at 9e\+09 s; must lie within 142 years"):
+    with pytest.raises(FormatError, match=r"1e-09 Hz: frame 9 comes at 9e\+09 s; must be within 142 years"):
         table(tmp_path, lines(np.ones((10, 6))), "rate_hz = 1e-9")
 
 
@@ -156,7 +156,9 @@ def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls
     table(tmp_path, lines(rows), f"{falls}[table]\ntime_column = 1\n")
     shown = CliRunner().invoke(app, ["info", str(tmp_path / "step.txt")]).stdout
     of_it = (
-        "as step.layout.toml turns them: leave falls out of it" if falls else "say falls = true in a layout file beside"
+        "as step.layout.toml turns them: if that is wrong, leave falls out of it"
+        if falls
+        else "write falls = true in a layout file beside"
     )
     assert of_it in shown
 
@@ -270,10 +272,13 @@ def test_a_layout_names_a_data_set_in_a_group_by_its_path(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("layout", "said"),
     [
-        ('array = "2x3"', "unknown key array; a size is said by rows = 2, columns = 3; there are"),
-        ('array = "palm"', r"unknown key array; it stands in \[data\]; there are"),
-        ('[data]\narray = "2x3x4.5"', r"the layout says \[data\] array: a size is said by rows = 2, .*pitch_mm = 4.5"),
-        ('[data]\ntime = "when"', r"the layout says \[data\] time: leave it out"),
+        ('array = "2x3"', "unknown key array; a size is given by rows = 2, columns = 3; there are"),
+        ('array = "palm"', r"unknown key array; it belongs in \[data\]; there are"),
+        (
+            '[data]\narray = "2x3x4.5"',
+            r"the layout states \[data\] array: a size is given by rows = 2, .*pitch_mm = 4.5",
+        ),
+        ('[data]\ntime = "when"', r"the layout states \[data\] time: leave it out"),
     ],
 )
 def test_a_size_or_a_name_where_none_belongs_is_told_where_it_does(tmp_path: Path, layout: str, said: str) -> None:
@@ -283,7 +288,7 @@ def test_a_size_or_a_name_where_none_belongs_is_told_where_it_does(tmp_path: Pat
         taxel.open(tmp_path / "a.npy")
     np.savez(tmp_path / "b.npz", palm=VALUES, when=[1, 2, 3])
     (tmp_path / "b.layout.toml").write_text('[data]\narray = "2x3"')
-    with pytest.raises(FormatError, match=r"no array 2x3; there are palm .*; a size is said by rows = 2, columns = 3"):
+    with pytest.raises(FormatError, match=r"no array 2x3; there are palm .*; a size is given by rows = 2, columns = 3"):
         taxel.open(tmp_path / "b.npz")
 
 
@@ -354,7 +359,7 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
         ("zeros_before_s = 0", "zeros_before_s is 0: must be from 1e-06 to 60"),
         ("table = 3", "table"),
         ("[table]\nseparator = ', '", "separator is ', ': must be one character"),
-        ("[table]\nskip_lines = 40", "no line after 40 skipped ones"),
+        ("[table]\nskip_lines = 40", "no line after the 40 skipped lines"),
         ("[table]\ntime_column = 'when'", "no column 'when' of times"),
         ("[table]\ntime_column = 9", "6 columns; time_column is 9"),
         ("rows = [", "not TOML"),
@@ -371,7 +376,7 @@ def test_a_layout_that_makes_no_sense_is_refused_in_one_line(tmp_path: Path, lay
 @pytest.mark.parametrize("head", ["", "heel, N\n"])
 def test_a_table_of_another_separator_is_named(tmp_path: Path, stated: str, there: str, head: str) -> None:
     head = head.replace(", ", there)
-    with pytest.raises(FormatError, match=r"line 1: one column by the separator .*say in the layout"):
+    with pytest.raises(FormatError, match=r"line 1: one column by the separator .*write in the layout"):
         table(tmp_path, head + lines(VALUES, there), f'rate_hz = 50\n[table]\nseparator = "{stated}"')
 
 
@@ -397,11 +402,19 @@ def test_a_name_with_a_comma_over_one_column_is_a_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("frames", "layout", "match"),
     [
-        (Frames(VALUES[:, None], [0, 1, 2]), "rows = 2\ncolumns = 4", "says 2 x 4 taxels; the recording holds 1 x 6"),
-        (Frames(VALUES.reshape(3, 2, 3), [0, 1, 2]), "rows = 3\ncolumns = 2", "says 3 x 2 taxels; the file says 2 x 3"),
-        (Frames(VALUES[:, None], [0, 1, 2], unit="N"), "unit = 'kPa'", "says unit kPa; one.npz is in N"),
-        (Frames(VALUES[:, None], [0, 10_000, 20_000]), "rate_hz = 50", "says 50 Hz; the times of one.npz make 100 Hz"),
-        (Frames(VALUES[:, None], [0, 1, 2], array=Array(1, 6, 3.0)), "pitch_mm = 4", "the file says 3 mm apart"),
+        (Frames(VALUES[:, None], [0, 1, 2]), "rows = 2\ncolumns = 4", "states 2 x 4 taxels; the recording holds 1 x 6"),
+        (
+            Frames(VALUES.reshape(3, 2, 3), [0, 1, 2]),
+            "rows = 3\ncolumns = 2",
+            "states 3 x 2 taxels; the file states 2 x 3",
+        ),
+        (Frames(VALUES[:, None], [0, 1, 2], unit="N"), "unit = 'kPa'", "states unit kPa; one.npz is in N"),
+        (
+            Frames(VALUES[:, None], [0, 10_000, 20_000]),
+            "rate_hz = 50",
+            "states 50 Hz; the times of one.npz make 100 Hz",
+        ),
+        (Frames(VALUES[:, None], [0, 1, 2], array=Array(1, 6, 3.0)), "pitch_mm = 4", "the file states 3 mm apart"),
     ],
 )
 def test_a_layout_that_contradicts_the_file_is_refused_where_it_is_given(
@@ -437,10 +450,12 @@ def test_a_recording_that_is_converted_beside_its_layout_is_turned_once(
     for other in ("false", "255"):
         given.write_text(f"falls = {other}\n")
         was = falls.replace("true", "0")
-        with pytest.raises(FormatError, match=f"says falls = {other}; the readings of .* were turned by falls = {was}"):
+        with pytest.raises(
+            FormatError, match=f"states falls = {other}; the readings of .* were turned by falls = {was}"
+        ):
             taxel.open(recording.path, layout=given)
     given.write_text('heel = "bottom"\n')
-    with pytest.raises(FormatError, match=r"says heel bottom; .* says top"):
+    with pytest.raises(FormatError, match=r"states heel bottom; .* states top"):
         taxel.open(recording.path, layout=given)
 
 
@@ -458,7 +473,7 @@ def test_a_layout_for_tables_says_nothing_of_a_board_s_recording_in_the_same_fol
     taxel.convert(events, tmp_path / "touch.mcap")
     (tmp_path / "layout.toml").write_text("rows = 2\ncolumns = 3\nfalls = true\nrate_hz = 100\nunit = 'N'\n")
     assert taxel.open(tmp_path / "touch.mcap").events == events
-    with pytest.raises(FormatError, match="says 2 x 3 taxels"):
+    with pytest.raises(FormatError, match="states 2 x 3 taxels"):
         taxel.open(tmp_path / "touch.mcap", layout=tmp_path / "layout.toml")
 
 
@@ -474,11 +489,11 @@ def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: 
     [
         (
             lambda place: np.savez(place, a=np.zeros((2, 6)), b=np.zeros(3)),
-            r"holds a \(2 x 6\), b \(3\); say which in the layout",
+            r"holds a \(2 x 6\), b \(3\); name one in the layout",
         ),
         (lambda place: np.savez(place, a=np.zeros(6)), "must be numbers of shape frames x rows x columns"),
         (lambda place: np.savez(place, a=np.array([["x"] * 6])), "must hold numbers"),
-        (lambda place: np.savez(place, a=np.zeros((2, 5))), "says 2 x 3 taxels"),
+        (lambda place: np.savez(place, a=np.zeros((2, 5))), "states 2 x 3 taxels"),
     ],
 )
 def test_arrays_that_do_not_fit_are_refused(tmp_path: Path, write: Any, match: str) -> None:
@@ -525,7 +540,7 @@ def test_the_rate_on_the_command_line_opens_an_array_without_a_layout(tmp_path: 
     np.save(palm, VALUES)
     assert TextOptions(rate_hz=100.0, array=["2x3"]).open_one(palm).array.shape == (2, 3)
     refused = CliRunner().invoke(app, ["info", str(palm)])
-    assert ", or rate_hz, says what it is" in str(refused.exception)
+    assert ", or rate_hz, describes it" in str(refused.exception)
 
 
 @pytest.mark.parametrize(
@@ -583,5 +598,5 @@ def test_zeros_before_frames_without_times_or_before_events_are_refused(tmp_path
     events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     taxel.convert(events, tmp_path / "board.mcap")
     (tmp_path / "given.toml").write_text("zeros_before_s = 0.5")
-    with pytest.raises(FormatError, match=r"holds events; .* and zeros_before_s are of frames"):
+    with pytest.raises(FormatError, match=r"holds events; .* and zeros_before_s are for frames"):
         taxel.open(tmp_path / "board.mcap", layout=tmp_path / "given.toml")

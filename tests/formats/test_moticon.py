@@ -47,7 +47,7 @@ def test_what_a_file_holds_beside_its_taxels_is_said_and_goes_with_the_file(tmp_
     ]
     for recording, other in ((left, "right "), (right, "left ")):
         [line] = recording.lost
-        assert line.startswith("columns that are no taxels: total, ")
+        assert line.startswith("columns that are not taxels: total, ")
         assert other not in line
         assert "pressure 1" not in line
     assert all(column in left.lost[0] for column in columns)

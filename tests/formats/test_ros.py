@@ -117,7 +117,7 @@ def test_topics_fields_and_parts_of_lists_become_sources(tmp_path: Path) -> None
     assert list(both.sources) == ["palm", "hand"]
     assert both.sources["palm"].frames().array == PALM_ARRAY
     assert np.array_equal(both.sources["hand"].frames().values[:, 0, 2], np.arange(6))
-    with pytest.raises(ProblemError, match=r"holds 2 sources \(palm, hand\); say which"):
+    with pytest.raises(ProblemError, match=r"holds 2 sources \(palm, hand\); choose one by"):
         both.frames()
     # What else the bag holds is named, in a recording made from it too.
     assert {one.lost for one in both.sources.values()} == {("other topics of the bag: /skin",)}
@@ -376,7 +376,7 @@ def test_a_definition_in_idl_opens_a_bag(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "error", "said"),
     [
-        ({}, FormatError, "is opened; taxel info .*grasp.* lists its topics; give topic"),
+        ({}, FormatError, "choose one of its topics.*; taxel info .*grasp.* lists the topics; give topic"),
         ({"topic": "/foot"}, FormatError, "has no topic /foot; its topics are /hand, /palm"),
         ({"topic": "/hand"}, FormatError, "topic /hand: has several fields with numbers, thumb, index.*; give field"),
         ({"topic": "/palm", "field": "thumb"}, FormatError, "field thumb: no field with numbers; there are taxels"),
@@ -385,7 +385,7 @@ def test_a_definition_in_idl_opens_a_bag(tmp_path: Path) -> None:
         ({"topic": ["/hand", "/palm"], "field": ["a"] * 3}, ProblemError, "topic: given 2 times for 3 sources"),
         ({"topic": ["/palm", "/palm"]}, ProblemError, "palm.taxels is chosen twice"),
         ({"topic": "/palm", "ros": "hubble"}, ProblemError, "ros is hubble: must be one of .*humble"),
-        ({"topic": "/palm", "types": "nowhere"}, ProblemError, "nowhere: no folder with .msg or .idl files"),
+        ({"topic": "/palm", "types": "nowhere"}, ProblemError, "nowhere: not a folder with .msg or .idl files"),
         ({"topic": 3}, ProblemError, "topic is 3"),
         ({"topic": [3]}, ProblemError, "topic is 3"),
         ({"topic": "/palm", "array": [3]}, ProblemError, "array is \\[3\\]: must be a taxel.Array"),
@@ -446,7 +446,7 @@ def test_only_a_bag_has_topics_and_a_taxel_mcap_is_no_bag(tmp_path: Path) -> Non
     taxel.convert(events, tmp_path / "own.mcap")
     assert not ros.is_bag(tmp_path / "own.mcap")
     assert taxel.open(tmp_path / "own.mcap").events == events
-    with pytest.raises(ProblemError, match=r"own\.mcap: a \.mcap; topic, field, types and ros are of a ROS bag"):
+    with pytest.raises(ProblemError, match=r"own\.mcap: a \.mcap; topic, field, types and ros are only for ROS bags"):
         taxel.open(tmp_path / "own.mcap", topic="/palm")
 
 
@@ -470,7 +470,7 @@ def test_a_folder_of_bags_opens_as_a_folder_of_trials(tmp_path: Path) -> None:
     opened = taxel.open_all(tmp_path, topic="/palm", array=PALM_ARRAY)
     assert [one.name for one in opened] == ["gra0.bag", "gra1.db3", "gra2.mcap", "gra3"]
     assert [len(one.notes) for one in opened] == [0, 1, 0, 0]
-    with pytest.raises(FormatError, match=r"gra0\.bag: a ROS bag, of which a topic"):
+    with pytest.raises(FormatError, match=r"gra0\.bag: a ROS bag: choose one of its topics"):
         taxel.open_all(tmp_path)
 
 

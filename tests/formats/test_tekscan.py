@@ -85,7 +85,7 @@ def swap(old, new):
         (swap("ROWS 4\n", ""), "no line ROWS in the header"),
         (swap("ROWS 4", "ROWS 0"), "line 4: ROWS is 0; must be above 0"),
         (swap("ROWS 4", "ROWS 4.5"), "line 4: ROWS is 4.5; must be 1 to 65535"),
-        (swap("a thumb", "ROWS 9"), "line 10: ROWS is said a second time, and differently"),
+        (swap("a thumb", "ROWS 9"), "line 10: ROWS is given a second time, with another value"),
         (swap("0.2 centimeters", "0.2 furlongs"), "line 6: ROW_SPACING is '0.2 furlongs'; must be a number and milli"),
         (swap("0.2 centimeters", "0,2 centimeters"), "line 6: ROW_SPACING has a decimal comma"),
         (swap("UNITS raw\n", ""), "no line UNITS in the header"),

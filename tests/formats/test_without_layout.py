@@ -28,7 +28,7 @@ def layout_said_of(place: Path) -> str:
 
 
 def test_a_decimal_comma_that_no_layout_says_is_named(tmp_path: Path) -> None:
-    said = r"step.txt, line 1: column 1 has a decimal comma \('0,00'\); say in a layout file: \[table\] decimal = ','"
+    said = r"step.txt, line 1: column 1 has a decimal comma \('0,00'\); write in a layout file: \[table\] decimal = ','"
     with pytest.raises(FormatError, match=said):
         table(tmp_path, "0,00\t1,5\n0,02\t2\n", '[table]\nseparator = "\t"\n')
 
@@ -141,7 +141,7 @@ def test_tables_as_programs_write_them_open_by_the_layout_that_is_printed(
     begin = {"time (ms)": 0, "clock": 0}.get(time, 1_714_557_600_000_000)
     np.testing.assert_allclose(frames.t - begin, t * 1e6, atol=1)
     assert frames.unit == ("counts" if units is None else units.strip("[]"))
-    left = {"index": ("columns that are no taxels: column 1",), "texts": ("columns that are no taxels: who, note",)}
+    left = {"index": ("columns that are not taxels: column 1",), "texts": ("columns that are not taxels: who, note",)}
     assert recording.lost == left.get(more, ())
 
 
@@ -219,12 +219,12 @@ def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: 
         ("leave_out = [4]", r"a\.csv: 3 columns; leave_out is 4"),
         ("leave_out = [0]", "leave_out is 0: must be a whole number from 1"),
         ('leave_out = "who"', "leave_out is 'who': must be a list of columns"),
-        ('leave_out = ["time", "who"]\ntime_column = "time"', "column 'time' is time_column, and left out"),
+        ('leave_out = ["time", "who"]\ntime_column = "time"', "column 'time' is the time_column, and is left out"),
         (
             'leave_out = ["who"]\ntime_column = "time"\ntime_unit = "iso"',
-            r"line 3: time is 'noon'; must be as 2024-05-01T",
+            r"line 3: time is 'noon'; must be like 2024-05-01T",
         ),
-        ('leave_out = ["who"]', r"column 'time' holds times by its name"),
+        ('leave_out = ["who"]', r"column 'time' holds times, as its name shows"),
         ('leave_out = ["time", "a"]', "line 2: who is 'me', not a number"),
     ],
 )
@@ -267,7 +267,7 @@ def test_a_folder_of_tables_without_a_layout_says_the_same(tmp_path: Path) -> No
 
 def test_a_text_without_numbers_prints_no_layout(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("of a hand\n")
-    with pytest.raises(FormatError, match=r"no recording; there are .* \(docs/files\.md\)$"):
+    with pytest.raises(FormatError, match=r"not a recording; recordings are .* \(docs/files\.md\)$"):
         taxel.open(tmp_path / "a.txt")
 
 

@@ -313,7 +313,7 @@ def test_neurons_name_touches_too():
     [
         ({"periods_ms": [0.5]}, "finer than the recordings"),
         ({"window_ms": None}, "has no end"),
-        ({"windows_ms": [80]}, "must lie in"),
+        ({"windows_ms": [80]}, "must be in"),
         ({"taxels": [7]}, "2 of the array's ever send an event"),
         ({"taxels_at_ms": 3}, "one of the periods"),
         ({"classifiers": ["forest"]}, "must be one of"),
@@ -382,7 +382,7 @@ def test_bits_that_shuffled_labels_reach_are_told_from_nothing_nowhere():
     assert found.full.found.right < 0.25
     assert found.empty
     assert [point.verdict.says for point in (*found.by_period[1:], *found.taxels)] == ["nothing"] * 2
-    assert any(text.startswith("not told from nothing") for text in found.warnings)
+    assert any(text.startswith("not distinguishable from 0 bits") for text in found.warnings)
     assert any("guessing gives 50 %" in text for text in found.warnings)
 
 
@@ -393,7 +393,7 @@ def test_a_control_that_tells_as_much_is_warned_of():
         for k in range(80)
     ]
     warnings = asked(pulsed(touches), taxels=[]).warnings
-    assert [text for text in warnings if text.startswith("event count alone tells")]
+    assert [text for text in warnings if text.startswith("event count alone gives")]
     assert not [text for text in warnings if text.startswith(("before contact", "length", "not told"))]
 
 

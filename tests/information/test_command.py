@@ -47,7 +47,7 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     said = done.stdout
     assert "60 trials, 2 labels x" in said
     assert "full: 1 ms, 2 taxels, to 60 ms 1.00 of 1.00 bits" in said
-    assert said.splitlines()[4].startswith("in brackets: where the bits lie when these trials")
+    assert said.splitlines()[4].startswith("in brackets: the range of the bits in 95 % of new draws of these trials")
     assert "<- cheapest" in said
     assert "10 ms " in said
     assert "wire version" in said
@@ -118,7 +118,7 @@ def test_notes_are_trials_as_rows_of_a_table_are(tmp_path):
     done = run(recording, "--labels", "notes", *asked)
     assert f"note at {int(rows[0][0]) + 100} us begins 0.1 ms after note at {rows[0][0]} us" in str(done.exception)
     note(recording, [("left first", 10**12), ("right first", 100_000)])
-    assert "lies outside touches.npz" in str(run(recording, "--labels", "notes", *asked).exception)
+    assert "is outside touches.npz" in str(run(recording, "--labels", "notes", *asked).exception)
 
 
 def test_without_labels_a_recording_is_a_trial_and_its_folder_the_label(tmp_path):
@@ -169,13 +169,13 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
     ("table", "arguments", "text"),
     [
         ("recording,label\na,b\n", [], "no column 't_us'"),
-        ("recording,t_us,label,t_us\na,1,b,2\n", [], "column 't_us' stands there twice"),
+        ("recording,t_us,label,t_us\na,1,b,2\n", [], "column 't_us' is there twice"),
         ("recording,t_us,label\n", [], "names no trial"),
         (GOOD.replace("touches.npz", "other.npz", 1), [], "line 2: recording 'other.npz' is not among those given"),
         (GOOD.replace("touches.npz", "other.npz"), [], "is not among those given"),
         (GOOD.replace("100000,a", "noon,a"), [], "line 2: t_us is 'noon', must be whole us"),
-        (GOOD.replace("100000,a,200000", "99000000,a,99100000"), [], "line 2: t_us 99000000 lies outside touches.npz"),
-        (GOOD.replace("100000,a,200000", "100000,a,90000"), [], "stop 90000 us does not lie after start"),
+        (GOOD.replace("100000,a,200000", "99000000,a,99100000"), [], "line 2: t_us 99000000 is outside touches.npz"),
+        (GOOD.replace("100000,a,200000", "100000,a,90000"), [], "stop 90000 us is not after start"),
         (GOOD.replace(",b,", ",a,"), [], "labels.csv: labels are all 'a'"),
         (GOOD.replace("touches.npz,100000,a,200000,u", "touches.npz,100000,a,200000,"), [], "group is empty"),
         (GOOD, ["--folds", "30"], None),
@@ -185,7 +185,7 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
             [],
             "labels.csv: 4 trials for 10 folds",
         ),
-        (GOOD.replace(",b,", ",c,", 1), [], "labels.csv: label 'c': all its trials lie in group 'v'"),
+        (GOOD.replace(",b,", ",c,", 1), [], "labels.csv: label 'c': all its trials are in group 'v'"),
         ("recording,t_us,label\ntouches.npz,100000,a\ntouches.npz,500000,b\n", [], "has no stop_us"),
         (
             "recording,t_us,label\ntouches.npz,100000,a\ntouches.npz,500000,b\n",
@@ -199,12 +199,12 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
         (
             GOOD.replace("group\n", "group,\n").replace("u\n", "u,9\n"),
             [],
-            "line 2: '9' stands in a column without a name",
+            "line 2: '9' is in a column without a name",
         ),
         ("\n\n", [], "labels.csv: holds nothing; must be recording,t_us,label"),
         (GOOD, ["--periods", "fast"], "must be numbers, as 1,2,5"),
         (GOOD, ["--periods", "0"], "--periods is [0.0]: must be whole us"),
-        (GOOD, ["--windows", "1000"], "--windows is [1000.0]: must lie in"),
+        (GOOD, ["--windows", "1000"], "--windows is [1000.0]: must be in"),
         (GOOD, ["--pools", "40"], "--pools is [40]: the array is"),
         (GOOD, ["--folds", "1"], "--folds is 1: must be a whole number from 2"),
         (GOOD, ["--taxels", "1.5"], "--taxels 1.5: must be whole numbers"),
@@ -266,7 +266,7 @@ def test_frames_without_times_are_told_so(tmp_path):
         for k in range(12):
             taxel.convert(taxel.Frames(values, np.arange(12)), tmp_path / label / f"{k}.npz")
     done = run(tmp_path / "a", tmp_path / "b", "--report", tmp_path / "page.html")
-    assert "its frames all lie within 11 us, so they have no times" in str(done.exception)
+    assert "its frames are all within 11 us, so they have no times" in str(done.exception)
 
 
 def test_a_folder_stands_for_its_recordings(tmp_path):
@@ -305,7 +305,7 @@ def test_a_recording_that_the_table_does_not_name_is_said(tmp_path):
     done = run(
         recording, tmp_path / "forgotten.npz", "--labels", labels, "--window-ms", "20", "--report", tmp_path / "p.html"
     )
-    assert "says nothing of" in str(done.exception)
+    assert "does not name" in str(done.exception)
 
 
 def test_a_label_that_tables_write_for_what_is_missing_is_refused(tmp_path):

@@ -213,7 +213,7 @@ def test_the_rule_rarely_takes_a_setting_that_is_too_cheap():
         (lambda: folds(["a", "b"] * 2, count=10), "4 trials for 10 folds"),
         (
             lambda: folds(["a", "a", "b", "b"], count=2, groups=["x", "y", "z", "z"]),
-            "'b': all its trials lie in group 'z'",
+            "'b': all its trials are in group 'z'",
         ),
         (lambda: folds(["a", "a", "b"], count=2), "label 'b' has one trial"),
     ],

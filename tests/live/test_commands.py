@@ -44,7 +44,7 @@ def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(ended: s
     np.testing.assert_array_equal(taxel.open(file).events.to_numpy(), events.to_numpy())
     again = run(*arguments)
     assert again.returncode == 2
-    said = f"taxel: {file}: exists already; give --overwrite, or name another"
+    said = f"taxel: {file}: exists already; give --overwrite, or another name"
     assert again.stderr.strip().splitlines() == [said]
 
 
@@ -162,7 +162,7 @@ def test_taxel_record_goes_on_by_itself_in_automatic_mode(tmp_path: Path) -> Non
     again = run(*arguments)
     assert (again.returncode, again.stderr.strip()) == (
         2,
-        f"taxel: {tmp_path / 'step7.lsa'}: exists already; give --overwrite, or name another",
+        f"taxel: {tmp_path / 'step7.lsa'}: exists already; give --overwrite, or another name",
     )
 
 

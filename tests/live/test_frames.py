@@ -335,7 +335,7 @@ def test_what_a_live_command_writes_is_replaced_only_where_it_is_told_to(
         with served(text) as at:
             source = f"lines+tcp:{at},array=2x2,time=1:us,unit=counts"
             code, _, err = call(capsys, "live", "--source", source, *plan, *option)
-        said = f"taxel: {place}: exists already; give --overwrite, or name another"
+        said = f"taxel: {place}: exists already; give --overwrite, or another name"
         assert (code, err.splitlines()[-1]) == (2, said)
     with served(text) as at:
         source = f"lines+tcp:{at},array=2x2,time=1:us,unit=counts"
@@ -421,6 +421,6 @@ def test_the_command_says_which_sources_it_does_not_read_out(
         code, _, err = call(capsys, "live", *words, "--readout", readout, "--record", path, "--seconds", "0.3")
     assert code == 0, err
     told = [line for line in err.splitlines() if "recorded only" in line]
-    assert told == ["right: recorded only, not read out or shown; a second taxel live reads it out"]
+    assert told == ["right: recorded, but neither read out nor shown; a second taxel live can read it out"]
     code, _, err = call(capsys, "detect", path, "--readout", readout, "--tare", "0.1")
     assert code == 0, err

@@ -28,7 +28,7 @@ def test_parcels_alone_carry_a_board_and_a_spoilt_one_is_refused(tmp_path: Path)
     copies, board = near.copies(), There("there:1/left", near.about)
     far = Live(remote=board, record=tmp_path / "far.mcap")
     assert (far.place, far.array, far.about) == ("there:1/left", array, near.about)
-    with pytest.raises(taxel.ProblemError, match="remote: is in use already; make another one"):
+    with pytest.raises(taxel.ProblemError, match="remote: is in use already; make another remote board"):
         Live(remote=board)
     # A smaller array drives fewer lines of a preset.
     assert (board.registers["lines"], board.registers["noise_floor"]) == (48, 10)

@@ -224,7 +224,9 @@ def test_without_one_nothing_is_called_newton(tmp_path):
     taxel.convert(frames(5.0), tmp_path / "press.npz")
     recording = taxel.open(tmp_path / "press.npz")
     assert recording.calibration is None
-    with pytest.raises(ProblemError, match="no calibration lies beside it; taxel calibrate makes one"):
+    with pytest.raises(
+        ProblemError, match=r"there is no calibration beside it, .*; taxel calibrate makes a calibration"
+    ):
         recording.calibrated()
 
 
@@ -260,10 +262,16 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
             lambda: Calibration.fit([Load(frames(1.0), 1.0), Load(frames(1.0, "ticks"), 1.0)]),
             "frames of load 2: in ticks; the calibration takes counts",
         ),
-        (lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]), "reading_unit is 'N': must say what is read"),
+        (
+            lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]),
+            "reading_unit is 'N': must be the unit of the readings",
+        ),
         (lambda: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"), r"readings\[1\] is 1: must rise"),
         (lambda: Calibration.table(ARRAY, [1.0], [1.0, 2.0], unit="N"), "1 reading and 2 values"),
-        (lambda: Calibration.table(ARRAY, [0.0, 1.0], [1.0, 2.0], unit="N"), "what reads 0 above rest bears 0"),
+        (
+            lambda: Calibration.table(ARRAY, [0.0, 1.0], [1.0, 2.0], unit="N"),
+            "must be 0 where the reading above rest is 0, and only there",
+        ),
         (lambda: Calibration.table(ARRAY, [1.0], [1.0], unit="bar"), "unit is 'bar': must be one of 'N', 'kPa'"),
         (lambda: Calibration.law(ARRAY, sensor={"exponent": 2.0}), "exponent is 2: must be from 0.5 to 1"),
         (lambda: Calibration.law(ARRAY, sensor={"foam": 1.0}), "foam"),

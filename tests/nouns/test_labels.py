@@ -103,7 +103,7 @@ def test_a_table_names_recordings_by_path_name_or_stem(tmp_path: Path) -> None:
     [
         ("label,t_us,host_ns\na,5,soon\n", "line 2: host_ns is 'soon'; must be whole ns"),
         ("label,t_us,host_ns\na,5,-1\n", "line 2: host_ns must be ns since 1970"),
-        ("label,t_us,t_us\na,5,5\n", "line 1: column 't_us' stands there twice"),
+        ("label,t_us,t_us\na,5,5\n", "line 1: column 't_us' is there twice"),
         ("label,host_ns\na,5\n", "line 1: no column 't_us'"),
     ],
 )
@@ -226,7 +226,7 @@ def test_a_cell_in_a_column_without_a_name_is_refused_and_an_empty_one_is_not(tm
     place.write_text("label,t_us,\nheel,5,\n")
     assert [row.others for row in taxel.Labels(place).rows] == [()]
     place.write_text("label,t_us,,\nheel,5,late,\n")
-    with pytest.raises(taxel.FormatError, match="line 2: 'late' stands in a column without a name; give it one"):
+    with pytest.raises(taxel.FormatError, match="line 2: 'late' is in a column without a name; name the column"):
         taxel.Labels(place)
 
 
@@ -273,7 +273,11 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("Zeit;Ereignis\n0,21;auf\n", r"line 2: Zeit is '0,21', of no unit; name its column as 'Zeit \[s\]' or \(ms\)"),
+        (
+            "Zeit;Ereignis\n0,21;auf\n",
+            r"line 2: Zeit is '0,21'; its unit is not known; name its column as 'Zeit "
+            r"\[s\]' or \(ms\)",
+        ),
         ("t_s,event\n0:0x,auf\n", "line 2: t_s is '0:0x'; must be a number, or as 2024-05-01"),
         ('t_s,event\n"0,21",auf\n', "line 2: t_s is '0,21'; must be a number"),
         ("t_s,event\n1e308,auf\n", "line 2: t_s is '1e308'; must be a number"),

@@ -116,7 +116,7 @@ def test_a_refused_bag_is_named_once_on_the_page(tmp_path):
     with viewed(tmp_path, "mat.npz") as page:
         refused = page.ask("open", name="grasp.bag")
         assert (refused["type"], refused["field"]) == ("refused", "name")
-        assert refused["reason"].startswith(f"{tmp_path / 'grasp.bag'}: a ROS bag, of which a topic")
+        assert refused["reason"].startswith(f"{tmp_path / 'grasp.bag'}: a ROS bag: choose one of its topics")
 
 
 def test_a_folder_of_bags_is_shown_by_options_that_hold_for_each(capsys, tmp_path):
@@ -185,7 +185,7 @@ def test_labels_of_a_folder_are_of_the_bag_that_they_name(capsys, tmp_path):
             f"contact,{times['a.bag'][0]}",
             "names no recording, and there are 2; must have the column recording",
         ),
-        ("recording,label,t_us", f"c.bag,contact,{times['a.bag'][0]}", "c.bag is no recording of this folder"),
+        ("recording,label,t_us", f"c.bag,contact,{times['a.bag'][0]}", "c.bag is not a recording of this folder"),
         ("recording,label,t_us", "a.bag,contact,480000000", "a.bag: has 1 note, none within"),
     ):
         (folder / "b.notes.csv").unlink(missing_ok=True)
@@ -254,7 +254,7 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
         (folder, f"{folder}: holds no recording; name a file, or one of its folders"),
         (
             folder / "palm.npy",
-            "layout.toml, or one given as layout, or rate_hz, says what it is (docs/files.md):",
+            "layout.toml, or one given as layout, or rate_hz, describes it (docs/files.md):",
         ),
     ):
         code, _, errors = call(capsys, "view", words, "--no-open", "--seconds", 1)

@@ -115,7 +115,7 @@ def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
         (("--load", "3", "--load-unit", "kg"), "unit is 'kg': must be one of 'N', 'kPa'"),
         (("--load", "3", "--each"), "no load determines a single taxel"),
         (("--law",), "--law: turns ticks of a board into N;"),
-        (("--from", "1"), "--from and --to are the time of --load: give --load"),
+        (("--from", "1"), "--from and --to give the time of --load: give --load too"),
         (("--loads", "loads.csv"), "loads.csv, line 2: unit is 'kg'; must be N or kPa"),
         (("--set", "exponent=9", "--load", "3"), "sensor holds values of the law; give --law"),
     ],

@@ -87,7 +87,7 @@ class Model:
             samples = self.samples and kind == ".mcap"
             return replace(self, clock=samples, samples=samples, lost=self.lost | said), said
         words = {
-            "the unit": self.unit != "counts", "the side": self.side, "where the heel lies": self.heel,
+            "the unit": self.unit != "counts", "the side": self.side, "where the heel is": self.heel,
             "that its readings were turned": self.turned is not None, "the names of the columns": self.columns,
             "note": self.notes, "detection": self.found,
         }  # fmt: skip

@@ -165,7 +165,7 @@ def test_the_sensor_of_a_table_of_events_is_said_once_and_kept(walk: Path, tmp_p
     table, kept = tmp_path / "walk.csv", tmp_path / "walk.npz"
     assert run("convert", walk, table).returncode == 0
     assumed = run("info", table).stdout
-    assert "64 x 64 taxels, 2.67 mm apart, thesis 64x64; a .csv does not hold it: --array" in assumed
+    assert "64 x 64 taxels, 2.67 mm apart, thesis 64x64; a .csv does not state it: give --array" in assumed
     assert "70 x 65 taxels, 5 mm apart\n" in run("info", table, "--array", "70x65x5").stdout
     # Without mm: those of the board's wire.
     assert "70 x 65 taxels, 2.67 mm apart\n" in run("info", table, "--array", "70x65").stdout
@@ -184,10 +184,10 @@ def test_info_says_what_spike_trains_are_and_other_commands_refuse_them_by_name(
     shown = run("info", path).stdout.splitlines()
     assert shown[0] == f"{path}: spike trains"
     assert [line.split(maxsplit=1) for line in shown[1:]] == [
-        ["trains", "3, 1 silent; the file does not say of which encoder"],
+        ["trains", "3, 1 silent; the file does not name the encoder"],
         ["kind", kind],
         ["time", "0 to 500 ms (0.500 s)"],
-        ["spikes", "3, 6 a second of all trains"],
+        ["spikes", "3, 6 per second in all trains"],
     ]
     said = json.loads(run("info", path, "--json").stdout)
     assert (said["trains"], said["spikes"], said["trains_kind"]) == (3, 3, kind)

@@ -240,7 +240,7 @@ def test_a_slice_of_a_recording_is_converted_as_a_slice(tmp_path: Path) -> None:
         (("E", "a.npz", {"frames_hz": 0}), "frames_hz is 0"),
         (("E", "a.npz", {"frames_hz": "fast"}), "frames_hz is 'fast'"),
         (("E", "a.npz", {"frames_hz": float("nan")}), "frames_hz is nan"),
-        (("F", "a.npz", {"frames_hz": 10}), "frames keep their own times"),
+        (("F", "a.npz", {"frames_hz": 10}), "frames keep their times"),
         (("E", "a.npz", {"overwrite": "yes"}), "overwrite is 'yes'"),
     ],
 )

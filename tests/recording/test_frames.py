@@ -338,7 +338,7 @@ def test_frames_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest.C
     assert timed.timed
     assert timed.frames().t.tolist() == [25_000 * k for k in range(len(one.frames()))]
     assert len(LevelCrossing([100.0]).encode(timed))
-    with pytest.raises(ProblemError, match="has times of its own"):
+    with pytest.raises(ProblemError, match="has times; a rate"):
         timed.at_rate(40)
     spikes = tmp_path / "spikes.npz"
     encode = ["encode", tmp_path / "one.mcap", spikes, "--encoder", "level_crossing", "--set", "levels=[100]"]

@@ -114,7 +114,7 @@ def test_a_sensor_that_is_too_large_is_refused(tmp_path: Path) -> None:
 def test_a_time_out_of_all_reason_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(f"t_us,x,y,p\n0,1,1,1\n{2**62},1,1,0\n")
-    unreadable(path, "time 1: .* must lie within .*142 years")
+    unreadable(path, "time 1: .* must be within .*142 years")
 
 
 def test_a_table_of_very_many_columns_is_refused_before_it_is_read(tmp_path: Path) -> None:

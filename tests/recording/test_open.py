@@ -47,7 +47,7 @@ def npz(**columns: object) -> bytes:
         ("a.npz", npz(t=[1], x=[2], y=[3], p=[True, False]), "p"),
         ("a.npz", npz(t=[1], x=[2], y=[3], p=[True], about="{"), "array about"),
         ("a.npz", npz(t=[1], values=np.zeros((2, 3, 3))), "t has shape"),
-        ("a.csv", b"\x89PNG\r\n", "a PNG picture, no recording"),
+        ("a.csv", b"\x89PNG\r\n", "a PNG picture, not a recording"),
         ("a.csv", b"", "line 1: '': must be"),
         ("a.csv", b"time,x,y\n", "line 1: 'time,x,y': must be t_us,x,y,p[,intensity]"),
         ("a.csv", b"\xff\xfe\x00", "byte 2: not text in UTF-16 (truncated data); save it as UTF-8"),
@@ -59,7 +59,7 @@ def npz(**columns: object) -> bytes:
         ("a.csv", b"t_us,x,y,p\n1,-2,3,0\n", "line 2, column x: is -2"),
         ("a.csv", b"t_us,x,y,p\n1.5,2,3,0\n", "line 2, column t_us"),
         ("a.csv", b"t_us,x,y,p,intensity\n1,2,3,0,70000\n", "column intensity: is 70000; must be 0 to 65535"),
-        ("a.csv", b"t_us,x0y0,x0y0\n0,1,2\n", "column 'x0y0' stands there twice"),
+        ("a.csv", b"t_us,x0y0,x0y0\n0,1,2\n", "column 'x0y0' is there twice"),
         ("a.csv", b"t_us,x0y0,heel\n0,1,2\n", "column 'heel' among taxels"),
         ("a.csv", b"t_us,x0y0\n0,1\n0,2\n", "t[1] is 0 us, not after"),
         ("a.csv", b"t_us,x0y0\n0.5,1\n", "a.csv, line 2, column t_us: is 0.5; must be a whole number of us"),
@@ -68,7 +68,7 @@ def npz(**columns: object) -> bytes:
         ("a.txt", b"hello", "no recording; there are .mcap, .lsa, .npz, .csv, .h5"),
         ("a.h5", b"\x89HDF\r\n\x1a\n", "not a whole HDF5 file"),
         ("a.h5", b"hello", "not with the magic of HDF5 (89 48 44 46)"),
-        ("a.bag", b"#ROSBAG V2.0", "a ROS bag, of which a topic, or [ros] in a layout file, is opened"),
+        ("a.bag", b"#ROSBAG V2.0", "a ROS bag: choose one of its topics, or write [ros] in a layout file"),
     ],
 )
 def test_a_wrong_file_is_one_line_with_place_and_remedy(tmp_path: Path, name: str, content: bytes, said: str) -> None:

@@ -93,7 +93,7 @@ def test_a_folder_is_a_list_in_the_order_of_the_names_with_its_labels_as_notes(t
         [],
     ]
     (tmp_path / "labels.csv").write_text("recording,label,t_us\nrun,heel,700\n")
-    with pytest.raises(FormatError, match=r"run is no recording of this folder; there are a\.h5, walk1\.csv"):
+    with pytest.raises(FormatError, match=r"run is not a recording of this folder; there are a\.h5, walk1\.csv"):
         taxel.open_all(tmp_path)
 
 
@@ -125,7 +125,7 @@ def test_info_of_a_folder_says_all_of_them(tmp_path: Path) -> None:
     assert head == f"{tmp_path}: 2 recordings"
     assert [row.split()[0] for row in rows] == ["walk0.npz", "walk1.npz"]
     assert last.split()[2:4] == ["80", "events"]
-    assert end == "--each prints all of each"
+    assert end == "--each prints all facts about each"
     each = run("info", tmp_path, "--each").stdout
     assert [f"walk{k}.npz: .npz" in each for k in range(2)] == [True, True]
 

@@ -84,7 +84,7 @@ def test_a_tare_comes_first_then_the_calibrations_rest_then_a_quiet_stretch(tmp_
     assert (said["rest"]["source"], said["pressure"]["unit"]) == ("calibration", "N")
     other = taxel.Tare.take(taxel.Frames(np.zeros((2, 3, 2)), [0, 1]))
     other.save(tmp_path / "other.json")
-    assert "the tare is of 3 x 2 taxels" in run("info", path, "--tare", tmp_path / "other.json").stderr
+    assert "the tare has 3 x 2 taxels" in run("info", path, "--tare", tmp_path / "other.json").stderr
 
 
 def test_frames_of_force_rest_at_0_and_others_where_they_are_quiet(tmp_path: Path) -> None:
@@ -151,13 +151,13 @@ def test_what_lay_on_the_array_in_its_quiet_stretch_is_said_and_is_no_rest_of_a_
     assert where in run("info", path).stdout
     trained = run("train", path, "--recipe", "touch", "--folds", "0", "-o", tmp_path / "r.json", "--overwrite")
     assert where in trained.stderr
-    assert "so the tare is of a time without it" in trained.stderr
+    assert "so the tare is measured in a time without it" in trained.stderr
     assert "tare: what the recording holds from 800 to 19" in trained.stdout.replace("from 810", "from 800")
     # Until the first label: then the tare is of a later quiet stretch.
     source, _ = preloaded(until_s=2, events=events)
     taxel.convert(source, path, overwrite=True)
     trained = run("train", path, "--recipe", "touch", "--folds", "0", "-o", tmp_path / "r.json", "--overwrite")
-    assert "so the tare is of a time without it" in trained.stderr
+    assert "so the tare is measured in a time without it" in trained.stderr
     begin, end = map(float, re.findall(r"holds from ([\d.]+) to ([\d.]+) ms", trained.stdout)[0])
     assert 2000 < begin < end
 

@@ -129,7 +129,7 @@ def test_of_several_boards_none_is_the_files_own(several: tuple[Path, dict[str, 
         lambda: taxel.cut(recording, stop_us=5.0)[0].events,
     ):
         with pytest.raises(
-            taxel.ProblemError, match=r"holds 4 sources \(right, left, imu, given\); say which"
+            taxel.ProblemError, match=r"holds 4 sources \(right, left, imu, given\); choose one by"
         ) as refused:
             ask()
         assert "\n" not in str(refused.value)
@@ -155,7 +155,7 @@ def test_of_one_board_and_numbers_the_files_own_is_the_board(tmp_path: Path) -> 
     assert list(alone.sources) == ["imu"]
     (part,) = taxel.cut(recording, stop_us=90_000.0)
     assert len(part.events) == 5
-    with pytest.raises(taxel.ProblemError, match="say on_clock"):
+    with pytest.raises(taxel.ProblemError, match="call on_clock"):
         _ = part.sources
 
 
@@ -377,7 +377,7 @@ def test_times_go_from_one_clock_to_the_other_and_nothing_else_moves(
         recording.on_clock("up")
     with pytest.raises(taxel.ProblemError, match="is on the clock of left already"):
         recording.on_clock("left").on_clock("host")
-    with pytest.raises(taxel.ProblemError, match=r"say on_clock\('left'\) before between"):
+    with pytest.raises(taxel.ProblemError, match=r"call on_clock\('left'\) before between"):
         plain["left"].between(0, 5).on_clock("left")
     note = recording.on_clock("host").notes[0]
     assert abs(note.t - note.at_ns / 1000) < 60_000_000

@@ -172,7 +172,7 @@ def test_no_table_of_a_report_is_cut(tmp_path, name, width):
         worst=[(name, "contact", 123.456789, "missed")],
         unclaimed=[(name, 123.456789, "a load without a detection: 0.51 s, up to 83.1 counts")],
         together=[],
-        about=[(name, ["Times are from 2026-01-02 03:04:05 UTC on."])],
+        about=[(name, ["Times are counted from 2026-01-02 03:04:05 UTC."])],
         most_open=4,
         warnings=[f"{name}: rest: 4 taxels drifted above the tare by more than the noise floor"],
         printed=["all  12  12"],

@@ -110,7 +110,7 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
     with pytest.raises(SceneError, match=r"scene.toml: bodies\[0\].shape.height_map.file .*sole\.csv: no such file"):
         SceneFile.open(tmp_path / "scene.toml")
     write(tmp_path, text.replace('file = "sole.csv"', 'file = "sole.csv", heights_mm = [[0, 0], [0, 0]]'))
-    with pytest.raises(SceneError, match="has heights_mm and a file: must have one of both"):
+    with pytest.raises(SceneError, match="has heights_mm and a file: must have only one of them"):
         SceneFile.open(tmp_path / "scene.toml")
     write(tmp_path, text.replace('file = "sole.csv"', "file = 3"))
     with pytest.raises(SceneError, match=r"height_map.file is 3: must be a text"):
@@ -126,7 +126,7 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
         (("mass_g = 30", 'material = "cheese"'), r'material is "cheese": must be "steel"'),
         (
             ("mass_g = 30", 'mass_g = 30\nmaterial = "steel"'),
-            r"bodies\[0\] has mass_g and material: must have one of both",
+            r"bodies\[0\] has mass_g and material: must have only one of them",
         ),
         (("mass_g = 30", "mass_g = inf"), r"bodies\[0\].mass_g is inf: must be finite"),
         (("mass_g = 30", "mass_g = 1e6"), r"scene.toml: the body bottoms out: 1000000.0 g"),

@@ -293,9 +293,9 @@ def test_labels_near_nothing_are_refused_in_one_line_that_names_the_option(tmp_p
     assert error.startswith(
         "taxel: labels: 0 of 12 labels lie within 50 ms of anything that was felt; what may help is "
     )
-    assert error.endswith("; to go on nonetheless, give --labels-as-given\n")
+    assert error.endswith("; to continue nonetheless, give --labels-as-given\n")
     assert not (tmp_path / "r.json").exists()
-    with pytest.raises(taxel.ProblemError, match="to go on nonetheless, give labels_as_given") as refusal:
+    with pytest.raises(taxel.ProblemError, match="to continue nonetheless, give labels_as_given") as refusal:
         taxel.train(taxel.open(recording), labels)
     assert refusal.value.argument == "labels_as_given"
 

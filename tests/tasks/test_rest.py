@@ -118,7 +118,7 @@ def test_the_first_stretch_counts_wherever_it_is_and_nothing_before_it_is_left_o
     assert each.outcome.found.t.tolist() == [10_000 * (k + at) for k in (5, 30, 55, 80, 200) for at in (0, 10)]
     rule.save(tmp_path / "rule.json")
     said = run("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json").stdout
-    assert "rest taken: its first quiet stretch, 1.000 to 1.500 s; --tare gives another" in said
+    assert "rest taken: its first quiet stretch, 1.000 to 1.500 s; --tare sets another rest" in said
 
 
 def test_the_page_takes_the_same_rest_also_where_a_touch_begins_the_recording(tmp_path: Path) -> None:
@@ -162,7 +162,7 @@ def test_where_nothing_is_quiet_it_is_refused_with_what_to_give(tmp_path: Path) 
 def test_what_lay_on_the_array_in_its_first_quiet_stretch_is_no_rest(tmp_path: Path, events: bool) -> None:
     source, _ = preloaded(events=events)
     taxel.convert(source, tmp_path / "a.npz")
-    with pytest.warns(UserWarning, match="something lay on rows 2 to 4, columns 5 to 7 .* of a time without it"):
+    with pytest.warns(UserWarning, match="something lay on rows 2 to 4, columns 5 to 7 .* in a time without it"):
         taken = rest(taxel.open(tmp_path / "a.npz"))
     assert (taken.source, taken.tare.start_us >= 800_000) == ("quiet", True)
     assert np.nanmax(np.abs(taken.tare.rest - 50)) < 2.5

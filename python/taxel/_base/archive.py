@@ -74,7 +74,9 @@ def shapes(path: str | os.PathLike[str]) -> dict[str, tuple[int, ...]]:
             return found
         # As in `read_arrays`.
         except Exception as error:
-            raise FormatError(f"{path}: no whole {Path(path).suffix} ({first_line(error)}); write it again") from None
+            raise FormatError(
+                f"{path}: not a whole {Path(path).suffix} ({first_line(error)}); write it again"
+            ) from None
 
 
 def fields_of(path: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -129,7 +131,9 @@ def read_array(path: str | os.PathLike[str], dtype: DTypeLike | None = None) -> 
             if dtype is not None and stored_as.kind not in "biuf":
                 raise FormatError(f"{path}: {stored_as} of shape {shape}; must be a NumPy array of numbers")
             if size > stored:
-                raise FormatError(f"{path}: says that it holds {size} bytes ({shape}, {stored_as}); there are {stored}")
+                raise FormatError(
+                    f"{path}: states that it holds {size} bytes ({shape}, {stored_as}); there are {stored}"
+                )
             unpacked(str(path), _kept(shape, stored_as, dtype))
             file.seek(0)
             return _read(file, dtype, str(path))
@@ -156,7 +160,7 @@ def read_arrays(
     wanted : names of arrays; others are ignored
     texts : dict from the names of those that hold one text to how many characters it may have
     dtypes : dict from name to dtype
-        What numbers are converted to, piece by piece as they are read. What a float cannot hold becomes infinite.
+        What numbers are converted to, piece by piece as they are read. Values too large for a float become infinite.
     chosen : function of a dict from name to shape
         Which of those that there are are read; it may refuse them by their shapes before any is read.
 
@@ -222,7 +226,9 @@ def _arrays(
             unpacked(location, total)
             stored = archive.getinfo(members[name]).file_size - begin
             if size != stored:
-                raise FormatError(f"{location}: says that it holds {size} bytes ({shape}, {dtype}); there are {stored}")
+                raise FormatError(
+                    f"{location}: states that it holds {size} bytes ({shape}, {dtype}); there are {stored}"
+                )
         for name in there:
             with archive.open(members[name]) as array:
                 columns[name] = _read(array, dtypes.get(name), f"{path}: {name}")

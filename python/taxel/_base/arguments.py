@@ -287,7 +287,7 @@ def window(unit: str, start: object, stop: object) -> tuple[float, float]:
     """Return an interval of time whose start is not after its stop; either may be infinite."""
     first, last = number("start", start, unit), number("stop", stop, unit)
     if not first <= last:
-        raise ProblemError(f"window {plain(first)} to {plain(last)} {unit}: start must not lie after stop")
+        raise ProblemError(f"window {plain(first)} to {plain(last)} {unit}: start must not be after stop")
     return first, last
 
 
@@ -356,7 +356,7 @@ def _first_changed(received: NDArray[Any], array: NDArray[Any]) -> tuple[int, ..
 
 
 def _refuse_others(name: str, values: NDArray[Any]) -> None:
-    """Refuse entries of an array of objects that NumPy converts although they are no numbers: texts, None, spans."""
+    """Refuse entries of an array of objects that NumPy converts although they are not numbers: texts, None, spans."""
     if any(issubclass(kind, _NO_NUMBERS) for kind in set(map(type, values.flat))):
         index, value = next((at, entry) for at, entry in np.ndenumerate(values) if isinstance(entry, _NO_NUMBERS))
         where = f"[{', '.join(map(str, index))}]" if index else ""

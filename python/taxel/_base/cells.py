@@ -1,4 +1,4 @@
-"""What the cells of tables of text say: names, units, times, marks of missing values."""
+"""Meaning of the cells of tables of text: names, units, times, marks of missing values."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def unit_of(name: str) -> str | None:
 
 
 def cells(line: str, separator: str) -> list[str]:
-    """Return the cells of a line, without blanks and quotes around them; by " " any number of blanks stands between."""
+    """Return the cells of a line, without blanks and quotes around them; by " " any number of blanks is between."""
     texts = line.split() if separator == " " else line.split(separator)
     if '"' in line and separator != " ":
         with suppress(csv.Error):

@@ -3,15 +3,15 @@
 The parent holds one end of a pipe, which the system closes however the parent ends. The child is this file, run by its
 path: before it runs its program, it starts a thread that waits for the end of the pipe. The thread removes the files
 that are unfinished and sends SIGTERM to its process group: the process and what it has started. A program that has to
-clean up handles SIGTERM, as the command line does. What still runs after `GRACE_S` is killed. So a program needs no
-code for this. It may be a file that does not import taxel, such as ``h5_child.py``, because this one imports the
-standard library alone::
+clean up handles SIGTERM, as the command line does. A process that still runs after `GRACE_S` is killed. So a program
+needs no code for this. It may be a file that does not import taxel, such as ``h5_child.py``, because this module
+imports the standard library alone::
 
     child = ChildProcess(Path("h5_child.py"), ["/dev/fd/5"], pass_fds=[5], stdin=PIPE, stdout=PIPE)
 
-A child has a session of its own: Ctrl-C in the terminal reaches the parent alone, which then ends its children.
+A child has a separate session: Ctrl-C in the terminal reaches the parent alone, which then ends its children.
 
-On Windows a child has a console of its own and belongs to a job (`taxel._base.windows_job`), by which the system kills
+On Windows a child has a separate console and belongs to a job (`taxel._base.windows_job`), by which the system kills
 it and its descendants as soon as the parent has ended; unfinished files are left.
 """
 
@@ -47,7 +47,7 @@ _running: weakref.WeakSet[ChildProcess] = weakref.WeakSet()
 
 
 class ChildProcess(subprocess.Popen[Any]):
-    """A Python process that ends within `GRACE_S` when this one ends or calls `end`.
+    """A Python process that ends within `GRACE_S` when this process ends or calls `end`.
 
     Parameters
     ----------

@@ -162,7 +162,7 @@ def of_json(location: str, text: str, most: int = BY_HAND, *, room: int = UNPACK
 
     Raises
     ------
-    FormatError : not JSON, as NaN and Infinity are not, a key that stands twice in an object, too long, or nested too
+    FormatError : not JSON, as NaN and Infinity are not, a key that is twice in an object, too long, or nested too
         deeply
     """
     _check_length(location, text, most)
@@ -172,11 +172,11 @@ def of_json(location: str, text: str, most: int = BY_HAND, *, room: int = UNPACK
         values = dict(pairs)
         if len(values) < len(pairs):
             twice = next(name for name, count in Counter(name for name, _ in pairs).items() if count > 1)
-            raise FormatError(f"{location}: not JSON: {shown(twice)} stands twice in one object")
+            raise FormatError(f"{location}: not JSON: {shown(twice)} is twice in one object")
         return values
 
     def refuse(constant: str) -> NoReturn:
-        raise FormatError(f"{location}: not JSON: {constant} is no number there")
+        raise FormatError(f"{location}: not JSON: {constant} is not a number in JSON")
 
     try:
         value = json.loads(text, object_pairs_hook=once, parse_constant=refuse)

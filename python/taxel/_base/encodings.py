@@ -27,7 +27,7 @@ def mark_of(data: bytes) -> tuple[bytes, str]:
 
 
 def as_utf_8(name: str, file: BinaryIO) -> BinaryIO:
-    """Return a text as UTF-8: a file in UTF-16 is converted as it is read, any other one itself.
+    """Return a text as UTF-8: a file in UTF-16 is converted as it is read, any other file is returned itself.
 
     Parameters
     ----------

@@ -1,22 +1,23 @@
 """Makes errors whose argument and remedy are data, and the line that shows them.
 
 An error that has an argument (`Error.argument`) names it once: before its text, or, with a remedy (`Error.hint`),
-within the remedy. The command line puts its option in the place of the argument.
+within the remedy. The command line puts its option instead of the argument.
 """
 
 from __future__ import annotations
 
+from textwrap import dedent
 from typing import TypeVar
 
 from taxel._base.messages import escaped, escaped_lines
-from taxel._core import Error, ProblemError
+from taxel._core import DeviceError, Error, FormatError, NotFittedError, ProblemError, SceneError
 
 _Error = TypeVar("_Error", bound=Error)
 
 #: What each remedy says, with the reader's name of the argument that helps.
 _REMEDIES = {
     "give": "give {}",
-    "go_on": "to go on nonetheless, give {}",
+    "go_on": "to continue nonetheless, give {}",
     "larger": "a larger {} reads more",
     "lay_out": "give {}, or rows and columns in a layout file, if they are a grid's taxels row by row",
     "pitch": "give {} with the pitch in mm, or pitch_mm in a layout file",
@@ -39,6 +40,83 @@ def _shown(error: Error) -> str:
 # The class is of the core; it needs Python 3.12 to have methods of its own there.
 Error.__str__ = _shown  # type: ignore[method-assign, assignment]
 Error.__repr__ = lambda error: f"{type(error).__name__}({str(error)!r})"  # type: ignore[method-assign]
+
+_ATTRIBUTES = """
+Attributes
+----------
+argument : str or None
+    The argument that is wrong, or that helps; None if the error concerns no single argument.
+hint : str or None
+    The remedy that the text ends with, as one word such as "give" or "larger"; None if there is none.
+
+Examples
+--------
+>>> import taxel
+"""
+_ABOUT = {
+    Error: (
+        "Base class of all errors of taxel: ``except taxel.Error`` catches each of them.",
+        """
+        >>> try:
+        ...     taxel.Array(0, 8)
+        ... except taxel.Error as error:
+        ...     print(f"{error} (argument: {error.argument})")
+        rows is 0: must be a whole number from 1 to 65535 (argument: rows)
+        """,
+    ),
+    FormatError: (
+        "A file, text or bytes cannot be read: it is damaged, or it is not in the format that it should be in.",
+        """
+        >>> try:
+        ...     taxel.Tare.from_json("{}")
+        ... except taxel.FormatError as error:
+        ...     print(error)
+        tare: array is missing
+        """,
+    ),
+    ProblemError: (
+        "An argument is invalid, or arguments, spike trains or a learning problem make no sense together.",
+        """
+        >>> try:
+        ...     taxel.Frames([[[1.0]], [[2.0]]], t=[5, 5])
+        ... except taxel.ProblemError as error:
+        ...     print(error)
+        t[1] is 5 us, not after t[0] = 5 us
+        """,
+    ),
+    NotFittedError: (
+        "A learner was used before its `fit` was called.",
+        """
+        >>> try:
+        ...     taxel.learn.ConeX().predict([])
+        ... except taxel.NotFittedError as error:
+        ...     print(error)
+        ConeX: not fitted yet, call fit first
+        """,
+    ),
+    DeviceError: (
+        "Registers break a rule of the board, the board does not answer, or its answer is wrong.",
+        """
+        >>> try:
+        ...     taxel.wire.Registers(line_read=3.2)
+        ... except taxel.DeviceError as error:
+        ...     print(error)
+        line_read 3.20 us is longer than line_period 3.00 us (rule 1)
+        """,
+    ),
+    SceneError: (
+        "A simulated scene cannot be played: a parameter is invalid, or a body is off the array.",
+        """
+        >>> try:
+        ...     taxel.simulate.Scene.draw(0, array=taxel.Array(8, 8))
+        ... except taxel.SceneError as error:
+        ...     print(error)
+        a scene needs mm, and the pitch of array is not known; give array with the pitch in mm...
+        """,
+    ),
+}
+for _kind, (_summary, _example) in _ABOUT.items():
+    _kind.__doc__ = f"{_summary}\n{_ATTRIBUTES}{dedent(_example).lstrip()}"
 
 
 def refused(name: str, text: str) -> ProblemError:

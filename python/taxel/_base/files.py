@@ -19,7 +19,7 @@ _NO_LINK = (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS)
 
 
 def beside(path: Path, name: str) -> Path:
-    """Return the place of a file of this name in the folder that a file or folder lies in.
+    """Return the place of a file of this name in the folder of a file or folder.
 
     Examples
     --------
@@ -89,10 +89,10 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
     target = Path(checked_path("path", path))
     overwrite = flag("overwrite", overwrite)
     if not overwrite and os.path.lexists(target):
-        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(target))
+        raise FileExistsError(errno.EEXIST, "exists already; give overwrite=True to replace it", str(target))
     # A rename would replace a device by a file: /dev/null for all programs, where a superuser asks for it.
     if target.exists() and not target.is_file():
-        raise OSError(errno.EINVAL, "is no regular file, and is not replaced", str(target))
+        raise OSError(errno.EINVAL, "is not a regular file, and is not replaced", str(target))
     # A rename checks the permissions of the folder only; a write-protected file is refused here, also for the
     # superuser.
     if target.exists() and not (target.stat().st_mode & 0o222 and os.access(target, os.W_OK)):

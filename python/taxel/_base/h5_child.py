@@ -203,7 +203,7 @@ class Listing:
                 self.send_entry(path, data)
 
     def send_entry(self, path: bytes, data: Any) -> None:
-        """Send the dtype ("text", or "" for what is no data set) and the shape of an entry."""
+        """Send the dtype ("text", or "" for anything except a data set) and the shape of an entry."""
         dtype, shape = "", ()
         if isinstance(data, self.h5py.h5d.DatasetID):
             self.check(path, data)
@@ -211,7 +211,7 @@ class Listing:
         send(entry=text_of(path), dtype=dtype, shape=shape)
 
     def opened(self, path: str) -> Any:
-        """Return a data set that was listed, checked anew: what is read is what was checked."""
+        """Return a data set that was listed, checked again, so that it is read as it was checked."""
         data = self.h5py.h5o.open(self.h5.id, path.encode())
         self.check(path.encode(), data)
         return data

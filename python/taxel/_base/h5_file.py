@@ -150,7 +150,7 @@ class H5File(ReadingChild):
         ----------
         name : str
         dtype : dtype, optional
-            What the values are converted to, piece by piece as they are read. What a float cannot hold becomes
+            What the values are converted to, piece by piece as they are read. Values too large for a float become
             infinite.
 
         Raises

@@ -72,7 +72,7 @@ class HeaderTable:
         header = tuple(name.strip() for name in first)
         repeated = next((name for name, count in Counter(header).items() if name and count > 1), None)
         if repeated is not None:
-            raise FormatError(f"{location}, line {line}: column {shown(repeated)} stands there twice")
+            raise FormatError(f"{location}, line {line}: column {shown(repeated)} is there twice")
         return cls(str(location), header, ())
 
     @classmethod
@@ -141,7 +141,7 @@ class HeaderTable:
             stray = next((cell for name, cell in named if not name and cell.strip()), None)
             if stray is not None:
                 raise FormatError(
-                    f"{self.location}, line {line}: {shown(stray)} stands in a column without a name; give it one"
+                    f"{self.location}, line {line}: {shown(stray)} is in a column without a name; name the column"
                 )
             yield line, {name: cell for name, cell in named if name}
 

@@ -1,7 +1,7 @@
 """Limits of the size of files, checked before memory is taken; errors name them, docs/files.md lists them.
 
-Files may be damaged or malicious: a few bytes can claim 10^12 values. The limits lie well above what current
-sensors record. Those of .mcap are in its reader (crates/taxel-live/src/recording/limits.rs).
+Files may be damaged or malicious: a few bytes can claim 10^12 values. The limits are well above what current sensors
+record. Those of .mcap are in its reader (crates/taxel-live/src/recording/limits.rs).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is saved as a file of JSON: the base of a tare, a calibration, a readout and a plain rule."""
+"""Base of what is saved as a file of JSON: a tare, a calibration, a readout and a plain rule."""
 
 from __future__ import annotations
 

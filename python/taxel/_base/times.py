@@ -21,7 +21,7 @@ def beginning_us(t: NDArray[np.int64]) -> int:
 
 
 def begun(begin_us: int) -> str:
-    """Return date and time of a beginning, to the millisecond; "" of 0, which is no date."""
+    """Return date and time of a beginning, to the millisecond; "" for 0, which is not a date."""
     if not begin_us:
         return ""
     begin = datetime(1970, 1, 1) + timedelta(microseconds=begin_us)

@@ -32,7 +32,7 @@ if sys.platform == "win32":
             _check(_kernel.SetInformationJobObject(self._handle, _LIMITS, limits, len(limits)))
 
         def add(self, process: int) -> None:
-            """Add a process, by its handle; processes that it starts from then on belong to the job too."""
+            """Add a process, by its handle; processes that it starts later belong to the job too."""
             _check(_kernel.AssignProcessToJobObject(self._handle, ctypes.c_void_p(process)))
 
         def end(self, code: int) -> None:

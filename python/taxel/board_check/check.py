@@ -52,7 +52,7 @@ def _nothing(port: int, seconds: float) -> str:
 
 
 class _Check:
-    """One check, as it goes on."""
+    """One check while it runs."""
 
     def __init__(self, say: Callable[[Finding], object] | None) -> None:
         self.say, self.findings = say, list[Finding]()
@@ -289,7 +289,7 @@ def check_board(
     if preset is not None and text("preset", preset) not in PRESETS:
         raise ProblemError(f"preset {preset!r}: there are {', '.join(map(repr, PRESETS))}")
     if preset is not None and place is not None:
-        raise refused("preset", ": the board on the serial line says what it holds: leave it out")
+        raise refused("preset", ": the board on the serial line states its registers: leave it out")
     check = _Check(None if say is None else callback("say", say))
     receiver = Receiver(text("host", host), where)
     with contextlib.closing(receiver.socket):

@@ -1,4 +1,4 @@
-"""What arrives of a board while it is checked, and the values in it."""
+"""Data that arrive from a board while it is checked, and the values in them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _STAMP_US = 100.0
 
 @dataclass
 class Capture:
-    """What arrived, and where."""
+    """Data that arrived, and the place."""
 
     datagrams: list[bytes] = field(default_factory=list)
     arrived_us: list[int] = field(default_factory=list)

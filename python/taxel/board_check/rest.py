@@ -1,4 +1,4 @@
-"""What the comparators of a board read at rest."""
+"""Readings of a board's comparators at rest."""
 
 from __future__ import annotations
 

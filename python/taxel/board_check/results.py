@@ -1,4 +1,4 @@
-"""What a check of a board found."""
+"""Result of a check of a board."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Finding:
     name : str
         As "address" or "values".
     good : bool or None
-        Whether it is as it must be; None where it is only told.
+        Whether it is as it must be; None where it is only reported.
     text : str
         A sentence.
 

@@ -51,7 +51,7 @@ class Calibration(Saved):
     rest : float64, shape (rows, columns), or None
         What taxels read without a load, where it is known; NaN where it is not, and such taxels give 0.
     floor : float, in readings
-        The noise floor: a reading that is no more than this above rest is no load.
+        The noise floor: a reading that is no more than this above rest is not a load.
     date : str
         The day, as 2026-11-21.
     residual : float or None
@@ -60,6 +60,10 @@ class Calibration(Saved):
     loads : tuple of (float, str, float)
         The loads of a fit: each load, its unit, and what the calibration makes of the frames under it.
     note : str
+
+    Raises
+    ------
+    ProblemError : the class is called; use `law`, `table`, `fit`, `load` or `from_json`
 
     Examples
     --------
@@ -101,7 +105,7 @@ class Calibration(Saved):
             checked_text("reading_unit", reading_unit),
         )
         if not reading_unit or reading_unit in UNITS:
-            raise refused("reading_unit", f" is {reading_unit!r}: must say what is read: ticks, counts")
+            raise refused("reading_unit", f" is {reading_unit!r}: must be the unit of the readings: ticks, counts")
         if isinstance(curve, PointCurve) and curve.x.ndim == 3 and curve.x.shape[1:] != array.shape:
             raise refused("readings", f" are of {curve.x.shape[1:]} taxels: the array has {array.shape}")
         calibration.gain = _by_taxel("gain", how.get("gain", 1.0), array)
@@ -146,7 +150,8 @@ class Calibration(Saved):
         ramp : float, ticks
             How long the board's ramp lasts (its register `ramp_time`).
         sensor : mapping, optional
-            What differs from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm ...
+            Parameters that differ from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm
+            ...
         unit : {"N", "kPa"}
         gain : float or float64, shape (rows, columns)
         rest : Tare or float64 of the array's shape, optional
@@ -198,7 +203,7 @@ class Calibration(Saved):
         ----------
         array : Array
         readings : float64, shape (points,) or (points, rows, columns), above rest, rising
-            The same for all taxels but for their gains, or what each reads under the same values.
+            The same for all taxels except for their gains, or the readings of each taxel under the same values.
         values : float64, shape (points,), in `unit`, rising
             A first point (0, 0) is added. Beyond the last point the last value holds.
         unit : {"N", "kPa"}
@@ -249,14 +254,14 @@ class Calibration(Saved):
         loads : list of Load, one or more
             All of one array and in one unit of readings.
         unit : {"N", "kPa"}
-            Of the calibration. Between N and kPa stands the area of each taxel.
+            Unit of the calibration. To convert between N and kPa, the area of each taxel must be known.
         start : Calibration, optional
             The calibration whose curve (a law, a table) is fitted; else a power of the reading.
         exponent : float, above 0, optional
             Of the value by the reading's conductance or count, not to be fitted. Left out, it is 1 (of a law, its own)
             where all loads are alike.
         each : bool
-            A gain of its own for each taxel that a load determines: uniform pressure (kPa), or a load on one
+            A separate gain for each taxel that a load determines: uniform pressure (kPa), or a load on one
             taxel. The others keep the common one.
         rest : Tare or float64, shape (rows, columns), in the unit of the readings, optional
             That of `start`, or 0, where it is left out.
@@ -279,7 +284,7 @@ class Calibration(Saved):
         checked_text("unit", unit, UNITS)
         measured = [instance("loads", load, Load) for load in several("loads", loads)]
         if not measured:
-            raise refused("loads", " is empty: lay at least one known load on the array")
+            raise refused("loads", " is empty: must hold at least one known load")
         array, reading_unit = instance("frames", measured[0].frames, Frames).array, measured[0].frames.unit
         curve: Curve = Power(1.0)
         if start is not None:
@@ -287,7 +292,7 @@ class Calibration(Saved):
             same(array, start.array, "start")
             if (start.reading_unit, start.unit) != (reading_unit, unit):
                 raise ProblemError(
-                    f"start turns {start.reading_unit} into {start.unit}: must turn {reading_unit} into {unit}"
+                    f"start converts {start.reading_unit} to {start.unit}: must convert {reading_unit} to {unit}"
                 )
             curve, rest = start._curve, start.rest if rest is None else rest
         fitted = cls._made(array, curve, unit, reading_unit, {"rest": rest, "floor": floor, "date": date, "note": note})
@@ -447,7 +452,7 @@ class Calibration(Saved):
 
     @staticmethod
     def beside(recording: str | os.PathLike[str]) -> Path | None:
-        """Return the file of the calibration that lies beside a recording; None where there is none.
+        """Return the file of the calibration beside a recording; None if there is none.
 
         Parameters
         ----------

@@ -82,7 +82,10 @@ class PointCurve:
         at_rest = self.x[0] == 0
         if np.any(at_rest != (self.y[0] == 0)):
             first = float(np.ravel(self.x[0])[0])
-            raise ProblemError(f"the table begins at {first:g}, {self.y[0]:g}: what reads 0 above rest bears 0")
+            raise ProblemError(
+                f"the table begins at {first:g}, {self.y[0]:g}: must be 0 where the reading above "
+                f"rest is 0, and only there"
+            )
         if not np.any(at_rest):
             self.x, self.y = np.concatenate([0 * self.x[:1], self.x]), np.append(0.0, self.y)
 

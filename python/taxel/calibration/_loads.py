@@ -42,6 +42,11 @@ class Load(NamedTuple):
     Raises
     ------
     ProblemError : values that are invalid, when `Calibration.fit` gets it
+
+    Examples
+    --------
+    >>> Load(Frames([[[20.0, 10.0]]], [0]), 3.0).unit
+    'N'
     """
 
     frames: Frames
@@ -51,7 +56,7 @@ class Load(NamedTuple):
 
 
 class CalibratedArray(NamedTuple):
-    """What is calibrated: its array, the units of its readings and of the result, its rest, and the floor above it."""
+    """Sensor to calibrate: its array, the units of its readings and of the result, its rest, and the floor above it."""
 
     array: Array
     reading_unit: str
@@ -77,7 +82,7 @@ class LoadEquations(NamedTuple):
         same(sensor.array, frames.array, f"the frames of {location}", frames.unit, sensor.reading_unit)
         value, unit = above_0(location, load.load), checked_text("unit", load.unit, UNITS)
         if not len(frames):
-            raise ProblemError(f"{location}: no frame while it lies")
+            raise ProblemError(f"{location}: there is no frame while it is on the array")
         rest = sensor.rest
         readings = frames.values.mean(axis=0, dtype=np.float64)
         chosen = sensor.array._there() & ~np.isnan(rest)
@@ -99,8 +104,8 @@ class LoadEquations(NamedTuple):
             areas = sensor.array.area_mm2
             if areas is None:
                 raise ProblemError(
-                    f"{location}: in {unit}, and the calibration in {sensor.unit}: between them stands the area of "
-                    f"each taxel, which is not known of {sensor.array!r}"
+                    f"{location}: in {unit}, and the calibration in {sensor.unit}: to convert, taxel needs the area "
+                    f"of each taxel, which is not known for {sensor.array!r}"
                 )
             weight = 1 / (areas * N_PER_KPA_MM2) if unit == "kPa" else areas * N_PER_KPA_MM2
         alone = unit == "kPa" or load.taxel is not None

@@ -33,7 +33,7 @@ app = App(
     cls=Commands,
     help="Touch as events: from the bytes of a tactile array to detections with exact times.",
     no_args_is_help=True,
-    epilog="Begin with: taxel demo. Pages by what you have are in docs/ of the repository, from docs/start.md on.",
+    epilog="Begin with: taxel demo. docs/start.md in the repository shows which page to read for your data.",
 )
 
 #: What checks numbers that the parser refuses.
@@ -98,7 +98,7 @@ def main(arguments: list[str] | None = None, *, loaded: Callable[[], None] | Non
             raise
         _end(str(error), WRONG_INPUT)
     except MemoryError as error:
-        _end(f"this needs more memory than there is ({error})", OUTSIDE)
+        _end(f"this needs more memory than is available ({error})", OUTSIDE)
     sys.exit(code if isinstance(code, int) else 0)
 
 

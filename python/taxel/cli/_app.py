@@ -1,4 +1,4 @@
-"""What every command is made of: its class, and options that several share."""
+"""Parts of every command: its class, and options that several share."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class _Command(TyperCommand):
         except FileExistsError as error:
             if error.filename is None:
                 raise
-            replace = "give --overwrite, or name another" if "overwrite" in self._options() else "name another"
+            replace = "give --overwrite, or another name" if "overwrite" in self._options() else "give another name"
             raise FileExistsError(errno.EEXIST, f"exists already; {replace}", error.filename) from error
 
     def _options(self) -> dict[str, Any]:
@@ -96,7 +96,7 @@ class _Command(TyperCommand):
 
 
 class App(typer.Typer):
-    """A group of such commands: no colours, no completion, no traceback of its own."""
+    """A group of such commands: without colours, completion or tracebacks."""
 
     def __init__(self, **options: Any) -> None:
         plain: dict[str, Any] = {
@@ -116,7 +116,7 @@ class App(typer.Typer):
 def as_command(
     call: Callable[..., None], work: Callable[..., None], parameters: Iterable[inspect.Parameter]
 ) -> Callable[..., None]:
-    """Return `call` as the command that `work` is, but with these parameters: options may stand before arguments."""
+    """Return `call` as the command that `work` is, but with these parameters: options may come before arguments."""
     functools.update_wrapper(call, work)
     keywords = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
     call.__signature__ = inspect.Signature(keywords)  # type: ignore[attr-defined]

@@ -73,13 +73,13 @@ def _read(
                 write(label)
                 report(f"noted: {label}")
             except (Error, OSError) as error:
-                report(f"not noted: {error}")
+                report(f"note not saved: {error}")
         if not typed:
             return
 
 
 def _keys(typed: str) -> list[str]:
-    """Return a label for each key: its letter, "mark" for space and return; none for arrow keys and the like."""
+    """Return a label for each key: its letter, "mark" for space and return; none for arrow keys and similar."""
     if typed.startswith("\x1b"):
         return []
     return [

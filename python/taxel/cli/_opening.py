@@ -20,17 +20,18 @@ class FileOptions:
         list[str] | None,
         typer.Option(
             metavar="ROWSxCOLUMNS[xMM]",
-            help="Rows, columns and pitch (mm) of the sensor, as 24x20x5, for files without them (.csv, .lsa, ROS "
-            "bags), and for frames of a row of as many channels. Default: 64x64x2.67, or a larger array if events "
-            "lie outside it; of a bag as its messages say. "
-            "Without mm the pitch is 2.67 for events of the board, else unknown.",
+            help="Rows, columns and pitch (mm) of the sensor, for example 24x20x5, for files that do not state them "
+            "(.csv, .lsa, ROS bags), and for frames of one row with as many channels. Default: 64x64x2.67, or a "
+            "larger array if events are outside it; for a bag, the size of its messages. If no pitch is given, "
+            "it is 2.67 mm for events of the board, otherwise unknown.",
         ),
     ] = None
     layout: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="What a file lacks: sensor, unit, rate, how to read a table. Default: NAME.layout.toml or layout.toml "
+            help="Layout file with the facts that a recording lacks: sensor, unit, rate, form of a table. Default: "
+            "NAME.layout.toml or layout.toml "
             "beside it.",
         ),
     ] = None
@@ -38,13 +39,15 @@ class FileOptions:
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="Open this topic of a ROS bag as frames; taxel info lists them. Repeated, with --field and --array "
-            "once or as often: each is a source.",
+            help="Open this topic of a ROS bag as frames; taxel info lists the topics. May be repeated: each topic "
+            "is a source; give --field and --array once, or once for each.",
         ),
     ] = None
     field: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="The topic's field, as left.taxels. Default: the only one with numbers."),
+        typer.Option(
+            metavar="NAME", help="The topic's field, for example left.taxels. Default: the only field with numbers."
+        ),
     ] = None
     types: Annotated[
         Path | None,
@@ -52,13 +55,16 @@ class FileOptions:
     ] = None
     ros: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="The release of ROS, as humble, whose messages a bag holds undefined."),
+        typer.Option(
+            metavar="NAME",
+            help="The ROS release, for example humble, whose message definitions are used if the bag lacks them.",
+        ),
     ] = None
     region: Annotated[
         str | None,
         typer.Option(
             metavar="A:B,C:D",
-            help="Read columns A to B - 1 and rows C to D - 1 of an event camera's file, as 100:420,60:300.",
+            help="Read columns A to B - 1 and rows C to D - 1 of an event camera's file, for example 100:420,60:300.",
         ),
     ] = None
     bin: Annotated[
@@ -67,7 +73,7 @@ class FileOptions:
             min=1,
             max=65_535,
             metavar="PIXELS",
-            help="So many pixels of an event camera along a side become one taxel.",
+            help="Side, in pixels of an event camera, of the square that becomes one taxel.",
         ),
     ] = None
     count_ms: Annotated[
@@ -76,8 +82,8 @@ class FileOptions:
             min=0.001,
             max=3.6e6,
             metavar="MS",
-            help="Read an event camera's file as frames of counts, one each so many ms (window_ms of taxel.open and of "
-            "layout files; --window-ms is the tolerance of a score).",
+            help="Read an event camera's file as frames of counts, each over this many ms (window_ms in taxel.open "
+            "and in layout files; --window-ms is the tolerance of a score).",
         ),
     ] = None
     polarity: Annotated[
@@ -86,20 +92,20 @@ class FileOptions:
     ] = None
     rate_hz: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Frames a second, for recordings without times, whose frames are numbered."),
+        typer.Option(metavar="HZ", help="Frames per second, for recordings whose frames have numbers and no times."),
     ] = None
     limit: Annotated[
         int | None,
         typer.Option(
             metavar="BYTES",
-            help="How much of a recording may be read into memory. Default: 3/4 of what is available, and at most the "
-            "sizes that taxel's docs state (files.md).",
+            help="How much of a recording may be read into memory. Default: 3/4 of the available memory, and at most "
+            "the sizes in docs/files.md.",
         ),
     ] = None
 
     @property
     def opener(self) -> TextOptions:
-        """What opens files by these options."""
+        """Opener of files with these options."""
         from taxel.recording.text_options import TYPED, TextOptions  # noqa: PLC0415  the command line starts quickly
 
         names = {typed: name for name, typed in TYPED.items()}

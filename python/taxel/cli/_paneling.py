@@ -14,7 +14,8 @@ from taxel.live import Panel
 PanelHostOption = Annotated[
     str,
     typer.Option(
-        help="The address of this machine on which the panel listens; a warning is printed for any but loopback."
+        help="The address of this machine on which the panel listens; a warning is printed for every address except "
+        "loopback."
     ),
 ]
 PanelPortOption = Annotated[int, typer.Option(min=0, max=65_535, help="The panel's TCP port; 0 finds a free one.")]
@@ -26,8 +27,8 @@ def announce(panel: Panel, opens: bool, console: Console) -> None:
     host = panel.address[0]
     if not ipaddress.ip_address(host).is_loopback:
         console.print(
-            f"warning: the panel listens on {host}: everybody who has its address with the token can see the board "
-            "and set registers, and the connection is not encrypted",
+            f"warning: the panel listens on {host}: everyone who has its address with the token can see the board "
+            f"and set registers, and the connection is not encrypted",
         )
     console.print(f"panel: {panel.url}", highlight=False)
     if opens and not webbrowser.open(panel.url):

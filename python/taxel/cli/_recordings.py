@@ -109,8 +109,8 @@ def _report(steps: Steps, ended: Event) -> None:
 def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """Show the current step of a task, and warnings as single lines; on stderr, so that results can be piped.
 
-    Without a terminal a line is said first after half a second, so that it is there within 2 s of the command's begin,
-    then after 10 s and every 30 s. How long the work takes is said as a line of its own.
+    Without a terminal a line is printed first after half a second, so that it is there within 2 s of the command's
+    begin, then after 10 s and every 30 s. The duration of the work is printed as a separate line.
     """
     from rich.text import Text  # noqa: PLC0415  the command line starts quickly
 

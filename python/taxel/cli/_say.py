@@ -15,7 +15,7 @@ def say(*lines: object, err: bool = False) -> None:
     *lines : str
         Of a text of several lines each is given alone. JSON holds no control character, and stays as it is.
     err : bool
-        Whether it goes to standard error.
+        Whether it is printed to standard error.
     """
     for line in lines:
         typer.echo(escaped(line), err=err)  # noqa: TID251  the place where it is allowed

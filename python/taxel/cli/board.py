@@ -42,12 +42,12 @@ RateOption = Annotated[
     float | None,
     typer.Option(
         min=0.0,
-        help="Frames a second of a sensor of your own, whose events taxel.live.Source sends, with --bits: the "
-        "registers are those that it makes.",
+        help="Frames per second of your own sensor, whose events taxel.live.Source sends. With --bits: sets the same "
+        "registers as the Source.",
     ),
 ]
 BitsOption = Annotated[
-    int | None, typer.Option(min=1, max=16, help="With --rate-hz: bits of the sensor's values, as of the Source.")
+    int | None, typer.Option(min=1, max=16, help="With --rate-hz: bits of the sensor's values, as given to the Source.")
 ]
 CongestionOption = Annotated[
     str | None,
@@ -137,7 +137,7 @@ def _registers(
     if rate_hz is None and bits is None:
         return preset
     if rate_hz is None or bits is None:
-        raise ProblemError("--rate-hz and --bits belong together: both are those of the taxel.live.Source that sends")
+        raise ProblemError("--rate-hz and --bits: give both, with the values of the taxel.live.Source that sends")
     if preset is not None or address is not None:
         option = "--preset" if preset is not None else "--remote"
         raise ProblemError(f"--rate-hz and {option}: both state the board's registers; give one of them")
@@ -191,7 +191,9 @@ def outside(counters: dict[str, Any], array: Array) -> str | None:
     if beyond < max(_OUTSIDE, _OUTSIDE_SHARE * words):
         return None
     size = f"{array.rows} x {array.columns}"
-    return f"{beyond:,} of {words:,} words name taxels outside {size}, and are dropped: give the board's own --array"
+    return (
+        f"{beyond:,} of {words:,} words name taxels outside {size}, and are dropped: give the board's size by --array"
+    )
 
 
 def doubts(counters: dict[str, Any]) -> Iterator[str]:
@@ -260,10 +262,10 @@ def left_out(lines: dict[str, Any]) -> str:
 _UNREAD = {
     "text": "of text",
     "other_length": "with another number of values",
-    "no_text": "with bytes that are no text: is the speed of the line right?",
+    "no_text": "with bytes that are not text: is the speed of the line right?",
     "unfinished_frames": "of frames that lack lines",
-    "repeated_stamps": "with a time that is not after the one before: is a part of it in another column "
-    "(time=A+B for seconds and nanoseconds), or its unit another?",
+    "repeated_stamps": "with a time that is not after the time before: is a part of it in another column (time=A+B "
+    "for seconds and nanoseconds), or is its unit wrong?",
 }
 
 
@@ -295,7 +297,7 @@ def _frames_table(now: dict[str, Any], frames: str, lines: str) -> Table:
         ("lines", f"{counts['lines']:,}", lines),
         ("frames", f"{now['frames']:,}", frames),
         ("not read", left_out(counts).removeprefix(", ") or "-", ""),
-        ("lost", f"{now['capture']['dropped_by_queue']:,} by our queue", ""),
+        ("lost", f"{now['capture']['dropped_by_queue']:,} by taxel's queue", ""),
         ("arrival to frame", delays(now["decode_latency"]), ""),
         ("source's clock", clock, ""),
     ):
@@ -318,7 +320,7 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
     damaged = wire["skipped"] + wire["contradictory"] + wire["outside"] + wire["unpaired"]
     damage = f"{damaged:,} bytes and words, {wire['back']:,} events out of order"
     by_kernel = "unknown" if capture["dropped_by_kernel"] is None else f"{capture['dropped_by_kernel']:,}"
-    lost = f"{by_kernel} by the kernel, {capture['dropped_by_queue']:,} by our queue"
+    lost = f"{by_kernel} by the kernel, {capture['dropped_by_queue']:,} by taxel's queue"
     if now["wire_version"] == 2:
         second = now["wire_v2"]
         damaged = second["checksum"] + second["short"] + second["foreign"] + second["malformed"]

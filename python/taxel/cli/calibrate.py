@@ -27,10 +27,10 @@ def calibrate(
     files: FileOptions,
     load: Annotated[float | None, typer.Option(help="A known load, on the sensor from --from to --to.")] = None,
     start: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="Start of the load, s, as taxel info counts.")
+        float | None, typer.Option("--from", metavar="S", help="Start of the load, s, on the time scale of taxel info.")
     ] = None,
     stop: Annotated[
-        float | None, typer.Option("--to", metavar="S", help="End of the load, s, as taxel info counts.")
+        float | None, typer.Option("--to", metavar="S", help="End of the load, s, on the time scale of taxel info.")
     ] = None,
     load_unit: Annotated[str, typer.Option(help="Unit of --load: N (total) or kPa (at every taxel).")] = "N",
     loads: Annotated[
@@ -54,9 +54,11 @@ def calibrate(
     each: Annotated[
         bool, typer.Option("--each", help="Fit a gain for each taxel (needs uniform kPa, or loads on single taxels).")
     ] = False,
-    exponent: Annotated[float | None, typer.Option(help="The exponent, given instead of fitted.")] = None,
-    tare: Annotated[str | None, tare_option("Default: that of a quiet stretch.")] = None,
-    date: Annotated[str | None, typer.Option(help="Date of the calibration, as 2026-11-21. Default: today.")] = None,
+    exponent: Annotated[float | None, typer.Option(help="The exponent, if it is not to be fitted.")] = None,
+    tare: Annotated[str | None, tare_option("Default: the rest in a quiet stretch.")] = None,
+    date: Annotated[
+        str | None, typer.Option(help="Date of the calibration, for example 2026-11-21. Default: today.")
+    ] = None,
     note: Annotated[str, typer.Option(help="A note: which sensor, which weights.")] = "",
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The new file. Default: beside the recording.")
@@ -72,7 +74,7 @@ def calibrate(
     Example: taxel calibrate weight.mcap --load 9.81 --from 2 --to 4 --tare 1
     """
     if load is None and (start is not None or stop is not None):
-        raise ProblemError("--from and --to are the time of --load: give --load")
+        raise ProblemError("--from and --to give the time of --load: give --load too")
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {start} and --to {stop} s: --from must not be after --to")
     options = taxel.tasks.CalibrateOptions(law, assignments(set_ or []), table, unit, each, exponent, tare, date, note)
@@ -93,4 +95,4 @@ def calibrate(
     for number, (true, unit_of_load, value) in enumerate(calibration.loads, start=1):
         say(f"  load {number}: {true:g} {unit_of_load}, calibrated {value:.4g} {unit_of_load}")
     if calibration.loads and calibration.residual is None:
-        say("  no residual: no more loads than unknowns, so the fit is exact; further loads show how good it is")
+        say("  no residual: there are no more loads than unknowns, so the fit is exact; more loads show how good it is")

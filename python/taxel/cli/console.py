@@ -15,7 +15,7 @@ __all__ = ["Console"]
 
 
 class Console(rich.console.Console):  # noqa: TID251  the place where it is allowed
-    """Show texts as they are, in which control characters are escaped and brackets are no markup."""
+    """Show texts as they are, in which control characters are escaped and brackets are not markup."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, **options)

@@ -41,7 +41,8 @@ def convert(
         typer.Option(metavar="HZ", help="Write frames at this rate instead of events (not .lsa)."),
     ] = None,
     part: Annotated[
-        str | None, typer.Option("--source", metavar="NAME", help="The source to convert, of a recording with several.")
+        str | None,
+        typer.Option("--source", metavar="NAME", help="The source to convert, if the recording has several."),
     ] = None,
     compression: Annotated[str, typer.Option(help="Compression of a .mcap: none, lz4 or zstd.")] = "none",
     overwrite: OverwriteOption = False,
@@ -61,7 +62,8 @@ def convert(
         opened = [of_source(recording, part) for recording in files.opener.open_joined(source)]
         if target.suffix and len(opened) > 1:
             raise ProblemError(
-                f"{source}: holds {len(opened)} recordings; {target} must be a folder, without an ending"
+                f"{source}: holds {len(opened)} recordings; {target} must be a folder, so its name must have no "
+                f"extension"
             )
         targets = [target] if target.suffix else _targets(opened, target)
         for file in targets if not target.suffix else ():

@@ -38,13 +38,13 @@ def cut(
     ],
     files: FileOptions,
     start: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="Start of the part, s, as taxel info counts.")
+        float | None, typer.Option("--from", metavar="S", help="Start of the part, s, on the time scale of taxel info.")
     ] = None,
     stop: Annotated[
-        float | None, typer.Option("--to", metavar="S", help="End of the part, s, as taxel info counts.")
+        float | None, typer.Option("--to", metavar="S", help="End of the part, s, on the time scale of taxel info.")
     ] = None,
-    columns: Annotated[str | None, typer.Option(metavar="A:B", help="Columns A to B - 1, as 0:32.")] = None,
-    rows: Annotated[str | None, typer.Option(metavar="A:B", help="Rows A to B - 1, as 10:20.")] = None,
+    columns: Annotated[str | None, typer.Option(metavar="A:B", help="Columns A to B - 1, for example 0:32.")] = None,
+    rows: Annotated[str | None, typer.Option(metavar="A:B", help="Rows A to B - 1, for example 10:20.")] = None,
     label: Annotated[str | None, typer.Option(help="Cut a part around each note with this text.")] = None,
     before: Annotated[
         float, typer.Option(min=0.0, metavar="S", help="With --label: start this long before the note, s.")
@@ -53,7 +53,7 @@ def cut(
         float, typer.Option(min=0.0, metavar="S", help="With --label: end this long after the note, s.")
     ] = 0.5,
     source: Annotated[
-        str | None, typer.Option("--source", metavar="NAME", help="The source to cut, of a recording with several.")
+        str | None, typer.Option("--source", metavar="NAME", help="The source to cut, if the recording has several.")
     ] = None,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
@@ -79,7 +79,7 @@ def cut(
         after_us=after * 1e6,
     )
     if not parts:
-        raise ProblemError(f"{recording}: no note {label!r} with a time in it; taxel info --json lists the notes")
+        raise ProblemError(f"{recording}: has no note {label!r} with a time; taxel info --json lists the notes")
     written = []
     for k, part in enumerate(parts, start=1):
         file = out if label is None else Path(_core.numbered_path(out, k))
@@ -124,5 +124,5 @@ def _range(option: str, text: str | None) -> slice | None:
         return None
     match = re.fullmatch(r"([0-9]{0,5}):([0-9]{0,5})", text)
     if match is None:
-        raise ProblemError(f"{option} is {text!r}: must be A:B, of which B is not included, as 0:32")
+        raise ProblemError(f"{option} is {text!r}: must be A:B, for example 0:32, where B is not included")
     return slice(*(int(n) if n else None for n in match.groups()))

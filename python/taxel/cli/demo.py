@@ -40,8 +40,8 @@ def demo(
 ) -> None:
     """Play scenes on the emulated board, find contact and lift-off while they run, and leave a report.
 
-    A ball falls on foam, is caught in flight, pressed by hand and lifted. The board is a process of its own that sends
-    real packets over UDP; this one records, encodes and detects contact and lift. A new folder gets report.html and
+    A ball falls on foam, is caught in flight, pressed by hand and lifted. The board is a separate process that sends
+    real packets over UDP; this process records, encodes and detects contact and lift. A new folder gets report.html and
     report.json.
 
     Example: taxel demo --seed 1

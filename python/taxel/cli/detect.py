@@ -38,15 +38,16 @@ def detect(
     recordings: Annotated[list[Path], typer.Argument(help=f"Recordings: {READ_HELP}, or folders of them.")],
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],
     files: FileOptions,
-    tare: Annotated[str | None, tare_option("Default: 0 of force and pressure, else the first quiet stretch.")] = None,
+    tare: Annotated[str | None, tare_option("Default: 0 for force and pressure, else the first quiet stretch.")] = None,
     frame_us: Annotated[
         float | None,
-        typer.Option(help="Length of the board's frame, us. Default: by the registers or the frames, else 192."),
+        typer.Option(help="Length of the board's frame, us. Default: from the registers or the frames, else 192."),
     ] = None,
     truth: Annotated[
         str | None,
         typer.Option(
-            help="Score against a CSV label,t_us or recording,label,t_us, or notes: the recordings' own notes."
+            help="Score against a CSV with the columns label,t_us or recording,label,t_us, or (notes) against the "
+            "recordings' notes."
         ),
     ] = None,
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
@@ -180,7 +181,7 @@ def _score_lines(found: Detecting, labels: Sequence[str], truth: str | None, *, 
     from taxel.detect.scoring import score_rows  # noqa: PLC0415  a command loads what it needs
 
     count, left_out = len(found.each), len(found.left_out)
-    read = f", in {count} of {count + left_out} recordings, as the others are left out" if left_out else ""
+    read = f", in {count} of {count + left_out} recordings (the others are left out)" if left_out else ""
     shift = f", labels moved by {found.shift_ms:+g} ms" if found.shift_ms else ""
     yield f"against {truth} (window {found.window_ms:g} ms{shift}){read}:"
     yield from repr(found.score).split("\n")
@@ -205,13 +206,13 @@ def _detection_lines(
         yield f"{each.outcome.name}:"
     yield repr(detections)
     if each.rest is not None and not given:
-        yield f"rest taken: {each.rest}; --tare gives another"
+        yield f"rest taken: {each.rest}; --tare sets another rest"
     yield from remarks
     first = detections[:rows]
     if not len(first):
         return
     if begin_us:
-        yield f"times are from {begun(begin_us)} on"
+        yield f"times are counted from {begun(begin_us)}"
     width = max(5, *(len(label) for label in detections.labels))
     # A plain rule has no slope; levels of frames come in steps, and may give one for all.
     sloped = len({f"{slope:.4g}" for slope in detections.slope}) > 1

@@ -67,7 +67,9 @@ def set_registers(
     place: PlaceArgument,
     fields: Annotated[
         list[str],
-        typer.Argument(metavar="NAME=VALUE...", help="Registers and values, as ramp=140 noise_floor=4; times in us."),
+        typer.Argument(
+            metavar="NAME=VALUE...", help="Registers and values, for example ramp=140 noise_floor=4; times in us."
+        ),
     ],
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
@@ -131,7 +133,9 @@ def watch(
     place: PlaceArgument,
     seconds: SecondsOption = None,
     baud: BaudOption = 115_200,
-    as_json: Annotated[bool, typer.Option("--json", help="Print a line of JSON a change, and nothing else.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one line of JSON for each change, and nothing else.")
+    ] = False,
 ) -> None:
     """Print the faults that a board reports, as they come; waits for a cable that was pulled.
 
@@ -155,7 +159,10 @@ def watch(
 def check(
     place: Annotated[
         str | None,
-        typer.Argument(help="The serial port, or host:port. Without it only the pattern that the board makes already."),
+        typer.Argument(
+            help="The serial port, or host:port. Without it, taxel checks only the pattern, if the board "
+            "sends it already."
+        ),
     ] = None,
     port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port that the board sends to.")] = PORT,
     host: Annotated[str, typer.Option(help="The address of this machine to listen on; 0.0.0.0: all.")] = "0.0.0.0",
@@ -165,9 +172,11 @@ def check(
     ] = None,
     preset: Annotated[
         str | None,
-        typer.Option(help="Without a serial line: the board's preset. Default: that which explains the values best."),
+        typer.Option(
+            help="Without a serial line: the board's preset. Default: the preset that explains the values best."
+        ),
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, help="For how long each part is received, s.")] = 4.0,
+    seconds: Annotated[float, typer.Option(min=0.1, help="Duration of each part of the check, s.")] = 4.0,
     as_json: JsonOption = False,
 ) -> None:
     """Check a board: its link by a pattern that it makes itself, then its comparators at rest.
@@ -206,7 +215,7 @@ def _field(assignment: str) -> tuple[str, float]:
     except ValueError:
         number = {"true": 1.0, "false": 0.0}.get(value, math.nan)
     if not equals or math.isnan(number):
-        raise ProblemError(f"{assignment}: must be NAME=NUMBER, as noise_floor=4")
+        raise ProblemError(f"{assignment}: must be NAME=NUMBER, for example noise_floor=4")
     return name, int(number) if number.is_integer() else number
 
 

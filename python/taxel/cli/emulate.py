@@ -91,7 +91,7 @@ class _EmulateArguments:
         typer.Option(
             min=0,
             max=65_535,
-            help="Wire 2: the number of the first session. Default: drawn, as at each reset of a board.",
+            help="Wire 2: the number of the first session. Default: random, as at each reset of a board.",
         ),
     ] = None
     hold: Annotated[float, _in_ms("hold_us")] = to_ms(Version2.hold_us)
@@ -294,7 +294,7 @@ def _pairs(option: str, assignments: Iterable[str], known: Collection[str]) -> d
 
 
 def _number(option: str, name: str, value: str) -> float:
-    """Return a number as it was typed: 2 is no 2.0 in an error."""
+    """Return a number as it was typed: an error shows 2, not 2.0."""
     try:
         number = float_of(value)
     except ValueError:

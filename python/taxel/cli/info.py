@@ -59,8 +59,8 @@ def info(
         Path | None,
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
-    tare: Annotated[str | None, tare_option("Default: that of a quiet stretch.")] = None,
-    each: Annotated[bool, typer.Option("--each", help="Print all of each recording of a folder.")] = False,
+    tare: Annotated[str | None, tare_option("Default: the rest in a quiet stretch.")] = None,
+    each: Annotated[bool, typer.Option("--each", help="Print all facts about each recording of a folder.")] = False,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -81,9 +81,9 @@ def info(
     from taxel.tasks.labels import are_trials, trial_name  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
-        raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
+        raise ProblemError(f"{picture}: the name of a picture must end in {', '.join(_PICTURES)}")
     if table is not None and table.suffix.lower() != ".csv":
-        raise ProblemError(f"{table}: a table ends in .csv")
+        raise ProblemError(f"{table}: the name of a table must end in .csv")
     for target in (picture, table):
         if target is not None:
             check_writable(target, overwrite=overwrite)
@@ -104,7 +104,7 @@ def info(
             of_each = [found.facts for found in infos]
             say(*_of_several(file, of_each, as_json=as_json, each=each))
             if are_trials(recordings) and not as_json:
-                say(f"labels name a trial in their column recording, as {trial_name(recordings[0])}")
+                say(f"labels name a trial in their column recording, for example {trial_name(recordings[0])}")
             say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
             return
         found = taxel.tasks.info(recording, tare)
@@ -126,16 +126,16 @@ def info(
 def _spikes(file: Path, as_json: bool, *, drawn: bool) -> list[str]:
     """Return what a file of spike trains holds, as one line of JSON or as lines for people."""
     if drawn:
-        raise ProblemError(f"{file}: spike trains; a picture or a table is of a recording")
+        raise ProblemError(f"{file}: holds spike trains; a picture or a table needs a recording")
     trains = SpikeTrains.load(file)
     silent, seconds = int(np.count_nonzero(trains.counts == 0)), (trains.stop - trains.start) / to_ms(1_000_000)
     spikes = int(trains.counts.sum())
     if as_json:
         facts = {"file": str(file), "trains": len(trains), "silent_trains": silent, "trains_kind": trains.kind}
         return [json.dumps(facts | {"spikes": spikes, "start_ms": trains.start, "stop_ms": trains.stop})]
-    rate = f", {spikes / seconds:.4g} a second of all trains" if seconds else ""
+    rate = f", {spikes / seconds:.4g} per second in all trains" if seconds else ""
     rows = [
-        ("trains", f"{len(trains)}, {silent} silent; the file does not say of which encoder"),
+        ("trains", f"{len(trains)}, {silent} silent; the file does not name the encoder"),
         ("kind", trains.kind),
         ("time", f"{trains.start:g} to {trains.stop:g} ms ({seconds:.3f} s)"),
         ("spikes", f"{spikes}{rate}"),
@@ -165,13 +165,14 @@ def _draw(picture: Path, recording: Recording, above: tuple[Frames, float, Rest]
 def _several(file: Path, recordings: Sequence[Recording]) -> str:
     """Return why there is no picture or table of several recordings, or of one with several sources."""
     if len(recordings) > 1:
-        alone = f"taxel convert {quote(str(file))} FOLDER writes each to a file of its own"
+        alone = f"taxel convert {quote(str(file))} FOLDER writes each to a separate file"
         alone = "name its file" if file.is_dir() else alone
-        return f"{file}: holds {len(recordings)} recordings; a picture or a table is of one: {alone}"
+        return f"{file}: holds {len(recordings)} recordings; a picture or a table shows one recording: {alone}"
     names = ", ".join(recordings[0].sources)
     return (
-        f"{file}: holds {len(recordings[0].sources)} sources ({names}); a picture or a table is of one: taxel convert "
-        "--source NAME writes it to a file of its own"
+        f"{file}: holds {len(recordings[0].sources)} sources ({names}); a picture or a table shows one source: taxel "
+        f"convert "
+        "--source NAME writes a source to a separate file"
     )
 
 
@@ -219,7 +220,7 @@ def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:
         *("  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows),
         *([f"notes: {of_notes}"] if notes else []),
         *(f"{counted(count, 'recording')}: {verdict}" for verdict, count in faults.items()),
-        "--each prints all of each",
+        "--each prints all facts about each",
     ]
 
 
@@ -297,7 +298,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     size = f"{array.rows} x {array.columns} taxels, {array._apart()}"
     # The default's name, and that of --array, say nothing more.
     size += "" if re.fullmatch(r"array|\d+x\d+\S*", array.name) else f", {array.name}"
-    yield "array", size + f"; a {kind_of_file(facts['kind'])} does not hold it: --array" * facts["array_assumed"]
+    yield "array", size + f"; a {kind_of_file(facts['kind'])} does not state it: give --array" * facts["array_assumed"]
     names = array.names or ()
     of_it = {"names": ", ".join(names[:8]) + " ..." * (len(names) > 8), "side": facts["side"], "heel": facts["heel"]}
     yield from ((name, value) for name, value in of_it.items() if value)
@@ -374,7 +375,7 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 def _time(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if not facts["timed"]:
-        yield "time", "none: frames are numbered; --rate-hz where a command needs times"
+        yield "time", "none: frames are numbered; give --rate-hz if a command needs times"
     elif facts["from_us"] is not None:
         begin = _begin_us(facts)
         yield "board time", f"{facts['from_us'] - begin} to {facts['to_us'] - begin} us ({facts['seconds']:.3f} s)"

@@ -38,31 +38,38 @@ def information(
         str | None,
         typer.Option(
             metavar="FILE",
-            help="A CSV recording,t_us,label[,stop_us][,group] and columns of parameters: a row is a trial; of one "
-            "recording the first may be absent. notes: each note of the recordings is a trial from its time on, its "
-            "text the label. Without either each recording is one, and its folder's name the label.",
+            help="A CSV with a row for each trial: recording,t_us,label[,stop_us][,group] and columns of parameters; "
+            "for a single recording the column recording may be left out. notes: each note of the recordings is "
+            "a trial that begins at its time, and its text is the label. Default: each recording is a trial, "
+            "and its folder's name is the label.",
         ),
     ] = None,
     window_ms: Annotated[
         float | None,
-        typer.Option(metavar="MS", help="How long after contact events count, ms; needed if trials have no stop_us."),
+        typer.Option(
+            metavar="MS", help="Time after contact in which events count, ms; needed if trials have no stop_us."
+        ),
     ] = None,
     windows_ms: Annotated[
-        str | None, typer.Option("--windows", help="Further windows: times after contact, ms, as 10,20,50.")
+        str | None, typer.Option("--windows", help="Further windows: times after contact, ms, for example 10,20,50.")
     ] = None,
-    periods_ms: Annotated[str | None, typer.Option("--periods", help="Sampling periods, ms, as 1,2,5.")] = None,
+    periods_ms: Annotated[
+        str | None, typer.Option("--periods", help="Sampling periods, ms, for example 1,2,5.")
+    ] = None,
     taxels: Annotated[
-        str | None, typer.Option(help="Subsets of taxels, drawn at random: their sizes, as 10,30,100.")
+        str | None, typer.Option(help="Sizes of subsets of taxels, drawn at random, for example 10,30,100.")
     ] = None,
-    pools: Annotated[str | None, typer.Option(help="Squares of taxels averaged to one: their sides, as 2,4.")] = None,
+    pools: Annotated[
+        str | None, typer.Option(help="Sides of squares of taxels, each averaged to one taxel, for example 2,4.")
+    ] = None,
     encoder: Annotated[str, typer.Option(help="The encoder: change_events or fa1.")] = "change_events",
     values: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=SET_HELP)] = None,
     classifiers: Annotated[
         str, typer.Option("--also", help="Further classifiers: neighbours, cone_r; with taxel_rules tempotron.")
     ] = "neighbours",
-    draws: Annotated[int, typer.Option(help="How many random phases of the sampling are averaged.")] = 5,
+    draws: Annotated[int, typer.Option(help="Number of random phases of the sampling that are averaged.")] = 5,
     folds: Annotated[int, typer.Option(help="Number of folds; groups are never split.")] = 10,
-    shuffles: Annotated[int, typer.Option(help="How often labels are shuffled, for the test against zero.")] = 20,
+    shuffles: Annotated[int, typer.Option(help="Number of shuffles of the labels, for the test against zero.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the random phases, folds, taxels and bootstrap.")] = 0,
     report: Annotated[Path, typer.Option(help="The page with pictures, an .html.")] = Path("information.html"),
     overwrite: OverwriteOption = False,
@@ -161,8 +168,8 @@ def lines(answer: Answer) -> list[str]:
         f"{100 * full.found.right:.0f} % right"
         + "".join(f"; frames {e.bits:.2f}" for p, e in answer.frames.items() if p == full.period_ms)
         + "".join(f"; {name} {e.bits:.2f}" for name, e in answer.classifiers.items()),
-        "in brackets: where the bits lie when these trials, or whole groups, are drawn again (95 % of draws); of few "
-        "trials the truth is outside more often than that",
+        "in brackets: the range of the bits in 95 % of new draws of these trials, or of whole groups; with few "
+        "trials the truth is outside it more often than that",
     ]
     text += [f"warning: {warning}" for warning in answer.warnings]
     text += ["", _row("period", "bits", "events", "mb/event", "kb/s", "silent", "95 % of the full?")]

@@ -123,16 +123,20 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
             sensor = trained.array if options["array"] is None else options["array"]
             frame_us = Registers(array=Array._of(sensor)).frame_us
             console.print(
-                f"the readout assumes frames of {plain(frame_us)} us, as of a board at reset; state others by "
-                "--preset, or by --rate-hz and --bits"
+                f"the readout assumes frames of {plain(frame_us)} us, as a board has at reset; if the board has "
+                f"others, give --preset, or --rate-hz and --bits"
             )
         say_waiting(options, console)
         with Live(**options | {"remote": board}) as pipeline:
             if trained is not None and trained.unit is not None and not pipeline._states_unit:
-                console.print(f"values are taken in {pipeline.unit}, as of the readout: --source states no unit")
+                console.print(
+                    f"values are assumed to be in {pipeline.unit}, the unit of the readout: --source states no unit"
+                )
             for name, counts in pipeline.counters["sources"].items():
                 if "capture" in counts:  # else lines that are no frames, as of an IMU
-                    console.print(f"{name}: recorded only, not read out or shown; a second taxel live reads it out")
+                    console.print(
+                        f"{name}: recorded, but neither read out nor shown; a second taxel live can read it out"
+                    )
             last = _show(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
             summary = last.stop()
             # Detections that the readout made while `stop` ran.

@@ -65,7 +65,7 @@ class _RecordArguments:
     as_json: Annotated[
         bool,
         typer.Option(
-            "--json", help="Print one line of JSON for each recording; what is for people goes to standard error."
+            "--json", help="Print one line of JSON for each recording; texts for people are printed to standard error."
         ),
     ] = False
 
@@ -96,7 +96,7 @@ def record(
     Example: taxel record --remote zenoh:192.168.1.5:7447/left walk.mcap
     """
     if typed.length is None and typed.trials is not None:
-        raise ProblemError("--trials without --length: automatic mode needs how long each trial is")
+        raise ProblemError("--trials without --length: automatic mode needs the length of each trial")
     if typed.length is not None and typed.seconds is not None:
         raise ProblemError("--seconds and --length: give --length for automatic mode, --seconds for one recording")
     live = for_live(options, typed.rate_hz, typed.bits, typed.seconds)

@@ -47,17 +47,18 @@ def train(
     labels: Annotated[
         str,
         typer.Option(
-            metavar="FILE", help="Reference events: a CSV recording,label,t_us, or notes: the recordings' own notes."
+            metavar="FILE",
+            help="Reference events: a CSV with the columns recording,label,t_us, or (notes) the recordings' notes.",
         ),
     ] = "notes",
     recipe: Annotated[
         str | None,
         typer.Option(
-            help="The recipe to start from: touch (events of a board; all labels but those of steps on any grid), "
+            help="The recipe to start from: touch (events of a board; on any grid, all labels except those of steps), "
             "event_counts (counts of an event camera), gait_plate (counts), gait_insole (N), gait_channel (others); or "
             "a TOML or JSON file (a path with a dot or a slash): [encoder] or [encoders.NAME], [learner], "
-            "[neurons.LABEL], run_threshold, align. Default, without --encoder: that which fits the recording and its "
-            "labels."
+            "[neurons.LABEL], run_threshold, align. Default, without --encoder: the recipe that fits the recording "
+            "and its labels."
         ),
     ] = None,
     encoder: Annotated[
@@ -71,8 +72,8 @@ def train(
     rule: Annotated[
         Path | None,
         typer.Option(
-            help="Write the plain rule to this file, for taxel detect --readout; rules of several labels each to its "
-            "own: FILE with the label before its suffix."
+            help="Write the plain rule to this file, for taxel detect --readout. If several labels have rules, each "
+            "rule is written to a separate file: FILE with the label before its suffix."
         ),
     ] = None,
     overwrite: OverwriteOption = False,
@@ -80,8 +81,9 @@ def train(
     folds: Annotated[
         int | None,
         typer.Option(
-            help="Score on held-out data, in so many folds: of recordings, or of blocks of time of a single one; 0: on "
-            "the training data. Default: at most 5, as many as the recordings and the rarest label allow.",
+            help="Number of folds for scores on held-out data: folds of recordings, or of blocks of time in a single "
+            "recording. 0: score on the training data. Default: at most 5, as many as the recordings and the "
+            "rarest label allow.",
         ),
     ] = None,
     align: Annotated[
@@ -95,13 +97,16 @@ def train(
         ),
     ] = False,
     shift_ms: Annotated[
-        float, typer.Option(help="Move all labels by so many ms before all else, as those of another clock.")
+        float,
+        typer.Option(
+            help="Before all else, move all labels by this many ms, for example if their times are of another clock."
+        ),
     ] = 0.0,
     labels_as_given: Annotated[
         bool,
         typer.Option(
             "--labels-as-given",
-            help="Train also where nearly no label lies near anything that the sensor felt, without a question.",
+            help="Train, without a question, even if almost no label is near anything that the sensor felt.",
         ),
     ] = False,
     report: ReportOption = None,
@@ -159,7 +164,7 @@ def train(
 
 
 def _trained(opened: Sequence[Recording], labels: str, options: TrainOptions, *, as_json: bool) -> Training:
-    """Train; where nearly no label lies near anything felt, ask first on a terminal."""
+    """Train; if almost no label is near anything that the sensor felt, ask first on a terminal."""
     try:
         with progress(as_json) as update:
             return taxel.train(opened, labels, options, progress=update)

@@ -32,8 +32,8 @@ def view(
     recording: Annotated[
         Path,
         typer.Argument(
-            help="A recording, a file of another maker, or a folder, for each file of which the options hold. The page "
-            "can open others in the folder."
+            help="A recording, a file of another maker, or a folder; the options hold for each of its files. The "
+            "page can open the other files of the folder."
         ),
     ],
     files: FileOptions,
@@ -41,7 +41,8 @@ def view(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Show frames in N or kPa by this calibration (taxel calibrate). Default: that beside the recording.",
+            help="Show frames in N or kPa by this calibration (taxel calibrate). Default: the calibration beside the "
+            "recording.",
         ),
     ] = None,
     panel_host: PanelHostOption = "127.0.0.1",

@@ -72,7 +72,7 @@ class TouchMatches(NamedTuple):
     false: dict[str, NDArray[np.int64]]
     """By label: times of detections that belong to no touch, us."""
     false_within: dict[str, int]
-    """How many of these lie within a touch all the same: a press that was detected more than 50 ms off."""
+    """Number of these that are within a touch all the same: a press that was detected more than 50 ms off."""
 
     def row(self, name: str, label: str) -> ClassMatches:
         """Return one row; its name may be cut short."""

@@ -1,4 +1,4 @@
-"""The demo while it runs: the board in a process of its own, the host here."""
+"""The demo while it runs: the board in a separate process, the host here."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def play_live(
     if summary.counters["late"]:
         verdicts.append(
             f"{counted(summary.counters['late'], 'event')} came after the readout's time had moved on, 5 frames behind "
-            "the host's clock: this machine was too busy, and detections of them came late, moved or were missed; the "
-            "recording has every event, and --no-clock simulates without the clock"
+            "the host's clock: this machine was too busy. Detections of these events came late, moved or were "
+            "missed. The recording has every event, and --no-clock simulates without the clock"
         )
     return Playing(evaluation, summary.counters, emulator, verdicts, recording, agrees)

@@ -35,7 +35,7 @@ def fall_ms(scene: Scene) -> float:
 
 
 def drawn(seed: int, index: int) -> Scene:
-    """Draw scene `index` of a seed as the demo plays it: on foam bonded to the board, every other one on a slant.
+    """Draw scene `index` of a seed as the demo plays it: on foam bonded to the board, every second scene on a slant.
 
     On the level array the ball bounces, is caught and pressed by hand; from the tilted one it glances off along the
     rows, and is taken away.

@@ -59,7 +59,7 @@ def examples(*, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Progr
     Returns
     -------
     list of Example
-        One a board: the spikes of the recipe's encoder, from the start marker on (what lies before is the tare's).
+        One for each board: the spikes of the recipe's encoder after the start marker (the time before is for the tare).
     """
     labelled = []
     for n in range(2 * boards):
@@ -77,7 +77,7 @@ def examples(*, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Progr
 def _labels(area: SpikeTrains, contacts: list[Contact]) -> dict[str, NDArray[np.int64]]:
     """Return the labels of touches that made any taxel spike: the first spike, and when the force returns to 0 (us).
 
-    Of two that lie nearer than the refractory time only the first is labelled.
+    If two are nearer than the refractory time, only the first is labelled.
     """
     rises = area[0]
     times: dict[str, list[float]] = {"contact": [], "lift": []}

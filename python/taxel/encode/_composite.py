@@ -26,9 +26,9 @@ from taxel.tare import Tare
 class Composite(Encoder):
     """Set several encoders side by side, so that one neuron can receive the trains of all of them, or of some.
 
-    The trains are those of all parts, as `SpikeTrains.side_by_side` joins them, in the order of the parts' names: the
-    signed trains of a part are split into ON and OFF; if a part is graded, the whole is, and the spikes of the others
-    have the value 1. The latency is the largest of a part.
+    The trains are those of all parts, as `SpikeTrains.side_by_side` joins them, in the order of the parts' names. The
+    signed trains of a part are split into ON and OFF. If a part is graded, all trains are graded, and the spikes of the
+    other parts have the value 1. The latency is the largest latency of a part.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Composite(Encoder):
 
     Raises
     ------
-    ProblemError : no part, a part that is no encoder, or an invalid parameter of one (names it)
+    ProblemError : no part, a part that is not an encoder, or an invalid parameter of a part (names it)
 
     Examples
     --------
@@ -79,7 +79,7 @@ class Composite(Encoder):
         return super(Composite, type(self)(parts)).encode(source)
 
     def only(self, names: Sequence[str]) -> Encoder:
-        """Return some of the parts side by side; of one alone the part itself.
+        """Return some of the parts side by side; for a single name, the part itself.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class Composite(Encoder):
 
         Raises
         ------
-        ProblemError : a name of no part, or one that comes twice
+        ProblemError : a name that no part has, or a name that is given twice
 
         Examples
         --------
@@ -104,14 +104,14 @@ class Composite(Encoder):
         return type(self)(chosen) if len(chosen) > 1 else next(iter(chosen.values()))
 
     def places(self, names: Sequence[str], array: Array) -> NDArray[np.bool_]:
-        """Return which of the trains are those of some of the parts.
+        """Return a mask of the trains that belong to some of the parts.
 
         Parameters
         ----------
         names : sequence of str, one or more
             In any order.
         array : Array
-            On which the number of trains of some encoders depends.
+            The sensor; the number of trains of some encoders depends on it.
 
         Returns
         -------
@@ -119,7 +119,7 @@ class Composite(Encoder):
 
         Raises
         ------
-        ProblemError : a name of no part, or one that comes twice
+        ProblemError : a name that no part has, or a name that is given twice
 
         Examples
         --------

@@ -124,7 +124,7 @@ class Encoder(Value):
 
         Raises
         ------
-        ProblemError : no array, or an invalid parameter
+        ProblemError : not an array, or an invalid parameter
 
         Examples
         --------
@@ -146,11 +146,11 @@ class Encoder(Value):
 
     @property
     def latency_ms(self) -> float:
-        """The delay of a spike after the touch that the encoder's rule itself causes, ms."""
+        """The delay between touch and spike that the encoder's rule causes, ms."""
         return _core.encoder_about(self._json(), Array(1, 1)._parts())[2]
 
     def with_tare(self, tare: Tare) -> Self:
-        """Return the same encoder with this tare; one without a parameter `tare`, or such a part, is unchanged.
+        """Return the same encoder with this tare; an encoder or part without the parameter `tare` is unchanged.
 
         Parameters
         ----------
@@ -164,7 +164,7 @@ class Encoder(Value):
 
         Raises
         ------
-        ProblemError : no tare
+        ProblemError : not a tare
 
         Examples
         --------
@@ -182,7 +182,7 @@ class Encoder(Value):
         Parameters
         ----------
         x : Events, Frames or Recording
-            Events need intensities, which are read as held values. An event up to 0.1 s behind an earlier one in the
+            Events need intensities, which are read as held values. An event up to 0.1 s behind an earlier event in the
             sequence (reordered datagrams) is assigned the later time, as in a stream. Channels are the existing taxels,
             in the order of their index.
 
@@ -233,11 +233,11 @@ class Encoder(Value):
         Returns
         -------
         list of SpikeTrains
-            One a recording, in ms from time 0 of the recording.
+            One for each recording, in ms from time 0 of the recording.
 
         Raises
         ------
-        ProblemError : no sequence of recordings, or as `encode`
+        ProblemError : not a sequence of recordings, or as `encode`
 
         Examples
         --------
@@ -262,7 +262,7 @@ class Encoder(Value):
 
         Raises
         ------
-        ProblemError : no array, or an invalid parameter
+        ProblemError : not an array, or an invalid parameter
 
         Examples
         --------
@@ -288,7 +288,7 @@ class EncoderStream:
 
     Raises
     ------
-    ProblemError : no encoder, no array, or an invalid parameter
+    ProblemError : not an encoder, not an array, or an invalid parameter
 
     Examples
     --------
@@ -347,7 +347,7 @@ class EncoderStream:
         return SpikeTrains._from_parts(self._begin(frames.array).push_frames(frames._parts()))
 
     def advance(self, t_us: int) -> SpikeTrains:
-        """Advance the stream's time: no event before `t_us` will be pushed any more.
+        """Advance the stream's time: after this call no event before `t_us` is pushed.
 
         Parameters
         ----------
@@ -361,7 +361,7 @@ class EncoderStream:
 
         Raises
         ------
-        ProblemError : no whole number, or beyond 2**60
+        ProblemError : not a whole number, or a number above 2**60
 
         Examples
         --------

@@ -21,9 +21,9 @@ from taxel.tare import Tare
 class Tared(Encoder):
     """Encode the values above the rest of the taxels; the base class of encoders with the parameter `tare`.
 
-    A rest is valid for one board on one day, so a saved readout has none and must be given one. If `tare` is a number
-    of seconds, the rest is measured at the beginning of each recording, so that recordings of several boards can be
-    encoded together.
+    A rest is valid for one board on one day, so a saved readout has no rest and must be given one. If `tare` is a
+    number of seconds, the rest is measured at the beginning of each recording, so that recordings of several boards can
+    be encoded together.
     """
 
     tare: Tare | float | None

@@ -15,19 +15,20 @@ _DEFAULT = defaults("change_events")
 class ChangeEvents(Encoder):
     """Encode each change of a taxel since its last event, in units of the noise floor; +-(2^bits - 1) at most.
 
-    One signed train a taxel. The first sample is the first reference value and causes no spike. Computed in float32.
+    There is one signed train for each taxel. The first sample is the first reference value and causes no spike.
+    Computed in float32.
 
     Parameters
     ----------
     noise_floor : float, in the sensor's unit, above 0
         The smallest change that causes an event; theta_0 of equation 5.7. 3 ticks in the board's fast presets.
     bits : int, from 1 to 10
-        Bits an event (figure 5.7); 1 is the polarity only.
+        Bits of an event (figure 5.7); 1 is the polarity only.
     previous : {"last_sent", "last_sample"}
         The value with which a sample is compared: that of the last event, or the last sample, as in section 4.3.
     rounding : {"truncate", "floor"}
         "truncate": towards zero, with an event only if the change is above the noise floor. "floor": 5.7 as printed, by
-        which any fall, however small, is -1.
+        which every fall, however small, gives -1.
     period_ms : float, ms, whole us
         Sampling period of events; the step of the wire's stamps is lossless.
 

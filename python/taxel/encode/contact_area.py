@@ -17,23 +17,23 @@ _DEFAULT = defaults("contact_area")
 class ContactArea(Tared):
     """Fire when the number of loaded taxels rises to a level, and when it falls below the level.
 
-    A taxel is loaded while its held value exceeds its rest by the noise floor and half a tick (half of a floor below 1,
-    which is that of a unit coarser than the values); it counts if one of its 8 neighbours is loaded too. A taxel
-    without a value, in the tare or since, is unloaded. The number is computed once a stamp, after the last event with
-    it, and spikes have the time of the stamp. Spikes do not depend on the position of a touch, so weights that are
-    learnt at one position apply to others.
+    A taxel is loaded while its held value exceeds its rest by the noise floor and half a tick (by the floor and half of
+    it if the floor is below 1, as for a unit coarser than the values). It counts if one of its 8 neighbours is loaded
+    too. A taxel without a value, in the tare or since, is unloaded. The number is computed once for each stamp, after
+    the last event with it, and spikes have the time of the stamp. Spikes do not depend on the position of a touch, so
+    weights that are learnt at one position apply to others.
 
     Trains are unsigned: rises to each level, then falls below each; ten by default.
 
     Parameters
     ----------
     noise_floor : float, in the sensor's unit (ticks), 0 or more
-        That of the board; 3 in its fast presets.
+        The noise floor of the board; 3 in its fast presets.
     levels : sequence of int, ascending
         Numbers of taxels.
     tare : Tare, or float, s, optional
         The taxels' rest, or the duration of rest at the beginning of each recording. It is valid for one board on one
-        day, so a saved readout has none; encoding requires one.
+        day, so a saved readout has no tare; encoding requires one.
 
     Raises
     ------

@@ -15,9 +15,9 @@ _DEFAULT = defaults("fa1")
 class FA1(Encoder):
     """Integrate each taxel's change of compressed pressure; fire with its sign when it crosses an adaptive threshold.
 
-    Exactly equations 5.1 to 5.5 (and 5.7 for more than one bit), with polarity; the constants are those of Table 5.3.
-    One signed train a taxel. The initial state is the steady state of the first sample. Computed in float64; pressure
-    below 0 counts as 0.
+    The equations are exactly 5.1 to 5.5 (and 5.7 for more than one bit), with polarity; the constants are those of
+    Table 5.3. There is one signed train for each taxel. The initial state is the steady state of the first sample.
+    Computed in float64; pressure below 0 counts as 0.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class FA1(Encoder):
     b : float, 0 or more
         A sample without a spike lowers it by ``b * theta_0``.
     decay : {"sample", "ms"}
-        Whether `b` applies a sample, as 5.5 is printed, or a ms (``b * period_ms * theta_0`` a sample).
+        Whether `b` applies to each sample, as 5.5 is printed, or to each ms (``b * period_ms * theta_0`` for a sample).
     theta_0 : float, 0 or more, optional
         The baseline threshold, in compressed units; with the 0 of Table 5.3 every change fires.
     range : float, in the sensor's unit, above 0, optional

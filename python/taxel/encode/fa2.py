@@ -12,10 +12,10 @@ _DEFAULT = defaults("fa2")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class FA2(Encoder):
-    """Fire while the pressure on a taxel changes fast: a spike a cycle at 200 to 250 Hz, none for constant pressure.
+    """Fire while the pressure on a taxel changes fast: one spike a cycle at 200 to 250 Hz, none for constant pressure.
 
-    The model of a Pacinian afferent. Spikes have no sign; one train a taxel. The initial state is the steady state of
-    the first sample. A value that a state of version 2 repaired is not a change.
+    This is the model of a Pacinian afferent. Spikes have no sign; there is one train for each taxel. The initial state
+    is the steady state of the first sample. A value that a state of version 2 repaired is not a change.
 
     Parameters
     ----------
@@ -51,8 +51,7 @@ class FA2(Encoder):
     Pacinian channel do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680). `corner_ms`, `membrane_ms`, `jump` and
     `recovery_ms` are fitted by us to a threshold of one spike a cycle that is least between 200 and 250 Hz. `threshold`
     is limited by the sensor: a step of one tick in 150 stays below it; a finger is far more sensitive. Thresholds at
-    periods of 0.05 to 0.2 ms agree within 5 % of each other; at periods above 0.5 ms there is no best frequency any
-    more.
+    periods of 0.05 to 0.2 ms agree within 5 % of each other; at periods above 0.5 ms there is no best frequency.
 
     Examples
     --------

@@ -23,7 +23,7 @@ class RunningRange(Value):
     window_s : float, s, whole us
         Length of the window; its samples are kept in memory.
     renew_s : float, s, whole us
-        Interval at which the percentiles are recomputed, from the end of the first window on.
+        Interval at which the percentiles are recomputed after the end of the first window.
     first_window : {"silent", "itself"}
         Before the first window is full there are no spikes; or, for recordings, the first window is encoded by its own
         percentiles, so that its spikes are late by up to the window.
@@ -58,8 +58,8 @@ _DEFAULT = defaults("level_crossing")
 class LevelCrossing(Encoder):
     """Fire when a taxel reaches a level (+1) and when it falls below the release of the level (-1).
 
-    Trains: ``taxel * len(levels) + level``, signed; with `tonic_ms` one more a taxel after them. The first sample is
-    not a crossing. Values and levels are compared in float32.
+    Trains are signed, in the order ``taxel * len(levels) + level``; with `tonic_ms`, one more train for each taxel
+    follows. The first sample is not a crossing. Values and levels are compared in float32.
 
     Parameters
     ----------

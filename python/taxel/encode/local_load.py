@@ -39,20 +39,20 @@ class LocalLoad(Tared):
        and the last 50 ms.
     4. *clock*: 1.
 
-    Without running means these are 21 quantities, with two of them 57. `quantities` names them, and `values` returns
-    them. One train each, graded: of events a spike every `period_ms`, of frames one a frame, none where the quantity is
-    0. A taxel that has been 0 since the first sample has no value yet and counts as at rest; one without a value in the
-    tare is left out. Computed in float32 above float64 baselines.
+    Without running means there are 21 quantities, with two running means 57. `quantities` names them, and `values`
+    returns them. Each quantity has one graded train: for events a spike every `period_ms`, for frames a spike for each
+    frame; none where the quantity is 0. A taxel that has been 0 since the first sample has no value yet and counts as
+    at rest; a taxel without a value in the tare is left out. Computed in float32 above float64 baselines.
 
-    With `levels` the trains are others, unsigned: of each quantity *largest* or *largest below*, in the order above,
-    one per level that fires when the quantity rises to it; then as many, in the same order, that fire when it falls
-    below `release` x level. They are computed once a stamp, after the last event with it, and as the rest moves; spikes
-    have the time of the stamp. A stuck taxel or two do not reach a level of 4.
+    With `levels` the trains are unsigned, and others: for each quantity *largest* or *largest below*, in the order
+    above, one train per level, which fires when the quantity rises to it; then as many trains, in the same order, which
+    fire when it falls below `release` x level. They are computed once for each stamp, after the last event with it, and
+    as the rest moves; spikes have the time of the stamp. A stuck taxel or two do not reach a level of 4.
 
     Parameters
     ----------
     noise_floor : float, in the sensor's unit (ticks), 0 or more
-        That of the board; 3 in its fast presets.
+        The noise floor of the board; 3 in its fast presets.
     least_noise : float, in the sensor's unit, from 1e-9 to 1e9
         Least noise of a taxel. 0.3 is the standard deviation within a tick; for another unit use 0.3 of the step
         between its values.
@@ -66,10 +66,11 @@ class LocalLoad(Tared):
     levels : sequence of float, units of noise, ascending, above 0
         Levels of the largest sums, which are 9 at most, instead of graded quantities; none by default.
     release : float, from 0.01 to 1
-        The part of a level below which it is left. Below 1, noise near a level does not cross it again and again.
+        The share of a level below which the quantity leaves the level. Below 1, noise near a level does not cross it
+        again and again.
     tare : Tare, or float, s, optional
         The taxels' rest and noise, or the duration of rest at the beginning of each recording. It is valid for one
-        board on one day, so a saved readout has none; encoding requires one.
+        board on one day, so a saved readout has no tare; encoding requires one.
 
     Raises
     ------
@@ -111,7 +112,7 @@ class LocalLoad(Tared):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The names of the quantities, in the order of the columns of `values`, and without `levels` of the trains.
+        """The names of the quantities, in the order of the columns of `values`, and, without `levels`, of the trains.
 
         Examples
         --------
@@ -142,7 +143,7 @@ class LocalLoad(Tared):
         Returns
         -------
         float64, shape (samples, quantities)
-            A row for each frame; of events one every `period_ms`, the first at the first stamp, the last at most one
+            A row for each frame; for events a row every `period_ms`, the first at the first stamp, the last at most one
             period after the last stamp. Totals are in the sensor's unit.
 
         Raises

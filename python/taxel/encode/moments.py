@@ -22,23 +22,23 @@ class Moments(Tared):
     all moments are 0. Each level of the displacement applies on both sides of 0. The moments do not depend on the
     position of the touch on the array, so weights that are learnt at one position apply to others; `centre` adds it.
 
-    Trains are unsigned, one a level in the order area, total, peak, x right, x left, y down, y up, levels ascending:
-    first the trains of levels reached, then those of levels left, then (with `tonic_ms`) those that fire while beyond
-    the level. The first sample is not a crossing. Computed in float64.
+    Trains are unsigned, one for each level in the order area, total, peak, x right, x left, y down, y up, levels
+    ascending: first the trains of levels reached, then those of levels left, then (with `tonic_ms`) those that fire
+    while beyond the level. The first sample is not a crossing. Computed in float64.
 
-    With `graded` all trains are graded. Those of the levels, whose spikes have the value 1, are followed by one for
-    each moment in the order area, total, peak, x, y. During a touch it fires at every sample with the value
-    log(1 + moment), of a displacement log(1 + its size) with its sign; where the value is 0 there is no spike. With
-    `centre` four more follow: the column of the centre, from -1 for the first to 1 for the last, its square, its row
-    and that one's square, as they are. With `ages_ms` the last trains are one an age. During a touch, at every sample,
-    one of them fires: that of the largest of the ages that the touch has reached. Age is counted from the encoder's own
-    onset, the first sample at which area is above 0. A sample is a frame, or of events the state every `period_ms` from
-    the first stamp.
+    With `graded` all trains are graded. Those of the levels, whose spikes have the value 1, are followed by one train
+    for each moment in the order area, total, peak, x, y. During a touch it fires at every sample with the value log(1 +
+    moment), for a displacement log(1 + its size) with its sign; where the value is 0 there is no spike. With `centre`
+    four more follow: the column of the centre, from -1 for the first to 1 for the last, its square, its row and the
+    row's square, as they are. With `ages_ms` there is one more train for each age, at the end. During a touch, one of
+    them fires at every sample: the train of the largest age that the touch has reached. Age is counted from the
+    encoder's own onset, the first sample at which area is above 0. A sample is a frame; for events it is the state
+    every `period_ms` from the first stamp.
 
     Parameters
     ----------
     noise_floor : float, in the sensor's unit (ticks), 0 or more
-        That of the board; 3 in its fast presets.
+        The noise floor of the board; 3 in its fast presets.
     levels : int, from 0 to 1000
         Number of levels of each moment, for a displacement on each side of 0. With 0 there are no trains of levels, and
         the least and largest levels only choose the moments; then `graded` or `ages_ms` is needed.
@@ -57,13 +57,13 @@ class Moments(Tared):
     ages_ms : float sequence, ms, 0 or more, ascending, optional
         Ages of a touch, each with a train that fires from that age to the next one, the last to the end of the touch.
         Each is rounded to a whole us. A neuron that learns to fire at an age needs an age there: training refuses a
-        `delay_ms` that is none of them.
+        `delay_ms` that is not one of them.
     period_ms : float, ms, whole us
         Sampling period of events; the step of the wire's stamps is lossless. With `graded` or `ages_ms` each sample of
         a touch gives spikes, so a longer period gives fewer.
     tare : Tare, or float, s, optional
         The taxels' rest, or the duration of rest at the beginning of each recording. It is valid for one board on one
-        day, so a saved readout has none; encoding requires one.
+        day, so a saved readout has no tare; encoding requires one.
 
     Raises
     ------

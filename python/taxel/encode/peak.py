@@ -1,4 +1,4 @@
-"""Encoder of the peak: the largest deviation of a taxel in units of its own noise."""
+"""Encoder of the peak: the largest deviation of a taxel in units of its noise."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ _DEFAULT = defaults("peak")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Peak(Tared):
-    """Fire as the largest deviation of a taxel from its rest reaches and leaves levels, in units of its own noise.
+    """Fire as the largest deviation of a taxel from its rest reaches and leaves levels, in units of its noise.
 
     With u a value less its rest, divided by the taxel's standard deviation in the tare (at least `least_noise`), the
-    peak is the largest u, and where several are 4 or more, the root of the sum of their squares; at least 0. It depends
-    neither on position nor on neighbours: one loaded taxel is a touch, and channels have a peak too. A stuck taxel that
-    moves is one as well, which `LocalLoad` and `ContactArea` reject.
+    peak is the largest u. If several are 4 or more, it is the root of the sum of their squares. It is at least 0. It
+    depends neither on position nor on neighbours: one loaded taxel is a touch, and channels have a peak too. A stuck
+    taxel that moves also counts as a touch; `LocalLoad` and `ContactArea` reject it.
 
-    The rest begins at the tare and follows each taxel's value, as that of `LocalLoad`. A taxel that has been 0 since
-    the first sample has no value yet and counts as at rest; one without a value in the tare is left out.
+    The rest begins at the tare and follows each taxel's value, as in `LocalLoad`. A taxel that has been 0 since
+    the first sample has no value yet and counts as at rest; a taxel without a value in the tare is left out.
 
-    Trains, unsigned: first one per level that fires when the peak rises to it, then one per level that fires when it
-    falls below `release` x level. They are computed once a stamp, after the last event with it, and as the rest moves.
+    Trains are unsigned: first one per level, which fires when the peak rises to it, then one per level, which fires
+    when the peak falls below `release` x level. They are computed once for each stamp, after the last event with it,
+    and as the rest moves.
 
     Parameters
     ----------
@@ -35,10 +36,11 @@ class Peak(Tared):
     levels : sequence of float, ascending, above 0
         In units of noise.
     release : float, from 0.01 to 1
-        The part of a level below which it is left: below 1, noise near a level does not cross it again and again.
+        The share of a level below which the peak leaves the level: below 1, noise near a level does not cross it again
+        and again.
     tare : Tare, or float, s, optional
         The taxels' rest and noise, or the duration of rest at the beginning of each recording. It is valid for one
-        board on one day, so a saved readout has none; encoding requires one.
+        board on one day, so a saved readout has no tare; encoding requires one.
 
     Raises
     ------

@@ -15,7 +15,7 @@ _DEFAULT = defaults("sa1")
 class SA1(Tared):
     """Fire while a taxel is pressed: fastest at the onset of pressure, then with a slowly falling rate (Merkel).
 
-    Spikes have no sign; one train a taxel. The initial state is the steady state of the first sample.
+    Spikes have no sign; there is one train for each taxel. The initial state is the steady state of the first sample.
 
     Parameters
     ----------
@@ -43,7 +43,8 @@ class SA1(Tared):
         Sampling period of events; frames must arrive at this period within one half.
     tare : Tare, or float, s, optional
         The taxels' rest, or the duration of rest at the beginning of each recording: pressure is the value above it (0
-        if a rest is unknown). Default: a rest of 0. It is valid for one board on one day, so a saved readout has none.
+        if a rest is unknown). Default: a rest of 0. It is valid for one board on one day, so a saved readout has no
+        tare.
 
     Raises
     ------

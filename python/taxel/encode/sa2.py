@@ -16,8 +16,8 @@ class SA2(Tared):
     """Fire steadily while a taxel is loaded, hardly faster at the onset of the load (Ruffini).
 
     SA-2 afferents respond mainly to stretch of the skin, which a pressure array does not measure; this is a model of
-    their response to load. Spikes have no sign; one train a taxel. The initial state is the steady state of the first
-    sample.
+    their response to load. Spikes have no sign; there is one train for each taxel. The initial state is the steady
+    state of the first sample.
 
     Parameters
     ----------
@@ -45,7 +45,8 @@ class SA2(Tared):
         Sampling period of events; frames must arrive at this period within one half.
     tare : Tare, or float, s, optional
         The taxels' rest, or the duration of rest at the beginning of each recording: pressure is the value above it (0
-        if a rest is unknown). Default: a rest of 0. It is valid for one board on one day, so a saved readout has none.
+        if a rest is unknown). Default: a rest of 0. It is valid for one board on one day, so a saved readout has no
+        tare.
 
     Raises
     ------

@@ -79,7 +79,7 @@ class Skin(Tared):
 
     Trains are unsigned, like the spikes of a nerve: all SA-1, then FA-1, SA-2, FA-2, each from the first taxel to the
     last; `afferents` returns the type and position of each. Each type is the encoder of that name with its defaults and
-    this `range`; FA-1's threshold decays a ms (`decay="ms"`).
+    this `range`; FA-1's threshold decays by the ms (`decay="ms"`).
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Skin(Tared):
         Density of each type, afferents per cm^2 of taxels; 0 excludes a type.
     sa1_field_mm2, fa1_field_mm2, sa2_field_mm2, fa2_field_mm2 : float, mm^2, above 0
         Area of the receptive field of each type: a disc, whose taxels are averaged with Gaussian weights; its edge is
-        at two standard deviations. If no centre of a taxel lies in it, the field is the taxel at its position.
+        at two standard deviations. If no centre of a taxel is in it, the field is the taxel at its position.
     range : float, in the sensor's unit, above 0
         The largest pressure; 150 ticks is the ramp of the board's 5.2 kHz preset.
     seed : int, 0 or more
@@ -96,7 +96,8 @@ class Skin(Tared):
         Sampling period of events; frames must arrive at this period within one half.
     tare : Tare, or float, s, optional
         The taxels' rest, or the duration of rest at the beginning of each recording: pressure is the value above it (0
-        if a rest is unknown). Default: a rest of 0. It is valid for one board on one day, so a saved readout has none.
+        if a rest is unknown). Default: a rest of 0. It is valid for one board on one day, so a saved readout has no
+        tare.
 
     Raises
     ------
@@ -104,9 +105,9 @@ class Skin(Tared):
 
     Notes
     -----
-    Densities are 70, 140 and 25 a cm^2 of SA-1, FA-1 and FA-2, and for SA-2 the rest of 241 in total: Johansson and
-    Vallbo (1979), J. Physiol. 286:283, as cited by Saal et al. (2017), PNAS 114:E5693. Fields are medians of 11.0 mm^2
-    (SA-1) and 12.6 (FA-1), some 5 times (SA-2) and 10 times (FA-2) as large (Johansson and Vallbo 1980, Brain Res.
+    Densities for each cm^2 are 70, 140 and 25 of SA-1, FA-1 and FA-2, and for SA-2 the rest of 241 in total: Johansson
+    and Vallbo (1979), J. Physiol. 286:283, as cited by Saal et al. (2017), PNAS 114:E5693. Fields are medians of 11.0
+    mm^2 (SA-1) and 12.6 (FA-1), some 5 times (SA-2) and 10 times (FA-2) as large (Johansson and Vallbo 1980, Brain Res.
     184:353). Their shape is our choice. On an array as coarse as the thesis' (2.67 mm) each taxel has several
     afferents.
 

@@ -14,7 +14,7 @@ _DEFAULT = defaults("threshold_izhikevich")
 
 @dataclass(eq=False, repr=False)
 class ThresholdIzhikevich(Encoder):
-    """Fire two Izhikevich neurons a level: one when a taxel reaches the level (+1), one when it leaves it (-1).
+    """Fire two Izhikevich neurons for each level: one when a taxel reaches the level (+1), one when it leaves it (-1).
 
     The input of one neuron is the thresholded signal, that of the other its inverse; each fires once for each step of
     its input, and repeated crossings within some 10 ms are suppressed. Trains: ``taxel * len(levels) + level``, signed.
@@ -24,7 +24,7 @@ class ThresholdIzhikevich(Encoder):
     levels : sequence of float, ascending
         In the sensor's unit; the thesis has one, 0.4 V.
     published : {"6.5.1", "3.4.3"}
-        Which published parameter set: a = 0.005, I = 0.6 (6.5.1, latency 15.8 ms) or a = 0.02, I = 0.5 (3.4.3, latency
+        The published parameter set: a = 0.005, I = 0.6 (6.5.1, latency 15.8 ms) or a = 0.02, I = 0.5 (3.4.3, latency
         20.2 ms); b = 0.25, c = -65 mV, d = 6 in both.
     begin : {"settled", "rest"}
         The steady state of the first sample; or rest without input, from which the ON neuron of each active channel and

@@ -13,20 +13,20 @@ _DEFAULT = defaults("touch_ends")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class TouchEnds(Tared):
-    """Give a graded spike on each train when a touch ends, which says how long it lasted and how large it was.
+    """Give a graded spike on each train when a touch ends, with the duration and size of the touch.
 
     A touch begins when the number of taxels that count for `ContactArea` rises above 0, and ends when it is 0 again.
-    The trains are log(1 + duration in ms); log(1 + the largest) of its area, of its total and of its peak, as of
+    The trains are log(1 + duration in ms); log(1 + the largest) of its area, of its total and of its peak, as in
     `Moments`; and 1. A touch that has not ended gives nothing. The detections of a neuron that receives them have the
-    begin of the touch as their time `t`, and are `known` after its end.
+    beginning of the touch as their time `t`, and are `known` after its end.
 
     Parameters
     ----------
     noise_floor : float, in the sensor's unit (ticks), 0 or more
-        That of the board; 3 in its fast presets.
+        The noise floor of the board; 3 in its fast presets.
     tare : Tare, or float, s, optional
         The taxels' rest, or the duration of rest at the beginning of each recording. It is valid for one board on one
-        day, so a saved readout has none; encoding requires one.
+        day, so a saved readout has no tare; encoding requires one.
 
     Raises
     ------

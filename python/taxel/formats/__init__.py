@@ -76,7 +76,7 @@ def trials(path: str | Path, format: str | None = None, **how: Any) -> Iterator[
     format : str, optional
         One of `FORMATS`; default: recognised by the files' names and first bytes.
     **how
-        Further arguments of its own: the `reduction` of an event camera's files.
+        Further arguments of the format: the `reduction` of an event camera's files.
 
     Yields
     ------
@@ -103,8 +103,8 @@ def trials(path: str | Path, format: str | None = None, **how: Any) -> Iterator[
     names = [format] if format else [name for name, kind in FORMATS.items() if kind.files(source)]
     if len(names) != 1:
         problem = "no known format" if not names else "several formats (" + ", ".join(names) + ")"
-        raise FormatError(f"{source}: holds {problem}; say format= one of {', '.join(FORMATS)}")
+        raise FormatError(f"{source}: holds {problem}; give format, one of {', '.join(FORMATS)}")
     try:
         yield from FORMATS[names[0]].trials(source, **how)
     except MemoryError as error:
-        raise FormatError(f"{source}: needs more memory than there is ({error})") from None
+        raise FormatError(f"{source}: needs more memory than is available ({error})") from None

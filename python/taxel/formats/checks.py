@@ -32,12 +32,12 @@ def files_at(path: str | Path, files: Callable[[Path], list[Path]], noun: str) -
     Raises
     ------
     FormatError : there is none (says `noun` they are)
-    ProblemError : `path` is no path
+    ProblemError : `path` is not a path
     """
     file = Path(checked_path("path", path))
     found = files(file)
     if not found:
-        raise FormatError(f"{file}: no {noun} in it")
+        raise FormatError(f"{file}: holds no {noun}")
     return found
 
 
@@ -64,7 +64,7 @@ def table(location: Path | str, data: Events | Frames) -> Events | Frames:
     far = np.flatnonzero((data.t < -TIME_US) | (data.t > TIME_US))
     if len(far):
         k = int(far[0])
-        raise FormatError(f"{location}, time {k}: {data.t[k]} us; times must lie within {TIME_US} us (142 years) of 0")
+        raise FormatError(f"{location}, time {k}: {data.t[k]} us; times must be within {TIME_US} us (142 years) of 0")
     return data
 
 
@@ -82,7 +82,7 @@ def whole_us(location: str, seconds: NDArray[np.float64], first_line: int = 1) -
         if len(wrong):
             k = begin + int(wrong[0])
             raise FormatError(
-                f"{location}, line {first_line + k}: time {seconds[k]:g} s; must lie within 142 years of 0"
+                f"{location}, line {first_line + k}: time {seconds[k]:g} s; must be within 142 years of 0"
             )
         t[part] = np.rint(seconds[part] * 1e6)
     return t

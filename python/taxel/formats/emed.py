@@ -76,7 +76,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
 @dataclass(frozen=True)
 class _Page:
-    """One frame: its number and that one's line, the sum of its cells, how many are not 0, the force it states."""
+    """One frame: its number with the line, the sum of its cells, how many are not 0, the force it states."""
 
     number: int
     line: int
@@ -133,7 +133,7 @@ def _read(file: Path) -> Trial:
 
 
 def _head(file: Path, content: Sequence[str], first: int) -> tuple[tuple[int, int], tuple[float, float], float]:
-    """Return rows and columns, the size of a sensor in cm, and ms between frames; `first` lines stand above pages."""
+    """Return rows and columns, the size of a sensor in cm, and ms between frames; `first` lines are above pages."""
     head = "\n".join(content)
     matches = {name: pattern.search(head) for name, pattern in _HEAD.items()}
     expected = {"matrix": "Matrix: 64x95", "size": "Sensor size: 0.500x0.500 cm", "period": "Time/picture:10.0 ms"}
@@ -185,7 +185,7 @@ def _page(
 def _indices(
     file: Path, line: int, noun: str, numbers: NDArray[np.float64], most: int, *, step: int
 ) -> NDArray[np.int64]:
-    """Convert numbers that count from 1 to indices; they must ascend and lie on the plate."""
+    """Convert numbers that count from 1 to indices; they must ascend and be on the plate."""
     wrong = (numbers != np.rint(numbers)) | (numbers < 1) | (numbers > most)
     wrong |= np.diff(numbers, prepend=0) <= 0
     if wrong.any():

@@ -48,7 +48,7 @@ def files(path: Path) -> list[Path]:
 def trials(path: str | Path) -> Iterator[Trial]:
     """Yield the left and the right channel of one person, or of all in a folder.
 
-    The right channel has no step times of its own, so its trial has no reference events. Invalid samples are skipped.
+    The right channel has no step times, so its trial has no reference events. Invalid samples are skipped.
 
     Yields
     ------
@@ -102,7 +102,7 @@ def format_212(data: bytes, name: str = "data") -> NDArray[np.int16]:
 
     Raises
     ------
-    FormatError : a length that is no multiple of 3
+    FormatError : a length that is not a multiple of 3
 
     Examples
     --------
@@ -125,7 +125,7 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
     ----------
     path : Path
         ``NAME.ts``: 13 columns; the first is the left heel strike that ends the row's left stride (verified: its
-        differences are the strides), and the foot-off lies one left swing before it.
+        differences are the strides), and the foot-off is one left swing before it.
 
     Returns
     -------

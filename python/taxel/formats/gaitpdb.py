@@ -49,8 +49,8 @@ def trials(path: str | Path) -> Iterator[Trial]:
     Yields
     ------
     Trial
-        Channels 0 to 7 are sensors 1 to 8 (heel to front) of either foot, at the places that the source states in units
-        of its own; ``series["total"]`` is the total force in N.
+        Channels 0 to 7 are sensors 1 to 8 (heel to front) of either foot, at the places that the source states,
+        without a unit; ``series["total"]`` is the total force in N.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
             read.add(t=t, left=rows[:, 1:9], right=rows[:, 9:17], totals=rows[:, 17:])
         t = ascending(file.name, read.column("t"))
         if len(t) < 2:
-            raise FormatError(f"{file.name}: fewer than 2 lines: must have more")
+            raise FormatError(f"{file.name}: fewer than 2 lines: must have 2 or more")
         totals = read.column("totals").T
         for foot, total in zip(("left", "right"), totals, strict=True):
             samples = known[person, foot] if (person, foot) in known else contacts(total)

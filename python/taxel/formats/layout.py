@@ -41,7 +41,7 @@ class Table:
     separator : str
         Between cells; " " stands for any number of blanks.
     decimal : {".", ","}
-        What stands before the decimals of a number.
+        Character before the decimals of a number.
     skip_lines : int, 0 or more
         Lines before the names of the columns, or before the numbers if there are no names.
     columns : list of str, optional
@@ -54,7 +54,7 @@ class Table:
     missing : str, optional
         A cell without a value; default: every cell is a number.
     leave_out : list of str or int
-        The columns that are no taxels, by name or number from 1, which may hold texts. All others are taxels.
+        The columns that are not taxels, by name or number from 1, which may hold texts. All others are taxels.
     frame_lines : int, 1 or more, optional
         Lines a frame, of which the first has its time; default: 1.
     frame_end : {"blank"}, optional
@@ -113,7 +113,7 @@ class Table:
         return not (self.frame_lines is None and self.frame_end is None and self.frame_begin is None)
 
     def is_between(self, line: str) -> bool:
-        """Whether a line holds no numbers, but stands between frames."""
+        """Whether a line holds no numbers, but separates frames."""
         return not line.strip() or (self.frame_begin is not None and line.lstrip().startswith(self.frame_begin))
 
 
@@ -203,7 +203,7 @@ class PrintedFrames:
     def __post_init__(self) -> None:
         for name in ("place", "time"):
             if getattr(self, name) is not None and "," in text(name, getattr(self, name)):
-                raise refused(name, f" is {shown(getattr(self, name))}: must hold no comma")
+                raise refused(name, f" is {shown(getattr(self, name))}: must not contain a comma")
         if self.baud is not None:
             integer("baud", self.baud, 1)
         _check_end(self)
@@ -212,7 +212,7 @@ class PrintedFrames:
                 _column(name, column)
 
     def options(self) -> dict[str, str]:
-        """Return the keys of the source that are stated, but for its place."""
+        """Return the keys of the source that are stated, except its place."""
         stated = {name: getattr(self, name) for name in ("baud", "time", "frame_lines", "frame_end")}
         listed = {name: ":".join(map(str, getattr(self, name))) for name in ("columns", "leave_out")}
         return {name: str(value) for name, value in (stated | listed).items() if value not in (None, "")}
@@ -235,7 +235,7 @@ class Layout:
     side : {"left", "right"}, optional
         The foot or hand that the sensor is of. For a recording of the other foot the places are mirrored.
     heel : {"top", "bottom"}, optional
-        At which rows, or at which end of the places, the heel lies.
+        Rows, or end of the places, at which the heel is.
     falls : bool or float, optional
         Whether readings fall with pressure, and are turned: to their negative, or, of a number, to that number less the
         reading.
@@ -288,7 +288,7 @@ class Layout:
             # Readings are subtracted from it, and values of frames have 32 bits.
             object.__setattr__(self, "falls", finite("falls", self.falls, least=-VALUE, most=VALUE))
         if self.unit is not None and not text("unit", self.unit):
-            raise refused("unit", " is '': must say what the readings are in")
+            raise refused("unit", " is '': must be the unit of the readings")
         if self.rate_hz is not None:
             finite("rate_hz", self.rate_hz, "Hz", least=1e-9, most=1e6)
         if self.zeros_before_s is not None:
@@ -396,7 +396,9 @@ class Layout:
         shape = (self.rows, self.columns) if self.rows is not None else (1, taxels) if stated is None else stated.shape
         rows, columns = (integer(name, n, 1, 65_535) for name, n in zip(("rows", "columns"), shape, strict=True))
         if stated is not None and rows * columns != stated.rows * stated.columns:
-            raise ProblemError(f"says {rows} x {columns} taxels; the recording holds {stated.rows} x {stated.columns}")
+            raise ProblemError(
+                f"states {rows} x {columns} taxels; the recording holds {stated.rows} x {stated.columns}"
+            )
         places, is_mirrored = self.places, bool(self.side and side and self.side != side)
         if places is not None and is_mirrored:
             places = Places(-places.x, places.y, places.area, places.unit)
@@ -468,7 +470,7 @@ def _known(before: str, values: Mapping[str, Any], names: list[str]) -> None:
             (f" in [{table}]" for table, group in _TABLES.items() if not before and unknown in _keys(group)), ""
         )
         of_size = as_size(values[unknown])
-        hint = f"; a size is said by {of_size}" if of_size else f"; it stands{inner}" if inner else ""
+        hint = f"; a size is given by {of_size}" if of_size else f"; it belongs{inner}" if inner else ""
         raise ProblemError(f"unknown key {before}{unknown}{hint}; there are {', '.join(names)}")
 
 
@@ -490,5 +492,5 @@ def as_size(value: object) -> str:
 
 @cache
 def load_packaged(name: str) -> Layout:
-    """Return the layout that comes along for a format whose source says where its sensors are."""
+    """Return the layout that taxel includes for a format whose source states where its sensors are."""
     return Layout.read(Path(__file__).parent / "layouts" / f"{name}.layout.toml")

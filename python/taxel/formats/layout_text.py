@@ -86,7 +86,7 @@ def with_keys(path: Path, text: str, keys: Mapping[str, Any]) -> str:
 
     Raises
     ------
-    FormatError : the text is no layout, before or with these keys
+    FormatError : the text is not a layout, before or with these keys
     ProblemError : it is written so that only a person can change it
 
     Examples

@@ -25,7 +25,7 @@ from taxel.frames import Frames
 
 __all__ = ["contacts", "files", "trials"]
 
-_SOURCE = "the insole's own sum, 10 % of its largest: no truth of its own"
+_SOURCE = "the insole's own sum, 10 % of its largest: not an independent truth"
 
 
 def files(path: Path) -> list[Path]:

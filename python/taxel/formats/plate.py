@@ -180,7 +180,7 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
     -------
     dict of int
         ``contact``: the first frame with any load; ``foot_off``: the frame after the last; ``heel_off``: the frame
-        after the last in which the first 30 % of the rows ever loaded carry at least 5 % of their own largest sum;
+        after the last in which the first 30 % of the rows ever loaded carry at least 5 % of their largest sum;
         ``p5``, ``p10``: the first frame with 5 %, 10 % of the largest sum, ``peak_sum``; ``flicker``: 1 if a frame in
         between has no load at all.
 

@@ -150,7 +150,7 @@ class _Header:
             match = _KEY.fullmatch(line.rstrip(", \t"))
             # Comment lines are free text, so a repeated key may be part of a comment.
             if match and match[1] in self.values and match[1] in _NEEDED and match[2] != self.values[match[1]]:
-                raise FormatError(f"{file.name}, line {k}: {match[1]} is said a second time, and differently")
+                raise FormatError(f"{file.name}, line {k}: {match[1]} is given a second time, with another value")
             if match:
                 self.values.setdefault(match[1], match[2])
                 self._lines.setdefault(match[1], k)
@@ -240,7 +240,7 @@ def _times(file: Path, frames: Sequence[_Frame], period: float) -> NDArray[np.in
     far = np.flatnonzero(np.abs(seconds) * 1e6 > TIME_US)
     if len(far):
         k = int(far[0])
-        raise FormatError(f"{file.name}, line {frames[k].line}: at {seconds[k]:g} s; must lie within 142 years of 0")
+        raise FormatError(f"{file.name}, line {frames[k].line}: at {seconds[k]:g} s; must be within 142 years of 0")
     t = np.rint(seconds * 1e6).astype(np.int64)
     back = np.flatnonzero(np.diff(t) <= 0)
     if len(back):

@@ -121,9 +121,9 @@ def _up_to(path: Path, most: int) -> Iterator[bytes]:
 
 
 def before(content: Iterator[str], ends: Callable[[str], bool]) -> tuple[list[str], str | None]:
-    """Take the lines before the first one that `ends` returns true for, and that one; the others are left.
+    """Take the lines up to the first line for which `ends` returns true, which is included; the others are left.
 
-    None stands for that one where no line of the first 1 MiB is.
+    None stands for that line where there is none in the first 1 MiB.
     """
     taken, left = list[str](), _HEAD
     for line in content:
@@ -161,7 +161,7 @@ def beginning(path: Path, most: int = _BEGINNING) -> list[str]:
 
 
 def first_bytes(path: Path, count: int) -> bytes:
-    """Read the beginning of a file; nothing of what is no file, as a folder may hold pipes, sockets and folders too."""
+    """Read the beginning of a file; nothing of anything else, as a folder may hold pipes, sockets and folders too."""
     try:
         with open_file(path) as file:
             return file.read(count)
@@ -217,13 +217,15 @@ def number(cell: str, path: Path, line: int, noun: str, *, unmarked: bool = Fals
     FormatError : no finite number (names file, line and column)
     """
     text, noun = cell.strip(), short(noun)
-    remedy = f"; if it marks a missing value, say in a layout file: [table] missing = {shown(text)}" if unmarked else ""
+    remedy = (
+        f"; if it marks a missing value, write in a layout file: [table] missing = {shown(text)}" if unmarked else ("")
+    )
     try:
         value = float_of(text)
     except ValueError:
         if _DECIMAL_COMMA.fullmatch(text):
             problem = f"has a decimal comma ({shown(text)}); "
-            problem += "say in a layout file: [table] decimal = ','" if unmarked else "export with decimal points"
+            problem += "write in a layout file: [table] decimal = ','" if unmarked else "export with decimal points"
         else:
             problem = f"is {shown(text)}, not a number" if text else "is empty, not a number"
             problem += remedy

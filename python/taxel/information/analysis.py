@@ -60,34 +60,35 @@ def answer(
     Parameters
     ----------
     trials : sequence of LabelledTrial
-        Of one array.
+        All of one array.
     encoder : Encoder, optional
-        `ChangeEvents` or `FA1`; its period is set. Left out: change events of one bit with the floor of `floor_of`.
+        `ChangeEvents` or `FA1`; its period is set. Default: change events of one bit with the floor of `floor_of`.
     window_ms : float, ms, optional
-        How far after the contact to look at most; needed where trials have no end. The shortest trial where left out.
+        Longest time after the contact that counts; needed if trials have no end. Default: the length of the shortest
+        trial.
     windows_ms, periods_ms : sequence of float, ms, optional
-        Steps of 1, 2, 5 where they are left out: windows from a fortieth of the longest, periods from the finest that
-        the recordings show, or a 500th of the window.
+        Default: steps of 1, 2, 5: windows from a fortieth of the longest, periods from the finest that the recordings
+        show, or a 500th of the window.
     taxels : sequence of int, optional
-        Numbers of taxels that are drawn at random among those that ever send an event; 10, 30, 100, 300 where left out.
+        Numbers of taxels that are drawn at random among those that ever send an event. Default: 10, 30, 100, 300.
     pools : sequence of int, optional
-        Sides of the squares of taxels that are averaged into one; 2, 4 and 7 where left out.
+        Sides of the squares of taxels that are averaged into one. Default: 2, 4 and 7.
     taxels_at_ms : float, ms, optional
-        The period at which taxels are left out or pooled, one of `periods_ms`; the finest where it is left out.
+        The period at which taxels are left out or pooled, one of `periods_ms`. Default: the finest.
     draws : int, 1 or more
-        Of sampling phases and of random taxels; answers are their means.
+        Number of draws of sampling phases and of random taxels; results are means over draws.
     folds : int, 2 or more
     shuffles : int, 1 or more
-        Of the test against zero.
+        Number of shuffles of the labels in the test against zero.
     classifiers : sequence of str
-        Beside the discriminants, at the full setting: "neighbours", "cone_r", or the name of an entry point of
-        the group ``taxel.classifiers``, as "tempotron" where taxel_rules is installed.
+        Further classifiers beside the discriminants, at the full setting: "neighbours", "cone_r", or the name of an
+        entry point of the group ``taxel.classifiers``, such as "tempotron" if taxel_rules is installed.
     seed : int, 0 or more
     progress : function of (what, done, all), optional
-        What is computed next, and how much of the expected time of all has passed, in ms of one core. The first call
-        comes before the work (done is 0); what it raises ends the work.
+        Called with the next step, and with the expected time of the steps done and of all steps, in ms of one core. The
+        first call is before the work (done is 0); an exception that it raises ends the work.
     watch : function of (period_ms, window_ms, bits), optional
-        Called whenever a draw of a setting of all taxels is done, with the bits by the draws so far.
+        Called after each draw of a setting with all taxels, with the bits by the draws so far.
 
     Returns
     -------
@@ -283,9 +284,11 @@ class _Answering(Question):
         # Recordings of a trial each may stand in any order.
         ordered = len({id(trial.source) for trial in self.trials}) < len(self.trials)
         if ordered and runs == len(np.unique(self.labels)) and len(self.labels) > 2 * runs:
-            self.notes.append("each label's trials lie together: a drift of the sensor would count as the label's")
+            self.notes.append(
+                "each label's trials are recorded together: a drift of the sensor would count as the label's"
+            )
         if not self.ended:
-            self.notes.append("trials have no end of their own: how long a touch lasts is known within the window only")
+            self.notes.append("trials have no stop_us: the length of a touch is known within the window only")
 
 
 def _about(spikes: SampledEvents, window: float, values: bool) -> tuple[float, float, float]:

@@ -26,16 +26,16 @@ class Point:
     period_ms, window_ms : float, ms
     taxels : int, 1 or more
     kind : {"all", "random", "pooled"}
-        All taxels that ever send an event, some of them drawn anew in each draw, or the means of squares of all.
+        All taxels that ever send an event, some of them, drawn again in each draw, or the means of squares of all.
     found : Estimate
     events : float, 0 or more
-        A trial, to the window.
+        Events in a trial, up to the end of the window.
     silent : float, share of all
-        The share of trials without any event.
+        Trials without any event.
     kbps : float, 0 or more
         Kilobits a second on the wire while touched.
     verdict : Keeping, optional
-        Against the finest period with all taxels, to the same window; None where it is that.
+        Comparison with the finest period and all taxels, to the same window; None for that setting itself.
     """
 
     period_ms: float
@@ -50,7 +50,7 @@ class Point:
 
     @property
     def millibits_per_event(self) -> float:
-        """Bits divided by events, in thousandths: highest where least is known, so no figure of merit."""
+        """Bits divided by events, in thousandths. Not a figure of merit: it is highest where the bits are lowest."""
         return 1000.0 * self.found.bits / self.events if self.events else 0.0
 
     def to_dict(self) -> dict[str, Any]:
@@ -79,15 +79,15 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """Hold the bits of a control: of something else than the touch's pattern.
+    """Hold the bits of a control: of a measurement other than the touch's pattern.
 
     Attributes
     ----------
     name : str
     found : Estimate, or None
-        None where the recordings do not hold what it needs.
+        None if the recordings lack the data for it.
     about : str
-        What it is, in one sentence.
+        Description of the measurement, in one sentence.
     """
 
     name: str
@@ -102,32 +102,32 @@ class Answer:
     Attributes
     ----------
     labels : dict of str to int
-        Trials by label.
+        Number of trials by label.
     groups : int, 0 or more
-        How many; 0 where none are named.
+        Number of groups; 0 if none are named.
     encoder : str
     full : Point
         The finest period, all taxels, the whole window: the reference of all others.
     points : tuple of Point
-        By period and window, all taxels.
+        Results by period and window, with all taxels.
     taxels : tuple of Point
-        By number of taxels, at one period.
+        Results by number of taxels, at one period.
     frames : dict of float to Estimate
-        By period, ms: frames instead of events, the whole window.
+        Results by period, ms, of frames instead of events, in the whole window.
     controls : tuple of Control
     zero : ZeroTest
     training : tuple of (int, float)
-        Training trials a label, and the bits then.
+        Number of training trials for each label, and the bits with so many.
     classifiers : dict of str to Estimate
-        Others than the discriminants, at the full setting.
+        Results of the further classifiers, at the full setting.
     parameters : dict of str to tuple of Point
-        By column of the table: the bits about it, by period.
+        For each column of the table: the bits about it, by period.
     notes : tuple of str
-        What these recordings cannot tell, and what was left out.
+        Questions that these recordings cannot answer, and results that were left out.
     draws : int, 1 or more
     seed : int, 0 or more
     wire : str
-        By which version of the wire the costs are counted.
+        Version of the wire by which the costs are counted.
     """
 
     labels: dict[str, int]
@@ -154,7 +154,7 @@ class Answer:
 
     @property
     def empty(self) -> bool:
-        """Whether the full setting's bits are not above 0, so that no other has anything to keep."""
+        """Whether the full setting's bits are not above 0, so that other settings have nothing to keep."""
         return not is_above_chance(self.full.found, self.zero) or any(
             p.verdict is not None and p.verdict.says == "nothing" for p in (*self.by_period, *self.taxels)
         )
@@ -166,7 +166,7 @@ class Answer:
         lines = []
         if estimate.bits <= self.zero.level:
             lines.append(
-                "not told from nothing: labels shuffled before training give as much "
+                "not distinguishable from 0 bits: labels shuffled before training give as much "
                 f"(95 % below {self.zero.level:.2f})"
             )
         guessed, least = _guessing(estimate)
@@ -177,7 +177,7 @@ class Answer:
             )
         if not self.empty:
             lines += [
-                f"{c.name} alone tells {c.found.bits:.2f} bits: the answer may be about that"
+                f"{c.name} alone gives {c.found.bits:.2f} bits: the answer may be about this measurement only"
                 for c in self.controls
                 if c.found is not None and c.found.interval[0] > 0 and c.found.bits >= _NEAR * estimate.bits
             ]
@@ -185,7 +185,7 @@ class Answer:
 
     @property
     def cheapest(self) -> Point:
-        """The setting of the lowest rate among those that keep 95 % of the full one's bits, or the full one."""
+        """The setting of the lowest rate among those that keep 95 % of the full setting's bits, or the full setting."""
         sufficient = [p for p in (*self.by_period, *self.taxels) if p.verdict is not None and p.verdict.says == "keeps"]
         return min([self.full, *sufficient], key=lambda point: point.kbps)
 

@@ -1,6 +1,6 @@
 """Mutual information of a table of counts, in bits: as counted, and corrected for the small number of trials.
 
-A table holds how often each response was given to each label: labels by rows, responses by columns. Every function
+A table holds how often each response was given to each label: a row is a label, a column a response. Every function
 takes one table or a stack of them, and all trials count alike.
 """
 
@@ -41,7 +41,7 @@ def confusion_matrix(
     labels, responses : labels, shape (trials,)
         Of any kind that can be compared: numbers or texts.
     classes : labels, shape (classes,), optional
-        The order of rows and columns; all labels and responses, sorted, where it is left out.
+        The order of rows and columns. Default: all labels and responses, sorted.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def confusion_matrix(
 
     Raises
     ------
-    ProblemError : no trials, unequal lengths, or what stands in no class
+    ProblemError : no trials, unequal lengths, or an entry that is in no class
 
     Examples
     --------
@@ -82,7 +82,7 @@ def confusion_matrix(
 
 
 def label_entropy(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
-    """Return the labels' entropy in bits: the most that any response can tell.
+    """Return the labels' entropy in bits: the most information that any response can give.
 
     Parameters
     ----------
@@ -137,8 +137,8 @@ def plug_in(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
 def relevant_responses(counts: ArrayLike) -> NDArray[np.int64]:
     """Return for each row how many of its responses can occur, by the Bayesian count of Panzeri and Treves.
 
-    Those that occurred are too few, all columns often too many: the count is that number of possible responses under
-    which, after so many trials, one expects to have seen as many as were seen.
+    The responses that occurred are too few, and all columns are often too many. The count is the number of possible
+    responses for which, after so many trials, the expected number of responses seen is the number that was seen.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def relevant_responses(counts: ArrayLike) -> NDArray[np.int64]:
     Returns
     -------
     int64, shape (...)
-        From those that occurred to all columns.
+        From the number of responses that occurred to the number of columns.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def panzeri_treves(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
 
     Notes
     -----
-    Panzeri and Treves (1996), Network 7:87: what counting adds is, to first order, (sum over labels of (R_s - 1) -
+    Panzeri and Treves (1996), Network 7:87: the bias of counting is, to first order, (sum over labels of (R_s - 1) -
     (R - 1)) / (2 N ln 2), R_s and R by `relevant_responses`. Where errors spread over all other labels it still reads
     high below some 7 trials a label and response; see `Estimate.warnings`.
 
@@ -249,13 +249,14 @@ def corrected(counts: ArrayLike) -> NDArray[np.float64]:
 def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: int = 0) -> float:
     """Return the mutual information in bits, extrapolated from half and a quarter of the trials to endlessly many.
 
-    A second estimate beside `panzeri_treves`. Their agreement is no proof: both err alike where trials are few.
+    This is a second estimate beside `panzeri_treves`. Their agreement does not prove them right: both err alike where
+    trials are few.
 
     Parameters
     ----------
     counts : int, shape (labels, responses), 0 or more
     repetitions : int, 1 or more
-        How often the trials are dealt out anew.
+        Number of times the trials are dealt out.
     seed : int, 0 or more
 
     Returns
@@ -269,7 +270,7 @@ def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: i
     Notes
     -----
     Strong et al. (1998), Phys. Rev. Lett. 80:197: the parabola in 1/N through the means at N, N/2 and N/4 trials.
-    Parts are dealt out of the answers, so a classifier that would be worse with fewer trials is not seen.
+    Parts are dealt out of the answers, so the method does not see that a classifier is worse with fewer trials.
 
     Examples
     --------

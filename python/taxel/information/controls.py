@@ -72,7 +72,7 @@ def _before(question: Question) -> Control:
     length = min(question.window_us, float(np.quantile(room, 0.1)))
     if length < 5 * question.finest or (question.contact - begin >= length).sum() < len(question.trials) * 0.5:
         question.notes.append(
-            "nothing is recorded before the contacts: what was there before the touch cannot be told apart"
+            "nothing is recorded before the contacts: information from before the touch cannot be separated"
         )
         return Control("before contact", None, "none recorded")
     moved = [

@@ -22,7 +22,7 @@ _CELLS = 1 << 20
 
 
 def residual(square: NDArray[np.float64], level: float) -> NDArray[np.float64]:
-    """Return the share of any classes that a ridge regression on them leaves over, as a matrix on the trials.
+    """Return the residual of a ridge regression on any classes, as a matrix on the trials.
 
     Parameters
     ----------
@@ -34,11 +34,11 @@ def residual(square: NDArray[np.float64], level: float) -> NDArray[np.float64]:
     Returns
     -------
     float64, shape (trials, trials)
-        The same for whatever labels.
+        The same for all labels.
 
     Raises
     ------
-    ProblemError : a matrix of no inner product
+    ProblemError : not a matrix of inner products
     """
     trials, centred = len(square), _centred(square)
     least = trials * np.finfo(float).eps * float(np.abs(centred).max())
@@ -62,7 +62,7 @@ class Regressions:
     residuals : float64, shape (regressions, trials, trials)
         As `residual` returns them.
     which : float64, shape (trials, classes)
-        1 where a trial is of a class, else 0.
+        1 if a trial belongs to a class, else 0.
 
     Notes
     -----
@@ -81,9 +81,9 @@ class Regressions:
         Parameters
         ----------
         number : int64, shape (cases,)
-            Which regression.
+            Index of the regression.
         out : int64, shape (cases, left out)
-            Which trials.
+            Indices of the trials.
 
         Returns
         -------
@@ -114,7 +114,7 @@ class Regressions:
 def discriminant(
     sums: NDArray[np.float64], counts: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what turns ridge regressions on classes into linear discriminants.
+    """Return the factor and offset that turn ridge regressions on classes into linear discriminants.
 
     Parameters
     ----------

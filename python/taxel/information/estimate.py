@@ -47,26 +47,28 @@ class Estimate:
     bits : float, bits
         `corrected`, held within 0 and `most` as the interval is.
     interval : (float, float), bits
-        Where trials, or whole groups, redrawn put it, shifted onto `bits`. Where trials are few it holds the truth less
-        often than it says: of 95 % some 55 to 99 at 20 trials a label, 78 to 95 at 40. Where fewer trials were named
-        wrongly than there are labels, redraws miss errors that did not come: then down to what Fano's inequality leaves
-        of the largest share of errors that so few allow (Clopper and Pearson, trial by trial).
+        Range of the bits when trials, or whole groups, are redrawn, shifted onto `bits`. With few trials it holds the
+        truth less often than stated: an interval of 95 % in some 55 to 99 % of cases at 20 trials a label, in 78 to 95
+        % at 40. If fewer trials were named wrongly than there are labels, redraws miss errors that did not occur. The
+        interval then reaches down to what Fano's inequality leaves with the largest share of errors that so few allow
+        (Clopper and Pearson, trial by trial).
     plug_in, extrapolated : float, bits
         As counted, and by `quadratic_extrapolation`. That the three agree does not mean that they are right.
     corrected : float, bits
-        As counted less the bias of Panzeri and Treves, the mean over draws; of few trials below 0 or above `most`.
+        As counted, minus the bias of Panzeri and Treves; the mean over draws. With few trials it may be below 0 or
+        above `most`.
     most : float, bits
-        The labels' entropy: the most there can be.
+        The labels' entropy: the largest possible value.
     right : float, from 0 to 1
         The share of trials whose answer is their label.
     counts : int64, shape (draws, labels, labels)
     classes : labels, shape (labels,)
     local : float64, shape (trials,), bits
-        What each trial's answer gave, the mean over draws.
+        Information of each trial's answer, the mean over draws.
     trials_for_tenth : int, 0 or more
-        How many trials would bring the interval (95 %) to a tenth of a bit either way.
+        Number of trials that would narrow the interval (95 %) to a tenth of a bit either way.
     warnings : tuple of str
-        By the number of trials a label and by the interval.
+        Warnings about the number of trials for each label and about the interval.
     """
 
     bits: float
@@ -110,15 +112,15 @@ class ZeroTest:
     Attributes
     ----------
     shuffled : tuple of float, bits
-        Corrected bits, one a shuffle.
+        Corrected bits, one value for each shuffle.
     level : float, bits
-        Below it lie 95 % of them: what is not above it is not told from nothing.
+        95 % of them are below it: an estimate that is not above it cannot be distinguished from 0 bits.
     p : float, from 0 to 1
-        How often, under the shuffle, as much as was found comes out; never below 1 / (shuffles + 1).
+        Share of shuffles that give as many bits as were found; never below 1 / (shuffles + 1).
 
     Notes
     -----
-    A test of zero and nothing else: taken off, the mean of the shuffled would make a perfect answer lose bits.
+    Use it only as a test of zero. If the mean of the shuffled bits were subtracted, a perfect answer would lose bits.
     """
 
     shuffled: tuple[float, ...]
@@ -144,12 +146,12 @@ def estimate(
     Parameters
     ----------
     labels : labels, shape (trials,)
-        Texts or whole numbers; two labels at least.
+        Texts or whole numbers; at least two different labels.
     responses : labels, shape (trials,) or (draws, trials)
-        What was answered; several draws (of the sampling's phase, of the folds) are averaged.
+        The answers; several draws (of the sampling's phase, of the folds) are averaged.
     groups : labels, shape (trials,), optional
-        What belongs together (person, session, pose): whole groups are redrawn, and few of them widen the interval by
-        Student's t.
+        Trials that belong together (person, session, pose): whole groups are redrawn, and if there are few, Student's t
+        widens the interval.
     redraws : int, 2 or more
     confidence : float, between 0 and 1
     seed : int, 0 or more
@@ -160,7 +162,7 @@ def estimate(
 
     Raises
     ------
-    ProblemError : one label, unequal lengths, or what is no label
+    ProblemError : one label, unequal lengths, or an entry that is not a label
 
     Examples
     --------
@@ -177,14 +179,16 @@ def estimate(
         raise refused("responses", f" has shape {array.shape}: must be ({len(truth)},), one a label, or draws of it")
     share = number("confidence", confidence)
     if not 0 < share < 1:
-        raise refused("confidence", f" is {shown(confidence)}: must lie between 0 and 1")
+        raise refused("confidence", f" is {shown(confidence)}: must be between 0 and 1")
     rounds, random = integer("redraws", redraws, 2), np.random.default_rng(integer("seed", seed, 0))
     if (truth.dtype.kind == "U") != (answered.dtype.kind == "U"):
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers")
     classes = np.unique(np.concatenate([distinct(truth), distinct(answered.ravel())]))
     row, column = numbered(classes, truth), numbered(classes, answered)
     if len(np.unique(row)) < 2:
-        raise refused("labels", f" are all {shown(truth[0].item())}: must be two at least, or there is nothing to tell")
+        raise refused(
+            "labels", f" are all {shown(truth[0].item())}: must be two at least, or there is nothing to distinguish"
+        )
     belongs = None if groups is None else belonging(groups, len(truth))
     cells = row * len(classes) + column
     counts = _tables(cells, np.ones((1, len(truth)), np.int64), len(classes))[0]
@@ -222,7 +226,7 @@ def estimate(
 
 
 def bits_of(labels: NDArray[Any], responses: Sequence[NDArray[Any]]) -> float:
-    """Return the bits of draws of responses, each one of the labels, without an interval."""
+    """Return the bits of draws of responses, without an interval; each response is a label."""
     classes = distinct(labels)
     cells = numbered(classes, labels) * len(classes) + numbered(classes, np.stack(responses))
     return float(_held(_tables(cells, np.ones((1, len(labels)), np.int64), len(classes)))[0])
@@ -242,12 +246,13 @@ def zero_test(
     Parameters
     ----------
     answer : function of labels, shape (trials,)
-        Trains anew on these labels and returns the responses, shape (trials,).
+        Trains again on these labels and returns the responses, shape (trials,).
     labels : labels, shape (trials,)
     found : float, bits
         The estimate with the true labels.
     groups : labels, shape (trials,), optional
-        Where each group has one label, whole groups change theirs; else labels are shuffled within each group.
+        If each group has a single label, the labels of whole groups are shuffled; else labels are shuffled within each
+        group.
     shuffles : int, 1 or more
     seed : int, 0 or more
 

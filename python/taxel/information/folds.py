@@ -17,16 +17,16 @@ __all__ = ["Split", "TrialFold", "folds", "split"]
 
 
 def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None, seed: int = 0) -> NDArray[np.int64]:
-    """Deal trials out to folds, each label as evenly as can be; trials of a group are never split.
+    """Deal trials out to folds, each label as evenly as possible; trials of a group are never split.
 
     Parameters
     ----------
     labels : labels, shape (trials,)
-        Texts or whole numbers; two at least.
+        Texts or whole numbers; at least two different labels.
     count : int, 2 or more
-        Folds; fewer where there are fewer groups.
+        Number of folds; fewer if there are fewer groups.
     groups : labels, shape (trials,), optional
-        What must not be split between folds: a person, a session, the variants of one trial.
+        Trials that must not be split between folds: of a person, a session, the variants of one trial.
     seed : int, 0 or more
 
     Returns
@@ -36,7 +36,7 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
 
     Raises
     ------
-    ProblemError : one label, fewer trials or groups than can be dealt out, or a label all of whose trials lie in one
+    ProblemError : one label, fewer trials or groups than can be dealt out, or a label all of whose trials are in one
         group (it could never be both trained and tested)
 
     Examples
@@ -49,7 +49,7 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
     classes, row = np.unique(truth, return_inverse=True)
     if len(classes) < 2:
         values = f"all {shown(truth[0].item())}" if len(truth) else "[]"
-        raise refused("labels", f" are {values}: must be two at least, or there is nothing to tell")
+        raise refused("labels", f" are {values}: must be two at least, or there is nothing to distinguish")
     if groups is None:
         if len(truth) < parts:
             raise ProblemError(
@@ -67,8 +67,8 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
         if len(group_numbers) < 2:
             group = words("groups", groups)[np.flatnonzero(belongs == group_numbers[0])[0]].item()
             raise ProblemError(
-                f"label {shown(name.item())}: all its trials lie in group {shown(group)}, so it could never be both "
-                f"trained and tested; must be two groups at least"
+                f"label {shown(name.item())}: all its trials are in group {shown(group)}, so it could never be both "
+                f"trained and tested; must be in at least two groups"
             )
     return _whole_groups(row, belongs, parts, random)
 
@@ -81,7 +81,7 @@ class TrialFold:
     ----------
     test, train : int64
     inner : tuple of int64
-        Empty where a label of the training trials cannot be dealt out.
+        Empty if a label of the training trials cannot be dealt out.
     """
 
     test: NDArray[np.int64]
@@ -91,7 +91,7 @@ class TrialFold:
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Labelled trials dealt out to folds, and the training trials of each fold to folds of their own.
+    """Labelled trials dealt out to folds, and the training trials of each fold to inner folds.
 
     Attributes
     ----------

@@ -22,18 +22,19 @@ CONFIDENCE = 0.9
 
 @dataclass(frozen=True)
 class Keeping:
-    """Hold whether a setting keeps a share of another's bits.
+    """State whether a setting keeps a share of another setting's bits.
 
     Attributes
     ----------
     says : {"keeps", "open", "loses", "nothing"}
-        Nothing: the other's bits are not above 0, so that there is nothing to keep.
+        "nothing": the other setting's bits are not above 0, so that there is nothing to keep.
     margin : float, bits
-        Its bits less the share of the other's.
+        Its bits minus the share of the other setting's bits.
     error : float, bits
-        Of the margin, by trial or group, paired.
+        Standard error of the margin, from pairs of trials or groups.
     trials_to_settle : int, 1 or more, optional
-        Trials that would settle an open verdict if the margin is as estimated; None where it is 0, or settled.
+        Number of trials that would settle an open verdict if the margin is as estimated; None if the margin is 0 or the
+        verdict is settled.
     """
 
     says: str
@@ -50,7 +51,7 @@ class Keeping:
 
 
 def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: ArrayLike | None = None) -> Keeping:
-    """Judge whether a setting keeps a share of another's bits, on the same trials.
+    """Judge whether a setting keeps a share of another setting's bits, on the same trials.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
         Of the same trials, in the same order.
     share : float, between 0 and 1
     groups : labels, shape (trials,), optional
-        Pairs are then means of groups.
+        If given, pairs are means of groups.
 
     Returns
     -------
@@ -72,8 +73,8 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
     -----
     d = i_cheap - share * i_dear by trial, i being log2 p(response | label) / p(response); bounds at 90 %, one-sided, by
     Student's t; i_dear itself is tested against 0 in the same way. Near the edge the rule "within one standard error"
-    takes too cheap a setting in 44 to 70 % of simulated cases, this one in at most 13 % (from 40 trials a label on); it
-    leaves many open instead.
+    takes too cheap a setting in 44 to 70 % of simulated cases, this rule in at most 13 % (with 40 trials a label or
+    more); it leaves many open instead.
 
     Examples
     --------
@@ -86,7 +87,7 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
     a, b = instance("cheap", cheap, Estimate).local, instance("dear", dear, Estimate).local
     part = number("share", share)
     if not 0 < part < 1:
-        raise refused("share", f" is {shown(share)}: must lie between 0 and 1")
+        raise refused("share", f" is {shown(share)}: must be between 0 and 1")
     if len(a) != len(b):
         raise ProblemError(f"estimates of {len(a)} and {len(b)} trials: must be of the same")
     belongs = np.arange(len(a)) if groups is None else belonging(groups, len(a))

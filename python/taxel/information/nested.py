@@ -41,10 +41,10 @@ class Nested:
     Attributes
     ----------
     responses : labels, shape (trials,)
-    folds : int64, shape (trials,), from 0 on
-        In which each trial was tested.
+    folds : int64, shape (trials,), counted from 0
+        Fold in which each trial was tested.
     chosen : dict from fold to (int, float)
-        Which matrix and which ridge (or how many neighbours) that fold's training trials chose among themselves.
+        The matrix and the ridge (or number of neighbours) that each fold's training trials chose among themselves.
     missing : tuple of (fold, class)
         Training sets without a class, which they cannot predict.
     """
@@ -72,19 +72,19 @@ def nested_predictions(
     Parameters
     ----------
     grams : sequence of float64, shape (trials, trials), in the features' unit squared
-        Inner products of all trials, a matrix for each way to see them (each smoothing); those first are preferred
-        where they do as well.
+        Inner products of all trials, a matrix for each way to see them (each smoothing); if two do equally well, the
+        first is preferred.
     features : sequence of int
-        How many features vary in each.
+        Number of features that vary in each matrix.
     y : labels, shape (trials,)
     groups : labels, shape (trials,), optional
-        What must not be split, neither between folds nor inside them.
+        Trials that must not be split, neither between folds nor inside them.
     count, inner : int, 2 or more
-        Folds, and folds among the training trials.
+        Number of folds, and of folds among the training trials.
     ridges : sequence of float, above 0
-        In units of the mean variance over features and trials (of all trials: it knows no label).
+        In units of the mean variance over features and all trials (which does not depend on labels).
     neighbours : sequence of int, 1 or more
-        So many nearest neighbours are tried instead of discriminants, where any are named.
+        If given, these numbers of nearest neighbours are tried instead of discriminants.
     seed : int, 0 or more
 
     Returns
@@ -172,9 +172,9 @@ def training_curve(
     grams, features, y
         As they were given to `nested_predictions`.
     nested : Nested
-        What that returned, by discriminants: folds, matrix and ridge stay as they were chosen.
+        The result of `nested_predictions`, by discriminants: folds, matrix and ridge stay as they were chosen.
     sizes : sequence of int
-        Training trials a label, drawn within each fold's training set.
+        Numbers of training trials for each label, drawn within each fold's training set.
     seed : int, 0 or more
 
     Returns

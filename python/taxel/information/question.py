@@ -92,7 +92,7 @@ class Question:
             lasts = max(int(np.ptp(trial.source.t)) for trial in self.trials if len(trial.source))
             if lasts < STEP_US:
                 raise ProblemError(
-                    f"{self.trials[0].name}: its frames all lie within {lasts} us, so they have no times; "
+                    f"{self.trials[0].name}: its frames are all within {lasts} us, so they have no times; "
                     "give them some (rate_hz in a layout file, t of taxel.Frames)"
                 )
             raise refused("trials", f": no event in any of them by {self.encoder!r}; a lower noise_floor may help")
@@ -132,7 +132,7 @@ class Question:
             chosen_windows = sorted(to_us(number("windows_ms", w)) for w in several("windows_ms", windows_ms))
             if any(not self.finest <= w <= window for w in chosen_windows):
                 raise refused(
-                    "windows_ms", f" is {shown(windows_ms)}: must lie in {to_ms(self.finest):g} to {to_ms(window):g} ms"
+                    "windows_ms", f" is {shown(windows_ms)}: must be in {to_ms(self.finest):g} to {to_ms(window):g} ms"
                 )
             self.windows = sorted({*chosen_windows, window})
         self.taxels_at = self.periods[0]
@@ -198,12 +198,12 @@ class Question:
         return [Matrices(grams, [size] * len(taus)) for size, *grams in zip(sizes, *by_tau, strict=True)]
 
     def _parameter_columns(self) -> dict[str, NDArray[np.generic]]:
-        """Return the columns of parameters that can stand in for the labels; the notes name the others."""
+        """Return the columns of parameters that can be used like labels; the notes name the others."""
         columns = {}
         for name in self.trials[0].parameters:
             column = np.array([trial.parameters.get(name, "") for trial in self.trials])
             if (column == self.labels).all():
-                self.notes.append(f"parameter {name} is left out: it says what the label says")
+                self.notes.append(f"parameter {name} is left out: it is the same as the label")
                 continue
             if (column == "").any():
                 self.notes.append(f"parameter {name} is left out: some trials have none")

@@ -37,7 +37,7 @@ STEP_US = 100
 class HeldValues:
     """Return what every taxel holds at any time: the last frame, or the last intensity that came.
 
-    Events without intensities count as steps of one, up or down, from their beginning on.
+    Events without intensities count as steps of one, up or down, from the beginning of the recording.
 
     Parameters
     ----------
@@ -84,9 +84,9 @@ class SampledEvents:
     trial, taxel, bin : int64, shape (spikes,)
         In the order of bins; bin 0 holds each trial's first event.
     value : float32, shape (spikes,)
-        +1 or -1, or with more bits the step.
+        +1 or -1; with more bits, the step.
     first_us : float64, shape (trials,), us
-        When the first event comes after the true contact; infinite in a silent trial.
+        Time from the true contact to the first event; infinite in a silent trial.
     length_us : float64, shape (trials,), us
         From the true contact to the trial's end.
     """
@@ -106,7 +106,7 @@ class SampledEvents:
         return len(self.first_us)
 
     def bins_to(self, window_us: float) -> NDArray[np.int64]:
-        """Return how many bins of each trial lie within so much time after the contact and before the trial's end."""
+        """Return how many bins of each trial are within so much time after the contact and before the trial's end."""
         stop = np.minimum(window_us, self.length_us)
         with np.errstate(invalid="ignore"):
             bins = np.ceil((stop - self.first_us) / self.period_us - 1e-9)
@@ -202,9 +202,9 @@ def spikes_of(
     contact_us : float64, shape (trials,), us
         The true contact; NaN where there is none, and the trial is silent.
     window_us : float, us
-        How far after it to look.
+        Time after the contact that counts.
     random : numpy.random.Generator
-        Of the phases.
+        Source of the random phases.
     pool : int
         Squares of so many by so many taxels are averaged into one.
 

@@ -145,16 +145,16 @@ class NeuronPerClass(Parameters, ABC):
 
 
 class ConeRReadout(NeuronPerClass):
-    """Classify by a neuron a class, which `ConeR` teaches to fire at the window's end on its own class and never else.
+    """Classify by one neuron for each class, which `ConeR` trains to fire at the window's end on its class only.
 
     Parameters
     ----------
     tau : float, ms, above 0
-        Of the neurons.
+        Time constant of the neurons.
     bound : float, mV, above 0
-        The largest weight, either way.
+        The largest absolute weight.
     max_seconds : float, above 0
-        Of training a neuron; after it the best so far is kept.
+        Time limit for training a neuron; then the best weights so far are kept.
 
     Attributes
     ----------
@@ -240,7 +240,7 @@ def readout_responses(
     spikes : SampledEvents
     window_us : float, us
     labels : labels, shape (trials,)
-    folds : int64, shape (trials,), from 0 on
+    folds : int64, shape (trials,), counted from 0
 
     Returns
     -------

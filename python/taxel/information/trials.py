@@ -34,28 +34,29 @@ _KNOWN = (*_COLUMNS, "stop_us", "group", "host_ns")
 class LabelledTrial:
     """Hold one trial: a stretch of a recording, its label and its group.
 
-    Its label is that of the whole stretch, which a classifier tells from others; a `taxel.detect.Example` has the times
-    of labelled events, at which a neuron learns to fire.
+    Its label belongs to the whole stretch, which a classifier distinguishes from others. A `taxel.detect.Example` has
+    the times of labelled events, at which a neuron learns to fire.
 
     Parameters
     ----------
     source : Events or Frames
-        The recording it lies in; trials of one recording share it.
+        The recording of the trial; trials of one recording share it.
     label : str
     start_us : int, us
         The touch begins at the first event at or after it.
     stop_us : int, us, optional
         The trial's end (exclusive): nothing after it is used, and the length of the touch is known.
     group : str
-        What must not be split between folds (person, session, pose); every trial by itself where it is empty.
+        Trials of a group (person, session, pose) are not split between folds; if it is empty, the trial is a group by
+        itself.
     parameters : mapping of str to str
-        What else is known: radius, height, slant ...
+        Further known values: radius, height, slant ...
     name : str
-        Where it lies, for errors.
+        Place of the trial, for errors.
 
     Raises
     ------
-    ProblemError : a source of another kind, an empty label, or an end that does not lie after the start
+    ProblemError : a source of another kind, an empty label, or an end that is not after the start
 
     Examples
     --------
@@ -84,7 +85,7 @@ class LabelledTrial:
         if self.stop_us is not None:
             object.__setattr__(self, "stop_us", integer("stop_us", self.stop_us))
             if not self.stop_us > self.start_us:
-                raise ProblemError(f"{self.name}: stop {self.stop_us} us does not lie after start {self.start_us} us")
+                raise ProblemError(f"{self.name}: stop {self.stop_us} us is not after start {self.start_us} us")
 
     @property
     def array(self) -> Array:
@@ -100,13 +101,13 @@ def read_trials(
     Parameters
     ----------
     table : path
-        A .csv with a header line, its columns in any order. A recording is named by its path, name or stem; where
-        one is given the column may be absent. ``t_us`` is where to begin to look for the touch; ``host_ns`` settles it
-        where the recording began in mid-stream, as for `Labels`.
+        A .csv with a header line, its columns in any order. A recording is named by its path, name or stem; with a
+        single recording the column may be absent. The search for the touch begins at ``t_us``; ``host_ns`` decides if
+        the recording began in mid-stream, as for `Labels`.
     recordings : sequence of Recording
-        All of them must be named, and no other.
+        The table must name all of them, and no others.
     window_ms : float, ms, above 0, optional
-        The length of trials without ``stop_us``; needed where there are such.
+        The length of trials without ``stop_us``; needed if there are such trials.
 
     Returns
     -------
@@ -114,7 +115,7 @@ def read_trials(
 
     Raises
     ------
-    FormatError : a column is missing, or a cell that is no number (names file and line)
+    FormatError : a column is missing, or a cell that is not a number (names file and line)
     ProblemError : recordings and table do not match, a recording is there twice or has no times, a start outside its
         recording, trials without an end, trials that overlap, or the host's time of another run
     """
@@ -139,7 +140,7 @@ def read_trials(
         recording.path for recording in opened if not {str(recording.path), recording.name, _stem(recording)} & names
     ]
     if unnamed:
-        raise ProblemError(f"{file}: says nothing of {unnamed[0]}; name it, or leave the recording out")
+        raise ProblemError(f"{file}: does not name {unnamed[0]}; add it, or leave the recording out")
     sources = {id(recording): _source(recording) for recording in opened}
     spans = {key: _span(source) for key, source in sources.items()}
     clocks = (
@@ -172,14 +173,14 @@ def read_trials(
 
 
 def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> list[LabelledTrial]:
-    """Take each note of recordings as one trial from its time on; its text is the label.
+    """Take each note of recordings as a trial that begins at its time; its text is the label.
 
     Parameters
     ----------
     recordings : sequence of Recording
-        Notes written while it was recorded, or set in the panel; those without the board's time are left out.
+        Their notes were written while recording, or set in the panel; notes without the board's time are left out.
     window_ms : float, ms, above 0
-        How long after the touch to look.
+        Time after the touch that counts.
 
     Returns
     -------
@@ -208,13 +209,13 @@ def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> lis
 
 
 def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | None = None) -> list[LabelledTrial]:
-    """Take each recording as one trial from its beginning on; its folder's name is the label.
+    """Take each recording as one trial, from its beginning; its folder's name is the label.
 
     Parameters
     ----------
     recordings : sequence of Recording
     window_ms : float, ms, above 0, optional
-        How long after the first event to look; to the end where it is left out.
+        Time after the first event that counts. Default: to the end.
 
     Returns
     -------
@@ -275,7 +276,7 @@ def _inside(trial: LabelledTrial, recording: str, span: tuple[int, int] | None, 
     end = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
     if span is None or trial.start_us > span[1] or end < span[0]:
         content = "nothing" if span is None else f"{span[0]} to {span[1]} us"
-        raise ProblemError(f"{trial.name}: t_us {trial.start_us} lies outside {recording}, which holds {content}")
+        raise ProblemError(f"{trial.name}: t_us {trial.start_us} is outside {recording}, which holds {content}")
 
 
 def _apart(trials: list[LabelledTrial], window_us: int) -> None:
@@ -287,7 +288,7 @@ def _apart(trials: list[LabelledTrial], window_us: int) -> None:
         for trial, after in pairwise(sorted(trials_of_source, key=lambda trial: trial.start_us)):
             before, apart = trial.name.split(", ")[-1], after.start_us - trial.start_us
             if apart == 0:
-                raise ProblemError(f"{after.name}: begins where {before} does; a touch must stand there once")
+                raise ProblemError(f"{after.name}: begins where {before} does; each touch must be listed once")
             if trial.stop_us is None and apart < window_us:
                 raise refused(
                     "window_ms",

@@ -1,4 +1,4 @@
-"""What a setting costs on the wire while the sensor is touched."""
+"""Cost of a setting on the wire while the sensor is touched."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ __all__ = ["WIRE", "kilobits_per_second"]
 
 #: What the rates refer to, printed beside them.
 WIRE = (
-    "wire version 2: 2 bytes an event (kind 0), 4 with a value (kind 2); a datagram for each time at which something "
-    "changed, 24 bytes of its own, nothing held back; UDP and IP would add 28 a datagram; promises, states and totals "
+    "wire version 2: 2 bytes for each event (kind 0), 4 with a value (kind 2); a datagram for each time at which "
+    "something changed, with 24 bytes of header, sent at once; UDP and IP would add 28 bytes to each datagram; "
+    "promises, states and totals "
     "are not counted"
 )
 
@@ -35,7 +36,7 @@ def kilobits_per_second(spikes: SampledEvents, window_us: float, *, values: bool
 
     Notes
     -----
-    Up to 32 767 places an event is one word, so its size does not depend on where it lies.
+    Up to 32 767 places an event is one word, so its size does not depend on its place.
     """
     inside = spikes.bin < spikes.bins_to(window_us)[spikes.trial]
     word = 4 if values else 2

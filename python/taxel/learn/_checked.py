@@ -52,7 +52,7 @@ def checked_examples(
         for k in np.flatnonzero(~((pattern.start <= times[p]) & (times[p] <= pattern.stop)))[:1]:
             window = f"{pattern.start:g} to {pattern.stop:g} ms"
             raise ProblemError(
-                f"pattern {p}, target {k}: {shown(times[p][k].item())} ms lies outside the pattern's window {window}"
+                f"pattern {p}, target {k}: {shown(times[p][k].item())} ms is outside the pattern's window {window}"
             )
         if (np.diff(times[p]) <= 0).any():
             raise ProblemError(f"targets of pattern {p}: must ascend")

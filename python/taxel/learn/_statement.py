@@ -277,7 +277,7 @@ class PatternRows:
 
     @property
     def reach(self) -> float:
-        """Return the age of an input, ms, from which on its kernel is smaller than the rounding of the others."""
+        """Return the age of an input, ms, above which its kernel is smaller than the rounding of the others."""
         sizes = np.abs(self.values[self.values != 0])
         return (50 + np.log(sizes.max() / sizes.min())) * self.neuron.tau if len(sizes) else 0.0
 

@@ -23,7 +23,7 @@ from taxel.spikes import SpikeTrains
 
 
 def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin: bool = True) -> bool:
-    """Check a proof of infeasibility, with its rows computed anew from spikes and kernels in plain NumPy.
+    """Check a proof of infeasibility, with its rows computed again from spikes and kernels in plain NumPy.
 
     Every solution w satisfies ``row @ w == limit`` at a target and ``<= limit`` elsewhere. It follows that
     ``g @ w <= multipliers @ limits``, where g is the sum of the rows, each times its multiplier. If the minimum of
@@ -105,7 +105,7 @@ def check_gap(
     *,
     silence: Sequence[ArrayLike | None] | None = None,
 ) -> float:
-    """Check how far a fit can be from the minimum, with 6.9 to 6.14 computed anew in plain NumPy.
+    """Check how far a fit can be from the minimum, with 6.9 to 6.14 computed again in plain NumPy.
 
     Each term of 6.14 (of 6.11 for `ConeX`) is at least each of its tangents. With x the excess of the potential over
     what its row requires: D of a silent row is at least ``y * x`` for a multiplier y from 0 to the factor of D, C of a
@@ -126,7 +126,7 @@ def check_gap(
     patterns : sequence of SpikeTrains
     targets : sequence of float sequences, ms
     silence : sequence of float sequences of shape (windows, 2), ms, optional
-        As in `ConeR.fit`; of an `OnlineConeR` those of its window, from the oldest on. Not of a `ConeX`.
+        As in `ConeR.fit`; for an `OnlineConeR` those of its window, the oldest first. Not for a `ConeX`.
 
     Returns
     -------

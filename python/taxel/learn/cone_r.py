@@ -100,7 +100,7 @@ class ConeR(SpikeLearner):
     unreachable_ : list of (pattern, target)
         Targets at which no weights within the bounds reach the threshold; the other targets are fitted.
     refires_ : int
-        Output spikes on the training patterns within `tau` of another one, with no target between.
+        Output spikes on the training patterns within `tau` of another output spike, with no target between.
     neuron_ : Neuron
         The trained neuron: a copy with ``time="grid"``.
 
@@ -379,8 +379,8 @@ def _weighed(name: str, count: int, trains: str) -> None:
     if count > _MOST_TRAINS:
         raise refused(
             name,
-            f": {count} {trains}, at most {_MOST_TRAINS} can be weighed, as memory goes with the square and time "
-            "with the cube of them; take an encoder that pools taxels (taxel train --recipe touch, or --encoder "
+            f": {count} {trains}, at most {_MOST_TRAINS} can be weighed, as memory grows with their square and time "
+            f"with their cube; take an encoder that pools taxels (taxel train --recipe touch, or --encoder "
             "contact_area), fewer levels, or a part of the array",
         )
 
@@ -433,7 +433,7 @@ def _warn(cone: ConeR) -> None:
         more = f" and {len(cone.unreachable_) - 5} more" if len(cone.unreachable_) > 5 else ""
         within = f"within {_shown(cone.lb)} to {_shown(cone.ub)} mV"
         warn(
-            f"no weights {within} bring {listed}{more} to the threshold; the rest was fitted",
+            f"no weights {within} raise {listed}{more} to the threshold; the rest was fitted",
             stacklevel=4,
         )
     if cone.refires_:
@@ -447,7 +447,7 @@ def _warn(cone: ConeR) -> None:
         )
     if cone.status_ != "solved":
         warn(
-            f"the objective is only proven to lie within {cone.gap_:.1e} of its least value (tolerance "
+            f"the objective is only proven to be within {cone.gap_:.1e} of its least value (tolerance "
             f"{cone.tolerance:.1e})",
             stacklevel=4,
         )

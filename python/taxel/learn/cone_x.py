@@ -231,7 +231,8 @@ class ConeX(SpikeLearner):
         margin have an objective smaller by more than `tolerance` of it, or by more than 1e-10 of the value of B for
         zero weights. "feasible": the search ended before that was proven (`reason_`). "infeasible": `certificate_`
         proves it. "stopped": none of these is known. "assigned": `weights_` was assigned after the fit, and
-        what that said of its own weights is gone (`objective_`, `parts_`, `gap_`, `margin_`, `reason_`, `violation_`).
+        the results about the weights of that fit are gone (`objective_`, `parts_`, `gap_`, `margin_`, `reason_`,
+        `violation_`).
     weights_ : float64, shape (trains,), mV
         The best so far if stopped, which may miss any row; NaN if infeasible, or if only the least margin tried is
         proven to be.
@@ -256,7 +257,7 @@ class ConeX(SpikeLearner):
     violation_ : float, mV
         The largest violation of a row: of a target, or of silence with half its margin.
     engine_ : {"native", "cone solver"}
-        The engine that closed the gap: taxel's own, or row generation around Clarabel if the own one did not.
+        The engine that closed the gap: taxel's engine, or row generation around Clarabel if taxel's engine did not.
     certificate_ : Certificate or None
         The proof, if infeasible.
     problem_ : ConeXProblem

@@ -64,7 +64,7 @@ class Checked:
 
 
 def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> Checked:
-    """Check that a fitted neuron fires at every target and nowhere else, computed anew in plain NumPy.
+    """Check that a fitted neuron fires at every target and nowhere else, computed again in plain NumPy.
 
     Spikes are put at the targets. Then the neuron fires at them if its potential reaches the threshold at each (6.9a),
     and nowhere else if it stays below at all other times outside the refractory times (6.9b), up to the horizon. Both
@@ -142,7 +142,7 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
             elif fires is None:
                 unproven.append(f"pattern {p}: whether it fires at target {k} ({t:g} ms) is not proven")
             if rows.on_grid and not rows.is_point(float(t)):
-                wrong.append(f"pattern {p}: target {k} ({t:g} ms) lies between grid points, where no neuron fires")
+                wrong.append(f"pattern {p}: target {k} ({t:g} ms) is between grid points, where no neuron fires")
             if not rows.on_grid:
                 slope = min(slope, float(-rows.slope(k)[0] @ w + rows.fall(k)))
         exponentials = exact.left
@@ -159,7 +159,7 @@ class _Least(NamedTuple):
 
 
 def _vague(excess: _Floats, rounding: _Floats) -> NDArray[np.bool_]:
-    """Return where rounding is a considerable part of an excess, or either is no number."""
+    """Return where rounding is a considerable part of an excess, or either is not a number."""
     return ~(rounding < _VAGUE * np.abs(excess))
 
 

@@ -23,7 +23,7 @@ _Key = tuple[str, int | None, str, str, int | None]
 
 @dataclass(frozen=True)
 class Edit:
-    """Put `new` in the place of `old`; without `old` mark it, without `new` delete `old`."""
+    """Replace `old` by `new`; without `old` mark it, without `new` delete `old`."""
 
     old: Note | None
     new: Note | None

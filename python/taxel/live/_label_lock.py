@@ -103,7 +103,7 @@ def locked_at_once(folder: Path) -> Iterator[bool]:
 
     Raises
     ------
-    ProblemError, OSError : as of `locked`, but for the time
+    ProblemError, OSError : as of `locked`, except the time limit
     """
     turn = _turn(folder)
     if not turn.lock.acquire(blocking=False):
@@ -128,7 +128,7 @@ def _file(path: Path) -> Iterator[bool]:
         lock = os.open(path, os.O_RDONLY | _HOW)
     try:
         if not stat.S_ISREG(os.fstat(lock).st_mode):
-            raise ProblemError(f"{path}: is no regular file, as the lock of tables must be; nothing was saved")
+            raise ProblemError(f"{path}: is not a regular file, as the lock of tables must be; nothing was saved")
         if not _lock(lock):
             yield False
             return

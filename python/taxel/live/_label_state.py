@@ -85,7 +85,7 @@ def from_json(saved: dict[str, Any]) -> Acknowledged:
 
 def not_saved(path: Path, error: Exception) -> FormatError:
     reason = f"not what taxel saved of the labels that it acknowledged ({error})"
-    return FormatError(f"{state_path(path)}: {reason}; delete it to go on without")
+    return FormatError(f"{state_path(path)}: {reason}; delete it to continue without it")
 
 
 def newest_of(path: Path, link: Path | None) -> Path:

@@ -2,9 +2,9 @@
 
 A write takes a lock on a file beside the table, reads the table again, joins (`_label_join`), and exchanges the new
 file for the old one in one step. Where the file that comes out is not the one that was read, it is put back, and the
-join is made anew.
+join is made again.
 
-What was acknowledged is saved beside the table, in ``.NAME.acknowledged``: its state before and after a write, with
+The acknowledged labels are saved beside the table, in ``.NAME.acknowledged``: its state before and after a write, with
 digests of both texts, before the table is exchanged, and the state after it alone, afterwards. A process that is killed
 in between leaves a state that the text of the table decides.
 """
@@ -439,7 +439,7 @@ class LabelTables:
 
         Raises
         ------
-        ProblemError : the table is no table of labels or cannot be written, or another program holds the lock
+        ProblemError : the table is not a table of labels or cannot be written, or another program holds the lock
         """
         joined = self._write(table, names, lambda known, file_rows: join(known, file_rows, requests))
         return joined.outcomes, self._written(joined)
@@ -568,8 +568,8 @@ class LabelTables:
     def _close_oldest(self, most: int = _MOST_WATCHED) -> bool:
         """Close the table that was replaced or written to longest ago, if they are too many or too large; say whether.
 
-        What was written to it is taken in. The last one stays, as a program may write to it this moment, but for
-        `most` 0, where the disk is full: then those stay that have something which cannot be taken in.
+        What was written to it is read. The last file stays, as a program may write to it this moment, except for `most`
+        0, where the disk is full: then the files stay whose changes cannot be read.
         """
         with self._watched_lock:
             count, size = len(self._watched), sum(len(watched.file.text or b"") for watched in self._watched)
@@ -676,7 +676,7 @@ def _new_file(path: Path, about: os.stat_result | None, text: bytes) -> Iterator
 
 
 def _put(name: str, file: _File) -> bool:
-    """Put a new file in the place of a table, the old one in its own; return False if there is a table by now."""
+    """Exchange a table with a new file; return False if there is a table by now."""
     if file.descriptor is None:
         try:
             create(name, file.path)

@@ -1,4 +1,4 @@
-"""The recordings that the panel shows and that are no files of a board's events: read, and handed to its server."""
+"""The recordings that the panel shows and that are not files of a board's events: read, and handed to its server."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ class ShownFiles:
                 self._folder = None
 
     def forget(self) -> None:
-        """Read the next recording anew, whose layout file was written."""
+        """Read again the next recording whose layout file was written."""
         with self._lock:
             self._trials = None
 

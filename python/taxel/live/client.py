@@ -55,7 +55,7 @@ _CURVES = np.dtype([("force", "<u4"), ("area", "<u4"), ("x", "<f4"), ("y", "<f4"
 class Subject:
     """Name the sensor or recording that is shown.
 
-    A new object of the same name means that time begins anew, as after a reset of the board.
+    A new object of the same name means that time begins again, as after a reset of the board.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class Frame:
     change : int8, shape (rows, columns), ticks
         The largest recent change, decaying.
     full, full_change : int, ticks
-        The largest value above rest, and the largest change either way, of the last 10 s; 1 at least.
+        The largest value above rest, and the largest absolute change, in the last 10 s; at least 1.
     """
 
     t: int
@@ -94,7 +94,7 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Hold the contact as a whole over time.
+    """Hold force, area and centre of the whole contact over time.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class Spikes:
     train : int64, shape (n,)
     value : float64, shape (n,)
     left_out : int
-        How many more there were than the server sends at once.
+        Number of further spikes, which the server does not send at once.
     """
 
     encoder: str
@@ -139,9 +139,8 @@ Item = Frame | Curves | Spikes | Detection | Note
 class PanelClient:
     """Receive what a panel shows: a context manager, and an iterator over pairs of `Subject` and `Item`.
 
-    The client is one more viewer of the panel. It receives a frame only when it has asked for one, so that it may be
-    as slow as it likes without delaying what is received and recorded. The iteration ends with the recording or with
-    the panel's server.
+    The client is one more viewer of the panel. It receives a frame only after a request, so that a slow client does not
+    delay receiving and recording. The iteration ends with the recording or with the panel's server.
 
     Parameters
     ----------
@@ -206,7 +205,7 @@ class PanelClient:
         Parameters
         ----------
         speed : float, 0.001 to 100
-            Board time over real time.
+            Speed: board time divided by real time.
         """
         self._send({"type": "play", "speed": number("speed", speed)})
 
@@ -298,7 +297,7 @@ class PanelClient:
             self._restart()
 
     def _restart(self) -> None:
-        """Begin time anew."""
+        """Begin time again."""
         self._time = self._curves_until = _NO_TIME
         self._full, self._full_change = _Scale(), _Scale()
 

@@ -41,11 +41,11 @@ _WAIT_S = 0.5
 
 
 class Live:
-    """Receive a board's datagrams, record them and read them out, as they arrive.
+    """Receive a board's datagrams; record and read them out as they arrive.
 
-    A context manager, and an iterator of detections that ends when `stop` was called. It works in threads of its own:
-    one receives, decodes and records, one encodes and reads out, and while it records a third receives. A queue that is
-    full drops data, and counts it.
+    It is a context manager, and an iterator of detections that ends after `stop` was called. It works in separate
+    threads: one receives, decodes and records, one encodes and reads out, and while it records a third receives. A
+    queue that is full drops data, and counts it.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ class Live:
             inlet.begin(partial(self._core.sample, _stream_name(source)))
 
     def _again(self, **changed: Any) -> Live:
-        """Return another one that works alike, with other options; it receives from the same place by default."""
+        """Return another `Live` that works alike, with other options; by default it receives from the same place."""
         host, port = self._listened_on
         options = replace(self._options, **{"host": host, "port": port, "remote": None, **changed})
         return Live(**{field.name: getattr(options, field.name) for field in fields(options)})
@@ -225,10 +225,10 @@ class Live:
         return self._core.is_over()
 
     def copies(self) -> _core.Copies:
-        """Return what copies everything that arrives from now on, for other computers.
+        """Return an object that copies all data that arrive after this call, for other computers.
 
-        Its ``next(timeout)`` returns the next copy, or None: ("parcel", bytes) for datagrams, ("frame", JSON) ten
-        times a second, ("detection", JSON); ``is_over()`` says whether the pipeline has ended and all were taken.
+        Its ``next(timeout)`` returns the next copy, or None: ("parcel", bytes) for datagrams, ("frame", JSON) ten times
+        a second, ("detection", JSON); ``is_over()`` is true if the pipeline has ended and all copies were taken.
         """
         return self._core.copy()
 
@@ -306,7 +306,8 @@ class Live:
     def frame(self) -> NDArray[np.uint16] | NDArray[np.float32]:
         """Values that the taxels hold, in `unit`, shape (rows, columns), ten times a second.
 
-        Those of a board without any event so far are 0; those of frames of numbers are NaN before the first one.
+        For a board, a taxel without any event so far is 0; for frames of numbers, values are NaN before the first
+        frame.
         """
         if self.frame_us is None:
             return self._core.frame().reshape(self.array.shape)
@@ -349,11 +350,11 @@ class Live:
         Parameters
         ----------
         name : str
-            Of the source, as in `sources`.
+            Name of the source, as in `sources`.
 
         Raises
         ------
-        ProblemError : no other board of that name
+        ProblemError : no other board has that name
 
         Examples
         --------
@@ -370,16 +371,16 @@ class Live:
     def sample(self, name: str, values: ArrayLike, arrived_ns: int | None = None) -> None:
         """Record numbers of a source whose values a program passes.
 
-        Of a source with an array they are those of a line of a frame.
+        For a source with an array, they are those of a line of a frame.
 
         Parameters
         ----------
         name : str
-            Of the source, as in `sources`.
+            Name of the source, as in `sources`.
         values : float, shape (columns,), each in the unit of its column (s, m/s2 ...)
             One for each column, with its own time stamp; NaN where a value is missing.
         arrived_ns : int, ns since 1970, optional
-            When they arrived. Default: now.
+            Time of their arrival. Default: now.
 
         Raises
         ------
@@ -393,7 +394,7 @@ class Live:
         self._core.sample(text("name", name), row.tolist(), arrival)
 
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
-        """Use the values that taxels hold now as their rest from now on: for taxels that drift.
+        """Use the present values of taxels as their rest from this time: for taxels that drift.
 
         The new rest of a taxel of frames, which are noisy, is the median of its last second. An encoder with a tare
         reads the taxels above that rest; the recording contains the zeroing, with the rests before and after, and
@@ -455,16 +456,17 @@ class Live:
     def record(
         self, path: str | os.PathLike[str], *, compression: str = "none", overwrite: bool = False
     ) -> Summary | None:
-        """Record what arrives from now on, of all sources, beginning with the registers and the held values.
+        """Record what arrives after this call, from all sources, beginning with the registers and the held values.
 
-        The previous recording ends with what arrived before: each datagram, and each line, belongs to one of the two.
+        The previous recording ends with the data that arrived before: each datagram, and each line, belongs to one of
+        the two.
 
         Parameters
         ----------
         path : path
             A new file, as `record` of the constructor.
         compression : {"none", "lz4", "zstd"}
-            Of a `.mcap`.
+            Compression of a `.mcap`.
         overwrite : bool
             Whether an existing file may be replaced.
 

@@ -1,7 +1,7 @@
 """The lab streaming layer: its streams as sources of a recording, and detections as one of its streams.
 
-Its library listens on every address of the machine, TCP and UDP from port 16572 on, and taxel cannot change that: so
-it is loaded only if a stream is named, and then with a warning.
+Its library listens on every address of the machine, TCP and UDP, at port 16572 and above. taxel cannot change that, so
+it loads the library only if a stream is named, and then warns.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ def _pylsl() -> Any:
     except ImportError:
         raise ImportError(f"pylsl is not installed: {installing('lsl')}") from None
     warn(
-        "the lab streaming layer listens on all addresses of this machine, TCP and UDP from port 16572 on", stacklevel=3
+        "the lab streaming layer listens on all addresses of this machine, TCP and UDP, at port 16572 and above",
+        stacklevel=3,
     )
     return pylsl
 
@@ -43,11 +44,12 @@ class LslInlet:
     Attributes
     ----------
     columns : list of str
-        Its time stamp, `t_s`, s of the sender's clock, then its channels, by their labels if it has some.
+        First its time stamp, `t_s` (s of the sender's clock), then its channels, named by their labels if there are
+        any.
 
     Raises
     ------
-    ProblemError : no stream of that name within 3 s, or one of texts
+    ProblemError : no stream of that name within 3 s, or a stream of texts
     ImportError : pylsl is not installed (``pip install 'taxel[lsl]'``)
     """
 
@@ -73,7 +75,7 @@ class LslInlet:
         self._thread: threading.Thread | None = None
 
     def begin(self, receive: Callable[[list[float], int], object]) -> None:
-        """Call `receive` with time stamp and values, and their arrival (ns since 1970), in a thread of its own."""
+        """Call `receive` with time stamp and values, and their arrival (ns since 1970), in a separate thread."""
 
         def run() -> None:
             while not self._ends.is_set():

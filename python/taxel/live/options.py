@@ -40,7 +40,7 @@ class LiveOptions(StatedOptions):
             detector("readout", readout)
         if remote is not None:
             if instance("remote", remote, RemoteBoard).in_use:  # type: ignore[type-abstract]
-                raise refused("remote", ": is in use already; make another one")
+                raise refused("remote", ": is in use already; make another remote board")
             array = remote.array if array is None else array
             registers = Registers._of(remote.registers, remote.array) if registers is None else registers
             differences = flag("differences", differences) or remote.differences

@@ -29,16 +29,16 @@ from taxel.tare import Tare
 
 
 class Panel:
-    """Serve the live panel, until it is stopped. A context manager.
+    """Serve the live panel until it is stopped; a context manager.
 
-    A thread of its own serves all clients. One that reads slowly, or never, delays neither the others nor what is
+    A separate thread serves all clients. A client that reads slowly, or never, delays neither the others nor what is
     received and recorded. The protocol is documented, so any program may be a client; `PanelClient` is one.
 
     Parameters
     ----------
     shows : Live or path
-        A live board; or a recording to show first, any file or folder that `taxel.open` reads: of a folder its first
-        recording. Others of the folder can be opened too.
+        A live board; or a recording to show first, any file or folder that `taxel.open` reads; from a folder, its first
+        recording. The page can open the other recordings of the folder.
     control : str, optional
         The board's serial line ("COM3", "/dev/ttyACM0", host:port), with which the page reads and sets registers.
     folder : path, optional
@@ -46,14 +46,14 @@ class Panel:
     port : int, 0 to 65535
         The TCP port; 0 finds a free one, see `url`.
     host : str
-        The address of this machine to listen on. On any but loopback every user with the token of the panel's address
-        can see the board and set registers, over a connection that is not encrypted.
+        The address of this machine to listen on. On any address except loopback, every user with the token of the
+        panel's address can see the board and set registers, over a connection that is not encrypted.
     opens : function of a path, optional
-        Opens the recording that is shown first, or of a folder each of its files, and returns its trials, and must heed
-        `options`; default: `TextOptions.open_joined`.
+        Opens the recording that is shown first, or each file of a folder, and returns its trials; it must use
+        `options`. Default: `TextOptions.open_joined`.
     options : taxel.recording.text_options.TextOptions, optional
-        What the files do not hold themselves; the page trains on a file by them too. Labels of frames that have times
-        by its `rate_hz` are saved in numbers of frames.
+        Facts that the files do not hold; the page uses them for training too. If `rate_hz` gives the times of frames,
+        labels are saved as numbers of frames.
 
     Raises
     ------
@@ -170,11 +170,11 @@ class Panel:
         Parameters
         ----------
         source : str
-            "serial:/dev/ttyACM0,array=16x16" ...; of a board "board:127.0.0.1:5208".
+            For example "serial:/dev/ttyACM0,array=16x16"; for a board "board:127.0.0.1:5208".
 
         Raises
         ------
-        ProblemError : as `listen`; a text that is no source, or lines that do not fit what it says
+        ProblemError : as `listen`; a text that is not a source, or lines that do not fit it
         OSError : the place cannot be opened; the source before stays in use
 
         Examples
@@ -197,7 +197,7 @@ class Panel:
             self._attach(after)
 
     def delta_intensity(self, on: bool) -> None:
-        """Interpret intensities as differences from the previous value, or as values, from now on.
+        """Interpret intensities as differences from the previous value, or as values, from this time.
 
         Earlier events were decoded the other way, so they are discarded: time, values, a readout and its tare restart,
         on the same address.
@@ -220,9 +220,9 @@ class Panel:
             self._attach(before._again(differences=on))
 
     def read_out(self, readout: str | os.PathLike[str]) -> None:
-        """Read the board out with another readout from now on: time, values and past restart, on the same address.
+        """From this time, read the board out with another readout: time, values and past restart, on the same address.
 
-        A readout that needs a tare uses that of the board, if there is one; else the values that the taxels hold now
+        A readout that needs a tare uses the tare of the board, if there is one; else the present values of the taxels
         are their rest, so the sensor must be unloaded.
 
         Parameters
@@ -233,7 +233,7 @@ class Panel:
         Raises
         ------
         ProblemError : as `listen`; the readout does not fit the board
-        FormatError : the file holds no readout
+        FormatError : the file is not a readout
         OSError : there is no such file; another program has opened the port in the meantime
         """
         with self._restarting:
@@ -252,7 +252,7 @@ class Panel:
             self._attach(after)
 
     def _attach(self, live: Live) -> None:
-        """Show another `Live` from now on."""
+        """Show another `Live` from this time."""
         self._core.attach(live._core)
         self._live = live
 
@@ -298,7 +298,7 @@ class Panel:
 def _folder_and_name(path: Path, options: TextOptions) -> tuple[Path, str]:
     """Return the folder of a recording and its name there; of a folder its first recording.
 
-    The server indexes it when a client opens it; what is no recording is refused now.
+    The server indexes it when a client opens it; a file that is not a recording is refused now.
     """
     if is_folder(path):
         files = recordings_in(path, options.layout)
@@ -312,7 +312,7 @@ def _folder_and_name(path: Path, options: TextOptions) -> tuple[Path, str]:
     try:
         path.name.encode()
     except UnicodeEncodeError:
-        raise ProblemError(f"{path}: its name is no UTF-8, which the page cannot hold; rename it") from None
+        raise ProblemError(f"{path}: its name is not UTF-8, so the page cannot show it; rename it") from None
     return path.parent, path.name
 
 

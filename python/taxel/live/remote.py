@@ -1,4 +1,4 @@
-"""A board of another computer, whose datagrams a package beside taxel carries to this one."""
+"""A board of another computer, whose datagrams a package beside taxel carries to this computer."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class RemoteBoard(ABC):
 
     @abstractmethod
     def begin(self, feed: ParcelFeed) -> None:
-        """Set `in_use`, and pass what arrives to a pipeline from now on, from a thread of its own.
+        """Set `in_use`, and from then pass what arrives to a pipeline, from a separate thread.
 
         Parameters
         ----------

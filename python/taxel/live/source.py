@@ -29,13 +29,13 @@ class Source:
     rate : float, 1/s, above 0
         Frames per second; each push advances the source's clock by one frame.
     bits : int, 1 to 16
-        Bits of the values. Where the board resolves fewer at this rate, values are shifted right by `shift`.
+        Bits of the values. If the board resolves fewer bits at this rate, values are shifted right by `shift`.
     noise_floor : int, 0 to 255
         A change above it makes an event.
     to : str
         Address and port that the datagrams are sent to.
     board : int, 0 to 65535
-        Its number, by which receivers distinguish sources on one address.
+        Number of the board, by which receivers distinguish sources on one address.
 
     Raises
     ------
@@ -79,12 +79,12 @@ class Source:
         Parameters
         ----------
         frame : int, shape (rows, columns) or flat, 0 to 2**bits - 1
-            Readings that are no whole numbers are scaled before: ``np.rint(readings / full * (2**bits - 1))``, `full`
+            Readings that are not whole numbers are scaled before: ``np.rint(readings / full * (2**bits - 1))``, `full`
             the greatest reading.
 
         Raises
         ------
-        ProblemError : another shape, or a value that is no whole number of that many bits (names the taxel)
+        ProblemError : another shape, or a value that is not a whole number of that many bits (names the taxel)
         OSError : the system refuses to send
         """
         ticks = np.minimum(self._whole(frame) >> self.shift, self.registers.ramp)

@@ -22,8 +22,8 @@ class Summary:
     counters : dict
         As `Live.counters`, at the end.
     verdict : Verdict
-        That nothing was lost after arrival, what was lost where, or that nothing arrived: a line of text with a status
-        and numbers by cause (`taxel.Verdict`).
+        Whether data were lost after arrival, and where, or that nothing arrived: a line of text with a status and
+        numbers by cause (`taxel.Verdict`).
     path : Path or None
         The recording; None if nothing arrived: then a new file is removed, and an earlier one stays.
     tare : Tare or None

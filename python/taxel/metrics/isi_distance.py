@@ -16,13 +16,13 @@ def isi_distance(a: Pattern, b: Pattern, *, window: tuple[float, float] | None =
     Parameters
     ----------
     a, b : float64, shapes (n,) and (m,), ms, ascending; or SpikeTrains with equally many trains
-        Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
+        Either may be empty. For patterns, the sum over trains; signed trains are split into ON and OFF.
     window : (start, stop), ms
-        Window of the mean; default: the widest of the patterns' own windows; lists of times have none.
+        Window of the mean; default: the widest window of the patterns; lists of times have none.
 
     Returns
     -------
-    float, from 0 to 1 a train
+    float, from 0 to 1 for each train
 
     Raises
     ------

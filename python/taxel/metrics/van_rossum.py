@@ -11,13 +11,13 @@ _DEFAULT = defaults("van_rossum")
 def van_rossum(a: Pattern, b: Pattern, *, tau: float, normalisation: str = _DEFAULT.normalisation) -> float:
     """Return the Euclidean distance of two spike trains smoothed by an exponential.
 
-    Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on; the squared difference is integrated over all time,
+    Each spike becomes ``exp(-(t - t_i) / tau)`` after its time; the squared difference is integrated over all time,
     in closed form, and the root taken. The distance of equal trains is exactly 0.
 
     Parameters
     ----------
     a, b : float64, shapes (n,) and (m,), ms, ascending; or SpikeTrains with equally many trains
-        Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
+        Either may be empty. For patterns, the sum over trains; signed trains are split into ON and OFF.
     tau : float, ms, above 0
     normalisation : {"spike", "tau", "none"}
         Divisor of the integral: ``tau / 2``, so that the distance of one additional spike is 1, as in elephant; `tau`,

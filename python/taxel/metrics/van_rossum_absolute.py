@@ -18,13 +18,13 @@ def van_rossum_absolute(
 ) -> float:
     """Return the absolute difference of two smoothed spike trains, summed over time.
 
-    Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on, as for `van_rossum`; but the absolute difference, as
+    Each spike becomes ``exp(-(t - t_i) / tau)`` after its time, as for `van_rossum`; but the absolute difference, as
     printed in 5.10, is summed over time instead of its square.
 
     Parameters
     ----------
     a, b : float64, shapes (n,) and (m,), ms, ascending; or SpikeTrains with equally many trains
-        Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
+        Either may be empty. For patterns, the sum over trains; signed trains are split into ON and OFF.
     tau : float, ms, above 0
     window : (start, stop), ms, optional
         The interval of the sum, 0 to T in 5.10; default: all time.

@@ -23,15 +23,15 @@ def van_rossum_spatial(
 ) -> float:
     """Return the Euclidean distance of two patterns smoothed in time and over the array.
 
-    Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on (5.8) and adds ``exp(-d / sigma)`` times that to the
+    Each spike becomes ``exp(-(t - t_i) / tau)`` after its time (5.8) and adds ``exp(-d / sigma)`` times that to the
     taxel at distance d (5.11). The squared differences are integrated over all time, in closed form, and summed over
     taxels; the root of that is the distance. The distance of equal patterns is exactly 0.
 
     Parameters
     ----------
     a, b : SpikeTrains with one train a taxel, or several for each
-        Signed ones are split into ON and OFF. If each taxel has several trains (all of one kind, then all of the next),
-        each kind is smoothed separately.
+        Signed trains are split into ON and OFF. If each taxel has several trains (all of one kind, then all of the
+        next), each kind is smoothed separately.
     array : Array
         The positions of the taxels; those that do not exist must have no spikes and are ignored.
     tau : float, ms, above 0

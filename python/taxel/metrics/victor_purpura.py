@@ -13,7 +13,7 @@ def victor_purpura(a: Pattern, b: Pattern, *, q: float) -> float:
     Parameters
     ----------
     a, b : float64, shapes (n,) and (m,), ms, ascending; or SpikeTrains with equally many trains
-        Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
+        Either may be empty. For patterns, the sum over trains; signed trains are split into ON and OFF.
     q : float, 1/ms, 0 or more; infinite: only spikes at exactly the same time match
 
     Returns

@@ -11,13 +11,13 @@ def victor_purpura_multi_unit(a: SpikeTrains, b: SpikeTrains, *, q: float, k: fl
     """Return the least cost of changing pattern `a` into pattern `b`, where a spike may also change its train.
 
     Removing or adding a spike costs 1, moving it by dt costs ``q * |dt|``, moving it to another train costs `k`. With
-    ``k = 0`` the trains are pooled; from ``k = 2`` on they are separate, and this is `victor_purpura` summed over
+    ``k = 0`` the trains are pooled; with k of 2 or more they are separate, and this is `victor_purpura` summed over
     trains.
 
     Parameters
     ----------
     a, b : SpikeTrains with equally many trains
-        Signed ones are split into ON and OFF, which are trains of their own.
+        Signed trains are split into ON and OFF, which are separate trains.
     q : float, 1/ms, 0 or more; infinite: only spikes at exactly the same time match
     k : float, 0 or more
 

@@ -101,7 +101,7 @@ def _verdict(source: RecordedSource, sources: Mapping[str, RecordedSource]) -> V
 
 
 def _ends(path: Path) -> bytes:
-    """Return a file's size and its first and last bytes, in which times and checksums stand: a copy has the same."""
+    """Return a file's size and its first and last bytes, which hold times and checksums: a copy has the same."""
     with open_file(path) as file:
         size = file.seek(0, os.SEEK_END)
         file.seek(max(size - _END, 0))
@@ -120,8 +120,8 @@ class Slices(Mapping[str, RecordedSource]):
         source = self._slices[name]
         if self._apart():
             raise ProblemError(
-                f"{self._origin.path}: a slice by one clock, and its sources ({', '.join(self)}) have each its own; "
-                "say on_clock(name) before between"
+                f"{self._origin.path}: a slice by one clock, but its sources ({', '.join(self)}) have different "
+                f"clocks; call on_clock(name) before between"
             )
         return source
 

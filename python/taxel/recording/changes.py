@@ -17,9 +17,14 @@ class Zeroing:
     x, y : int, taxels
         The taxel's column and row.
     rest : float, ticks
-        The rest from then on.
+        The rest after it.
     before : float, ticks, optional
         The rest before, if it was known.
+
+    Examples
+    --------
+    >>> Zeroing(5000, 3, 2, rest=120.0, before=100.0)
+    Zeroing(t=5000, x=3, y=2, rest=120.0, before=100.0)
     """
 
     t: int
@@ -43,7 +48,7 @@ class BoardChange:
         "reset": the board was reset, so the values of its taxels are unknown until their next event. "wire": it
         switched to another version of the wire.
     version : int, 1 or more, or None
-        The version of the wire from then on.
+        The version of the wire after it.
     asked : bool
         Whether the host requested the change; otherwise it was detected in the board's datagrams.
 

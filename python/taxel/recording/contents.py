@@ -1,4 +1,4 @@
-"""What a recording holds: of each source a header in common, and a board's events, frames, or a stream of numbers."""
+"""Contents of a recording: for each source a common header, and a board's events, frames, or a stream of numbers."""
 
 from __future__ import annotations
 
@@ -264,8 +264,8 @@ def several(sources: Mapping[str, RecordedSource]) -> Several:
 
     def refuse() -> NoReturn:
         raise ProblemError(
-            f"{path}: holds {len(sources)} sources ({names}); say which, as recording.sources["
-            f"{next(iter(sources))!r}]; taxel convert --source NAME writes one to a file of its own"
+            f"{path}: holds {len(sources)} sources ({names}); choose one by recording.sources["
+            f"{next(iter(sources))!r}]; taxel convert --source NAME writes a source to a separate file"
         )
 
     refused: Once[Any] = Once(refuse)

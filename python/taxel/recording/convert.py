@@ -46,7 +46,7 @@ def convert(
     compression: str = "none",
     overwrite: bool = False,
 ) -> list[str]:
-    """Write a recording as another kind of file, named by the target's ending.
+    """Write a recording as the kind of file that the target's ending names.
 
     Parameters
     ----------
@@ -55,15 +55,15 @@ def convert(
     frames_hz : float, Hz, optional
         Write frames at this rate (.mcap, .npz, .csv, .h5) instead of events.
     compression : {"none", "lz4", "zstd"}
-        Of a .mcap.
+        Compression of a .mcap.
     overwrite : bool
         Whether an existing file may be replaced.
 
     Returns
     -------
     list of str
-        A line for each kind of information that was lost: `Recording.lost` of the source, and what the target cannot
-        hold; empty if nothing is lost.
+        A line for each kind of information that was lost: `Recording.lost` of the source, and the information that the
+        target cannot hold; empty if nothing is lost.
 
     Raises
     ------
@@ -89,13 +89,13 @@ def convert(
         raise ProblemError(f"{path}: ends in {kind or 'nothing'!r}; must be {', '.join(KINDS)}")
     text("compression", compression, ("none", "lz4", "zstd"))
     if not flag("overwrite", overwrite) and os.path.lexists(path):
-        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(path))
+        raise FileExistsError(errno.EEXIST, "exists already; give overwrite=True to replace it", str(path))
     if frames_hz is not None:
         period_us("frames_hz", frames_hz)
     contents = _contents(source)
     if frames_hz is not None:
         if isinstance(source, Frames):
-            raise refused("frames_hz", ": frames keep their own times; open the file and ask it for frames(rate_hz)")
+            raise refused("frames_hz", ": frames keep their times; open the file and call frames(rate_hz)")
         if contents.is_several and share_clock(contents.sources):
             contents = alone(
                 {name: as_frames(source, frames_hz, name="frames_hz") for name, source in contents.sources.items()}
@@ -126,7 +126,7 @@ def _write_lsa(path: Path, source: RecordedSource, overwrite: bool) -> None:
     """Write a `.lsa` and its `.lss` whole; until then an older pair stays as it is."""
     marker = path.with_suffix(".lss")
     if not overwrite and os.path.lexists(marker):
-        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(marker))
+        raise FileExistsError(errno.EEXIST, "exists already; give overwrite=True to replace it", str(marker))
     with (
         whole_file(path, overwrite=overwrite) as temporary,
         tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder,

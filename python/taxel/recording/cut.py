@@ -36,18 +36,18 @@ def cut(
     start_us, stop_us : float, us
         The interval to keep, by the board's clock: ``start_us <= t < stop_us``.
     columns, rows : slice, optional
-        The rectangle to keep, within the array; it becomes a sensor of its own, whose columns and rows count from 0.
+        The rectangle to keep, within the array; it becomes a separate sensor, whose columns and rows count from 0.
         With all columns and rows the recording is unchanged.
     label : str, optional
-        Cut around each note of this text; the result is one recording a note, and may be empty.
+        Cut around each note with this text; the result has one recording for each note, and may be empty.
     before_us, after_us : float, us
         Time to keep before and after the note.
 
     Returns
     -------
     list of Recording
-        One recording, or one a note. Times do not change. Its `lost` lists what a part by region cannot hold
-        (datagrams); its registers are those of the whole sensor.
+        One recording, or one for each note. Times do not change. `Recording.lost` lists the information that a part by
+        region cannot hold (datagrams); its registers are those of the whole sensor.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def _bounds(chosen: slice) -> str:
 
 
 def region(contents: Contents, columns: slice, rows: slice) -> Contents:
-    """Return the part of a recording within a rectangle, as a sensor of its own; unchanged if that is all.
+    """Return the part of a recording within a rectangle, as a separate sensor; unchanged if that is all.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def region(contents: Contents, columns: slice, rows: slice) -> Contents:
             for name, chosen in (("columns", columns), ("rows", rows))
             if chosen != slice(None)
         )
-        raise ProblemError(f"{bounds}: no taxel lies there; there are {array.columns} columns and {array.rows} rows")
+        raise ProblemError(f"{bounds}: no taxel is there; there are {array.columns} columns and {array.rows} rows")
     if (bottom - top, right - left) == array.shape:
         return contents
     refuse_several(contents.main)

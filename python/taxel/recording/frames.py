@@ -53,12 +53,12 @@ def times_at(number: NDArray[np.int64], rate_hz: float) -> NDArray[np.int64]:
 
     Raises
     ------
-    ProblemError : a time that does not lie within 142 years of 0
+    ProblemError : a time that is not within 142 years of 0
     """
     us = number * (1e6 / rate_hz)
     if len(us) and np.abs(us).max() > TIME_US:
         raise ProblemError(
-            f"{rate_hz:g} Hz: frame {number[-1]} comes at {us[-1] / 1e6:.3g} s; must lie within 142 years"
+            f"{rate_hz:g} Hz: frame {number[-1]} comes at {us[-1] / 1e6:.3g} s; must be within 142 years"
         )
     t: NDArray[np.int64] = np.rint(us).astype(np.int64)
     return t
@@ -129,7 +129,7 @@ def at_rate(contents: Contents, rate_hz: float) -> Contents:
     """
     period_us("rate_hz", rate_hz)
     if not contents.main.untimed:
-        raise ProblemError(f"{contents.main.origin.path}: has times of its own; a rate is of frames without times")
+        raise ProblemError(f"{contents.main.origin.path}: has times; a rate is only for frames without times")
     sources = {name: _at_rate(source, rate_hz) for name, source in contents.sources.items()}
     return Contents(several(sources) if contents.is_several else _at_rate(contents.main, rate_hz), sources)
 
@@ -166,8 +166,8 @@ def calibrate(source: RecordedSource, rate_hz: float | None = None, rest: Tare |
     calibration = source.sensor.calibration()
     if calibration is None:
         raise ProblemError(
-            f"{source.origin.path}: no calibration lies beside it; taxel calibrate makes one, and without one nothing "
-            "is N or kPa"
+            f"{source.origin.path}: there is no calibration beside it, so its values cannot be converted to N or "
+            f"kPa; taxel calibrate makes a calibration"
         )
     drawn = as_frames(source, rate_hz)
     calibrated = replace(

@@ -75,8 +75,8 @@ def apply_layout(contents: Contents, layout: Layout, *, given: bool) -> Contents
     contents : Contents
     layout : Layout
     given : bool
-        Whether it was named for this recording; else it lies beside it, and fills only what a file that states its
-        sensor lacks.
+        Whether it was named for this recording; else it is beside it, and fills only what a file that states its sensor
+        lacks.
 
     Raises
     ------
@@ -101,18 +101,20 @@ def _apply_layout(source: RecordedSource, layout: Layout, *, given: bool) -> Rec
             raise FormatError(f"{layout.path}: {name}: {first_line(error)}") from None
         array = sensor.array
     if strict and sensor.heel and layout.heel not in ("", sensor.heel):
-        raise FormatError(f"{layout.path}: says heel {layout.heel}; {name} says {sensor.heel}")
+        raise FormatError(f"{layout.path}: states heel {layout.heel}; {name} states {sensor.heel}")
     same = source if array == sensor.array else on_array(source, array)
     same = replace(same, sensor=replace(same.sensor, side=sensor.side or layout.side, heel=sensor.heel or layout.heel))
     if not isinstance(same, FrameSource):
         if strict and (layout.turned is not None or layout.unit or layout.rate_hz or layout.zeros_before_s):
-            of_frames = "falls, unit, rate_hz and zeros_before_s are of frames"
+            of_frames = "falls, unit, rate_hz and zeros_before_s are for frames"
             raise FormatError(f"{layout.path}: {name} holds events; {of_frames}")
         return same
     was = same.frame_table.turned
     if strict and was is not None and layout.falls is not None and layout.turned != was:
         falls = "false" if layout.turned is None else f"{layout.turned:g}"
-        raise FormatError(f"{layout.path}: says falls = {falls}; the readings of {name} were turned by falls = {was:g}")
+        raise FormatError(
+            f"{layout.path}: states falls = {falls}; the readings of {name} were turned by falls = {was:g}"
+        )
     full = layout.turned if was is None else None
     # Read at once, so that a layout that contradicts the file is refused where the file is opened.
     frames = _read(same.table, layout, full, name, is_alone=kind in _ALONE, strict=strict)
@@ -130,11 +132,11 @@ def _array(source: RecordedSource, layout: Layout) -> Array:
     array = layout.array(stated.rows * stated.columns, stated, source.sensor.side)
     if source.has_events and array.shape != stated.shape:
         raise ProblemError(
-            f"says {array.rows} x {array.columns} taxels; its events are of {stated.rows} x {stated.columns}"
+            f"states {array.rows} x {array.columns} taxels; its events are of {stated.rows} x {stated.columns}"
         )
     if min(stated.shape) > 1 and array.shape != stated.shape:
         raise ProblemError(
-            f"says {array.rows} x {array.columns} taxels; the file says {stated.rows} x {stated.columns}"
+            f"states {array.rows} x {array.columns} taxels; the file states {stated.rows} x {stated.columns}"
         )
     if not array._is_measured:
         with_names = (
@@ -145,7 +147,7 @@ def _array(source: RecordedSource, layout: Layout) -> Array:
         kind in _ALONG and stated.places == load_packaged(kind).array(stated.columns, stated, source.sensor.side).places
     )
     if stated._is_measured and not along and (stated.pitch_mm, stated.places) != (array.pitch_mm, array.places):
-        raise ProblemError(f"says taxels {array._apart()}; the file says {stated._apart()}")
+        raise ProblemError(f"states taxels {array._apart()}; the file states {stated._apart()}")
     return array
 
 
@@ -172,7 +174,7 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_al
         if unit in _UNSAID:
             unit = layout.unit
         elif strict and unit != layout.unit:
-            raise FormatError(f"{layout.path}: says unit {layout.unit}; {name} is in {unit}")
+            raise FormatError(f"{layout.path}: states unit {layout.unit}; {name} is in {unit}")
     if layout.rate_hz is not None:
         if _are_numbers(t):
             try:
@@ -180,7 +182,9 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_al
             except ProblemError as error:
                 raise FormatError(f"{layout.path}: {name}: {error}") from None
         elif strict and len(t) > 1 and abs(layout.rate_hz * (step := _median_step(t)) / 1e6 - 1) > _SLACK:
-            raise FormatError(f"{layout.path}: says {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz")
+            raise FormatError(
+                f"{layout.path}: states {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz"
+            )
     if full is not None:
         values = _writable(values)
         step = max(1, _PIECE // max(1, values[:1].size))

@@ -185,7 +185,7 @@ class _Merging:
         return sections.Sensor(
             array,
             self.agreed((sensor.side for sensor in sensors), "", "the side"),
-            self.agreed((sensor.heel for sensor in sensors), "", "where the heel lies"),
+            self.agreed((sensor.heel for sensor in sensors), "", "where the heel is"),
             known(calibration),
         )
 
@@ -204,7 +204,7 @@ class _Merging:
         )
 
     def marks(self) -> sections.Marks:
-        """Merge what happened at a time; a note with its name stands at the beginning of each recording."""
+        """Merge what happened at a time; a note with its name is at the beginning of each recording."""
         changes, notes, found = list[tuple[BoardChange, ...]](), list[Note](), list[Any]()
         for source, table, shift in zip(self.sources, self.tables, self.shifts, strict=True):
             marks, d = source.marks, source.marks.detections()
@@ -229,7 +229,7 @@ class _Merging:
             self.lost += ["arrival times"] * any(map(anything, clocks))
             clock = None
         return sections.Timing(
-            known(clock), self.agreed((p.timing.clock_of for p in self.sources), None, "by whose clock times are")
+            known(clock), self.agreed((p.timing.clock_of for p in self.sources), None, "the clock of the times")
         )
 
     def losses(self) -> sections.Losses:
@@ -240,13 +240,15 @@ class _Merging:
             verdict = Verdict._together(_of_files(self.sources, self.shifts))
         return sections.Losses(
             counts=known(
-                self.agreed((source.counts() for source in losses), {}, "what each received and lost, by cause")
+                self.agreed(
+                    (source.counts() for source in losses), {}, "the counts of received and lost data, by cause"
+                )
             ),
             verdict=known(verdict),
             remarks=name_remarks([(source.origin.name, source.losses.remarks) for source in self.sources]),
             truncated=any(source.truncated for source in losses),
             rebuilt=known(
-                self.agreed((source.rebuilt() for source in losses), {}, "what reading each had to put up with")
+                self.agreed((source.rebuilt() for source in losses), {}, "the remarks on reading each recording")
             ),
         )
 
@@ -325,7 +327,7 @@ def _same_clock(a: Clock | None, b: Clock | None) -> bool:
 def _of_files(sources: Sequence[RecordedSource], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
     """Return name and verdict of each file or merged recording of which there are parts.
 
-    Stretches of one recording, in memory or in files of their own, have the losses of the whole, which count once;
+    Stretches of one recording, in memory or in separate files, have the losses of the whole, which count once;
     sources of one file share its damage.
     """
     files: dict[str, Any] = {}
@@ -383,8 +385,8 @@ def _common(sources: Sequence[RecordedSource], tables: Sequence[Events | Frames]
     for source, table in zip(sources, tables, strict=True):
         if not array.fits(table.array):
             raise ProblemError(
-                f"{source.origin.name}: {table.array!r}, {sources[0].origin.name}: {array!r}; different sensors are "
-                "merged beside one another only"
+                f"{source.origin.name}: {table.array!r}, {sources[0].origin.name}: {array!r}; different sensors can "
+                f"only be merged beside one another"
             )
     return array
 
@@ -413,7 +415,7 @@ def _events(tables: list[Events], shifts: list[int], array: Array, lefts: list[i
 
 
 def _side_by_side(filled: NDArray[Any], columns: Iterable[tuple[NDArray[Any], int]]) -> NDArray[Any]:
-    """Fill values of a whole sensor with those of its parts, each from a column on; return them."""
+    """Fill values of a whole sensor with those of its parts, each beginning at a column; return them."""
     for values, left in columns:
         filled[..., : values.shape[-2], left : left + values.shape[-1]] = values
     return filled

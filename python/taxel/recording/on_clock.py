@@ -32,7 +32,7 @@ Times = Callable[[NDArray[np.int64]], NDArray[np.int64]]
 
 
 def on_clock(contents: Contents, name: str) -> Contents:
-    """Return the same recording with the times of all sources by the clock of one of them, or of the host.
+    """Return the same recording with the times of all sources by the clock of a single source, or of the host.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def on_clock(contents: Contents, name: str) -> Contents:
     main, sources = contents.main, contents.sources
     path, label = main.origin.path, main.origin.label
     if main.timing.interval is not None and main.timing.clock_of is None:
-        raise ProblemError(f"{path}: a slice by its own clock; say on_clock({name!r}) before between")
+        raise ProblemError(f"{path}: a slice by its clock; call on_clock({name!r}) before between")
     if name not in (*sources, HOST):
         raise ProblemError(f"{path}: has no clock {name!r}; there are {', '.join((*sources, HOST))}")
     if main.timing.clock_of is not None:

@@ -50,7 +50,7 @@ class Once(Generic[T]):
         return anything(self()) if self._holds is None else self._holds()
 
     def to(self, change: Callable[[T], U]) -> Once[U]:
-        """Return a changed value, read at its first call, that holds something if this one does."""
+        """Return a changed value, read at its first call, that holds something if this value does."""
         return Once(lambda: change(self()), self.holds)
 
     def __getstate__(self) -> dict[str, Any]:

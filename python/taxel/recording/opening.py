@@ -77,12 +77,12 @@ class OpenOptions(SharedOptions):
 
     @property
     def topics(self) -> Topics:
-        """What of a ROS bag is opened."""
+        """Topics of a ROS bag that are opened."""
         return Topics(self.topic, self.field, self.types, self.ros)
 
     @property
     def reduction(self) -> Reduction:
-        """What is read of the events of a camera."""
+        """Selection of the events of a camera."""
         return Reduction(self.region, self.bin, self.window_ms, self.polarity)
 
     def how(self, path: Path, name: str, layout: Layout | None) -> dict[str, Reduction]:
@@ -101,8 +101,8 @@ class OpenOptions(SharedOptions):
 
 def _no_camera(path: Path) -> ProblemError:
     return ProblemError(
-        f"{path}: holds no events without intensities, as an event camera's file does; region, bin, window_ms and "
-        "polarity are of these"
+        f"{path}: holds no events without intensities, as files of event cameras do; region, bin, window_ms and "
+        f"polarity are only for such events"
     )
 
 
@@ -110,35 +110,37 @@ def _no_camera(path: Path) -> ProblemError:
 def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     r"""Open a recording.
 
-    `taxel.open` is this function; `taxel.open_all` opens those of a folder.
+    `taxel.open` is this function; `taxel.open_all` opens all recordings of a folder.
 
     Parameters
     ----------
     path : path
-        A .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged; a file of another format
+        A .mcap, .lsa, .npz, .csv or .h5 that taxel wrote, finished or not, whole or damaged; a file of another format
         that `taxel.formats` reads, with one trial; or a ROS bag.
     array : Array, or list of Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
-        a larger one if events lie outside it. A .mcap holds its own, which is kept. Of a ROS bag rows and
-        columns, for messages that do not state them.
+        a larger one if events are outside it. The array in a .mcap is kept. For a ROS bag: rows and columns, for
+        messages that do not state them.
     layout : path, optional
-        The layout file that says what the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
+        The layout file with the facts that the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
         ``layout.toml`` beside it, if there is one.
     topic, field : str, or list of str, optional
-        What of a ROS bag is opened as frames: a topic, and the path of a field of its messages, as "left.taxels"
-        (default: the only one with numbers). Of lists each entry becomes a source, with its own `array` if that is a
-        list too.
+        For a ROS bag: the topic that is opened as frames, and the path of a field of its messages, for example
+        "left.taxels" (default: the only field with numbers). If they are lists, each entry becomes a source, with its
+        own `array` if that is a list too.
     types, ros : path and str, optional
-        For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, as "humble".
+        For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, for example
+        "humble".
     region, bin, window_ms, polarity : str, int, float (ms) and str, optional
-        What is read of an event camera's file, or of other events without intensities: columns and rows as
-        "100:420,60:300", of which the last are not included; the side of the square of pixels that becomes a taxel;
-        frames of counts, one each `window_ms`, at the window's begin; and "on" or "off" events alone, not "both".
+        For an event camera's file, or other events without intensities. `region`: columns and rows, for example
+        "100:420,60:300", where the last are not included. `bin`: side of the square of pixels that becomes a taxel.
+        `window_ms`: read frames of counts, each over a window of this length, at its beginning. `polarity`: only "on"
+        or "off" events, or "both".
     limit : int, bytes, 1 or more, optional
-        How much may be read into memory; default: three quarters of what is available, and at most the sizes of
-        docs/files.md.
+        Most bytes that may be read into memory; default: three quarters of the available memory, and at most the sizes
+        in docs/files.md.
     pairing : {"direct", "taxel"}
-        Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
+        The change that an intensity belongs to: the change directly before it, or the latest change of that taxel.
     differences : bool
         Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
 
@@ -154,12 +156,12 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
 
     Notes
     -----
-    At most half as much memory as the arrays take is used beside them, and 256 MiB. A .mcap is read where its parts are
-    first used.
+    Besides the arrays, at most half as much memory as they take, and 256 MiB, is used. Parts of a .mcap are read when
+    they are first used.
 
-    A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
-    is described in `taxel.recording.writers.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`)
-    become notes of a file of frames that it names.
+    A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column for each taxel. The layout of
+    a .h5 is described in `taxel.recording.writers.h5`. The reference events of a ``labels.csv`` in a folder
+    (`taxel.Labels`) become notes of the files of frames that the table names.
 
     Examples
     --------
@@ -192,15 +194,15 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     Parameters
     ----------
     path : path
-        A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as of `taxel.open`.
+        A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as for `taxel.open`.
     array, layout, topic, field, types, ros
-        As of `taxel.open`.
+        As in `taxel.open`.
     region, bin, window_ms, polarity : str, int, float (ms) and str, optional
-        As of `taxel.open`.
+        As in `taxel.open`.
     limit : int, bytes, 1 or more, optional
-        As of `taxel.open`, for all recordings together.
+        As in `taxel.open`, for all recordings together.
     pairing, differences
-        As of `taxel.open`.
+        As in `taxel.open`.
 
     Returns
     -------
@@ -210,7 +212,7 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
 
     Raises
     ------
-    FormatError : a folder without a recording; else as of `taxel.open`
+    FormatError : a folder without a recording; else as for `taxel.open`
     OSError : the file does not exist, or cannot be read
 
     Notes
@@ -242,7 +244,7 @@ def _open(path: Path, options: OpenOptions) -> list[Recording]:
 
 
 def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
-    """Open a file, or a ROS bag: of a file of another format all trials."""
+    """Open a file or a ROS bag; from a file of another format, open all trials."""
     text("pairing", options.pairing, ("direct", "taxel"))
     flag("differences", options.differences)
     layout = recognition.layout_of(path, options.layout)
@@ -260,14 +262,14 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
             case recognition.ForeignFile():
                 assert layout is not None  # one without is refused
                 if options.topics.are_given:
-                    raise ProblemError(f"{path}: no ROS bag; topic, field, types and ros are of one")
+                    raise ProblemError(f"{path}: not a ROS bag; topic, field, types and ros are only for ROS bags")
                 array = None if options.array is None else Array._given(options.array)
                 contents = Contents.single(read_foreign(path, layout, array))
                 if array is not None and not contents.main.has_events:
                     contents = Contents.single(_on_given(contents.main, array))
             case recognition.TaxelFile(kind):
                 if options.topics.are_given:
-                    raise ProblemError(f"{path}: a .{kind}; topic, field, types and ros are of a ROS bag")
+                    raise ProblemError(f"{path}: a .{kind}; topic, field, types and ros are only for ROS bags")
                 array = None if options.array is None else Array._given(options.array)
                 if kind == "records" and array is None and layout is not None:
                     array = layout.grid()
@@ -277,7 +279,7 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
         return [Recording(with_sidecars(_of_camera(contents, path, options.reduction, layout)))]
     except MemoryError:
         raise helped(
-            FormatError(f"{path}: needs more memory than there is ({limits.available()} bytes are available)"),
+            FormatError(f"{path}: needs more memory than is available ({limits.available()} bytes)"),
             "limit",
             "larger",
         ) from None
@@ -398,7 +400,7 @@ def _size(table: object) -> int:
 
 
 def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path], options: OpenOptions) -> None:
-    """Warn of tables and arrays with a layout that are left out beside recordings, but for those converted to one."""
+    """Warn of tables and arrays with a layout that are left out beside recordings, unless they were converted."""
     stems = {file.stem for file in recorded}
     left = [
         file.name
@@ -409,8 +411,8 @@ def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
         beside = ", ".join(file.name for file in recorded[:3]) + " ..." * (len(recorded) > 3)
         warn(
-            f"{folder}: {names} left out, as beside recordings ({beside}) tables and arrays are not read: convert "
-            "them, or keep them in a folder of their own",
+            f"{folder}: {names} left out, as tables and arrays are not read in a folder with recordings ({beside}): "
+            f"convert them, or move them to a separate folder",
             stacklevel=6,
         )
 
@@ -424,7 +426,7 @@ def _add_labels(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Record
     unknown = [name for name in labels.recordings if name not in known]
     if unknown:
         names = ", ".join(str(name) for name, _ in pairs[:8])
-        raise FormatError(f"{table}: {unknown[0]} is no recording of this folder; there are {names}")
+        raise FormatError(f"{table}: {unknown[0]} is not a recording of this folder; there are {names}")
     # The feet of one trial are one recording.
     count = len({trial_of(str(name), recording.label) for name, recording in pairs})
     if count > 1 and any(not row.recording for row in labels.rows):
@@ -505,7 +507,7 @@ def _recording_of(trial: Trial, path: Path, kind: str, given_layout: str | os.Pa
 def _beside_frames(trial: Trial) -> tuple[str, ...]:
     """Return the line of `lost` for what a file holds of a trial beside its taxels, times and reference events."""
     names = [*trial.series, *trial.unread]
-    return (f"columns that are no taxels: {', '.join(names)}",) if names else ()
+    return (f"columns that are not taxels: {', '.join(names)}",) if names else ()
 
 
 def join_feet(opened: Sequence[Recording]) -> list[Recording]:
@@ -549,7 +551,7 @@ def sensors(recording: Recording) -> list[Recording]:
 
 
 def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordings") -> list[Recording]:
-    """Return each sensor of recordings as one of its own; refuse what is no recording."""
+    """Return each sensor of recordings as a separate recording; refuse anything except recordings."""
     entries = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
     if not len(entries):
         raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")

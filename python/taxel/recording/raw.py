@@ -1,4 +1,4 @@
-"""What was received, unchanged: the datagrams of a board, the lines of a stream of numbers."""
+"""Data as they were received: the datagrams of a board, the lines of a stream of numbers."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class Datagrams:
     Parameters
     ----------
     arrived_ns : int64, shape (n,), ns since 1970
-    number : uint64, shape (n,), from 0 on
-        Our arrival number; a missing number is a datagram that was received but is not stored.
+    number : uint64, shape (n,), counted from 0
+        Number of the arrival; a missing number is a datagram that was received but is not stored.
     offsets : int64, shape (n + 1,), bytes
         Index of the first byte of each in `payload`; the last entry is the number of bytes.
     payload : uint8, shape (bytes,), bytes as received

@@ -44,14 +44,15 @@ _STRANGERS = {
     b"\x04\x22\x4d\x18": "lz4; unpack it first",
     b"BZh": "bzip2; unpack it first",
     b"\xfd7zXZ": "xz; unpack it first",
-    b"\x89PNG": "a PNG picture, no recording",
-    b"%PDF": "a PDF document, no recording",
+    b"\x89PNG": "a PNG picture, not a recording",
+    b"%PDF": "a PDF document, not a recording",
     **{
-        b"#!AER-DAT%d" % k: f"AEDAT {k}; of event cameras {', '.join(CAMERA)} are read: save it as one"
+        b"#!AER-DAT%d" % k: f"AEDAT {k}; taxel reads these files of event cameras: {', '.join(CAMERA)}; save it as "
+        f"one of them"
         for k in (1, 2, 3)
     },
     b"#!AER-DAT4": "AEDAT 4; name it .aedat4",
-    b"\x93NUMPY": "a single NumPy array; say in NAME.layout.toml what it holds",
+    b"\x93NUMPY": "a single NumPy array; describe it in NAME.layout.toml",
 }
 
 
@@ -87,7 +88,7 @@ class ForeignFile:
 
 @dataclass(frozen=True)
 class Refusal:
-    """No recording, and why; a companion is a file of taxel that may lie beside recordings."""
+    """Reason why a file is not a recording; a companion is a file of taxel that may be beside recordings."""
 
     error: FormatError
     is_companion: bool = False
@@ -181,7 +182,7 @@ def is_recording(path: Path, layout: GivenLayout = None) -> bool:
 
 
 def check_recording(path: Path, layout: GivenLayout = None) -> None:
-    """Refuse a path that is no recording by its name, its first bytes, and its layout file.
+    """Refuse a path that is not a recording by its name, its first bytes, and its layout file.
 
     Raises
     ------
@@ -280,12 +281,12 @@ def natural_order(path: Path) -> list[tuple[bool, int, str]]:
 
 
 def _companion(path: Path, *, has_layout: bool) -> str:
-    """Return what a file of taxel is that may lie beside recordings, as the end of an error; "" of another file."""
+    """Return what a file of taxel is that may be beside recordings, as the end of an error; "" of another file."""
     if path.suffix.lower() == ".csv" and is_label_table(path):
-        return ", line 1: a table of labels (docs/command-line.md), no recording"
+        return ", line 1: a table of labels (docs/command-line.md), not a recording"
     if are_spike_trains(path) and not has_layout:
         return (
-            ": spike trains, as taxel encode writes them, no recording; taxel info describes them, and "
+            ": spike trains, as taxel encode writes them, not a recording; taxel info describes them, and "
             "taxel.SpikeTrains.load reads them"
         )
     return ""
@@ -353,7 +354,11 @@ def _by_first_bytes(path: Path) -> TaxelFile | Refusal:
     if ending is None:
         describes = advice(path, "describes a table or an array of another program")
         known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
-        wrong = f"{starts}: no recording; there are {known}; {describes}" if head else f"{path}: is empty: no recording"
+        wrong = (
+            f"{starts}: not a recording; recordings are {known}; {describes}"
+            if head
+            else (f"{path}: is empty: not a recording")
+        )
         return Refusal(FormatError(wrong))
     if ending in {"npz", "h5"}:
         magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]

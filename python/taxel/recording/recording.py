@@ -110,7 +110,7 @@ class Recording:
         """
         events = self._contents.main.table
         if not isinstance(events, Events):
-            raise ProblemError(f"{self.path}: holds frames and no events; ask for frames()")
+            raise ProblemError(f"{self.path}: holds frames and no events; call frames()")
         return events
 
     def frames(self, rate_hz: float | None = None) -> Frames:
@@ -138,7 +138,7 @@ class Recording:
         """The sources of the file by name, in their order in the file, each with its own clock.
 
         Each is a recording that every function accepts. A file of one board has one source. In a file of one board and
-        streams of numbers (an IMU) the events, frames and other attributes are those of the board, but for the verdict,
+        streams of numbers (an IMU) the events, frames and other attributes are those of the board, except the verdict,
         which is of all; in a file of several boards they raise an error that names the sources.
 
         Raises
@@ -149,7 +149,7 @@ class Recording:
         return {name: self if len(sources) == 1 else Recording(Contents(sources[name], sources)) for name in sources}
 
     def on_clock(self, name: str) -> Recording:
-        """Return the same recording with the times of all sources by the clock of one of them, or of the host.
+        """Return the same recording with the times of all sources by the clock of a single source, or of the host.
 
         No other function converts times between clocks (`clock`): without this call each source has its own.
 
@@ -203,18 +203,18 @@ class Recording:
 
         Raises
         ------
-        ProblemError : no calibration lies beside it, or one of another array
+        ProblemError : no calibration is beside it, or a calibration of another array
         """
         return calibrate(self._contents.main, rate_hz, rest).table
 
     @property
     def side(self) -> str:
-        """The foot or hand that the sensor is of, "left" or "right"; "" if not stated."""
+        """The foot or hand of the sensor, "left" or "right"; "" if not stated."""
         return self._contents.main.sensor.side
 
     @property
     def heel(self) -> str:
-        """Where on the sensor the heel lies, "top" or "bottom"; "" if not stated."""
+        """Place of the heel on the sensor, "top" or "bottom"; "" if not stated."""
         return self._contents.main.sensor.heel
 
     @property
@@ -224,7 +224,7 @@ class Recording:
 
     @property
     def interval(self) -> tuple[int, int] | None:
-        """The first time and the end of a slice, us; None of a whole file."""
+        """The first time and the end of a slice, us; None for a whole file."""
         interval = self._contents.main.timing.interval
         return None if interval is None else interval()
 
@@ -245,7 +245,7 @@ class Recording:
 
     @property
     def label(self) -> str:
-        """The name of the source within its file, as "left"; "" for a file of several sensors as a whole."""
+        """The name of the source within its file, such as "left"; "" for a file of several sensors as a whole."""
         return self._contents.main.origin.label
 
     @property
@@ -319,7 +319,7 @@ class Recording:
         """
         columns = self._contents.main.columns
         if columns is None:
-            raise ProblemError(f"{self.path}: source {self.label!r} is no stream of numbers, so it has no columns")
+            raise ProblemError(f"{self.path}: source {self.label!r} is not a stream of numbers, so it has no columns")
         return list(columns)
 
     @property
@@ -346,30 +346,30 @@ class Recording:
         if self.is_stream:
             why = f"source {self.label!r} is a stream of numbers, which has lines and no datagrams"
         elif self.kind == "mcap":
-            why = "a part of the sensor has no datagrams; those of the file are of the whole"
+            why = "a part of the sensor has no datagrams; the datagrams of the file belong to the whole sensor"
         else:
             why = f"the {kind_of_file(self.kind)} holds no datagrams; only .mcap does"
         raise ProblemError(f"{self.path}: {why}")
 
     @property
     def counts(self) -> dict[str, Any]:
-        """The numbers of what was received and lost, by cause."""
+        """The numbers of the counts of received and lost data, by cause."""
         return dict(self._contents.main.losses.counts())
 
     @property
     def verdict(self) -> Verdict:
-        """What was lost at which stage: a line of text, with a status and numbers by cause (`taxel.Verdict`).
+        """Losses at each stage: a line of text, with a status and numbers by cause (`taxel.Verdict`).
 
-        That of a part is that of the whole file. Gaps of frames with times, and of the events of a camera, are those of
-        the part, and are in it where the file does not say what was lost. The page *What the output means* lists
-        statuses, causes and wordings; all else there is to know is in `remarks`.
+        A part of a file has the verdict of the whole file. Only gaps of frames with times, and gaps in the events of a
+        camera, are those of the part; they are in the verdict if the file does not state what was lost. The page *What
+        the output means* lists statuses, causes and wordings; `remarks` has further facts.
         """
         each = self.sources if self.is_several else {self.label: self}
         return with_gaps(verdict_of(self._contents.main), {name: source._gaps() for name, source in each.items()})
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What else there is to know, one line each: whose times it has, what was left out, what it was converted from.
+        """Further facts, one line each: the clock of its times, what was left out, what it was converted from.
 
         `.mcap`, `.npz` and `.h5` store it.
 
@@ -407,7 +407,7 @@ class Recording:
 
     @property
     def truncated(self) -> bool:
-        """Whether what came last is missing: the writer was killed, or the file was cut within its data."""
+        """Whether the last data are missing: the writer was killed, or the file was cut within its data."""
         return self._contents.main.losses.truncated
 
     @property
@@ -429,7 +429,7 @@ class Recording:
 
         Raises
         ------
-        ProblemError : a start that lies after the stop, or is no number
+        ProblemError : a start after the stop, or a time that is not a number
 
         Examples
         --------
@@ -457,10 +457,10 @@ class Recording:
         if recording is None:
             return f"{bounds} of {self.title}"
         t = recording._contents.main.table.t
-        return f"{bounds}: {recording.title} " + (f"lies from {t.min()} to {t.max()} us" if len(t) else "is empty")
+        return f"{bounds}: {recording.title} " + (f"is from {t.min()} to {t.max()} us" if len(t) else "is empty")
 
     def at_rate(self, rate_hz: float) -> Recording:
-        """Return the same recording of numbered frames with times: so many frames a second, the first at 0.
+        """Return the same recording of numbered frames with times: `rate_hz` frames per second, the first at 0.
 
         Parameters
         ----------
@@ -468,7 +468,7 @@ class Recording:
 
         Raises
         ------
-        ProblemError : it has times of its own (`timed`), or a rate that is invalid
+        ProblemError : it has times (`timed`), or the rate is invalid
 
         Examples
         --------
@@ -491,7 +491,7 @@ class Recording:
 
         Raises
         ------
-        ProblemError : something that is no `taxel.Note`
+        ProblemError : something that is not a `taxel.Note`
         """
         more = tuple(instance("notes", note, Note) for note in several("notes", notes))
         return Recording(with_notes(self._contents, more))

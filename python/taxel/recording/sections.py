@@ -1,4 +1,4 @@
-"""The sections of a recording: what a function does with a field follows from the type of the section it stands in.
+"""The sections of a recording: what a function does with a field follows from the type of its section.
 
 Each function (`between`, `merge`, `convert` ...) has a rule for every type in `Section`: the type checker demands it.
 """
@@ -81,7 +81,7 @@ class Sensor:
     side : {"left", "right", ""}
         The foot or hand that the sensor is of.
     heel : {"top", "bottom", ""}
-        Where on the sensor the heel lies.
+        Place of the heel on the sensor.
     calibration : Calibration
     """
 
@@ -91,9 +91,9 @@ class Sensor:
     calibration: Once[Calibration | None] = _NONE
 
     def losses(self) -> list[str]:
-        """Return what a file without this section does not hold, but for the array."""
+        """Return what a file without this section does not hold, except the array."""
         lines = [f"the side ({self.side})"] * bool(self.side)
-        return lines + [f"where the heel lies ({self.heel})"] * bool(self.heel)
+        return lines + [f"where the heel is ({self.heel})"] * bool(self.heel)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +149,7 @@ class Timing:
     clock_of : str
         The name of the clock of all times, if it is not the source's own.
     interval : (int, int), us
-        The first time and the end of a slice. A slice that is written to a file becomes a recording of its own.
+        The first time and the end of a slice. A slice that is written to a file becomes a separate recording.
     """
 
     clock: Once[Clock | None] = _NONE
@@ -162,8 +162,8 @@ class Timing:
         return clock if clock is not None and len(clock.board_us) else None
 
     def losses(self) -> list[str]:
-        """Return what a file without this section does not hold, but for arrival times."""
-        return [f"by whose clock times are ({self.clock_of})"] * (self.clock_of is not None)
+        """Return what a file without this section does not hold, except arrival times."""
+        return [f"the clock of the times ({self.clock_of})"] * (self.clock_of is not None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,14 +195,14 @@ class Losses:
     def losses(self) -> list[str]:
         """Return what a file without this section does not hold, one line each."""
         counts = self.counts.holds()
-        lines = ["what was received and lost, by cause"] * counts
+        lines = ["the counts of received and lost data, by cause"] * counts
         # With counts, this is what they say.
-        lines += ["what was lost, in one line"] * (not counts and self.verdict() is not None)
+        lines += ["the summary of losses"] * (not counts and self.verdict() is not None)
         return lines + [f"the remark: {line}" for line in self.remarks] + self.damage()
 
     def damage(self) -> list[str]:
         """Return what a file that does not state its damage lacks."""
-        return ["that its end is missing"] * self.truncated + ["what reading had to put up with"] * self.rebuilt.holds()
+        return ["that its end is missing"] * self.truncated + ["the remarks on reading it"] * self.rebuilt.holds()
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,11 +237,11 @@ class FrameTable:
     frame_us: float | None = None
 
     def losses(self) -> list[str]:
-        """Return what a file without this section does not hold, but for the frames."""
+        """Return what a file without this section does not hold, except the frames."""
         lines = ["that its frames have no times"] * self.untimed
         lines += [] if self.turned is None else [f"that its readings were turned (falls = {self.turned:g})"]
         return lines + (
-            [] if self.frame_us is None else [f"that a readout took its frames to last {self.frame_us:g} us"]
+            [] if self.frame_us is None else [f"the length of a frame that a readout assumed, {self.frame_us:g} us"]
         )
 
 
@@ -275,7 +275,7 @@ class Wire:
     def losses(self, *, with_times: bool = False) -> list[str]:
         """Return what a file without this section does not hold; the other fields say how bytes are encoded."""
         lines = ["raw datagrams" + " with their arrival times" * with_times] * self.datagrams.holds()
-        return lines + ["raw bytes (words that are no events)"] * (self.payload is not None and self.payload.size > 0)
+        return lines + ["raw bytes (words that are not events)"] * (self.payload is not None and self.payload.size > 0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ class TextOptions(SharedOptions):
     array : sequence of str, optional
         Rows, columns and pitch (mm) of the sensor, as "24x20x5"; of a ROS bag one for each topic, or one for all.
     layout, topic, field, types, ros, region, bin, window_ms, polarity, limit
-        As of `taxel.open`.
+        As in `taxel.open`.
     rate_hz : float, Hz, optional
         Frames a second, for recordings without times.
     """
@@ -114,7 +114,7 @@ class TextOptions(SharedOptions):
     def open_sensors(self, paths: Sequence[str | os.PathLike[str]]) -> list[Recording]:
         """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
 
-        Each sensor of a file with several is a recording of its own (`Recording.title`).
+        Each sensor of a file with several is a separate recording (`Recording.title`).
         """
         trials = (trial for path in several("paths", paths) for trial in self.open_trials(path))
         return [sensor for trial in trials for sensor in sensors(trial)]

@@ -28,23 +28,28 @@ class Verdict(str):
     Attributes
     ----------
     status : {"complete", "complete after arrival", "unknown", "damaged", "unfinished", "nothing arrived", "lost"}
-        From the best to the worst; of several parts the worst.
+        Listed from the best to the worst; for several parts, the worst.
     lost : dict of int
-        What was lost, by cause; of several parts the sum.
+        Losses by cause; for several parts, the sum.
     damaged : dict of int
-        What could not be used, of the bytes that came and of the file, by cause; damage of a file of several sources
-        counts once.
+        Data that could not be used, of the received bytes and of the file, by cause; damage of a file of several
+        sources counts once.
     noted : dict of int
-        What is no loss of its own: repeated datagrams, repaired values, resets of the board and others.
+        Events that are not losses: repeated datagrams, repaired values, resets of the board and others.
     doubtful_after_us : int, us, or None
-        The time after which times are doubtful; of several parts the earliest.
+        The time after which times are doubtful; for several parts, the earliest.
     steps_back : list of dict of int
-        Where times step back in the order of arrival, at most the 256 largest steps: "after_us", the latest time before
-        it; "by_us", how far the earliest event is before that; "events", how many are.
+        Steps back of times in the order of arrival, at most the 256 largest: "after_us", the latest time before the
+        step; "by_us", the distance of the earliest event before that time; "events", the number of events before it.
     stretch_of : str or None
-        Of a stretch of a recording a name of the whole, whose losses these are: `merge` counts them once.
+        For a stretch of a recording, a name of the whole recording, to which the losses belong: `merge` counts them
+        once.
     parts : dict of Verdict
-        Of several sources or merged recordings that of each, by name; else empty.
+        For several sources or merged recordings, the verdict of each, by name; else empty.
+
+    Raises
+    ------
+    ProblemError : the class is called; a verdict comes from `taxel.open` or `from_dict`
 
     Examples
     --------
@@ -100,7 +105,7 @@ class Verdict(str):
         return self._of({"later": [shift, self._held]})
 
     def _noting(self, texts: Iterable[str], noted: Mapping[str, int]) -> Self:
-        """Return the same verdict with more texts at its end, and more that is no loss of its own."""
+        """Return the same verdict with more texts at its end, and more events that are not losses."""
         return self._from(
             {**self._held, "text": "; ".join([str(self), *texts]), "noted": {**self._held["noted"], **noted}}
         )
@@ -112,17 +117,17 @@ class Verdict(str):
 
     @property
     def lost(self) -> dict[str, int]:
-        """What was lost, by cause."""
+        """Losses by cause."""
         return dict(self._held["lost"])
 
     @property
     def damaged(self) -> dict[str, int]:
-        """What could not be used, by cause."""
+        """Data that could not be used, by cause."""
         return dict(self._held["damaged"])
 
     @property
     def noted(self) -> dict[str, int]:
-        """What is no loss of its own, by cause."""
+        """Events that are not losses, by cause."""
         return dict(self._held["noted"])
 
     @property

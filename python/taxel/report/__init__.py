@@ -1,4 +1,4 @@
-"""Pages with pictures, each one file that needs no other."""
+"""Pages with pictures; each page is one file that needs no other file."""
 
 from taxel._base.files import write_whole
 from taxel.report.detections import write_detections

@@ -294,7 +294,7 @@ def _pressed(outcome: Outcome, frames: Frames) -> tuple[NDArray[np.int64], NDArr
 def _about(outcome: Outcome, readout: Readout | PlainRule) -> list[str]:
     """Return what else is known of the detections in a recording."""
     lines = [f"{text}."] if (text := outcome.outside_text) and isinstance(readout, Readout) else []
-    return [*lines, *([f"Times are from {begun(outcome.begin_us)} on."] if outcome.begin_us else [])]
+    return [*lines, *([f"Times are counted from {begun(outcome.begin_us)}."] if outcome.begin_us else [])]
 
 
 def _together(listened: Sequence[Outcome]) -> list[tuple[str, int, Score | None]]:
@@ -510,7 +510,7 @@ def _channels(planes: list[tuple[str, NDArray[np.float64]]], array: Array) -> Fi
 
 
 def _name_inputs(axis: Axes, encoder: Encoder, array: Array, delays: int) -> None:
-    """Name the inputs of bars by the encoder, or by the parts of a composite one, which are told apart by lines."""
+    """Name the inputs of bars by the encoder, or by the parts of a composite encoder, which are separated by lines."""
     names = sorted(encoder.parts) if isinstance(encoder, Composite) else [encoder.name.replace("_", " ")]
     counts = [part.trains(array) * (2 if part.signed else 1) for part in encoder._each()] * delays
     ends = np.cumsum(counts) - 0.5

@@ -140,9 +140,7 @@ def _by_period(ax: Axes, answer: Answer) -> None:
         ax.plot(
             [p.period_ms for p in points], normal, marker=".", lw=1, label=f"{name} (of {points[0].found.most:.2f})"
         )
-    ax.set(
-        xscale="log", xlabel="sampling period, ms", title=f"how fast one has to look (to {answer.full.window_ms:g} ms)"
-    )
+    ax.set(xscale="log", xlabel="sampling period, ms", title=f"how fast to sample (to {answer.full.window_ms:g} ms)")
     ax.legend(frameon=False)
 
 

@@ -14,7 +14,7 @@ __all__ = ["render"]
 
 
 def _show(value: object) -> object:
-    """Return what a template shows: texts as one line without control characters; figures are no texts."""
+    """Return what a template shows: texts as one line without control characters; figures are not texts."""
     return value if hasattr(value, "__html__") else escaped(value)
 
 

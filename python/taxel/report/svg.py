@@ -39,7 +39,7 @@ _LARGEST, _PIXELS = 500_000, 200
 
 
 def picture(figure: Figure) -> Markup:
-    """Return a figure as what stands in a page: SVG that takes the page's colours, and whose text can be searched.
+    """Return a figure for a page: SVG that takes the page's colours, and whose text can be searched.
 
     Where a figure has so many points, lines or bars that the page would become large, these are pixels in it, on white.
     """

@@ -1,8 +1,8 @@
 """Simulated touch: bodies on foam, and the emulated board that reads them.
 
-A scene says what happens to the bodies. `play` plays acts to a board as fast as it goes, `emulate` in real time over
-UDP: acts, a recording again, or the frames of any other sensor. `Board` is the board alone, a frame at a time.
-`taxel.simulate.circuit` is what lies between touch and board: fabric, lines, converter.
+A scene describes the motion of bodies. `play` plays acts to a board as fast as possible. `emulate` sends UDP in real
+time: acts, a recording, or the frames of another sensor. `Board` is the board alone, one frame at a time.
+`taxel.simulate.circuit` simulates what is between touch and board: fabric, lines, converter.
 """
 
 from taxel.simulate import circuit

@@ -1,4 +1,4 @@
-"""What the emulated board is shown: silence, bodies, frames."""
+"""Acts that the emulated board is shown: silence, bodies, frames."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["Act", "Contact", "FrameSequence", "Motion", "Scene", "Silence", "Tra
 
 
 class Contact(NamedTuple):
-    """One true touch: from the time at which its force leaves zero to that at which it returns there.
+    """One true touch, from the time at which its force rises above zero to the time at which it is zero again.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Contact(NamedTuple):
     start_us : float, us
     stop_us : float, us
     speed_m_s : float, m/s, 0 or more
-        How fast it began.
+        Speed at its beginning.
     peak_n : float, N
         The largest force; 0 where it is not known.
     """
@@ -47,12 +47,12 @@ class Track(NamedTuple):
     Attributes
     ----------
     x_mm : float32, shape (n,), mm
-        Where its middle is, right of the first taxel.
+        Place of its middle, to the right of the first taxel.
     y_mm : float32, shape (n,), mm
     depth_mm : float32, shape (n,), mm
-        Of its lowest point below the foam's face; negative above it.
+        Depth of its lowest point below the foam's surface; negative above it.
     force_n : float32, shape (n,), N
-        On the foam.
+        Force on the foam.
     """
 
     x_mm: NDArray[np.float32]
@@ -68,9 +68,9 @@ class Motion(NamedTuple):
     ----------
     step_us : float, us
     tracks : list of Track
-        One a body.
+        One for each body.
     contacts : list of Contact
-        Of all bodies, by time.
+        Contacts of all bodies, in order of time.
     """
 
     step_us: float
@@ -128,8 +128,8 @@ class Scene:
           dashpot_ms.
         - ``surface``: "layer", foam bonded to the board, for any bodies; or "columns", for one ball that moves straight
           up and down on foam with poisson up to 0.1: the fastest.
-        - ``cells_per_pitch``: how many cells of the layer lie along the pitch of taxels; usually 1, more for a touch
-          narrower than two taxels.
+        - ``cells_per_pitch``: how many cells of the layer there are along the pitch of taxels; usually 1, more for a
+          touch narrower than two taxels.
         - ``slant_deg``, ``downhill_deg``: how far the array is tilted, and which way; ``lead_ms``, ``tail_ms``.
 
     Raises
@@ -164,7 +164,7 @@ class Scene:
 
     @classmethod
     def draw(cls, seed: int, index: int = 0, *, left_to_rest: bool = False, array: Array | None = None) -> Scene:
-        """Draw scene `index` of a seed: another place, ball, drop and foam each time.
+        """Draw scene `index` of a seed: place, ball, drop and foam differ from scene to scene.
 
         Parameters
         ----------
@@ -172,7 +172,7 @@ class Scene:
         left_to_rest : bool
             Whether the ball is left to come to rest; else it is caught after 2 to 4 impacts and pressed by hand.
         array : Array, optional
-            The thesis' 64 x 64 taxels where it is left out.
+            Default: the thesis' 64 x 64 taxels.
 
         Returns
         -------
@@ -181,7 +181,7 @@ class Scene:
         Raises
         ------
         SceneError : an array too small to keep 36 mm from its edge
-        ProblemError : a seed or an index that is no whole number
+        ProblemError : a seed or an index that is not a whole number
 
         Examples
         --------
@@ -193,7 +193,7 @@ class Scene:
         return cls(_core.draw_scene(parts, seed, index, flag("left_to_rest", left_to_rest)))
 
     def replace(self, **changes: Any) -> Scene:
-        """Return the scene with parameters changed; a mapping changes some of a part, as ``foam={"dashpot_ms": 0}``.
+        """Return the scene with parameters changed. A mapping changes a part: ``foam={"dashpot_ms": 0}``.
 
         Raises
         ------
@@ -207,7 +207,7 @@ class Scene:
         return Scene(_replaced("a scene", self.parameters, changes, ("cells_per_pitch",)))
 
     def body(self, n: int = 0, **changes: Any) -> Scene:
-        """Return the scene with parameters of body `n` changed, as ``x_mm=80``; a mapping changes some of a part.
+        """Return the scene with parameters of body `n` changed, such as ``x_mm=80``. A mapping changes a part.
 
         Parameters
         ----------
@@ -240,9 +240,9 @@ class Scene:
         Parameters
         ----------
         step_us : float, us, above 0, at most 1000
-            From one entry of a track to the next.
+            Time from one entry of a track to the next.
         array : Array, optional
-            The thesis' 64 x 64 taxels where it is left out.
+            Default: the thesis' 64 x 64 taxels.
 
         Returns
         -------
@@ -251,7 +251,7 @@ class Scene:
         Raises
         ------
         SceneError : a parameter of the scene that is invalid, a body off the array, or more than 2e7 steps
-        ProblemError : a step that is no number
+        ProblemError : a step that is not a number
 
         Examples
         --------
@@ -297,7 +297,7 @@ def _only(body: object, part: str) -> str:
 def _replaced(
     noun: str, before: Mapping[str, Any], changes: Mapping[str, Any], more: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Return parameters with some changed; parts are merged to any depth, but for one of several kinds."""
+    """Return parameters with some changed; parts are merged to any depth, except a part that has several kinds."""
     merged = dict(before)
     for name, change in changes.items():
         if name not in before and name not in more:
@@ -320,18 +320,18 @@ def _merged(before: Any, change: Any) -> Any:
 
 
 class FrameSequence:
-    """Lay frames over the array, with straight lines in time between them.
+    """Play frames on the array, with linear interpolation in time.
 
     Parameters
     ----------
     values : float32, shape (n, rows, columns), 0 to 1
-        The share of the way from a taxel's rest to the ramp's end.
+        Share of the range from a taxel's rest to the ramp's end.
     period_us : float, us
-        From one frame to the next; not less than the time of the board's frame.
+        Time from one frame to the next; at least the time of the board's frame.
 
     Raises
     ------
-    ProblemError : values that are no frames, or outside 0 to 1
+    ProblemError : values that are not frames, or outside 0 to 1
 
     Examples
     --------

@@ -35,20 +35,21 @@ class Version2:
     Parameters
     ----------
     board : int, 0 to 65535
-        Its number: with the sender's address it names a source.
+        Number of the board: together with the sender's address it identifies a source.
     seed : int, 0 to 65535
-        The number of its first session; each reset takes the next.
+        Number of the first session; each reset increases it by one.
     hold_us : int, us
-        For how long events wait for others in their datagram: 1000 makes sparse scenes a quarter smaller, and all up to
-        1 ms later.
+        Time that events wait for others in their datagram: 1000 makes sparse scenes a quarter smaller, and all events
+        up to 1 ms later.
     heartbeat_us : int, us
-        How often it sends that nothing has happened; each frame for 0.1 s after an event.
+        Interval at which the board reports that nothing has happened; for 0.1 s after an event it does so in each
+        frame.
     states_us : int, us
-        How often each value and the board's totals are sent again; 0: never.
+        Interval at which each value and the board's totals are sent again; 0: never.
 
     Raises
     ------
-    ProblemError : out of these ranges
+    ProblemError : a value out of its range
 
     Examples
     --------
@@ -83,7 +84,7 @@ def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:
 
 
 def fitting(preset: str | None, array: Array) -> Registers:
-    """Return a preset with as many of its lines as an array has; unnamed: "5.2 kHz", or what a larger board resets to.
+    """Return a preset with as many lines as an array has; default: "5.2 kHz", or that of a larger board at reset.
 
     Raises
     ------
@@ -103,7 +104,7 @@ def fitting(preset: str | None, array: Array) -> Registers:
 
 
 def pattern(frame: int, *, array: Array | None = None, ramp: int = 150) -> NDArray[np.uint16]:
-    """Return what a board whose register `pattern` is set reads, in the place of its comparators' values.
+    """Return what a board whose register `pattern` is set reads, instead of its comparators' values.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def pattern(frame: int, *, array: Array | None = None, ramp: int = 150) -> NDArr
     array : Array, optional
         The sensor; default: the thesis' 64 x 64.
     ramp : int, ticks, 1 to 65534
-        As the registers have it.
+        Value of the register `ramp`.
 
     Returns
     -------
@@ -141,32 +142,32 @@ def pattern(frame: int, *, array: Array | None = None, ramp: int = 150) -> NDArr
 
 
 class Board:
-    """Emulate the board: scan frames of trip times into the datagrams that the real one would send.
+    """Emulate the board: scan frames of trip times into the datagrams that the real board would send.
 
-    It has no clock: each frame moves its time on. The same contract holds for the logic on the FPGA.
+    It has no clock: each frame advances its time. The logic on the FPGA keeps the same contract.
 
     Parameters
     ----------
     registers : Registers, optional
-        What it holds at first; where it is left out, of a board of 64 x 64 taxels the preset "5.2 kHz".
+        Its registers at first. Default: as at reset; for 64 x 64 taxels the preset "5.2 kHz".
     array : Array, optional
-        Up to 65 536 positions; the thesis' where it is left out.
+        Up to 65 536 positions. Default: the thesis' array.
     previous : {"last_sent", "last_sample"}
-        What a new value is compared with.
+        The value that a new value is compared with.
     intensity : {"value", "difference", "nothing"}
-        What an intensity word holds.
+        Content of an intensity word.
     queue : int, words, 0 or more
-        A taxel whose two words find no room is dropped and counted.
+        Room for words; a taxel whose two words find no room is dropped and counted.
     version_2 : Version2, optional
-        How it speaks version 2 of the wire.
+        Options of version 2 of the wire.
     circuit : Circuit, optional
-        Lines that its taxels share, settling, comparators with hysteresis: what `frame` is given passes through it
-        first. Left out, each taxel reads by itself. The converter's times are the registers'.
+        Lines that its taxels share, settling, comparators with hysteresis: the values given to `frame` pass through it
+        first. Default: each taxel is read by itself. The converter's times are those of the registers.
     asynchronous : bool
         Each taxel compares by itself with what it sent last; nothing is scanned, and stamps are of 1 us, so the
-        registers must hold version 2 of the wire (thesis 4.5, Table 7.1). It tells each step of ``noise_floor + 1``
-        ticks when it reaches it. What it reads between two frames lies on a straight line, so events leave a frame
-        after they happened, with the time at which they did. Such taxels share no lines: no `circuit`.
+        registers must hold version 2 of the wire (thesis 4.5, Table 7.1). It sends each step of ``noise_floor + 1``
+        ticks when it reaches it. Its readings between two frames are on a straight line, so events leave a frame after
+        they happened, with the time at which they did. Such taxels share no lines, so `circuit` must be left out.
 
     Raises
     ------
@@ -176,7 +177,7 @@ class Board:
     -----
     +
 
-    What a new value is compared with (`previous`) is open in thesis 4.3; the board's own rule stands in `docs/wire.md`.
+    What a new value is compared with (`previous`) is open in thesis 4.3; the board's own rule is in `docs/wire.md`.
 
     Examples
     --------
@@ -213,18 +214,18 @@ class Board:
         self._core = _core.WireBoard(start._json(), self.array._parts(), json.dumps(options))
 
     def frame(self, ticks: ArrayLike, *, most: int | None = None, accepted: ArrayLike | None = None) -> list[bytes]:
-        """Scan one frame; return the datagrams that went out.
+        """Scan one frame; return the datagrams that were sent.
 
         Parameters
         ----------
         ticks : uint16, shape (rows * columns,) or (rows, columns), ticks
-            Trip times of the comparators by taxel, in 1/300 us from the ramp's start. At or above the ramp's length
-            one reads as that length; `NOT_RETURNED` is a fault.
+            Trip times of the comparators by taxel, in 1/300 us from the ramp's start. A time at or above the ramp's
+            length reads as that length; `NOT_RETURNED` is a fault.
         most : int, 0 or more, optional
-            How many datagrams the network takes during this frame; the rest waits in the queue.
+            Number of datagrams that the network takes during this frame; the others wait in the queue.
         accepted : bool, shape as of `ticks`, optional
-            Taxels whose events find room in the queue; events of the others are dropped and counted. Left out, all
-            do as far as `queue` has room.
+            Taxels whose events find room in the queue; events of the others are dropped and counted. Default: all, as
+            far as `queue` has room.
 
         Returns
         -------
@@ -232,7 +233,7 @@ class Board:
 
         Raises
         ------
-        ProblemError : not one trip time, or one flag, a taxel
+        ProblemError : not one trip time, or one flag, for each taxel
 
         Examples
         --------
@@ -247,7 +248,7 @@ class Board:
     def reset(self) -> None:
         """Reset it, in a new session.
 
-        Registers are those of a board at reset, with the version of the wire that this one had at first; values, time
+        Registers are those of a board at reset, with the version of the wire that this board had at first; values, time
         and the counts of its status lines are 0. Datagrams that wait are still sent; the one that is being filled is
         discarded, with the events held in it.
         """
@@ -259,11 +260,11 @@ class Board:
         Parameters
         ----------
         data : bytes
-            Five bytes a command; what is not whole yet waits for the rest.
+            Five bytes for each command; an incomplete command waits for its other bytes.
 
         Raises
         ------
-        ProblemError : no bytes
+        ProblemError : not bytes
 
         Examples
         --------
@@ -273,7 +274,7 @@ class Board:
         return self._core.command(buffer_bytes(data))
 
     def record(self, start: bool) -> None:
-        """Start or stop a recording: a marker goes out where that changes anything.
+        """Start or stop a recording; if that changes anything, the board sends a marker.
 
         Parameters
         ----------
@@ -286,7 +287,7 @@ class Board:
         self._core.record(flag("start", start))
 
     def faults(self) -> str:
-        """Return a status line for each fault whose count has moved since this was last asked."""
+        """Return a status line for each fault whose count has changed since the last call."""
         return self._core.faults()
 
     @property
@@ -301,7 +302,7 @@ class Board:
 
     @property
     def registers(self) -> Registers:
-        """As written; the scan takes them over at the next frame's edge."""
+        """The registers as written; the scan uses them from the next frame."""
         return Registers._of(self._core.registers(), self.array)
 
     @property

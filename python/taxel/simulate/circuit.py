@@ -43,7 +43,7 @@ class Fabric(Value):
     rest_us : float, uS, 0 or more
         Conductance at rest.
     touch_us : float, uS, above 0
-        What 0.02 N add; the default makes 0.1 V at 1.3 V and 47 kOhm.
+        Conductance that 0.02 N adds; the default makes 0.1 V at 1.3 V and 47 kOhm.
     exponent : float, from 0.5 to 1
 
     Raises
@@ -68,7 +68,7 @@ class Fabric(Value):
     _kind = "fabric"
 
     def conductance(self, force_n: ArrayLike) -> Values:
-        """Return conductances in uS of forces in N, of the same shape; a force below 0 is none.
+        """Return conductances in uS of forces in N, of the same shape; a force below 0 counts as 0.
 
         Parameters
         ----------
@@ -132,14 +132,14 @@ class _Lines(Value):
 
         Raises
         ------
-        ProblemError : a conductance that is none (names the taxel), or another shape
+        ProblemError : an invalid conductance (names the taxel), or another shape
         """
         checked = _frames("conductance_us", conductance_us, "uS")
         shape: tuple[int, int] = checked.shape[-2:]
         return _core.circuit_volts(self._kind, self._json(), shape, checked.ravel()).reshape(checked.shape)
 
     def volts_alone(self, conductance_us: ArrayLike) -> Values:
-        """Return what taxels would make by themselves on ideal lines, V, of the same shape: no crosstalk.
+        """Return the voltages of taxels on ideal lines without crosstalk, V, of the same shape.
 
         Parameters
         ----------
@@ -161,8 +161,8 @@ class _Lines(Value):
 class VirtualGround(_Lines):
     """Hold rows by transimpedance amplifiers and columns by switches, all at one voltage; the read column is grounded.
 
-    Ideal, each taxel gives ``v_trans (1 + feedback_kohm G)`` by itself. Switches, wires and amplifiers that are not
-    ideal let taxels touch each other: `volts` solves that network exactly.
+    With ideal parts, each taxel gives ``v_trans (1 + feedback_kohm G)`` by itself. Switches, wires and amplifiers that
+    are not ideal make taxels influence each other: `volts` solves that network exactly.
 
     Parameters
     ----------
@@ -173,16 +173,16 @@ class VirtualGround(_Lines):
     gain : float, 1 or more, optional
         Open-loop gain of the amplifiers (a guess); None: without bound.
     offset_mv : float, mV, from 0 to 1000000
-        How far the amplifiers' offsets differ: standard deviation.
+        Standard deviation of the amplifiers' offsets.
     switch_ohm : float, ohm, from 0 to 1e9
-        A column's switch: an ADG734's.
+        Resistance of a column's switch; default: that of an ADG734.
     wire_ohm : float, ohm, from 0 to 1e9
-        A line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
+        Resistance of a line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
     rail_v : float, V, above 0
-        Where amplifiers saturate; also at 0 V. The line of one that does is no longer held: the feedback
-        resistor ties it to the rail.
+        Voltage at which amplifiers saturate; they also saturate at 0 V. The line of a saturated amplifier is no longer
+        held: the feedback resistor ties it to the rail.
     seed : int, 0 or more
-        Of the offsets.
+        Seed of the offsets.
 
     Raises
     ------
@@ -190,8 +190,9 @@ class VirtualGround(_Lines):
 
     Notes
     -----
-    Thesis 4.3.2, figure 4.1. Without wire resistance it takes one dense factor of as many unknowns as rows; with it two
-    voltages a taxel, sparse. The gain is that of slow signals: an amplifier has less of it within 3 us.
+    Thesis 4.3.2, figure 4.1. Without wire resistance the solution takes one dense factor with as many unknowns as rows;
+    with it, a sparse one with two voltages for each taxel. The gain is that of slow signals: within 3 us an amplifier
+    has less.
 
     Examples
     --------
@@ -214,7 +215,7 @@ class VirtualGround(_Lines):
     _kind = "virtual_ground"
 
     def ideal(self) -> Self:
-        """Return the same with ideal amplifiers, switches and wires: no crosstalk."""
+        """Return the same circuit with ideal amplifiers, switches and wires: no crosstalk."""
         return type(self)(**{**self._values(), "gain": None, "offset_mv": 0.0, "switch_ohm": 0.0, "wire_ohm": 0.0})
 
 
@@ -227,13 +228,13 @@ class Divider(_Lines):
     Parameters
     ----------
     supply_v : float, V, above 0, at most 1000
-        Of the driven line (thesis 3.4.2).
+        Voltage of the driven line (thesis 3.4.2).
     resistor_kohm : float, kOhm, above 0, at most 1000000
         The other half of the divider (a guess).
     switch_ohm : float, ohm, from 0 to 1e9
-        A driven line's switch.
+        Resistance of a driven line's switch.
     wire_ohm : float, ohm, from 0 to 1e9
-        A line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
+        Resistance of a line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
     idle : {"held", "floating"}
         Whether lines that are not driven are held at ground, as in thesis 3.4.2, or float.
 
@@ -243,7 +244,8 @@ class Divider(_Lines):
 
     Notes
     -----
-    Thesis 3.4.2 and Appendix 1, figure 1.1. There rows are driven and columns are read: its array is this one turned.
+    Thesis 3.4.2 and Appendix 1, figure 1.1. There rows are driven and columns are read, so its array is this array
+    turned.
 
     Examples
     --------
@@ -267,9 +269,9 @@ class Trace(NamedTuple):
     ----------
     t_us : float64, shape (n,), us
     line_v : float64, shape (n,), V
-        The sense line that the multiplexer has chosen.
+        Voltage of the sense line that the multiplexer has chosen.
     input_v : float64, shape (n,), V
-        The comparator's input, which settles towards it.
+        Voltage of the comparator's input, which settles towards the sense line.
     ramp_v : float64, shape (n,), V
         The ramp.
     high : bool, shape (n,)
@@ -290,26 +292,26 @@ class Converter(Value):
     Parameters
     ----------
     shape : {"rc", "linear"}
-        Of the ramp: charging towards 5 V, or straight; both end at 3 V.
+        Shape of the ramp: charging towards 5 V, or straight; both end at 3 V.
     ramp : int, ticks, from 1 to 65534
-        How long it rises, in 1/300 us; a line above 3 V reads it.
+        Time that the ramp rises, in 1/300 us; a line above 3 V reads this value.
     hysteresis_v : float, V, 0 or more
-        Between a comparator's two thresholds (thesis 4.3.2).
+        Distance between a comparator's two thresholds (thesis 4.3.2).
     settle_us : float, us, from 0 to 1000000
         Time constant of a comparator's input: the default settles to 2 % in 0.2 us (thesis 4.4.1).
     amplifier_us : float, us, from 0 to 1000000
-        Time constant of the amplifiers, what a column leaves for the next; 0: none. 0.705 if the board's 15 pF lie
+        Time constant of the amplifiers, by which a column affects the next; 0: none. 0.705 if the board's 15 pF are
         across its 47 kOhm, which no text states.
     discharge_us : float, us, from 0 to 1000000
         Time constant with which the ramp falls back (a guess).
     wait_us : float, us, from 0 to 1000000
-        From a step's beginning to the ramp's.
+        Time from a step's beginning to the ramp's beginning.
     step_us : float, us, above 0, at most 1000000
-        From one sense line of a channel to its next.
+        Time from one sense line of a channel to its next.
     line_us : float, us, above 0, at most 1000000
-        From one column to the next.
+        Time from one column to the next.
     steps : int, from 1 to 65535
-        Sense lines of a channel.
+        Number of sense lines of a channel.
 
     Raises
     ------
@@ -343,7 +345,7 @@ class Converter(Value):
     _kind = "converter"
 
     def ticks(self, volts: ArrayLike) -> Values:
-        """Return when each comparator trips, in ticks with their fraction.
+        """Return the time at which each comparator trips, in ticks with their fraction.
 
         A counter shows the whole ticks below. The frames are scanned one after the other, columns from the first; the
         first frame finds everything settled.
@@ -368,7 +370,7 @@ class Converter(Value):
         return _core.converter_ticks(self._json(), shape, checked.ravel()).reshape(checked.shape)
 
     def ramp_volts(self, ticks: ArrayLike) -> Values:
-        """Return where the ramp stands after so many ticks.
+        """Return the voltage of the ramp after so many ticks.
 
         Parameters
         ----------
@@ -392,7 +394,7 @@ class Converter(Value):
         return _core.converter_ramp(self._json(), checked.ravel(), False).reshape(checked.shape)
 
     def ramp_ticks(self, volts: ArrayLike) -> Values:
-        """Return when the ramp passes a voltage: the inverse of `ramp_volts`.
+        """Return the time at which the ramp passes a voltage: the inverse of `ramp_volts`.
 
         Parameters
         ----------
@@ -418,7 +420,7 @@ class Converter(Value):
         line_v : sequence of float, V, one a step
             The sense lines, settled.
         every_us : float, us, above 0 and finite
-            Between two points.
+            Time between two points.
         stop_us : float, us, 0 or more
 
         Returns
@@ -427,7 +429,7 @@ class Converter(Value):
 
         Raises
         ------
-        ProblemError : not one voltage a step, or more than 1e7 points or steps
+        ProblemError : not one voltage for each step, or more than 1e7 points or steps
 
         Examples
         --------
@@ -441,16 +443,16 @@ class Converter(Value):
 
 
 class Converted(NamedTuple):
-    """Hold frames that were converted one after the other, each with a ramp of its own.
+    """Hold frames that were converted one after the other, each with a separate ramp.
 
     Attributes
     ----------
     t_us : float64, shape (frames,), us
-        When each began; a column is read with the voltages at the time of its own conversion.
+        Time at which each frame began; a column is read with the voltages at the time when it is converted.
     ramp : uint32, shape (frames,), ticks
-        How long its ramp took.
+        Duration of its ramp.
     ticks : float64, shape (frames, rows, columns), ticks
-        When the comparators tripped, as `Converter.ticks`.
+        Times at which the comparators tripped, as from `Converter.ticks`.
     volts : float64, shape (frames, rows, columns), V
         The voltages of the whole ticks that a counter shows: halfway to the next tick, 3 V at the end.
     """
@@ -465,9 +467,10 @@ class Converted(NamedTuple):
 class AdaptiveRamp(Value):
     """Convert by a ramp that is steep while the signal moves fast and gentle while it hardly does (thesis 4.3.2).
 
-    After a frame the taxel that moved farthest sets the length of the next ramp, which lets it move by `moves_ticks`
-    of that ramp within the frame, so that a reading is about as much too old as too coarse. Without any move the ramp
-    takes twice its time, up to the gentlest. What a step and a column take beside their ramp stays.
+    After a frame, the taxel that moved farthest sets the length of the next ramp: it moves by `moves_ticks` of that
+    ramp within the frame, so that the error of a reading by its age is about its error by coarse ticks. If no taxel
+    moves, the ramp takes twice its time, up to the gentlest. The time that a step and a column take beside their ramp
+    stays the same.
 
     Parameters
     ----------
@@ -478,9 +481,9 @@ class AdaptiveRamp(Value):
     gentlest : int, ticks, from 1 to 65534
         The longest; the default is that of the preset "2 kHz".
     moves_ticks : float, ticks, above 0
-        How far the fastest taxel may move in a frame.
+        Largest move of the fastest taxel in a frame.
     noise_ticks : float, ticks, 0 or more
-        What does not count as a move, in ticks of the coarser of two ramps.
+        Largest change that does not count as a move, in ticks of the coarser of two ramps.
 
     Raises
     ------
@@ -489,7 +492,7 @@ class AdaptiveRamp(Value):
     Notes
     -----
     The thesis calls for a steep slope during gross movements and a gentle one during fine control, and states no rule:
-    this one is ours. ``taxel study adaptive_ramp`` shows what it gains.
+    this rule is ours. ``taxel study adaptive_ramp`` shows what it gains.
 
     Examples
     --------
@@ -508,14 +511,14 @@ class AdaptiveRamp(Value):
     _nested: ClassVar[dict[str, type[Any]]] = {"converter": Converter}
 
     def convert(self, volts: ArrayLike, *, period_us: float) -> Converted:
-        """Convert what lines give, frame after frame until the voltages end.
+        """Convert voltages of lines, frame after frame until the voltages end.
 
         Parameters
         ----------
         volts : float64, V, (n, rows, columns)
-            The lines at even times, straight in between.
+            Voltages of the lines at even times, with linear interpolation.
         period_us : float, us, above 0
-            From one of these times to the next.
+            Time from one of these voltages to the next.
 
         Raises
         ------
@@ -531,7 +534,7 @@ class AdaptiveRamp(Value):
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Circuit(Value):
-    """Put lines and converter together, as an emulated board can have them.
+    """Combine lines and converter for an emulated board.
 
     Parameters
     ----------
@@ -542,7 +545,7 @@ class Circuit(Value):
 
     Raises
     ------
-    ProblemError : one of another kind
+    ProblemError : a part of another kind
 
     Examples
     --------
@@ -569,7 +572,7 @@ class Circuit(Value):
 
         Raises
         ------
-        ProblemError : as theirs
+        ProblemError : as these
         """
         volts = (self.readout or VirtualGround()).volts(conductance_us)
         return (self.converter or Converter()).ticks(volts)

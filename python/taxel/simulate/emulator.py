@@ -28,17 +28,17 @@ __all__ = ["EmulatorReport", "Played", "emulate", "play", "truth"]
 
 
 class Played(NamedTuple):
-    """What a host decoded of a board's datagrams.
+    """Data that a host decoded from a board's datagrams.
 
     Attributes
     ----------
     events : Events
-        All of them: the tare's, then from the start marker on what the scenes made.
+        All events: those of the tare, then, after the start marker, those of the scenes.
     datagrams : int, 0 or more
     words : int, 0 or more
-        Of version 1 of the wire, of five bytes each; 0 on version 2.
+        Words of version 1 of the wire, of five bytes each; 0 with version 2.
     bytes : int, 0 or more
-        Of all datagrams, without what the network puts around them.
+        Bytes of all datagrams, without the headers of the network.
     """
 
     events: Events
@@ -56,10 +56,10 @@ def truth(
     ----------
     acts : sequence of Scene, Silence, FrameSequence
     preset : str, optional
-        The board's registers, one of `taxel.wire.PRESETS`, with as many lines as the array has; left out, "5.2 kHz", or
-        what a board of more than 64 lines resets to.
+        The board's registers, one of `taxel.wire.PRESETS`, with as many lines as the array has. Default: "5.2 kHz", or
+        the preset of a board of more than 64 lines at reset.
     array : Array, optional
-        The thesis' 64 x 64 taxels where it is left out.
+        Default: the thesis' 64 x 64 taxels.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def play(
     asynchronous: bool = False,
     watch: Callable[[float], object] = lambda _: None,
 ) -> Played:
-    """Play acts to an emulated board, as fast as it goes, and decode its datagrams.
+    """Play acts to an emulated board, as fast as possible, and decode its datagrams.
 
     The board arms after its first frame, is tared with a noise floor of 0 for `tare_ms`, then takes the preset's floor
     and marks a start; before the last frame it marks a stop.
@@ -109,17 +109,17 @@ def play(
     array : Array, optional
         As in `truth`.
     sensor : mapping, optional
-        What differs from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm, gain_spread,
-        offset_mv, noise_ticks.
+        Parameters that differ from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm,
+        gain_spread, offset_mv, noise_ticks.
     wire : {1, 2}, optional
-        The version of the wire that it speaks; left out, its registers', or 2 where it is asynchronous.
+        Version of the wire. Default: that of the registers, or 2 if `asynchronous`.
     circuit : Circuit, optional
-        Lines that its taxels share, settling, comparators with hysteresis; left out, each taxel reads by itself. Its
-        voltage and resistor must be the sensor's; the converter's times are the preset's.
+        Lines that its taxels share, settling, comparators with hysteresis. Default: each taxel is read by itself. Its
+        voltage and resistor must be those of the sensor; the converter's times are those of the preset.
     asynchronous : bool
         Each taxel compares by itself, as in `Board`; needs version 2, and no circuit.
     watch : function, optional
-        Called with the share that is played, once a second of the board's time.
+        Called with the share that has been played, once in each second of the board's time.
 
     Raises
     ------
@@ -155,25 +155,25 @@ def play(
 def emulate(options: EmulateOptions) -> EmulatorReport:
     """Play a touch to an emulated board in real time, and send its datagrams by UDP.
 
-    Of acts the board arms after the first frame, sets the noise floor to 0 for `tare_ms`, marks a start, and at the end
-    a stop.
+    When acts are played, the board arms after the first frame, sets the noise floor to 0 for `tare_ms`, marks a start,
+    and at the end a stop.
 
     Parameters
     ----------
     to : str
-        Address and port to send to, as "127.0.0.1:5208".
+        Address and port to send to, for example "127.0.0.1:5208".
     touch : iterable of Scene, Silence, FrameSequence; Replay; or Pipe
         The touch. An iterable of acts may be endless: each act is computed while those before it are played.
     seed : int, 0 or more
-        Of the spread of the taxels and the noise.
+        Seed of the spread of the taxels and of the noise.
     preset : str, optional
         A preset of the registers. Default: those of a board of this array at reset.
     registers : Registers, optional
         The registers of the board, in place of a preset.
     tare_ms : float, ms, 0 to 60000
-        How long the noise floor is 0 before the start marker, where acts are played.
+        Time for which the noise floor is 0 before the start marker, if acts are played.
     array : Array, optional
-        The sensor; that of a Replay or a Pipe is its own. Default: 64 x 64 taxels.
+        The sensor; a Replay or a Pipe has its own sensor. Default: 64 x 64 taxels.
     sensor : mapping, optional
         Parameters that differ from the usual sensor, as in `play`.
     wire : {1, 2}, optional
@@ -183,11 +183,11 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
     intensity : {"value", "difference", "nothing"}
         As in `Board`.
     version_2 : Version2, optional
-        How the board speaks version 2.
+        Options of version 2 of the wire.
     circuit : Circuit, optional
-        Lines that the taxels share, settling, comparators with hysteresis; by default each taxel is read by itself. Of
-        acts its voltage and resistor must be the sensor's. The converter's times are those of the registers, and flaws
-        are applied after it. The report has the frame rate that one core reached.
+        Lines that the taxels share, settling, comparators with hysteresis; by default each taxel is read by itself.
+        With acts, its voltage and resistor must be those of the sensor. The converter's times are those of the
+        registers, and flaws are applied after it. The report has the frame rate that a single core reached.
     asynchronous : bool
         Each taxel compares by itself, as in `Board`; no circuit, and version 2 of the wire (``wire=2``).
     flaws : Flaws, optional

@@ -1,4 +1,4 @@
-"""What an emulated board has done so far."""
+"""Report of what an emulated board has done so far."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ _QUANTILES = {"p50": "median", "p99": "99 %", "max": "at most"}
 
 @dataclass(frozen=True)
 class EmulatorReport:
-    """What an emulated board has done so far.
+    """Report of what an emulated board has done so far.
 
     Attributes
     ----------
     frames : int, 0 or more
     began_ns : int, ns since 1970
-        The host's clock at the board's time 0, ns since 1970: what the board does is due by it.
+        The host's clock at the board's time 0, from which the times of all actions of the board follow.
     board_seconds : float, s
-        By the board's own clock.
+        Duration by the board's clock.
     seconds : float, s
-        By the host's: larger where the machine cannot hold the board's rate.
+        Duration by the host's clock: larger if the machine cannot keep the board's rate.
     changes : int, 0 or more
     datagrams : int, 0 or more
     bytes : int, 0 or more
     dropped : int, 0 or more
         Changes that found the board's queue full.
     late_frames : int, 0 or more
-        Sent more than a frame after their end.
+        Frames that were sent more than a frame after their end.
     late_us : mapping of str to float, us
-        How long after its end a frame was sent: p50, p99, max; not measured where frames go as they come.
+        Delay between the end of a frame and its datagram: p50, p99, max; not measured if frames are sent as they come.
     network : mapping of str to int, or None
-        What the network did to datagrams, where asked to: given, delivered, and by fault.
+        Effects of the simulated network on datagrams, if there is one: given, delivered, and by fault.
     resets : int, 0 or more
-        How often the board was reset.
+        Number of resets of the board.
     """
 
     frames: int
@@ -71,7 +71,7 @@ class EmulatorReport:
 
     @property
     def verdict(self) -> str:
-        """One line: whether the rate was held, or by how much not, and how late frames were."""
+        """One line: whether the rate was kept, or by how much it was missed, and how late frames were."""
         late = ", ".join(f"{to_ms(self.late_us[q]):.2f} ms ({quantile})" for q, quantile in _QUANTILES.items())
         late = f"late by {late}; {self.late_frames} of {self.frames} by a frame or more"
         if self.held:

@@ -26,11 +26,11 @@ class Pressed(NamedTuple):
     Attributes
     ----------
     pressure_kpa : float64, shape (rows, columns), kPa
-        On the layer's face, by taxel, shape (rows, columns); nowhere negative.
+        Pressure on the layer's surface, by taxel; nowhere negative.
     base_kpa : float64, shape (rows, columns), kPa
-        At the layer's base, where the taxels lie; beside the body a bonded base is also pulled, a little.
+        Pressure at the layer's base, where the taxels are; beside the body, a bonded base is also pulled a little.
     force_n : float, N
-        All of the pressure on the face.
+        Force of all pressure on the surface.
     """
 
     pressure_kpa: NDArray[np.float64]
@@ -44,27 +44,28 @@ class Layer:
     Parameters
     ----------
     foam : mapping, optional
-        What differs from the usual foam: modulus_kpa, thickness_mm, poisson, yield_strain, densification_strain,
-        exponent (losses are of motion: see `Scene`).
+        Parameters that differ from the usual foam: modulus_kpa, thickness_mm, poisson, yield_strain,
+        densification_strain, exponent (losses are of motion: see `Scene`).
     array : Array, optional
-        The taxels that lie beneath; the thesis' where it is left out.
+        The taxels beneath; default: the thesis' array.
     cells_per_pitch : int, 1 to 16
-        How many cells of the layer lie along the pitch of taxels: more than one for a touch narrower than two taxels.
+        How many cells of the layer there are along the pitch of taxels: more than one for a touch narrower than two
+        taxels.
     tolerance : float, above 0
         A solution ends when no pressure moves by more than this share of the largest.
 
     Raises
     ------
     SceneError : foam that is invalid; so many cells on so large an array
-    ProblemError : a number of cells or a tolerance that is none
+    ProblemError : an invalid number of cells, or an invalid tolerance
 
     Notes
     -----
     Carbone and Mangialardi 2008 for the face; the base's share of a wave solves the same four conditions. Contact is
-    solved by projected Gauss-Seidel, of more than 600 cells (times `cells_per_pitch`) by conjugate gradients with FFT
-    (Polonsky and Keer 1999). A taxel senses the mean stress of its cells.
-    Collapse and densification replace how far a body has sunk by how far it would have in a linear column under the
-    same pressure (ours): exact for a wide touch, for columns and for linear foam.
+    solved by projected Gauss-Seidel; with more than 600 cells (times `cells_per_pitch`), by conjugate gradients with
+    FFT (Polonsky and Keer 1999). A taxel senses the mean stress of its cells. For collapse and densification, the depth
+    of a body is replaced by its depth in a linear column under the same pressure (ours). That is exact for a wide
+    touch, for columns and for linear foam.
 
     Examples
     --------
@@ -101,12 +102,12 @@ class Layer:
 
     @property
     def cells_mm(self) -> NDArray[np.float64]:
-        """Where the cells lie: y and x from the first taxel, each as `press` takes what has sunk there."""
+        """Places of the cells: y and x from the first taxel, in the order in which `press` takes depths."""
         y, x = self._core.cells_mm()
         return np.stack(np.meshgrid(y, x, indexing="ij"))
 
     def compliance(self, waves: ArrayLike) -> NDArray[np.float64]:
-        """Return how far a wave of pressure pushes the face in.
+        """Return the displacement of the surface by a wave of pressure.
 
         Parameters
         ----------
@@ -115,11 +116,11 @@ class Layer:
 
         Returns
         -------
-        float64, one a wave number, mm/kPa
+        float64, one for each wave number, mm/kPa
 
         Raises
         ------
-        ProblemError : a wave number that is none
+        ProblemError : an invalid wave number
 
         Notes
         -----
@@ -142,11 +143,11 @@ class Layer:
 
         Returns
         -------
-        float64, one a wave number, 0 to 1
+        float64, one for each wave number, 0 to 1
 
         Raises
         ------
-        ProblemError : a wave number that is none
+        ProblemError : an invalid wave number
 
         Examples
         --------
@@ -156,14 +157,14 @@ class Layer:
         return np.asarray(self._core.waves(_waves(waves))[1])
 
     def press(self, sunk_mm: ArrayLike) -> Pressed:
-        """Return the pressures that hold a body which has sunk so far below the face at rest.
+        """Return the pressures that hold a body which has sunk so far below the unloaded surface.
 
-        The solution begins at the pressures to which the latest two calls lead.
+        The solution begins at pressures that are extrapolated from the latest two calls.
 
         Parameters
         ----------
         sunk_mm : float64, mm, shape (rows, columns), each times `cells_per_pitch`
-            At each cell; below 0 where the body is still above the face.
+            Depth at each cell; below 0 where the body is still above the surface.
 
         Returns
         -------

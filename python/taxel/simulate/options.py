@@ -1,4 +1,4 @@
-"""How an emulated board works: each option once, for `emulate`, the command line and Rust."""
+"""Options of an emulated board, each defined once for `emulate`, the command line and Rust."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ class EmulateOptions:
     version_2: Version2 | None = None
     circuit: Circuit | None = option(
         None,
-        "Simulate the circuit of shared lines; NAME is one of gain, switch_ohm, wire_ohm, offset_mv, "
-        "hysteresis_v, settle_us, amplifier_us; "
-        "one of them puts in the whole circuit, the others as usual. Takes the board to some 2.4 kHz.",
+        "Simulate the circuit of shared lines; NAME is one of gain, switch_ohm, wire_ohm, offset_mv, hysteresis_v, "
+        "settle_us, amplifier_us. One of them is enough: the whole circuit is simulated, the others with their usual "
+        "values. The board then reaches about 2.4 kHz.",
     )
     asynchronous: bool = option(False, "Taxels send by themselves, without a scan, with stamps of 1 us (wire 2).")
     flaws: Flaws | None = option(
@@ -71,7 +71,7 @@ class EmulateOptions:
         "May be repeated.",
     )
     reset_every_s: float | None = option(None, "Interval between resets of the board, s. Default: none.", least=0.001)
-    drift_ppm: float = option(0.0, "How much faster the board's clock runs, parts per million.")
+    drift_ppm: float = option(0.0, "By how many parts per million the board's clock runs too fast.")
     control: str | None = option(None, "Accept commands on this TCP port of loopback; 0 finds a free one.")
     line: str | os.PathLike[str] | None = option(
         None, "Accept commands on a serial line of this name (a link to a pseudo-terminal)."

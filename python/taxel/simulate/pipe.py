@@ -24,20 +24,20 @@ class Pipe:
     """Play frames of any other sensor to the board as they come: from a pipe, after a line that describes them.
 
     The line is JSON: ``{"rows": 16, "columns": 8, "rate": 100, "bits": 12}``, and may name ``pitch_mm`` and ``name``.
-    Behind it stand frames: uint16, little-endian, row by row. The board's clock is the pipe's: a frame is one over
-    `rate` long.
+    After it come frames: uint16, little-endian, row by row. The pipe gives the board's clock: a frame lasts 1 / `rate`
+    s.
 
     Parameters
     ----------
     source : binary file
-        As ``sys.stdin.buffer``; must have a descriptor.
+        For example ``sys.stdin.buffer``; must have a descriptor.
     noise_floor : int, ticks
         A change above it makes an event; a tick is one unit of the values, or more where so many bits are too many for
         so fast a scan (`shift` is how often a value is halved).
 
     Raises
     ------
-    FormatError : another first line
+    FormatError : the first line is not as described
     ProblemError : numbers in it that are invalid
     """
 

@@ -25,16 +25,16 @@ class Replay:
     ----------
     source : Recording, Events or Frames
     speed : float, above 0
-        2 plays it in half the time.
+        Speed of the replay; 2 plays it in half the time.
 
     Raises
     ------
-    ProblemError : neither of these, or nothing in it
+    ProblemError : another kind of source, or an empty source
 
     Notes
     -----
-    The board's frames quantise time: what came within one is sent at its end, of several events of a taxel the last.
-    Frames that are not in ticks are scaled so that the largest value is the end of the ramp.
+    The board's frames quantise time: events within a frame are sent at its end; if a taxel has several, the last is
+    sent. Frames that are not in ticks are scaled so that the largest value is the end of the ramp.
     """
 
     def __init__(self, source: Recording | Events | Frames, speed: float = 1.0) -> None:
@@ -56,12 +56,12 @@ class Replay:
         return self.source.array
 
     def registers(self, preset: str | None) -> Registers:
-        """Return the registers of the board that plays it: the recording's where they are known, else a preset.
+        """Return the registers of the board that plays it: those of the recording, if known, else a preset.
 
         Parameters
         ----------
         preset : str or None
-            The registers where the recording has none.
+            The registers if the recording has none.
 
         Raises
         ------

@@ -52,13 +52,13 @@ class SceneFile:
     ----------
     scene : Scene
     seed : int, 0 or more
-        Draws the taxels' spread and their noise.
+        Seed of the taxels' spread and noise.
     preset : str or None
         The board's registers, as in `play`.
     tare_ms : float, ms
     array : Array
     sensor : mapping of str to float
-        What differs from the usual taxels, as in `play`.
+        Parameters that differ from the usual taxels, as in `play`.
 
     Examples
     --------
@@ -95,7 +95,7 @@ class SceneFile:
         Parameters
         ----------
         path : path of a .toml
-            The keys of a `Scene`, and beside them ``seed``, ``preset``, ``tare_ms``, ``array`` (rows, columns,
+            The keys of a `Scene`, and also ``seed``, ``preset``, ``tare_ms``, ``array`` (rows, columns,
             pitch_mm) and ``taxels`` (as `sensor` of `play`). The heights of a height map may be a ``file`` beside it:
             rows of numbers in mm, with commas or blanks between them.
 
@@ -158,7 +158,7 @@ class SceneFile:
         return fitting(self.preset, self.array)
 
     def acts(self) -> list[Act]:
-        """Return silence for the tare, the scene, and a little silence: what `play` and `emulate` take."""
+        """Return silence for the tare, the scene, and a little silence: as `play` and `emulate` take them."""
         return [Silence(self.tare_ms + _BEFORE_MS), self.scene, Silence(_AFTER_MS)]
 
     @property
@@ -168,7 +168,7 @@ class SceneFile:
 
 
 def _known(location: str, table: object, names: tuple[str, ...] | list[str]) -> None:
-    """Refuse a key that is not known, with the one that was meant."""
+    """Refuse an unknown key, and name the key that was probably meant."""
     if not isinstance(table, Mapping):
         raise SceneError(f"{location} is {json.dumps(table, default=str)}: must be a table")
     for name in table:
@@ -179,7 +179,7 @@ def _known(location: str, table: object, names: tuple[str, ...] | list[str]) -> 
 
 
 def _bodies(described: Any, folder: Path) -> Any:
-    """Return bodies with the height maps that lie in files."""
+    """Return bodies with the height maps that are in files."""
     if not isinstance(described, list):
         raise SceneError(f"bodies is {json.dumps(described, default=str)}: must be written [[bodies]], once a body")
     bodies = []
@@ -190,13 +190,13 @@ def _bodies(described: Any, folder: Path) -> Any:
                 if isinstance(kinds, Mapping) and len(kinds) > 1:
                     raise SceneError(f"bodies[{n}].{part} is {' and '.join(kinds)}: must be one of them")
             if "mass_g" in body and "material" in body:
-                raise SceneError(f"bodies[{n}] has mass_g and material: must have one of both")
+                raise SceneError(f"bodies[{n}] has mass_g and material: must have only one of them")
         shape: Any = body.get("shape") if isinstance(body, Mapping) else None
         relief = shape.get("height_map") if isinstance(shape, Mapping) else None
         if isinstance(relief, Mapping) and "file" in relief:
             where = f"bodies[{n}].shape.height_map"
             if "heights_mm" in relief:
-                raise SceneError(f"{where} has heights_mm and a file: must have one of both")
+                raise SceneError(f"{where} has heights_mm and a file: must have only one of them")
             file = folder / text(f"{where}.file", relief["file"])
             try:
                 rows = read_text(file, DESCRIPTION).replace(",", " ").splitlines()

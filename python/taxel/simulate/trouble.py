@@ -17,30 +17,31 @@ __all__ = ["Faults", "Flaws"]
 
 @dataclass(frozen=True)
 class Flaws:
-    """Set the flaws of taxels; each is 0 where it is left out, and is drawn from a seed of its own.
+    """Set the flaws of taxels; each is 0 where it is left out, and is drawn from a separate seed.
 
     Parameters
     ----------
     gain : float, 0 or more
         Standard deviation of the logarithm of the taxels' gains.
     threshold : float, ticks, 0 or more
-        Standard deviation of the taxels' thresholds: a taxel reads so many ticks too few.
+        Standard deviation of the taxels' thresholds: the number of ticks by which a taxel reads too little.
     hysteresis : float, ticks, 0 or more
-        How far a reading stays behind its way up and down; of each taxel half to three halves of it.
+        Lag of a reading when the value rises or falls; for each taxel between half and three halves of this number.
     drift : float, ticks a minute, 0 or more
         Standard deviation over taxels of a steady drift of their readings.
     dead, stuck : float, share of taxels, from 0 to 1
         Taxels that always read 0, or one value that is drawn for each.
     loose : int, lines, 0 or more
-        Lines with a loose contact: all of a line reads 0 now and then, for 50 ms on average, once a second.
+        Number of lines with a loose contact: all taxels of such a line read 0 about once a second, for 50 ms on
+        average.
     noise : float, ticks, 0 or more
         Standard deviation of one reading.
     seeds : mapping of names to int, 0 or more, optional
-        The seed of a flaw; each of the others has 0.
+        Seeds of flaws; a flaw that is not named has the seed 0.
 
     Raises
     ------
-    ProblemError : a size outside its range, a seed for no flaw, or a seed that is no whole number
+    ProblemError : a size outside its range, a seed for no flaw, or a seed that is not a whole number
 
     Examples
     --------
@@ -66,7 +67,7 @@ class Flaws:
                 finite(name, getattr(self, name), least=0.0, most=1.0 if name in ("dead", "stuck") else math.inf)
         for name, seed in mapping("seeds", {} if self.seeds is None else self.seeds).items():
             if name not in self._names():
-                raise refused("seeds", f": {shown(name)} is no flaw: there are {', '.join(self._names())}")
+                raise refused("seeds", f": {shown(name)} is not a flaw: there are {', '.join(self._names())}")
             integer(f"seeds[{name}]", seed, 0, 2**63 - 1)
 
     @classmethod
@@ -90,12 +91,13 @@ class Faults:
     Parameters
     ----------
     lost, repeated, reordered, cut, corrupted : float, share of datagrams, from 0 to 1, together at most 1
-        Never arrive; arrive twice; are overtaken by 1 to 8 others; arrive without their end; with 1 to 8 flipped bits.
+        Shares of datagrams that never arrive; that arrive twice; that arrive after 1 to 8 later datagrams; that arrive
+        without their end; that arrive with 1 to 8 flipped bits.
     seed : int, 0 or more
 
     Raises
     ------
-    ProblemError : a share that is none, shares that are more than 1 together, or a seed that is no whole number
+    ProblemError : a share outside 0 to 1, shares that are more than 1 together, or a seed that is not a whole number
 
     Examples
     --------

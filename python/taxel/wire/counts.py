@@ -151,7 +151,7 @@ class Status:
     Parameters
     ----------
     frames, events, dropped, datagrams, faults : int
-        The number of frames scanned, of events sent, of events dropped, of datagrams sent before this one, and of
+        The number of frames scanned, of events sent, of events dropped, of datagrams sent before this datagram, and of
         conversions whose comparator had not returned.
 
     Notes

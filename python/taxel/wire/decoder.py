@@ -49,8 +49,8 @@ def decode(
         separately, so that an intensity never belongs to a change of the datagram before.
     columns : Columns, optional
         Memory to reuse, with room for ``len(data) // 5 + 2`` events, of version 2 for ``len(data) // 2 + 32``: the
-        events are views of it, valid until it is filled again. By default, and with pairing "taxel", they have memory
-        of their own.
+        events are views of it, valid until it is filled again. By default, and with pairing "taxel", they have separate
+        memory.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def decode(
 
     Raises
     ------
-    ProblemError : an invalid argument; damage in the bytes is no error
+    ProblemError : an invalid argument; damage in the bytes is not an error
 
     Notes
     -----
@@ -79,7 +79,7 @@ def decode(
     room, fresh = Columns._or_fresh(columns, _core.wire_rows(decoder.version, len(stream)))
     if decoder.version == 2:
         if lengths is not None:
-            raise refused("lengths", ": each datagram of version 2 has its own before it; leave them out")
+            raise refused("lengths", ": each datagram of version 2 has its length before it; leave them out")
         filled = _core.decode_datagrams(stream, decoder.array._parts(), room._parts())
     elif lengths is not None:
         filled = decoder._core.fill_datagrams(stream, column("lengths", lengths, np.int64), room._parts())
@@ -124,7 +124,7 @@ class Decoder:
     Notes
     -----
     Table 5.4, and the page *Wire version 2*. Time of version 1 is unwrapped into 64 bits: a stamp up to 0.1 s behind
-    the latest time is a step back, which is counted and stays in the events; any other stamp lies ahead, so that pauses
+    the latest time is a step back, which is counted and stays in the events; any other stamp is ahead, so that pauses
     of up to 6.45 s are unwrapped correctly. For longer pauses arrival times are needed (`push`).
 
     Examples
@@ -160,7 +160,7 @@ class Decoder:
         self.array = Array._of(array)
         text("pairing", pairing, _PAIRINGS)
         if self.version == 2 and (pairing != "direct" or flag("differences", differences)):
-            raise ProblemError("pairing and differences are of version 1: datagrams of version 2 say both themselves")
+            raise ProblemError("pairing and differences are for version 1: datagrams of version 2 state both")
         parts = self.array._parts()
         self._core = _core.WireDecoder(self.version, parts, pairing, flag("differences", differences))
 

@@ -69,7 +69,7 @@ class Registers:
     Raises
     ------
     DeviceError : a rule is broken (names it, with the numbers)
-    ProblemError : no such field, a value that is no number, a time that is no multiple of 0.01 us
+    ProblemError : no such field, a value that is not a number, a time that is not a multiple of 0.01 us
 
     Notes
     -----
@@ -250,7 +250,7 @@ class Registers:
     def commands_to(self, target: Registers) -> list[Command]:
         """Return the writes that change this set into another, in an order in which the board refuses none.
 
-        `record` stays as it is: starting a recording is a command of its own.
+        `record` stays as it is: starting a recording is a separate command.
 
         Parameters
         ----------

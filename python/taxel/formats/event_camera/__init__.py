@@ -19,7 +19,7 @@ __all__ = ["ENDINGS", "Reduction", "are_counts", "files", "reduced", "trials"]
 
 
 def files(path: Path) -> list[Path]:
-    """Find the files of this format: ``.raw`` and ``.aedat4``, and those ``.dat`` that are no text."""
+    """Find the files of this format: ``.raw`` and ``.aedat4``, and those ``.dat`` that are not text."""
     found = sorted(path.iterdir()) if path.is_dir() else [path]
     named = (file for file in found if file.suffix.lower() in ENDINGS and file.is_file())
     return [file for file in named if file.suffix.lower() != ".dat" or is_dat(file)]

@@ -41,12 +41,12 @@ class CountWindows:
         self._begin = first // self._window_us
         count = last // self._window_us - self._begin + 1
         size = f"{count} frames of {array.rows} x {array.columns} taxels"
-        fewer = "less by --region, by a larger --bin, or by a larger window, --count-ms (window_ms in Python)"
+        fewer = "fewer with --region, a larger --bin, or a larger window, --count-ms (window_ms in Python)"
         unpacked(f"{name}, {size} ({fewer})", count * (4 * array.rows * array.columns + 8))
         self._values = np.zeros((count, *array.shape), np.float32)
 
     def add(self, t: NDArray[np.int64], x: NDArray[np.uint16], y: NDArray[np.uint16]) -> bool:
-        """Count events; return whether all lie in the windows."""
+        """Count events; return whether all are in the windows."""
         window = t // self._window_us - self._begin
         if len(window) and not 0 <= window.min() <= window.max() < len(self._values):
             return False

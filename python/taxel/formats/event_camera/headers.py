@@ -103,10 +103,12 @@ def _check_packets(path: Path, file: BinaryIO, size: int) -> None:
     if not magic:
         raise FormatError(f"{path}: empty; must be AEDAT 4")
     if (older := re.match(rb"#!AER-DAT([0-3])", magic)) is not None:
-        raise FormatError(f"{path}: its header states AEDAT {older[1].decode()}; AEDAT 4 is read: save it as that")
+        raise FormatError(
+            f"{path}: its header states AEDAT {older[1].decode()}; only AEDAT 4 is read: save it as AEDAT 4"
+        )
     if magic != _AEDAT:
         begins = " ".join(f"{byte:02X}" for byte in magic[:4])
-        raise FormatError(f"{path}, byte 0: starts with {begins}, not with #!AER-DAT4.0: damaged, or no AEDAT")
+        raise FormatError(f"{path}, byte 0: starts with {begins}, not with #!AER-DAT4.0: damaged, or not AEDAT")
     try:
         (length,) = struct.unpack("<I", file.read(4))
         if length > min(size, _HEADER):

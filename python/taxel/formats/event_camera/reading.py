@@ -67,7 +67,7 @@ class _EventFile(ReadingChild):
         self._order({"kind": self._encoding})
         columns, rows = self._answer()["size"]
         if not columns or not rows:
-            raise FormatError(f"{self.path}: its header says no size; give it a line such as % geometry 640x480")
+            raise FormatError(f"{self.path}: its header states no size; add a line such as % geometry 640x480")
         left, right, top, bottom = reduction.bounds(columns, rows)
         array = sensor(str(self.path), Array(*reduction.shape(columns, rows), name="event camera"))
         how = {
@@ -83,7 +83,7 @@ class _EventFile(ReadingChild):
             raise FormatError(f"{self.path}: holds no event: damaged, or nothing moved")
         first, last = found["ends"]
         if last > TIME_US:
-            raise FormatError(f"{self.path}: reaches {last} us; times must lie within {TIME_US} us (142 years) of 0")
+            raise FormatError(f"{self.path}: reaches {last} us; times must be within {TIME_US} us (142 years) of 0")
         self._order({**how, "columns": True})
         if reduction.window_us is None:
             return self._events(array, found["count"])

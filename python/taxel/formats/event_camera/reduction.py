@@ -1,4 +1,4 @@
-"""What is read of the events of a camera: a region, taxels of several pixels, a polarity, counts in windows."""
+"""Selection of the events of a camera: a region, taxels of several pixels, a polarity, counts in windows."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class Reduction:
         if not (right <= columns and bottom <= rows):
             size = f"{columns} columns and {rows} rows"
             raise ProblemError(
-                f"region {shown(self.region)}: must lie within the sensor's {size}, as 0:{columns},0:{rows}"
+                f"region {shown(self.region)}: must be within the sensor's {size}, as 0:{columns},0:{rows}"
             )
         return left, right, top, bottom
 

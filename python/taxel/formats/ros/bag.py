@@ -90,7 +90,7 @@ class Bag:
         return {connection.topic for connection in self.reader.connections}
 
     def undefined(self, name: str) -> str:
-        """Return the name of a type that is not defined: this one, or one that it is made of; "" if none."""
+        """Return the name of a type that is not defined: this type, or a type that it is made of; "" if none."""
         if name not in self.store.fielddefs:
             return name
         from rosbags.interfaces import Nodetype  # noqa: PLC0415  an extra
@@ -115,7 +115,7 @@ class Bag:
         return decode(data, connection.msgtype)
 
     def _check_digest(self, sent: Connection) -> None:
-        """Refuse a definition that was given for messages of another one, if the bag holds the digest of its own."""
+        """Refuse a given definition whose digest differs from that of the messages' own, if the bag holds it."""
         if sent.msgdef.data or not sent.digest:
             return
         digest = self.store.generate_msgdef(sent.msgtype)[1] if self.is_ros1 else self.store.hash_rihs01(sent.msgtype)
@@ -145,19 +145,21 @@ def open_bag(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
     except Error:
         raise
     # Damaged files raise errors of rosbags' parts: of struct, of SQLite, of YAML, of bz2, of zstd; and a damaged size
-    # asks for more memory than there is.
+    # asks for more memory than is available.
     except Exception as error:
         is_position = getattr(error, "errno", None) == errno.EINVAL or "offset-sized" in str(error)
         if isinstance(error, OSError) and error.errno is not None and not is_position:
             error.filename = error.filename or str(path)
             raise
-        why = "more memory than there is" if isinstance(error, MemoryError) else first_line(error)
+        why = "more memory than is available" if isinstance(error, MemoryError) else first_line(error)
         if is_position:
             why = "it is damaged: it names a position that no file has"
         elif "index" in why.lower() and path.suffix == ".bag":
-            why = "its index is missing or damaged, as of a recording that was cut off; rosbag reindex makes it anew"
+            why = (
+                "its index is missing or damaged, as in a recording that was cut off; rosbag reindex makes a new index"
+            )
         elif "magic" in why.lower() and path.suffix not in (".bag", ".db3"):
-            why = "its end is missing, as of a recording that was cut off; mcap recover makes a whole file of it"
+            why = "its end is missing, as in a recording that was cut off; mcap recover makes a whole file of it"
         raise FormatError(f"{path}: cannot be read as a ROS bag: {why}") from None
 
 
@@ -191,7 +193,7 @@ def _bounded_unpacker(name: str) -> Callable[..., bytes]:
         if left <= 0:
             raise ValueError(f"a chunk unpacks to more than {size} bytes; at most that are read")
         if not unpacker.eof:
-            raise EOFError("a chunk ends before what it holds does")
+            raise EOFError("a chunk ends before its content does")
         return b"".join(parts)
 
     return unpack
@@ -247,7 +249,7 @@ def _of_folder(folder: Path, needed: Iterable[str]) -> dict[str, Any]:
 
     files = sorted(file for file in folder.rglob("*") if file.suffix in (".msg", ".idl"))
     if not files:
-        raise ProblemError(f"{folder}: no folder with .msg or .idl files")
+        raise ProblemError(f"{folder}: not a folder with .msg or .idl files")
     defined: dict[str, Any] = {}
     for file in files:
         try:

@@ -210,7 +210,7 @@ class _Held:
         t, by_the_bag = _times(np.array(stamps, np.int64)[order], bag) if has_stamps else (bag, 0)
         if np.abs(t).max() // 1000 > TIME_US:
             raise FormatError(
-                f"{self.location}: a message at {t[np.abs(t).argmax()]} ns; must lie within 142 years of 0"
+                f"{self.location}: a message at {t[np.abs(t).argmax()]} ns; must be within 142 years of 0"
             )
         return Read(
             self.topic,

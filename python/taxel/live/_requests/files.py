@@ -75,7 +75,7 @@ class FileRequests:
             return [file.name for file in folder.iterdir() if self._opening.is_recording(file)]
 
     def read(self, path: Path, trial: str | None, entire: bool) -> tuple[Path | None, ReadFrames | None]:
-        """Read a recording that is no file of a board's events.
+        """Read a recording that is not a file of a board's events.
 
         Parameters
         ----------

@@ -70,7 +70,7 @@ def _scores(result: dict[str, Any]) -> Iterator[tuple[str, bool, int, int, int, 
 
 
 class TrainingRequests:
-    """Train readouts in a process of their own, one at a time, and run them on recordings.
+    """Train readouts in a separate process, one at a time, and run them on recordings.
 
     Parameters
     ----------

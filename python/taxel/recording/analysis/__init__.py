@@ -1,1 +1,1 @@
-"""What a recording shows: rest, pressure, and the health of its taxels."""
+"""Analysis of a recording: rest, pressure, and the health of its taxels."""

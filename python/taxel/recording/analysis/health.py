@@ -76,7 +76,13 @@ class Health:
         Number of events (or changes of the frame) at each taxel.
     dead, stuck, noisy : bool, shape (rows, columns)
     untested : bool, shape (rows, columns)
-        Not touched enough to say: neither named nor seen to work.
+        Taxels that were not touched enough to say whether they work.
+
+    Examples
+    --------
+    >>> from taxel.frames import Frames
+    >>> health(Frames([[[0.0, 5.0]], [[0.0, 7.0]], [[0.0, 5.0]]], [0, 10_000, 20_000]))
+    Health(2 taxels: 0 dead, 0 stuck, 0 noisy, 2 not touched enough to say)
     """
 
     array: Array
@@ -112,10 +118,10 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     """Return which taxels are dead, stuck or noisy, each compared with its neighbours.
 
     A recording cannot show whether taxels work in a region that was never touched: a taxel is named dead or stuck only
-    if its neighbours were touched three times or more, or if it always reads the greatest value of all. One that was
-    touched less and did nothing is *untested*. States of wire version 2 (`Events.repaired`) and the values held at the
-    beginning count as held values, but not as changes of the taxel. Without neighbours, as in one channel, no taxel is
-    named.
+    if its neighbours were touched three times or more, or if it always reads the greatest value of all. A taxel that
+    was touched less and did nothing is *untested*. States of wire version 2 (`Events.repaired`) and the values held at
+    the beginning count as held values, but not as changes of the taxel. Without neighbours, as in one channel, no taxel
+    is named.
 
     Parameters
     ----------
@@ -223,7 +229,7 @@ class Touches(NamedTuple):
 
 
 class TaxelStatistics(NamedTuple):
-    """Statistics of each taxel's events and held values; whole numbers, shape (rows, columns) but for touches."""
+    """Statistics of each taxel's events and held values; whole numbers, shape (rows, columns) except touches."""
 
     activity: NDArray[np.int64]
     """Number of events."""

@@ -46,8 +46,8 @@ def free_of_preload(recording: Recording, rest: Rest) -> tuple[tuple[int, int] |
 
 def _line(recording: Recording, rest: Rest, *, found: bool) -> str:
     """Return the line on a tare beside a rest with something on the array, where a time without it was found or not."""
-    without = "so the tare is of a time without it"
-    lacks = "and there is no other rest, so the tare holds it; give a tare's file"
+    without = "so the tare is measured in a time without it"
+    lacks = "and there is no other rest, so the tare includes it; give a tare's file"
     return f"{recording.path}: the rest is {rest}, {without if found else lacks}"
 
 
@@ -62,7 +62,7 @@ def _free(frames: Frames, rest: Rest) -> NDArray[np.int64]:
 
 
 def _later(frames: Frames, free: NDArray[np.int64]) -> tuple[int, int] | None:
-    """Return the first quiet stretch from the first of these frames on, us, unless something lies on the array."""
+    """Return the first quiet stretch after the first of these frames, us, unless the array is loaded in it."""
     later = of_quiet(frames.between(frames.t[free[0]], np.inf))
     return None if later.preload_at else later.quiet_us
 

@@ -189,8 +189,8 @@ def _series_of(drawn: _Drawn, rest: Rest, array: Array) -> Series:
 def _moments(events: Events, drawn: _Drawn, rest: Rest, drawn_series: Series) -> NDArray[np.int64]:
     """Return the times of events at which area, peak and sum may be largest, us.
 
-    Each event changes them by what its taxel changes, above a rest that stands still from one frame to the next:
-    from each frame's own values on, that tells where to look, not what is there.
+    Each event changes them by what its taxel changes, above a rest that is constant from one frame to the next. Added
+    to each frame's values, that shows where to look, not what is there.
     """
     assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller checked
     events = events if np.all(np.diff(events.t) >= 0) else events.sorted()
@@ -312,7 +312,8 @@ class _Drawn:
     def sampled(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """The times at which values are read: the frames', and those at which the rest is tracked.
 
-        Beside each stands how many times it stands for, of the frames' and of all multiples of `_TRACKED_US`.
+        With each comes the number of times that it stands for, among the frames' and among all multiples of
+        `_TRACKED_US`.
         """
         if not len(self.t):
             return self.t, self.t
@@ -341,7 +342,7 @@ class _Drawn:
     def blocks(self) -> Iterator[tuple[NDArray[np.bool_], FrameBlock]]:
         """Yield the held values in the rectangle, at the frames' times and often enough between them.
 
-        Beside them stands which of them are frames.
+        A mask shows which of them are frames.
         """
         times, _ = self.sampled
         shown = np.isin(times, self.t)
@@ -427,7 +428,7 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
     Notes
     -----
     *Reading*: the rest is a given tare, and that of a zeroed taxel what it was zeroed to; else the calibration's; else
-    0 where the unit is one of force or pressure; else that of a quiet stretch, tracked from there on
+    0 where the unit is one of force or pressure; else that of a quiet stretch, tracked after it
     (`taxel.encode.LocalLoad`); else it is not known: events are then above each taxel's first value, and frames as
     they are. A taxel is loaded if it is above its rest by more than the noise floor of the board's fast presets and
     half a tick, as in `taxel.encode.ContactArea`; in another unit the range of a recording's values counts as 150
@@ -521,7 +522,7 @@ def _measured(recording: Recording, tare: Tare | None) -> Rest | None:
     if tare is not None:
         if tare.array.shape != recording.array.shape:
             measured, stated = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
-            raise ProblemError(f"the tare is of {measured} taxels, {recording.path} of {stated}")
+            raise ProblemError(f"the tare has {measured} taxels, {recording.path} has {stated}")
         return Rest("tare", tare.rest.reshape(-1))
     calibration = recording.calibration
     if calibration is None or calibration.rest is None:

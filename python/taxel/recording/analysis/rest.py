@@ -73,7 +73,7 @@ class Rest:
     begin_us : int, us
         The time that text counts the quiet stretch from (`taxel._base.times`).
     zeroed : int
-        Number of taxels that were zeroed while recording: from then on their rest is what was given.
+        Number of taxels that were zeroed while recording: after that their rest is the given value.
     falls : bool
         Whether values of frames go further below the rest of a quiet stretch than above it, and come back: less may
         mean more pressure.
@@ -103,7 +103,7 @@ class Rest:
             "tare": "the given tare",
             "calibration": "the calibration's",
             "unit": "0, as the values are force or pressure",
-            "none": "not known, as no half second was quiet with nothing on it; a tare can be given",
+            "none": "not known, as no half second was both quiet and without load; a tare can be given",
         }
         text = words.get(self.source, "")
         if self.quiet_us is not None:
@@ -119,12 +119,12 @@ class Rest:
         """Return what to do of values that fall; of the recording of a path it names the layout file."""
         layout, turning = Rest.turning(path)
         if layout:
-            return f"values fall from their rest as {layout} turns them: leave falls out of it, if that is wrong"
-        return f"values fall from their rest: if less means more pressure, say {turning}"
+            return f"values fall from their rest as {layout} turns them: if that is wrong, leave falls out of it"
+        return f"values fall from their rest: if less means more pressure, write {turning}"
 
     @staticmethod
     def turning(path: Path | None = None) -> tuple[str, str]:
-        """Return the layout file that turns a recording's values ("" if none does), and what turns them anew."""
+        """Return the layout file that turns a recording's values ("" if none does), and what turns them again."""
         file = None if path is None else Layout.beside(path)
         with suppress(FormatError, OSError):
             if file is not None and Layout.read(file).turned is not None:
@@ -257,7 +257,7 @@ def find_rest(
     corner : (int, int)
         Row and column of the first taxel, for text.
     stands_for : int64, shape (frames,), optional
-        How many equal frames each one is; default 1.
+        Number of equal frames that each frame stands for; default 1.
     """
     rest = _core.TrackedRest(columns, NOISE_FLOOR, np.full(taxels, np.nan), falls)
     begin_us = None

@@ -150,9 +150,9 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
 def _full_scale(frames: Frames) -> dict[str, Any] | None:
     """Return how many readings are at full scale, and of which value; None where the readings show none.
 
-    It is the greatest value if two taxels or more read exactly that one in several frames, and other values too.
-    Readings of few levels reach their greatest one by chance, and in the tail of noise each value is rarer than the one
-    below it.
+    It is the greatest value if two taxels or more read exactly this value in several frames, and other values too.
+    Readings of few levels reach their greatest value by chance, and in the tail of noise each value is rarer than the
+    one below it.
     """
     values = frames.values
     if not values.size:

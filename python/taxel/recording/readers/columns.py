@@ -29,7 +29,7 @@ PIECE_BYTES = 1 << 20
 def digest_of(columns: dict[str, NDArray[Any]]) -> NDArray[np.uint8]:
     """Return BLAKE2b (16 bytes) over the columns by name: of each a line of JSON (name, dtype, shape), then its bytes.
 
-    Bytes are in C order, little-endian; texts are UTF-32. Entries that are no columns of a recording do not count.
+    Bytes are in C order, little-endian; texts are UTF-32. Entries that are not columns of a recording do not count.
     """
     digest = hashlib.blake2b(digest_size=16)
     for name in sorted(columns.keys() & set(COLUMNS)):

@@ -105,7 +105,7 @@ def _names(path: Path, head: bytes) -> list[str]:
     if names[0] != "t_us" or len(names) < 2:
         begin = repr(_text_of(head)[:40].decode("utf-8", "replace"))
         raise FormatError(
-            f"{path}, line 1: {begin}: must be t_us,x,y,p[,intensity][,repaired], or t_us and a column a taxel; "
+            f"{path}, line 1: {begin}: must be t_us,x,y,p[,intensity][,repaired], or t_us and a column for each taxel; "
             + advice(path, "describes a table of another program")
         )
     if tuple(names[:4]) == EVENTS:
@@ -116,7 +116,7 @@ def _names(path: Path, head: bytes) -> list[str]:
         return names
     repeated = next((name for name, n in Counter(names).items() if n > 1), None)
     if repeated is not None:
-        raise FormatError(f"{path}, line 1: column {shown(repeated)} stands there twice")
+        raise FormatError(f"{path}, line 1: column {shown(repeated)} is there twice")
     return names
 
 
@@ -220,7 +220,7 @@ def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: A
             raise FormatError(f"{path}, line 1: {error}") from None
     elif x.max() >= columns or y.max() >= rows:
         k = int(np.flatnonzero((x >= columns) | (y >= rows))[0])
-        raise FormatError(f"{path}, line 1: column {names[k + 1]!r} lies outside {rows} x {columns} taxels")
+        raise FormatError(f"{path}, line 1: column {names[k + 1]!r} is outside {rows} x {columns} taxels")
     else:
         sensor = array if called is None else replace(array, names=called)
     read = Growing(str(path), t=((), np.int64), values=((rows, columns), np.float32))
@@ -292,7 +292,7 @@ def _whole(path: Path, first: int, body: bytes, times: NDArray[np.float64]) -> N
 
 
 def _line_number(body: bytes, row: int) -> int:
-    """Return the number of the line, from 0 on, of a row of numbers; empty lines are not rows."""
+    """Return the number of the line, counted from 0, of a row of numbers; empty lines are not rows."""
     rows = -1
     for k, line in enumerate(body.split(b"\n")):
         rows += bool(line.strip())

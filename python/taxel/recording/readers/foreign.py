@@ -71,7 +71,9 @@ def read_foreign(path: Path, layout: Layout, array: Array | None = None) -> Reco
         taxels = math.prod(values.shape[1:])
         if layout.rows is not None and layout.columns is not None and taxels != layout.rows * layout.columns:
             hint = frames_hint(layout, taxels) if is_table else ""
-            raise FormatError(f"{path}: {read.size}; {layout.path} says {layout.rows} x {layout.columns} taxels{hint}")
+            raise FormatError(
+                f"{path}: {read.size}; {layout.path} states {layout.rows} x {layout.columns} taxels{hint}"
+            )
         grid = Array(values.shape[1], values.shape[2], name=path.stem) if values.ndim == 3 else None
         # More channels than a sensor may have columns are a grid by the layout.
         grid = grid or (None if taxels <= 65_535 else layout.grid())
@@ -103,8 +105,8 @@ def _data(path: Path, how: Data) -> Readings:
         key = next((key for key in ("array", "time") if getattr(how, key) is not None), None)
         if key is not None:
             size = as_size(getattr(how, key))
-            right = f"a size is said by {size}" if size else "leave it out"
-            raise FormatError(f"{path}: one array without a name; the layout says [data] {key}: {right}")
+            right = f"a size is given by {size}" if size else "leave it out"
+            raise FormatError(f"{path}: one array without a name; the layout states [data] {key}: {right}")
         arrays = {"": read_array(path, np.float32)}
         stored_names: list[str] = [""]
         wanted = stored_names
@@ -112,7 +114,7 @@ def _data(path: Path, how: Data) -> Readings:
         stored_shapes = shapes_of(path)
         stored_names = list(stored_shapes)
         if how.array is None and len(stored_names) != 1:
-            raise FormatError(f"{path}: holds {list_arrays(stored_shapes)}; say which in the layout: [data] array")
+            raise FormatError(f"{path}: holds {list_arrays(stored_shapes)}; name one in the layout file: [data] array")
         # A path within a .h5 may begin at its root.
         named = [
             name if name in stored_shapes else name.strip("/") for name in (how.array, how.time) if name is not None
@@ -123,7 +125,7 @@ def _data(path: Path, how: Data) -> Readings:
             if (why := _left_out_of(path).get(missing)) is not None:
                 raise FormatError(f"{path}, {missing}: {why}")
             size = as_size(missing)
-            hint = f"; a size is said by {size}" if size else ""
+            hint = f"; a size is given by {size}" if size else ""
             raise FormatError(f"{path}: holds no array {missing}; there are {list_arrays(stored_shapes)}{hint}")
         if len(wanted) > 1 and stored_shapes[wanted[1]] != stored_shapes[wanted[0]][:1]:
             count, frames = math.prod(stored_shapes[wanted[1]]), math.prod(stored_shapes[wanted[0]][:1])

@@ -57,11 +57,11 @@ def read_h5(path: Path, array: Array | None) -> RecordedSource:
         version = h5.attribute(MARK)
         if version is None:
             raise FormatError(
-                f"{path}: HDF5, but without the attribute taxel of what taxel convert writes; other people's files are "
-                "read by taxel.open and taxel.formats.trials"
+                f"{path}: an HDF5 file without the attribute taxel, which taxel convert writes; taxel.open and "
+                f"taxel.formats.trials read files of other programs"
             )
         if version != VERSION:
-            number = "no whole number" if isinstance(version, str) else version
+            number = "not a whole number" if isinstance(version, str) else version
             raise FormatError(f"{path}: its attribute taxel is {number}; this version of taxel reads {VERSION}")
         names = chosen(path, {name: entry.shape for name, entry in h5.entries.items()})
         h5.check_size(names, DTYPES)

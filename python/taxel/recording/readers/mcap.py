@@ -224,7 +224,7 @@ class _Source:
         return {**rebuilt, "bad_chunks": int(self.remarks().condition["bad_chunks"])}
 
     def counts(self, read: Callable[[], dict[str, Any]]) -> Once[Mapping[str, Any]]:
-        """Return the field of counts: those that are read, or those of the recording that this one was converted from.
+        """Return the field of counts: those that are read, or those of the recording before it was converted.
 
         Those have the damage of this file beside them.
         """

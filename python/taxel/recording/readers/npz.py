@@ -65,12 +65,12 @@ def _wrong_shape(name: str, shapes: Mapping[str, tuple[int, ...]]) -> str | None
         is_right = len(shape) == 2 and shape[0] <= MARKERS and shape[1] == 2
         return None if is_right else f"a time and whether it is a start, of at most {MARKERS} markers"
     if name == "held":
-        return f"a value a taxel, at most {TAXELS}" if math.prod(shape) > TAXELS else None
+        return f"a value for each taxel, at most {TAXELS}" if math.prod(shape) > TAXELS else None
     if frames is not None:
         is_right = name == "values" or shape == frames[:1]
         return None if is_right else f"a time for each of {counted(math.prod(frames[:1]), 'frame')}"
     is_right = len(shape) == 1 and shape == shapes.get("t", shape)
-    return None if is_right else "one value an event, as many as t has"
+    return None if is_right else "one value for each event, as many as in t"
 
 
 def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: Array | None) -> RecordedSource:
@@ -90,7 +90,7 @@ def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], a
     ProblemError : the given sensor has other rows or columns than the frames
     """
     if DIGEST in columns and not np.array_equal(columns[DIGEST], digest_of(columns)):
-        raise FormatError(f"{path}: damaged: what it holds is not what was written")
+        raise FormatError(f"{path}: damaged: its content is not what was written")
     values = columns.get("values")
     if values is not None and values.dtype.kind == "f" and values.flags.writeable:
         # Of the NaNs of a damaged file some may be signalling ones, of which each computation would warn.
@@ -161,18 +161,18 @@ def read_records(path: Path, array: Array | None) -> RecordedSource:
     """
     records = read_array(path)
     if records.ndim != 1:
-        raise FormatError(f"{path}: records of shape {records.shape}: must be one an event")
+        raise FormatError(f"{path}: records of shape {records.shape}: must be one for each event")
     names = records.dtype.fields or ()
     columns = {name: records[name].copy() for name in _OF_EVENTS if name in names}
     return source_of_columns(path, "records", columns, array)
 
 
 def around(x: NDArray[Any], y: NDArray[Any]) -> Array:
-    """Return the thesis' array, or a larger one if events lie outside it."""
+    """Return the thesis' array, or a larger array if events are outside it."""
     thesis = Array.thesis()
     if not len(x):
         return thesis
     if min(x.min(), y.min()) < 0 or max(x.max(), y.max()) >= 65_535:
-        raise ProblemError("x and y: must lie in 0 to 65534")
+        raise ProblemError("x and y: must be from 0 to 65534")
     rows, columns = max(thesis.rows, int(y.max()) + 1), max(thesis.columns, int(x.max()) + 1)
     return thesis if (rows, columns) == thesis.shape else Array(rows, columns)

@@ -96,8 +96,8 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
     """
     if not topics.topic:
         error = FormatError(
-            f"{path}: a ROS bag, of which a topic, or [ros] in a layout file, is opened; taxel info {path} lists its "
-            "topics"
+            f"{path}: a ROS bag: choose one of its topics, or write [ros] in a layout file; taxel info {path} lists "
+            f"the topics"
         )
         raise helped(error, "topic", "give")
     reads = read(path, topics.chosen(array), topics.folder, topics.ros)

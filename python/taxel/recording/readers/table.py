@@ -57,7 +57,7 @@ class Readings:
 
 @dataclass(frozen=True, eq=False)
 class _Head:
-    """Hold what stands above the numbers of a table, and how its lines are read."""
+    """Hold the lines above the numbers of a table, and how its lines are read."""
 
     path: Path
     how: Table
@@ -76,7 +76,7 @@ class _Head:
 
     @classmethod
     def read(cls, path: Path, how: Table, taxels: int | None) -> _Head:
-        """Read what stands above the numbers; `taxels` are those of a line, if the layout says them.
+        """Read the lines above the numbers; `taxels` are those of a line, if the layout states them.
 
         Raises
         ------
@@ -84,7 +84,9 @@ class _Head:
         """
         skipped, lines = _beginning(path, how)
         if not lines:
-            raise FormatError(f"{path.name}, line {how.skip_lines + 1}: no line after {how.skip_lines} skipped ones")
+            raise FormatError(
+                f"{path.name}, line {how.skip_lines + 1}: no line after the {how.skip_lines} skipped lines"
+            )
         (first, text_of_first), *_ = lines
         names = cells(text_of_first, how.separator)
         if len(names) > COLUMNS:
@@ -94,7 +96,7 @@ class _Head:
         if len(names) == 1 and separator is not None and not is_decimal:
             raise FormatError(
                 f"{path.name}, line {first}: one column by the separator {shown(how.separator)}, and "
-                f"{shown(separator)} within it; say in the layout which it is: [table] separator"
+                f"{shown(separator)} within it; write in the layout file which it is: [table] separator"
             )
         _refuse_skipped(path, how, skipped, len(names))
         named = not how.columns and not _are_of_frame(names, how)
@@ -120,12 +122,13 @@ class _Head:
         time = None if how.time_column is None else _column(path, "time_column", how.time_column, names, is_named)
         left = {_column(path, "leave_out", column, names, is_named) for column in how.leave_out}
         if time in left:
-            raise FormatError(f"{path.name}: column {shown(names[time or 0])} is time_column, and left out")
+            raise FormatError(f"{path.name}: column {shown(names[time or 0])} is the time_column, and is left out")
         times = times_of([name if k not in left else "" for k, name in enumerate(names)])
         if time is None and times:
             name, at = names[times[0]], lines[0][0]
             raise FormatError(
-                f"{path.name}, line {at}: column {shown(name)} holds times by its name; say in the layout: [table] "
+                f"{path.name}, line {at}: column {shown(name)} holds times, as its name shows; write in the layout "
+                f"file: [table] "
                 f"time_column = {json.dumps(name, ensure_ascii=False)}, and time_unit if not s; or, if it is a taxel, "
                 f"skip the names: skip_lines = {first - 1}"
             )
@@ -148,7 +151,7 @@ class _Head:
     def lost(self) -> tuple[str, ...]:
         """The line of what is lost that names the columns that are left out."""
         names = ", ".join(self.names[k] or f"column {k + 1}" for k in sorted(self.left))
-        return (f"columns that are no taxels: {names}",) if names else ()
+        return (f"columns that are not taxels: {names}",) if names else ()
 
     def line(self, row: int) -> int:
         """Return the number of the line of a row, after all were read."""
@@ -181,7 +184,7 @@ def read_table(path: Path, layout: Layout) -> Readings:
 
     Raises
     ------
-    FormatError : it is not what the layout says, or a cell is no number (names line and column)
+    FormatError : it differs from the layout, or a cell is not a number (names line and column)
     """
     how = layout.table or Table()
     taxels = None if layout.rows is None or layout.columns is None else layout.rows * layout.columns
@@ -193,7 +196,7 @@ def read_table(path: Path, layout: Layout) -> Readings:
     names_of_taxels = [name for k, name in enumerate(names) if k != time] if head.named and lines == 1 else None
     lost, end = head.lost, rows // lines * lines
     if end < rows:
-        lost = (*lost, f"lines at the end that make no whole frame: {rows - end} of {lines}")
+        lost = (*lost, f"lines at the end that are not a whole frame: {rows - end} of {lines}")
     size = counted(width, "column") if lines == 1 else f"{lines} lines of {counted(width, 'column')} a frame"
     if how.has_lines:
         values = values[:end].reshape(-1, lines, width)
@@ -206,7 +209,7 @@ def frames_hint(layout: Layout, taxels: int) -> str:
     how, lines = layout.table or Table(), (layout.rows or 0) * (layout.columns or 0) // taxels
     if how.has_lines or lines < 2 or lines * taxels != (layout.rows or 0) * (layout.columns or 0):
         return ""
-    return f"; if {lines} lines are a frame, say in the layout: [table] frame_lines = {lines}"
+    return f"; if {lines} lines are a frame, write in the layout file: [table] frame_lines = {lines}"
 
 
 def read_events(path: Path, layout: Layout, array: Array | None) -> RecordedSource:
@@ -354,7 +357,9 @@ def _us(times: NDArray[np.float64], name: str, how: Table, path: Path, first: in
     """Return the times of some lines in us; `first` is the number of the first."""
     missing = np.flatnonzero(np.isnan(times))
     if len(missing):
-        raise FormatError(f"{path.name}, line {first + missing[0]}: {short(name)} is missing; every frame has a time")
+        raise FormatError(
+            f"{path.name}, line {first + missing[0]}: {short(name)} is missing; every frame must have a time"
+        )
     return whole_us(path.name, times * UNITS_US.get(how.time_unit, UNITS_US["s"]) / 1e6, first)
 
 
@@ -363,13 +368,13 @@ def _seconds(cell: str, path: Path, line: int) -> str:
     seconds = seconds_of(cell)
     if math.isnan(seconds):
         raise FormatError(
-            f"{path.name}, line {line}: time is {shown(cell)}; must be as 2024-05-01T10:00:00.25, or 10:00:00.25"
+            f"{path.name}, line {line}: time is {shown(cell)}; must be like 2024-05-01T10:00:00.25, or 10:00:00.25"
         )
     return repr(seconds)
 
 
 def _with_points(texts: list[str], time: int | None, names: Sequence[str], path: Path, line: int) -> list[str]:
-    """Return the cells of a line with points for decimal commas, but for a time that is a text."""
+    """Return the cells of a line with points for decimal commas, except a time that is a text."""
     texts = list(texts)
     if time is not None:
         texts[time] = ""
@@ -411,7 +416,7 @@ def _column(path: Path, key: str, column: str | int, names: Sequence[str], named
         known_names = (
             ", ".join(map(short, names[:8])) + " ..." * (len(names) > 8)
             if named
-            else "no names, so give its number from 1"
+            else "no names, so give its number, counted from 1"
         )
         kind = " of times" if key == "time_column" else ""
         raise FormatError(f"{path.name}: no column {shown(name)}{kind}; there are {known_names}")

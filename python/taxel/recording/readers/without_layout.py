@@ -58,8 +58,8 @@ _IN_BRACKETS = re.compile(r"[\[(]\s*([^\s\d\[\]()]{1,8})\s*[\])]$")
 #: What the names of two feet or hands begin with.
 _SIDE = re.compile(r"(left|right|links|rechts|l|r)(?![^\W\d_])", re.IGNORECASE)
 _SIDES = ({"left", "right"}, {"links", "rechts"}, {"l", "r"})
-_NO_RATE = "# rate_hz = 100  # frames a second: the file does not say it, and without it frames are numbered"
-_NO_UNIT = '# unit = "kPa"  # of the readings: the file does not say it, and without it they are counts'
+_NO_RATE = "# rate_hz = 100  # frames per second: the file does not state it, and without it frames are numbered"
+_NO_UNIT = '# unit = "kPa"  # of the readings: the file does not state it, and without it they are counts'
 #: Names of the columns of events in the orders that programs write without names.
 _EVENTS = (("x", "y", "p", "t"), ("t", "x", "y", "p"))
 _EVENT_NAMES: dict[str, Callable[[str], bool]] = {
@@ -88,7 +88,7 @@ def refuse_without_layout(path: Path) -> None:
         # Compressed texts are several times larger.
         size = path.stat().st_size * (4 if path.suffix.lower() == ".gz" else 1)
         holds, lines = _of_table(found, max(1.0, size / sum(len(line) + 1 for line in lines)), begin)
-        says = "says how to read it"
+        says = "describes how to read it"
     else:
         shapes = shapes_of(path)
         name = next((name for name, shape in shapes.items() if len(shape) in (2, 3)), None)
@@ -98,7 +98,7 @@ def refuse_without_layout(path: Path) -> None:
                 "layout file, an array of frames x rows x columns or frames x taxels (docs/files.md)"
             )
         holds, lines = list_arrays(shapes), _of_arrays(path, name, shapes)
-        says = "says which are the frames" if len(shapes) > 1 else "or rate_hz, says what it is"
+        says = "names the array of frames" if len(shapes) > 1 else "or rate_hz, describes it"
     raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
 
 
@@ -187,7 +187,7 @@ class _TextTable:
         return np.array([_number(row[column], self.decimal) for row in self.body])
 
     def called(self, column: int) -> str:
-        """Return how a layout names a column: by its name, or by its number from 1 without one of its own."""
+        """Return how a layout names a column: by its name, or, without a name, by its number from 1."""
         name = self.names[column] if self.names else ""
         return _quote(name) if name and list(self.names).count(name) == 1 else str(column + 1)
 
@@ -266,7 +266,7 @@ class _TextTable:
         return bool((np.diff(numbers[:: self.lines_of(numbers)]) == 1).all())
 
     def left_out(self, time: int | None) -> list[int]:
-        """Return which columns are no taxels: of texts, other times, another unit than most, and numbers of lines."""
+        """Return which columns are not taxels: texts, other times, another unit than most, and numbers of lines."""
         times = [] if time is None else times_of(self.names)
         left = {k for k, is_numeric in enumerate(self.numeric) if not is_numeric or k in times or self._is_empty(k)}
         left |= {0} if self.counts else set()
@@ -335,7 +335,7 @@ class _Fit:
 
 
 def _numbers_columns(rows: Sequence[Sequence[str]], numeric: Sequence[bool], decimal: str, *, below: bool) -> bool:
-    """Return whether the first line of numbers numbers the columns, from 0 on as programs do; `below`: another line."""
+    """Return whether the first line of numbers numbers the columns, from 0 as programs do; `below`: another line."""
     first, *rest = rows[below:]
     cells = [cell for cell in first if cell]
     if not rest or not _FEWEST < len(cells) >= len(numeric) - 1 or cells != [str(k) for k in range(len(cells))]:
@@ -404,12 +404,12 @@ def _of_events(found: _TextTable, order: Sequence[str]) -> tuple[str, list[str]]
         *skipped.form(),
         f"columns = [{', '.join(map(_quote, columns))}]",
         'time_column = "t"',
-        f"time_unit = {_quote(unit)}" + "  # if it is not another" * (not unit_of(name)),
+        f"time_unit = {_quote(unit)}" + "  # if it is not another unit" * (not unit_of(name)),
         *([f"leave_out = [{', '.join(map(str, left))}]"] if left else []),
         "events = true",
     ]
     x, y = (int(found.numbers(order.index(axis)).max()) + 1 for axis in "xy")
-    size = f"# rows = {y} and columns = {x} at least, or those of the sensor: the file does not say them"
+    size = f"# rows = {y} and columns = {x} at least, or those of the sensor: the file does not state them"
     return f"a table of events ({', '.join(filter(None, order))})", [size, "[table]", *table]
 
 
@@ -437,15 +437,15 @@ def _fits(row: Sequence[str], numeric: Sequence[bool], decimal: str) -> bool:
 
 
 def _size(taxels: int, names: Sequence[str]) -> list[str]:
-    """Return the lines that say rows and columns of so many taxels, a grid only where their names are no words."""
+    """Return the lines that state rows and columns of so many taxels, a grid only where their names are not words."""
     words = any(names) and not all(_NUMBERED.fullmatch(name) for name in names)
     rows = next(rows for rows in range(math.isqrt(taxels), 0, -1) if not taxels % rows)
     columns = taxels // rows
     is_grid = rows == columns if taxels < _LARGE else columns <= _FLATTEST * rows
     if words or not is_grid or taxels < (_NAMED_GRID if any(names) else _GRID):
-        note = "" if words or taxels < 2 else "  # if they are a grid row by row: its rows and columns"
+        note = "" if words or taxels < 2 else "  # for a grid, row by row: write its rows and columns"
         return ["rows = 1", f"columns = {taxels}{note}"]
-    guess = f"  # a guess from {taxels} taxels: if they are another grid, or a row, its rows and columns"
+    guess = f"  # a guess from {taxels} taxels: for another grid, or a row, write its rows and columns"
     return [f"rows = {rows}{guess}", f"columns = {columns}"]
 
 

@@ -119,7 +119,7 @@ def _provenance(source: RecordedSource) -> dict[str, Any]:
 def _write_frames(
     path: Path, sources: Mapping[str, FrameSource], compression: str, counts: Mapping[str, dict[str, Any]]
 ) -> None:
-    """Write sources of frames, all by one clock; times in the file are those of the board, from 0 on."""
+    """Write sources of frames, all by one clock; times in the file are those of the board, counted from 0."""
     tables = {name: source.table for name, source in sources.items()}
     origin_us = min([0, *(int(table.t[0]) for table in tables.values() if len(table))])
     headers = [

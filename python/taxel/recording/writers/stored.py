@@ -81,12 +81,12 @@ def _storable(source: RecordedSource, ending: str, path: Path) -> RecordedSource
         stored,
         origin=replace(stored.origin, path=path, name=path.name, kind=ENDINGS[ending]),
         sensor=replace(stored.sensor, calibration=beside),
-        # A slice that is written to a file becomes a recording of its own.
+        # A slice that is written to a file becomes a separate recording.
         timing=replace(stored.timing, interval=None),
     )
     alone = source.sensor.calibration.holds() and not beside.holds()
     return with_losses(
-        stored, lambda: [*lines, *["the calibration, a file of its own: lay a copy beside the new one"] * alone]
+        stored, lambda: [*lines, *["the calibration, a separate file: put a copy beside the new file"] * alone]
     )
 
 
