@@ -1,6 +1,7 @@
 """Registers behind RAM blocks become the blocks' own, which Yosys 0.70 does not use: their output comes 4.9 ns earlier.
 
-A block's output stands 5.83 ns after the clock, that of its register 0.96 ns (speed grade 6, nextpnr 0.11.1).
+A block's output stands 5.83 ns after the clock, that of its register 0.96 ns (speed grade 6, nextpnr 0.11.1; no board has
+confirmed its data base).
 """
 
 from __future__ import annotations

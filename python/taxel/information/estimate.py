@@ -333,6 +333,7 @@ def _held(tables: NDArray[np.int64]) -> NDArray[np.float64]:
     -------
     float64, shape (redraws,), bits
     """
+    # Draws are averaged before they are limited, so perfect draws weigh slightly more than others.
     return np.asarray(np.clip(corrected(tables).mean(axis=1), 0.0, label_entropy(tables[:, 0])))
 
 
