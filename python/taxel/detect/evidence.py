@@ -105,15 +105,34 @@ class Evidence:
         return self.felt.distances(self._counts)
 
     @cached_property
+    def _best(self) -> Off | None:
+        """The distance that labels agree on best, begins before others: where they are off, it is the clock's."""
+
+        def rank(label: str) -> tuple[Any, ...]:
+            off = self._distances[label]
+            return *off.disorder, recipes.neuron_of("touch", label) == "lift", off.spread_ms
+
+        best = min(self._distances, key=rank, default=None)
+        return None if best is None else self._distances[best]
+
+    @cached_property
     def felt_apart(self) -> dict[str, Off]:
         """Labels too far from what was felt to be aligned, and near enough for a window, where no other name is off."""
-        if not self.is_of_one_name and all(distance.is_far for distance in self._distances.values()):
+        if self._is_shifted:
             return {}
         return {
             label: distance
             for label, distance in self._distances.items()
             if distance.is_far and abs(distance.ms) <= 2 * WINDOW_MS
         }
+
+    @cached_property
+    def _is_shifted(self) -> bool:
+        """Whether the clock of labels is off: those that agree best are, or those of other names to the same side."""
+        best, far = self._best, [distance for distance in self._distances.values() if distance.is_far]
+        if best is None or not far or self.is_of_one_name:
+            return False
+        return best.is_far or all(off.ms * best.ms > 0 and abs(best.ms) > WINDOW_MS / 2 for off in far)
 
     def felt_rank(self, label: str) -> int:
         """Return how many loads that begin, or end, and labels have no pair within twice the window of alignments."""
@@ -214,47 +233,49 @@ class Evidence:
         yield Cause("foreign_labels", (label,), mistakes, measured, FOREIGN)
 
     def _shifts(self, wrong: Mapping[str, int]) -> Iterator[Cause]:
-        """Yield by how much labels are off, which one option moves if no label is then too far off.
+        """Yield by how much labels are off, which one option moves by the distance that they agree on best.
 
         Labels that a hand set live need a second option, for their spread. Where other labels fit, those that a wider
         window reaches are right: what they name is felt late, or early, as the end of a slow release.
         """
-        distances = self._distances
-        all_ms = [distance.ms for distance in distances.values()]
-        together = bool(all_ms) and max(all_ms) - min(all_ms) <= _TOGETHER * WINDOW_MS
-        shift_ms = -round((max(all_ms) + min(all_ms)) / 2) if together else 0
-        within_ms = max((distance.within_ms for distance in distances.values()), default=0.0)
-        for label in wrong:
-            if label not in distances:
-                yield from self._part_off(label, wrong[label])
-        for label, distance in distances.items():
-            if label not in wrong or not distance.is_far:
+        best, far = self._best, {label: off for label, off in self._distances.items() if off.is_far}
+        yield from self._part_off({label: count for label, count in wrong.items() if label not in far})
+        for label, distance in far.items():
+            if best is None or label not in wrong or (label in self.felt_apart and not self.is_of_one_name):
                 continue
-            if label in self.felt_apart and not self.is_of_one_name:
-                continue
-            measured = f"{distance}; the score is then against the moved labels"
-            if together:
-                option, arguments = f"--shift-ms {shift_ms}", {"shift_ms": float(shift_ms)}
-                if within_ms > WINDOW_MS:
-                    option, arguments = f"{option} --window-ms {within_ms:.0f}", arguments | {"window_ms": within_ms}
+            if (best.is_far or self._is_shifted) and abs(distance.ms - best.ms) <= 2 * WINDOW_MS:
+                option, arguments = f"--shift-ms {-best.ms:.0f}", {"shift_ms": -float(round(best.ms))}
+                if best.within_ms > WINDOW_MS:
+                    option = f"{option} --window-ms {best.within_ms:.0f}"
+                    arguments["window_ms"] = best.within_ms
+                measured = f"{distance}; the score is then against the moved labels"
                 yield by_option("shifted_labels", label, wrong[label], measured, option, **arguments)
             else:
                 side = "earlier" if distance.ms > 0 else "later"
-                advice = f"times of {label} {abs(distance.ms):.0f} ms {side} in the labels, as others fit"
-                yield Cause("shifted_labels", (label,), wrong[label], measured, advice)
+                advice = f"times of {label} {abs(distance.ms):.0f} ms {side} in the labels{', as others fit' * (not best.is_far)}"
+                yield Cause("shifted_labels", (label,), wrong[label], str(distance), advice)
 
-    def _part_off(self, label: str, wrong: int) -> Iterator[Cause]:
-        """Yield by how much labels of a part of a recording are off."""
-        alike = self.felt.part_off(label)
-        if alike is None or 4 * (count := int(alike.members.sum())) < wrong:
-            return
-        times = self.felt.times(label)
-        if stretch := stretch_of(times, alike.members, self.sound):
-            side, back = ("after", "earlier") if alike.ms > 0 else ("before", "later")
-            distance = f"{abs(alike.ms):.0f} ms"
-            measured = f"{count} of {len(times)} lie {distance} {side} what the sensor felt, all {stretch}"
-            advice = f"labels {stretch} {abs(round(alike.ms, -1)):.0f} ms {back}"
-            yield Cause("shifted_labels", (label,), min(2 * count, wrong), measured, advice)
+    def _part_off(self, wrong: Mapping[str, int]) -> Iterator[Cause]:
+        """Yield by how much labels of a part of a recording are off: those of all names, else of single ones."""
+        for names in dict.fromkeys([tuple(self._counts), *((label,) for label in wrong)]):
+            off = self.felt.part_off(names)
+            stretch = "" if off is None else stretch_of(off[0], off[1].members, self.sound)
+            if off is None or not stretch:
+                continue
+            (times, alike), side, back = off, *(("after", "earlier") if off[1].ms > 0 else ("before", "later"))
+            count, distance = int(alike.members.sum()), f"{abs(alike.ms):.0f} ms"
+            labels = "labels" if len(names) == len(self._counts) else f"labels of {', '.join(names)}"
+            measured = f"{count} of {counted(len(times), 'label')} {lie(count)} {distance} {side} where the sensor felt the others"
+            for label in wrong if len(names) > 1 else names:
+                yield Cause(
+                    "shifted_labels",
+                    (label,),
+                    wrong[label],
+                    f"{measured}, all {stretch}",
+                    f"{labels} {stretch} {distance} {back}",
+                )
+            if len(names) > 1:
+                return
 
     def _of_label(self, label: str, wrong: int) -> Iterator[Cause]:
         if (count := self._counts.get(label, 0)) < TWO_FOLDS:

@@ -291,18 +291,24 @@ def overlapping(label: str, count: int, labels: int, mistakes: int) -> Cause:
 def stretch_of(labels: NDArray[np.int64], members: NDArray[np.bool_], examples: Sequence[Example]) -> str:
     """Return from when to when some of the labels (us, on one clock) lie in one recording; "" where it is no part.
 
-    Nearly all labels between the first and the last of them must be among them.
+    Nearly all labels between the first and the last there must be among them, and nearly all of them there.
     """
-    places = np.flatnonzero(members)
-    if not len(places):
-        return ""
+    # The densest stretch: each of the labels adds to it, each of the others takes away as many as `_STRETCH` allows.
     recording = np.rint(labels / APART_US).astype(int)
-    first, last = places[0], places[-1]
-    if recording[first] != recording[last] or len(places) < _STRETCH * (last - first + 1):
+    best, first, last, worth, begin = 0.0, 0, -1, 0.0, 0
+    for k, is_member in enumerate(members):
+        if worth <= 0 or recording[k] != recording[begin]:
+            worth, begin = 0.0, k
+        worth += 1 if is_member else -_STRETCH / (1 - _STRETCH)
+        if worth > best:
+            best, first, last = worth, begin, k
+    if members[first : last + 1].sum() < _STRETCH * members.sum():
         return ""
     here = np.flatnonzero(recording == recording[first])
     starts, ends = first == here[0], last == here[-1]
-    begin_s, end_s = (float(labels[k] - recording[k] * APART_US) / 1e6 for k in (first, last))
+    # Rounded so that the first and the last are within.
+    begin_s, end_s = (float(labels[k] - recording[k] * APART_US) / 1e5 for k in (first, last))
+    begin_s, end_s = np.floor(begin_s) / 10, np.ceil(end_s) / 10
     example = examples[recording[first]]
     if starts and ends:
         return f"in {example.name}" if len(examples) > 1 else ""

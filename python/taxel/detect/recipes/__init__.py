@@ -24,7 +24,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["chosen", "fitting", "for_labels", "kinds", "knows", "names", "names_of", "read", "spelling"]
+__all__ = ["chosen", "fitting", "for_labels", "kinds", "knows", "names", "names_of", "neuron_of", "read", "spelling"]
 
 #: The recipe of recordings that no other fits: its levels are shares of the running range, of any unit.
 _ANY = "gait_channel"
@@ -207,6 +207,17 @@ def knows(recipe: str, label: str) -> bool:
     (True, False)
     """
     return _listed(read(recipe), text("label", label)) is not None
+
+
+def neuron_of(recipe: str, label: str) -> str | None:
+    """Return the recipe's neuron that a label names, also as an end of a step; None of any other label.
+
+    Examples
+    --------
+    >>> neuron_of("touch", "left toe off"), neuron_of("touch", "Grip"), neuron_of("touch", "ball")
+    ('lift', 'contact', None)
+    """
+    return _own(read(recipe), text("label", label))
 
 
 def kinds(recipe: str, labels: Sequence[str]) -> tuple[str, ...]:
