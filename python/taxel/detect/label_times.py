@@ -18,6 +18,8 @@ from taxel.detect.loads import Loads, clock_of, lacks_neighbours
 from taxel.detect.scoring import APART_US, score
 from taxel.detect.tares import TOUCH, early_part
 from taxel.detections import Detections
+from taxel.events import Events
+from taxel.frames import Frames
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: The peak that noise does not reach.
@@ -32,6 +34,9 @@ _SHARE, _LEAST = 0.8, 5
 _HAND_MS, _HAND_SPREAD_MS, _DEVIATIONS, _STEP_MS = 500.0, 170.0, 3.0, 10.0
 #: Labels lie as tightly around two distances whose spreads differ by less, ms.
 _TIGHT_MS = 25.0
+#: A load changes from its label on where it has on the middle part of the way to where it is felt, looked at so often,
+#: of so many labels; what falls has fallen to that share.
+_MIDDLE, _LOOKS, _MOST, _FALLEN = (0.25, 0.75), 8, 0.85, 0.75
 #: The standard deviation of normal values that have the median deviation of 1.
 _NORMAL = 1.4826
 #: Chance brings as many labels to one distance with at most this probability.
@@ -55,6 +60,8 @@ class Off(NamedTuple):
     labels: int
     spread_ms: float
     within_ms: float = 0.0
+    changes_from_label: bool = False
+    """Whether the load changes from the labels on: it is felt late, as what rises or falls slowly."""
 
     @property
     def disorder(self) -> tuple[bool, float, float]:
@@ -68,6 +75,11 @@ class Off(NamedTuple):
 
     def __str__(self) -> str:
         side = "after" if self.ms > 0 else "before"
+        if self.changes_from_label:
+            return (
+                f"the load changes from the labels on, and is felt {abs(self.ms):.0f} ms behind {self.alike} of "
+                f"{self.labels} (median): slowly, the labels are not off"
+            )
         hand = f" and within {self.within_ms:.0f} ms of that, as keys pressed live" if self.within_ms else ""
         return f"{self.alike} of {self.labels} lie {abs(self.ms):.0f} ms {side} what the sensor felt (median){hand}"
 
@@ -88,6 +100,8 @@ class FeltLoads:
         early = [
             example if (tare := early_part(example)) is None else example._replace(tare=tare) for example in examples
         ]
+        stamps = [example.source.t for example in examples if isinstance(example.source, Events | Frames)]
+        self._lasts_us = sum(int(t[-1] - t[0]) for t in stamps if len(t))
         self._loads, self._felt = None, {"peak": PEAK} | ({} if lacks_neighbours(examples) else {"area": TOUCH})
         if known and examples:
             clocks = [clock_of(example) for example in early]
@@ -126,9 +140,10 @@ class FeltLoads:
                 at_edge |= np.diff(np.searchsorted(edge, [times - reach, times + reach]), axis=0)[0] > 0
         return near, at_edge
 
-    def covered(self) -> int:
-        """Return for how long something lies within 50 ms of the begin or end of a load, us, at most."""
-        return sum(4 * round(to_us(WINDOW_MS)) * len(self._spans(quantity)[0]) for quantity in self._felt)
+    def at_edges_by_chance(self, count: int, among: int) -> bool:
+        """Whether chance brings so many of some times within 50 ms of the begins and ends of loads."""
+        covered = sum(4 * round(to_us(WINDOW_MS)) * len(self._spans(quantity)[0]) for quantity in self._felt)
+        return chance_of(count, among, min(1.0, covered / max(1, self._lasts_us))) > _CHANCE
 
     def overlapped(self, label: str) -> NDArray[np.bool_]:
         """Return which labels of a name lie while a load lasts that holds two of them or more, far from its ends."""
@@ -156,6 +171,29 @@ class FeltLoads:
         after = np.append(ends, np.iinfo(np.int64).max)[np.searchsorted(ends, begins)]
         return begins, np.minimum(np.minimum(after, np.append(begins[1:], last[-1:])), last)
 
+    def strong(self, labels: Iterable[str], times: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which times lie in or beside loads without a label of some names, about as strong as those with one.
+
+        A load is as strong that has half the peak that loads with a label have at the median.
+        """
+        assert self._loads is not None
+        begins, ends = self._spans(self._quantity)
+        reach, named = round(to_us(2 * WINDOW_MS)), np.sort(np.concatenate([self.times(label) for label in labels]))
+        if not len(begins):
+            return np.zeros(len(times), np.bool_)
+        has = np.diff(np.searchsorted(named, [begins - reach, ends + reach]), axis=0)[0] > 0
+        shares = np.linspace(0.0, 1.0, 4 * _LOOKS)[:, None]
+        peaks = self._loads.values_at("peak", np.rint(begins + shares * (ends - begins)).astype(np.int64)).max(axis=0)
+        strong = ~has & (peaks >= 0.5 * np.median(peaks[has] if has.any() else np.inf))
+        load = np.searchsorted(begins, times + reach, side="right") - 1
+        inside: NDArray[np.bool_] = (load >= 0) & (ends[load] + reach >= times) & strong[load]
+        return inside
+
+    @property
+    def count(self) -> int:
+        """How many loads there are."""
+        return len(self._spans(self._quantity)[0])
+
     def rank(self, label: str, reach_ms: float) -> int:
         """Return how many labels of a name, and begins of loads, have no pair that near; or ends, if that is fewer."""
         assert self._loads is not None
@@ -177,8 +215,21 @@ class FeltLoads:
             for label in labels:
                 felt = self._edges(label, quantity)
                 if label not in found and (off := _distance(self.times(label), felt)) is not None:
-                    found[label] = off
+                    found[label] = off._replace(changes_from_label=off.is_far and self._changes(label, off.ms))
         return found
+
+    def _changes(self, label: str, ms: float) -> bool:
+        """Whether most loads rise, or fall, on the way from a label to where its load begins or ends."""
+        if ms >= 0 or self._loads is None:
+            return False
+        shares = np.linspace(*_MIDDLE, _LOOKS)[:, None]
+        times, way = self.times(label), round(to_us(-ms))
+        before, middle = (
+            self._loads.values_at("peak", np.rint(times + way * at).astype(np.int64)).mean(axis=0)
+            for at in (shares - 1.0, shares)
+        )
+        falls = (before >= PEAK) & (middle < _FALLEN * before)
+        return bool(max((middle > before).mean(), falls.mean()) >= _MOST)
 
     def part_off(self, labels: Sequence[str]) -> tuple[NDArray[np.int64], Alike] | None:
         """Return labels of some names, and which of them lie at one distance from what was felt, far from all of it.
@@ -326,7 +377,12 @@ def _by_chance(least: int, labels: int, pairs: int, spread_ms: float) -> float:
     """Return how probable it is that so many labels have pairs in one of the stretches of that length by chance."""
     stretches = 2 * _FARTHEST_MS / max(spread_ms, 1.0)
     share = min(1.0, pairs / labels / stretches)
-    return stretches * sum(comb(labels, k) * share**k * (1 - share) ** (labels - k) for k in range(least, labels + 1))
+    return stretches * chance_of(least, labels, share)
+
+
+def chance_of(least: int, among: int, share: float) -> float:
+    """Return how probable it is that so many or more of some times lie by chance in that share of all time."""
+    return sum(comb(among, k) * share**k * (1 - share) ** (among - k) for k in range(least, among + 1))
 
 
 def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[Off]:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import comb
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.messages import counted
+from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.cause import Cause, by_option, lie, ordered
 from taxel.detect.examples import Example, Outcome, check_examples
-from taxel.detect.label_times import FeltLoads, same_distance
+from taxel.detect.label_times import FeltLoads, chance_of, same_distance
 from taxel.detect.scoring import APART_US, Mistake, Score, mistakes_of, score
 from taxel.detections import Detections
 from taxel.frames import Frames
@@ -238,34 +238,37 @@ class Measured:
         return cause, left.without(np.zeros(len(left.missed), np.bool_), at)
 
     def _unlabelled(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
-        """Return how many false lie where a load begins or ends without a label, and how many missed far from that."""
+        """Return how many false lie in strong loads without a label, and how many missed far from any load's edge.
+
+        Weak loads without a label may be noise, and labels where nothing is felt may be of weak touches.
+        """
         if not self._felt.are_known:
             return None
-        reach = round(to_us(2 * self._window_ms))
-        names = sorted({name for example in self._examples for name in example.labels})
-        labels = np.sort(np.concatenate([self._labels(name) for name in names]))
-        beside = np.diff(np.searchsorted(labels, [left.false - reach, left.false + reach]), axis=0)[0] > 0
-        felt = self._felt.felt_at(left.false)[1] & ~beside
-        if self._by_chance(int(felt.sum()), len(felt), self._felt.covered()):
-            felt[:] = False
+        names = {name for example in self._examples for name in example.labels}
+        end = recipes.neuron_of("touch", label) == "lift"
+        strong = self._felt.strong([n for n in names if (recipes.neuron_of("touch", n) == "lift") == end], left.false)
         unfelt = ~self._felt.felt_at(left.missed)[1]
-        count = int(felt.sum()) + int(unfelt.sum())
-        if not count or 2 * count <= len(left.missed) + len(left.false):
+        count, mistakes = int(strong.sum()), int(strong.sum()) + int(unfelt.sum())
+        if 2 * mistakes <= len(left.missed) + len(left.false):
             return None
         parts = []
-        if felt.any():
-            n = int(felt.sum())
-            parts.append(f"{n} of {len(felt)} false {lie(n)} where a load begins or ends that has no label")
-        if unfelt.any():
-            n = int(unfelt.sum())
-            where = "one does" if parts else "a load begins or ends"
-            parts.append(f"{n} of {len(unfelt)} missed {lie(n)} more than {WINDOW_MS:.0f} ms from where {where}")
-        times = np.sort(np.concatenate([left.missed[unfelt], left.false[felt]]))
-        named = ", ".join(self._place(t) for t in times[:_NAMED])
-        measured = f"{', and '.join(parts)}, as at {named}"
-        return Cause("unlabelled_loads", (label,), count, measured, "a look at these labels"), left.without(
-            unfelt, felt
+        if count:
+            parts.append(f"{count} of {len(strong)} false {lie(count)} in loads without a label, as strong as others")
+        if n := int(unfelt.sum()):
+            parts.append(
+                f"{n} of {len(unfelt)} missed {lie(n)} more than {WINDOW_MS:.0f} ms from where a load begins or ends"
+            )
+        times = left.false[strong] if count else left.missed[unfelt]
+        measured = f"{', and '.join(parts)}, as at {', '.join(self._place(t) for t in np.sort(times)[:_NAMED])}"
+        is_most = 2 * count > len(left.missed) + len(left.false)
+        cause = Cause(
+            "unlabelled_loads" if count else "unfelt_labels",
+            (label,),
+            mistakes,
+            measured,
+            "labels of these loads too" * is_most,
         )
+        return cause, left.without(unfelt, strong)
 
     def _place(self, t: int) -> str:
         k = round(t / APART_US)
@@ -273,9 +276,7 @@ class Measured:
 
     def _by_chance(self, count: int, among: int, covered_us: int) -> bool:
         """Whether as many times lie by chance in so much of the recordings."""
-        share = min(1.0, covered_us / max(1, self._lasts_us))
-        ways = sum(comb(among, k) * share**k * (1 - share) ** (among - k) for k in range(count, among + 1))
-        return ways > _CHANCE
+        return chance_of(count, among, min(1.0, covered_us / max(1, self._lasts_us))) > _CHANCE
 
 
 def overlapping(label: str, count: int, labels: int, mistakes: int) -> Cause:
