@@ -171,17 +171,20 @@ class FeltLoads:
         after = np.append(ends, np.iinfo(np.int64).max)[np.searchsorted(ends, begins)]
         return begins, np.minimum(np.minimum(after, np.append(begins[1:], last[-1:])), last)
 
-    def strong(self, labels: Iterable[str], times: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which times lie in or beside loads without a label of some names, about as strong as those with one.
+    def strong(self, label: str, names: Iterable[str], times: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which times lie in or beside loads that are about as strong as those with a label, but have none.
 
-        A load is as strong that has half the peak that loads with a label have at the median.
+        Ends of loads have labels of names of an end anywhere in them, as they may be felt late, begins those of other
+        names beside them. A load is as strong that has half the peak that loads with a label have at the median.
         """
         assert self._loads is not None
         begins, ends = self._spans(self._quantity)
-        reach, named = round(to_us(2 * WINDOW_MS)), np.sort(np.concatenate([self.times(label) for label in labels]))
         if not len(begins):
             return np.zeros(len(times), np.bool_)
-        has = np.diff(np.searchsorted(named, [begins - reach, ends + reach]), axis=0)[0] > 0
+        reach, is_end = round(to_us(2 * WINDOW_MS)), recipes.neuron_of("touch", label) == "lift"
+        same = [self.times(name) for name in names if (recipes.neuron_of("touch", name) == "lift") == is_end]
+        until = (ends if is_end else begins) + reach
+        has = np.diff(np.searchsorted(np.sort(np.concatenate(same)), [begins - reach, until]), axis=0)[0] > 0
         shares = np.linspace(0.0, 1.0, 4 * _LOOKS)[:, None]
         peaks = self._loads.values_at("peak", np.rint(begins + shares * (ends - begins)).astype(np.int64)).max(axis=0)
         strong = ~has & (peaks >= 0.5 * np.median(peaks[has] if has.any() else np.inf))

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.messages import counted
-from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.cause import Cause, by_option, lie, ordered
 from taxel.detect.examples import Example, Outcome, check_examples
@@ -245,8 +244,7 @@ class Measured:
         if not self._felt.are_known:
             return None
         names = {name for example in self._examples for name in example.labels}
-        end = recipes.neuron_of("touch", label) == "lift"
-        strong = self._felt.strong([n for n in names if (recipes.neuron_of("touch", n) == "lift") == end], left.false)
+        strong = self._felt.strong(label, names, left.false)
         unfelt = ~self._felt.felt_at(left.missed)[1]
         count, mistakes = int(strong.sum()), int(strong.sum()) + int(unfelt.sum())
         if 2 * mistakes <= len(left.missed) + len(left.false):
@@ -260,7 +258,7 @@ class Measured:
             )
         times = left.false[strong] if count else left.missed[unfelt]
         measured = f"{', and '.join(parts)}, as at {', '.join(self._place(t) for t in np.sort(times)[:_NAMED])}"
-        is_most = 2 * count > len(left.missed) + len(left.false)
+        is_most = 2 * count >= len(left.missed) + len(left.false)
         cause = Cause(
             "unlabelled_loads" if count else "unfelt_labels",
             (label,),
