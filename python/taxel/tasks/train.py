@@ -299,18 +299,18 @@ class _Work:
         if not open_labels or self.options.changes or isinstance(source, SpikeTrains) or name not in recipes.names():
             return causes
         ends = [recipes.neuron_of("touch", label) for label in labels]
-        others = [recipes.fitting(source, labels), *["touch"] * (None not in ends and len(set(ends)) == len(ends))]
-        other = next((recipe for recipe in others if recipe != name), None)
-        if other is None:
+        candidates = [recipes.fitting(source, labels), *["touch"] * (None not in ends and len(set(ends)) == len(ends))]
+        untried = next((recipe for recipe in candidates if recipe != name), None)
+        if untried is None:
             return causes
-        self.update(f"{', '.join(open_labels)}: many are missed or false, so that recipe {other} is tried too", 0, 0)
+        self.update(f"{', '.join(open_labels)}: many are missed or false, so that recipe {untried} is tried too", 0, 0)
         try:
             with collected():
-                tried = Recipe.load(other, None, labels, measured_floor(self.examples))
+                tried = Recipe.load(untried, None, labels, measured_floor(self.examples))
                 judged = judge(self.examples, tried, folds, window_ms=self.options.window_ms, progress=self.update)
         except ProblemError:  # as of a tare that only the other recipe needs
             return causes
-        return by_recipe(other, scored.together, judged.together, causes)
+        return by_recipe(untried, scored.together, judged.together, causes)
 
     def _say_how_long(self, plan: Recipe, once_s: float, folds: int) -> None:
         """Say how long all takes by what one training on all data took, if that is more than a minute."""
