@@ -58,7 +58,8 @@ def test_every_kind_of_recording_has_one_recipe() -> None:
     found = {unit: recipes.fitting(Frames(frames, [0, 1000], unit=unit)) for unit in ("counts", "N", "kPa")}
     assert found == {"counts": "gait_plate", "N": "gait_insole", "kPa": "gait_channel"}
     few = Frames(np.zeros((2, 1, 32)), [0, 1000], unit="counts")
-    assert recipes.fitting(few, ["contact", "foot_off"]) == "gait_channel"
+    for rests, name in ((True, "touch"), (False, "gait_channel")):
+        assert recipes.fitting(few, ["contact", "foot_off"], rests=rests) == name
     assert recipes.fitting(Events([0], [0], [0], [True], array=Array(1, 1))) in recipes.names()
 
 

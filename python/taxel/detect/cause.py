@@ -13,8 +13,14 @@ from taxel._base.errors import refused
 KINDS = (
     "falling_values", "shifted_labels", "shifted_training", "few_labels", "unlabelled_source", "levels",
     "overlapping_loads", "foreign_labels", "tare", "begun_loaded", "durations", "recipe", "window", "gaps",
-    "unlabelled_time", "label_name", "other_name", "unlabelled_loads", "unlike_training", "plain_rule", "no_neighbours",
+    "unlabelled_time", "label_name", "other_name", "unlabelled_loads", "unfelt_labels", "unlike_training", "plain_rule",
     "indistinct_kinds", "overfitting", "many_false", "unknown",
+)  # fmt: skip
+
+#: Those that lie in the data: no other recipe helps.
+OF_DATA = (
+    "falling_values", "shifted_labels", "few_labels", "unlabelled_source", "overlapping_loads", "foreign_labels",
+    "tare", "begun_loaded", "gaps", "unlabelled_time", "unlabelled_loads",
 )  # fmt: skip
 
 

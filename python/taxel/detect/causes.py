@@ -12,15 +12,14 @@ from taxel._base.messages import counted
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.cause import Cause, by_option, ordered
-from taxel.detect.evidence import FIVE_FOLDS, FOREIGN, Evidence, of_weak_bursts
+from taxel.detect.evidence import FIVE_FOLDS, Evidence, of_weak_bursts
 from taxel.detect.examples import Example
 from taxel.detect.fitting import Trained
 from taxel.detect.label_times import unlabelled_us
-from taxel.detect.loads import lacks_neighbours
 from taxel.detect.mistakes import Measured, many_wrong
 from taxel.detect.plain_score import PlainScore
 from taxel.detect.scoring import Mistake, Score
-from taxel.encode import ContactArea, Moments
+from taxel.encode import Moments
 
 #: From this share of the time before the first label and behind the last one on, some labels may be missing there.
 _UNLABELLED = 0.25
@@ -98,13 +97,14 @@ class Mistakes:
         causes = [*self._unlabelled_time(evidence.sound, label), *self._name(label, wrong), *where]
         known = [cause for cause in found if label in cause.labels]
         # A tare that does not fit lets labels lie far from what is felt, too, and so does what is felt late.
-        if not any(cause.kind in ("foreign_labels", "tare") for cause in known) and label not in evidence.felt_apart:
+        unpaired = ("foreign_labels", "unfelt_labels", "tare")
+        if not any(cause.kind in unpaired for cause in known) and label not in evidence.felt_apart:
             causes += self._unpaired(evidence.sound, label)
         explained = max(sum(c.mistakes for c in where), max((c.mistakes for c in (*known, *causes)), default=0))
         if any(cause.kind == "other_name" for cause in where) and (indistinct := list(self._indistinct(label, wrong))):
             return [*(cause for cause in causes if cause.kind != "other_name"), *indistinct]
         # What a training may learn otherwise is for what nothing else explains.
-        rest = self._rule(label, wrong) if 2 * explained >= wrong else self._of_learning(evidence, label, wrong)
+        rest = self._rule(label, wrong) if 2 * explained >= wrong else self._of_learning(label, wrong)
         return [*causes, *rest]
 
     def _of_sources(self, examples: Sequence[Example], label: str) -> Iterator[tuple[int, Cause]]:
@@ -154,13 +154,16 @@ class Mistakes:
 
     def _felt_late(self, evidence: Evidence, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the window in which a plain rule halves what is wrong, as something is felt late or early."""
-        apart = evidence.felt_apart.get(label)
-        if apart is not None and self.window_ms < 2 * WINDOW_MS and 2 * (left := evidence.felt_rank(label)) <= wrong:
-            option = f"--window-ms {2 * WINDOW_MS:g} --rule FILE"
+        if label not in evidence.felt_apart:
+            return
+        apart, (reach_ms, left) = evidence.felt_apart[label], evidence.felt_window(label)
+        if self.window_ms < reach_ms and 2 * left <= wrong:
+            option = f"--window-ms {reach_ms:g} --rule FILE"
+            within = f"within {reach_ms:g} ms a plain rule leaves {left} missed and false, the neuron {wrong}"
             advice = f"a wider window and the plain rule ({option})"
-            within = f"within {2 * WINDOW_MS:g} ms a plain rule leaves {left} missed and false, the neuron {wrong}"
-            measured = f"{apart}; {within}"
-            yield Cause("window", (label,), wrong - left, measured, advice, option, {"window_ms": 2 * WINDOW_MS})
+            yield Cause("window", (label,), wrong - left, f"{apart}; {within}", advice, option, {"window_ms": reach_ms})
+        elif apart.changes_from_label:
+            yield Cause("window", (label,), wrong, str(apart), "")
 
     def _unpaired(self, examples: Sequence[Example], label: str) -> Iterator[Cause]:
         """Yield how many labels lie far from what the neuron learnt them by, or are weaker than that."""
@@ -174,7 +177,7 @@ class Mistakes:
         measured = (
             f"no input that {label} is learnt from lies within {WINDOW_MS:.0f} ms of {counted(unpaired, 'label')}"
         )
-        yield Cause("foreign_labels", (label,), mistakes, measured, FOREIGN)
+        yield Cause("unfelt_labels", (label,), mistakes, measured, "")
 
     def _name(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield that a label without its name may be the end of a touch, where it was learnt as a kind of touch."""
@@ -188,16 +191,10 @@ class Mistakes:
         )
         yield Cause("label_name", (label,), wrong, measured, "another name of the label")
 
-    def _of_learning(self, evidence: Evidence, label: str, wrong: int) -> Iterator[Cause]:
+    def _of_learning(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the causes where labels and tares are right: inputs, kinds, too few examples; or that there is none."""
         if rules := list(self._rule(label, wrong)):
             yield from rules
-            return
-        if lacks_neighbours(evidence.examples) and (self._touches or self._by_chance(label)):
-            array = self.trained.readout.array
-            size = "ROWSxCOLUMNSxMM" if array is None else f"{array.rows}x{array.columns}xMM"
-            measured = "channels in a row at a known distance, MM mm, have neighbours; then the recipe touch fits"
-            yield by_option("no_neighbours", label, wrong, measured, f"--array {size}")
             return
         if indistinct := list(self._indistinct(label, wrong)):
             yield from indistinct
@@ -228,18 +225,13 @@ class Mistakes:
         return _chance(label, self.scored, self.plain) if self.scored[label].events >= FIVE_FOLDS else ""
 
     def _rule(self, label: str, wrong: int) -> Iterator[Cause]:
-        """Yield the plain rule if it halves the mistakes, or the recipe that has its inputs, if this one has not."""
+        """Yield the plain rule if it halves the mistakes."""
         if self.plain is None or self.plain.together is None or label not in self.plain.better(self.scored):
             return
         left, rule = self.plain.together[label].rank[0], self.plain.rules[label]
         if 2 * left > wrong:
             return
         measured = f"leaves {left} missed and false on the same labels, the neuron {wrong}"
-        has_area = any(isinstance(encoder, ContactArea) for encoder in self.trained.recipe.encoder._each())
-        if self._touches and not has_area:
-            measured = f"the plain rule, which has its inputs, {measured}"
-            yield by_option("plain_rule", label, wrong - left, measured, "--recipe touch", recipe="touch")
-            return
         lasting = rule is not None and isinstance(rule.age_ms, str)
         measured = (
             f"it {measured}{', as it knows how long touches last' * lasting}; taxel detect --readout FILE runs it"
@@ -252,10 +244,20 @@ class Mistakes:
         """Whether it was trained by the recipe `touch`."""
         return self.trained.recipe.about == str(recipes.read("touch")["about"])
 
-    @property
-    def _touches(self) -> bool:
-        """Whether all labels are those of the recipe `touch`, contact and lift: not contact and foot off."""
-        return all(recipes.knows("touch", label) for label in self.trained.readout.labels)
+
+def by_recipe(name: str, scored: Score, tried: Score, causes: Sequence[Cause]) -> tuple[Cause, ...]:
+    """Return causes with that another recipe, which was tried on the same folds, makes at most half the mistakes."""
+    found = []
+    for label, wrong in many_wrong(scored).items():
+        parts = [score.by_label[label] for score in (tried, scored)]
+        left, left_now = (f"{part.missed} missed, {part.false} false" for part in parts)
+        if 2 * parts[0].rank[0] <= wrong:
+            option, measured = (
+                f"--recipe {name}",
+                f"tried on the same folds: {left}, where this training has {left_now}",
+            )
+            found.append(by_option("recipe", label, wrong - parts[0].rank[0], measured, option, recipe=name))
+    return ordered([*causes, *found])
 
 
 def _chance(label: str, scored: Score, plain: PlainScore | None) -> str:

@@ -26,10 +26,10 @@ from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording.analysis.rest import TIMES_NOISE, ZEROS_BEFORE, of_frames
-from taxel.spikes import SpikeTrains, to_ms, to_us
+from taxel.spikes import to_ms, to_us
 
 #: What helps against labels that lie elsewhere.
-FOREIGN = "labels of this recording, where it was touched"
+FOREIGN = "labels of this recording"
 #: What makes a tare's file of a recording.
 _MAKES_TARE = "taxel cut RECORDING FILE --from S --to S"
 #: Labels are a question before a training if at most this share of them lies near anything that was felt ...
@@ -105,19 +105,47 @@ class Evidence:
         return self.felt.distances(self._counts)
 
     @cached_property
+    def _best(self) -> Off | None:
+        """The distance that labels agree on best, begins before others: where they are off, it is the clock's."""
+
+        def rank(label: str) -> tuple[Any, ...]:
+            off = self._distances[label]
+            return *off.disorder, recipes.neuron_of("touch", label) == "lift", off.spread_ms
+
+        sure = (label for label, off in self._distances.items() if not off.changes_from_label)
+        best = min(sure, key=rank, default=None)
+        return None if best is None else self._distances[best]
+
+    @cached_property
     def felt_apart(self) -> dict[str, Off]:
-        """Labels too far from what was felt to be aligned, and near enough for a window, where no other name is off."""
-        if not self.is_of_one_name and all(distance.is_far for distance in self._distances.values()):
-            return {}
+        """Labels too far from what was felt to be aligned that are not off, as what they name is felt slowly.
+
+        And those near enough for a window, where no other name is off.
+        """
         return {
             label: distance
             for label, distance in self._distances.items()
-            if distance.is_far and abs(distance.ms) <= 2 * WINDOW_MS
+            if distance.is_far
+            and (distance.changes_from_label or (abs(distance.ms) <= 2 * WINDOW_MS and not self._is_shifted))
         }
 
-    def felt_rank(self, label: str) -> int:
-        """Return how many loads that begin, or end, and labels have no pair within twice the window of alignments."""
-        return self.felt.rank(label, 2 * WINDOW_MS)
+    @cached_property
+    def _is_shifted(self) -> bool:
+        """Whether the clock of labels is off: those that agree best are, or those of other names to the same side."""
+        far = [off for off in self._distances.values() if off.is_far and not off.changes_from_label]
+        best = self._best
+        if best is None or not far or self.is_of_one_name:
+            return False
+        return best.is_far or all(off.ms * best.ms > 0 and abs(best.ms) > WINDOW_MS / 2 for off in far)
+
+    def felt_window(self, label: str) -> tuple[float, int]:
+        """Return the window that reaches from labels to where they are felt, ms: twice that of alignments at least.
+
+        And how many loads that begin, or end, and labels have no pair within it.
+        """
+        off = self.felt_apart[label]
+        reach_ms = max(2.0, np.ceil((abs(off.ms) + off.spread_ms / 2) / WINDOW_MS)) * WINDOW_MS
+        return reach_ms, self.felt.rank(label, reach_ms)
 
     @cached_property
     def _early(self) -> str:
@@ -193,7 +221,7 @@ class Evidence:
         yield Cause("label_name", (label,), wrong, measured, "labels of where touches begin or end")
 
     def _foreign(self, label: str, wrong: int) -> Iterator[Cause]:
-        """Yield at how many labels no load begins or ends; all mistakes may be by them if that is most."""
+        """Yield that labels lie at loads as by chance, or at the beginning, as those of another recording or unit."""
         if self._early:
             yield Cause("foreign_labels", (label,), wrong, f"the labels {self._early}", "labels with times in us")
             return
@@ -205,56 +233,63 @@ class Evidence:
         if 2 * (count := int(self.felt.overlapped(label).sum())) > away:
             yield overlapping(label, count, total, wrong)
             return
+        # Of few loads, and where half of the labels are felt, the others may be too weak.
+        if 2 * away <= total or 2 * self.felt.count < total or not self.felt.at_edges_by_chance(at_edge, total):
+            return
         measured = (
-            f"{away} of {counted(total, 'label')} {lie(away)} more than {WINDOW_MS:.0f} ms from where a load begins "
-            "or ends: they are of another recording, or off by another time each, or name what the sensor does not "
-            "feel, or a tare from elsewhere does not fit"
+            f"{at_edge} of {counted(total, 'label')} {lie(at_edge)} within {WINDOW_MS:.0f} ms of where a load begins "
+            f"or ends, as chance has it, while the sensor felt {counted(self.felt.count, 'load')}"
         )
-        mistakes = wrong if 2 * away > total else min(away, wrong)
-        yield Cause("foreign_labels", (label,), mistakes, measured, FOREIGN)
+        yield Cause("foreign_labels", (label,), wrong, measured, FOREIGN)
 
     def _shifts(self, wrong: Mapping[str, int]) -> Iterator[Cause]:
-        """Yield by how much labels are off, which one option moves if no label is then too far off.
+        """Yield by how much labels are off, which one option moves by the distance that they agree on best.
 
         Labels that a hand set live need a second option, for their spread. Where other labels fit, those that a wider
         window reaches are right: what they name is felt late, or early, as the end of a slow release.
         """
-        distances = self._distances
-        all_ms = [distance.ms for distance in distances.values()]
-        together = bool(all_ms) and max(all_ms) - min(all_ms) <= _TOGETHER * WINDOW_MS
-        shift_ms = -round((max(all_ms) + min(all_ms)) / 2) if together else 0
-        within_ms = max((distance.within_ms for distance in distances.values()), default=0.0)
-        for label in wrong:
-            if label not in distances:
-                yield from self._part_off(label, wrong[label])
-        for label, distance in distances.items():
-            if label not in wrong or not distance.is_far:
+        best, far = self._best, {label: off for label, off in self._distances.items() if off.is_far}
+        yield from self._part_off({label: count for label, count in wrong.items() if label not in far})
+        for label, distance in far.items():
+            if best is None or label not in wrong or distance.changes_from_label:
                 continue
             if label in self.felt_apart and not self.is_of_one_name:
                 continue
-            measured = f"{distance}; the score is then against the moved labels"
-            if together:
-                option, arguments = f"--shift-ms {shift_ms}", {"shift_ms": float(shift_ms)}
-                if within_ms > WINDOW_MS:
-                    option, arguments = f"{option} --window-ms {within_ms:.0f}", arguments | {"window_ms": within_ms}
+            if (best.is_far or self._is_shifted) and abs(distance.ms - best.ms) <= 2 * WINDOW_MS:
+                option, arguments = f"--shift-ms {-best.ms:.0f}", {"shift_ms": -float(round(best.ms))}
+                if best.within_ms > WINDOW_MS:
+                    option = f"{option} --window-ms {best.within_ms:.0f}"
+                    arguments["window_ms"] = best.within_ms
+                measured = f"{distance}; the score is then against the moved labels"
                 yield by_option("shifted_labels", label, wrong[label], measured, option, **arguments)
             else:
                 side = "earlier" if distance.ms > 0 else "later"
-                advice = f"times of {label} {abs(distance.ms):.0f} ms {side} in the labels, as others fit"
-                yield Cause("shifted_labels", (label,), wrong[label], measured, advice)
+                fit = ", as others fit" * (not best.is_far)
+                advice = f"times of {label} {abs(distance.ms):.0f} ms {side} in the labels{fit}"
+                yield Cause("shifted_labels", (label,), wrong[label], str(distance), advice)
 
-    def _part_off(self, label: str, wrong: int) -> Iterator[Cause]:
-        """Yield by how much labels of a part of a recording are off."""
-        alike = self.felt.part_off(label)
-        if alike is None or 4 * (count := int(alike.members.sum())) < wrong:
-            return
-        times = self.felt.times(label)
-        if stretch := stretch_of(times, alike.members, self.sound):
-            side, back = ("after", "earlier") if alike.ms > 0 else ("before", "later")
-            distance = f"{abs(alike.ms):.0f} ms"
-            measured = f"{count} of {len(times)} lie {distance} {side} what the sensor felt, all {stretch}"
-            advice = f"labels {stretch} {abs(round(alike.ms, -1)):.0f} ms {back}"
-            yield Cause("shifted_labels", (label,), min(2 * count, wrong), measured, advice)
+    def _part_off(self, wrong: Mapping[str, int]) -> Iterator[Cause]:
+        """Yield by how much labels of a part of a recording are off: those of all names, else of single ones."""
+        for names in dict.fromkeys([tuple(self._counts), *((label,) for label in wrong)]):
+            off = self.felt.part_off(names)
+            stretch = "" if off is None else stretch_of(off[0], off[1].members, self.sound)
+            if off is None or not stretch:
+                continue
+            (times, alike), side, back = off, *(("after", "earlier") if off[1].ms > 0 else ("before", "later"))
+            count, distance = int(alike.members.sum()), f"{abs(alike.ms):.0f} ms"
+            labels = "labels" if len(names) == len(self._counts) else f"labels of {', '.join(names)}"
+            where = f"{distance} {side} where the sensor felt the others"
+            measured = f"{count} of {counted(len(times), 'label')} {lie(count)} {where}"
+            for label in wrong if len(names) > 1 else names:
+                yield Cause(
+                    "shifted_labels",
+                    (label,),
+                    wrong[label],
+                    f"{measured}, all {stretch}",
+                    f"{labels} {stretch} {distance} {back}",
+                )
+            if len(names) > 1:
+                return
 
     def _of_label(self, label: str, wrong: int) -> Iterator[Cause]:
         if (count := self._counts.get(label, 0)) < TWO_FOLDS:
@@ -277,7 +312,6 @@ class Evidence:
             measured = f"of the tare: {because}" + ("" if arguments else f"; {_MAKES_TARE} makes that file, a .npz")
             yield Cause("tare", (label,), wrong, measured, advice, option, arguments)
         yield from self._begun_loaded(label, wrong)
-        yield from self._other_recipe(label, wrong)
 
     def _begun_loaded(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield how many labels lie where a recording begins loaded, of which encoders of levels see no begin."""
@@ -295,17 +329,6 @@ class Evidence:
                 "recordings that begin loaded, where no load begins"
             )
             yield Cause("begun_loaded", (label,), min(count, wrong), measured, ZEROS_BEFORE)
-
-    def _other_recipe(self, label: str, wrong: int) -> Iterator[Cause]:
-        """Yield the recipe that fits recording and labels, if another named one is trained by."""
-        used = next((name for name in recipes.names() if recipes.read(name)["about"] == self.plan.about), None)
-        source = recorded(self.examples[0].source)
-        if used is None or isinstance(source, SpikeTrains):
-            return
-        fits, why = recipes.chosen(source, list(self._counts))
-        if fits != used:
-            measured = f"it is made for {why}; this training took {used}"
-            yield by_option("recipe", label, wrong, measured, f"--recipe {fits}", recipe=fits)
 
 
 class _WeakBurst(NamedTuple):

@@ -84,6 +84,8 @@ class Trained(NamedTuple):
         By how much its labels were moved to what the sensor felt, by label; empty where the recipe does not align them.
     fitted_levels : bool
         Whether the encoder's levels are of the training data (`Recipe`).
+    chosen : mapping of str to str
+        Of labels with a point of `choose` that point and the first one, and the mistakes of both in the training data.
     """
 
     recipe: Recipe
@@ -91,6 +93,7 @@ class Trained(NamedTuple):
     readout: Readout
     alignments: Mapping[str, Alignment]
     fitted_levels: bool = False
+    chosen: Mapping[str, str] = {}
 
 
 def fit(
@@ -237,16 +240,24 @@ def readout_of(
 
 def learn(examples: EncodedExamples, recipe: Recipe, array: Array | None, report: Progress) -> Trained:
     """Fit the learner of each of a recipe's labels on encoded examples; see `fit`."""
-    learners, delays, alignments, ranges = {}, {}, {}, {}
+    learners, delays, alignments, ranges, chosen = {}, {}, {}, {}, {}
     points = dict(recipe.neurons)
     for label in _labels_to_learn(examples.patterns, recipe):
-        _, fitting, learners[label], points[label], _ = _best(examples, recipe, label, array, report)
+        best, first_wrong = _best(examples, recipe, label, array, report)
+        fitting, learners[label], points[label] = best.fitting, best.learner, best.point
+        if differs := _differing(best.point, recipe._choices_of(label)[0]):
+            by, by_first = differs
+            chosen[label] = (
+                f"learnt by {by}: {best.wrong} missed and false in the training data, {first_wrong} by {by_first}"
+            )
         delays[label], ranges[label] = fitting.delay_ms, fitting.seen(learners[label])
         if fitting.alignment is not None:
             of_all = np.array(fitting.places)[fitting.alignment.example]
             alignments[label] = replace(fitting.alignment, example=of_all)
     plan = replace(recipe, neurons=points) if recipe.neurons else recipe
-    return Trained(plan, learners, readout_of(learners, delays, plan, array)._with(seen=ranges), alignments)
+    return Trained(
+        plan, learners, readout_of(learners, delays, plan, array)._with(seen=ranges), alignments, chosen=chosen
+    )
 
 
 class _FittedPoint(NamedTuple):
@@ -260,8 +271,23 @@ class _FittedPoint(NamedTuple):
     caught: list[str]
 
 
-def _best(examples: EncodedExamples, recipe: Recipe, label: str, array: Array | None, report: Progress) -> _FittedPoint:
+def _differing(point: Mapping[str, Any], first: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Return by what a point and the first one differ, as text; None where they do not."""
+    keys = [key for key in dict(point) | dict(first) if point.get(key) != first.get(key)]
+
+    def text(values: Mapping[str, Any]) -> str:
+        of_key = {key: values.get(key, "as of all") for key in keys}
+        return ", ".join(" and ".join(v) if key == "inputs" else f"{key} {v}" for key, v in of_key.items())
+
+    return (text(point), text(first)) if keys else None
+
+
+def _best(
+    examples: EncodedExamples, recipe: Recipe, label: str, array: Array | None, report: Progress
+) -> tuple[_FittedPoint, int]:
     """Return the first of the points to choose from, or a later one that leaves fewer events missed or false.
+
+    And how many the first one leaves.
 
     They are tried in turn. A later one counts if it leaves as many fewer as its `fewer` says, else `_FEWER`, and
     `_FEWER_SHARE` of the labels, as some more or less are chance; with 0 it counts if it leaves no more. Where an
@@ -300,7 +326,7 @@ def _best(examples: EncodedExamples, recipe: Recipe, label: str, array: Array | 
         if error.hint != "unfelt":
             raise
         refused = error
-    usual = max(_FEWER, _FEWER_SHARE * count)
+    usual, first_wrong = max(_FEWER, _FEWER_SHARE * count), count if best is None else best.wrong
     for point, stated in zip(points[1:], recipe._fewer_of(label), strict=True):
         fewer = usual if stated is None else stated
         wrong, fewer = (count, min(max(1, fewer), count)) if best is None else (best.wrong, fewer)
@@ -320,7 +346,7 @@ def _best(examples: EncodedExamples, recipe: Recipe, label: str, array: Array | 
         raise refused
     for caught in best.caught:
         warn(caught, stacklevel=5)
-    return best
+    return best, first_wrong
 
 
 def _waits(label: str, planned: Fitting, early: ConeR, later: Fitting) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.progress import reporting
+from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example
 from taxel.detect.floors import floor_of
@@ -17,6 +18,8 @@ from taxel.detect.loads import Loads, clock_of, lacks_neighbours
 from taxel.detect.scoring import APART_US, score
 from taxel.detect.tares import TOUCH, early_part
 from taxel.detections import Detections
+from taxel.events import Events
+from taxel.frames import Frames
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: The peak that noise does not reach.
@@ -29,6 +32,11 @@ _SHARE, _LEAST = 0.8, 5
 #: Marks that a hand sets live have a common distance of at most that, ms, and the same share of them lies in a stretch
 #: of at most that, ms; all but a few in so many standard deviations around it, in steps of that, ms.
 _HAND_MS, _HAND_SPREAD_MS, _DEVIATIONS, _STEP_MS = 500.0, 170.0, 3.0, 10.0
+#: Labels lie as tightly around two distances whose spreads differ by less, ms.
+_TIGHT_MS = 25.0
+#: A load changes from its label on where it has on the middle part of the way to where it is felt, looked at so often,
+#: of so many labels; what falls has fallen to that share.
+_MIDDLE, _LOOKS, _MOST, _FALLEN = (0.25, 0.75), 8, 0.85, 0.75
 #: The standard deviation of normal values that have the median deviation of 1.
 _NORMAL = 1.4826
 #: Chance brings as many labels to one distance with at most this probability.
@@ -42,14 +50,23 @@ _SEVERAL, _FIRST = 4, 0.01
 class Off(NamedTuple):
     """By how much labels of one name lie after what was felt, ms; how many lie there, how many of them too far, of all.
 
-    `within_ms` is how far marks that a hand set live spread around that distance; 0 of other labels.
+    `within_ms` is how far marks that a hand set live spread around that distance; 0 of other labels. `spread_ms` is the
+    distance between the first and the last of those that lie there.
     """
 
     ms: float
     alike: int
     beyond: int
     labels: int
+    spread_ms: float
     within_ms: float = 0.0
+    changes_from_label: bool = False
+    """Whether the load changes from the labels on: it is felt late, as what rises or falls slowly."""
+
+    @property
+    def disorder(self) -> tuple[bool, float, float]:
+        """How badly labels agree on the distance: that of a hand is worst, then that of few labels, then a wide one."""
+        return self.within_ms > 0.0, -self.alike / self.labels, self.spread_ms // _TIGHT_MS
 
     @property
     def is_far(self) -> bool:
@@ -58,6 +75,11 @@ class Off(NamedTuple):
 
     def __str__(self) -> str:
         side = "after" if self.ms > 0 else "before"
+        if self.changes_from_label:
+            return (
+                f"the load changes from the labels on, and is felt {abs(self.ms):.0f} ms behind {self.alike} of "
+                f"{self.labels} (median): slowly, the labels are not off"
+            )
         hand = f" and within {self.within_ms:.0f} ms of that, as keys pressed live" if self.within_ms else ""
         return f"{self.alike} of {self.labels} lie {abs(self.ms):.0f} ms {side} what the sensor felt (median){hand}"
 
@@ -78,6 +100,8 @@ class FeltLoads:
         early = [
             example if (tare := early_part(example)) is None else example._replace(tare=tare) for example in examples
         ]
+        stamps = [example.source.t for example in examples if isinstance(example.source, Events | Frames)]
+        self._lasts_us = sum(int(t[-1] - t[0]) for t in stamps if len(t))
         self._loads, self._felt = None, {"peak": PEAK} | ({} if lacks_neighbours(examples) else {"area": TOUCH})
         if known and examples:
             clocks = [clock_of(example) for example in early]
@@ -116,34 +140,10 @@ class FeltLoads:
                 at_edge |= np.diff(np.searchsorted(edge, [times - reach, times + reach]), axis=0)[0] > 0
         return near, at_edge
 
-    def covered(self) -> int:
-        """Return for how long something lies within 50 ms of the begin or end of a load, us, at most."""
-        return sum(4 * round(to_us(WINDOW_MS)) * len(self._spans(quantity)[0]) for quantity in self._felt)
-
-    def without_label(
-        self, times: NDArray[np.int64], labels: NDArray[np.int64], reach: int, share: float
-    ) -> tuple[NDArray[np.bool_], int]:
-        """Return which times lie in loads without a label of one name, and how long these last, us.
-
-        None does where less than that share of the loads has one: then it is not of each load.
-
-        Parameters
-        ----------
-        times, labels : int64, us on the one clock
-        reach : int, us
-            How far before the begin and behind the end of a load labels and times belong to it.
-        share : float
-        """
-        begins, ends = self._spans(self._quantity)
-        # A load that ends slowly flickers.
-        apart = begins[1:] - ends[:-1] > round(to_us(WINDOW_MS))
-        begins, ends = begins[np.append(True, apart)[: len(begins)]], ends[np.append(apart, True)[: len(ends)]]
-        has = np.searchsorted(labels, ends + reach, side="right") > np.searchsorted(labels, begins - reach)
-        if not has.any() or has.mean() < share:
-            return np.zeros(len(times), np.bool_), 0
-        begins, ends = begins[~has] - reach, ends[~has] + reach
-        inside = np.searchsorted(begins, times, side="right") > np.searchsorted(ends, times)
-        return inside, int(np.sum(ends - begins))
+    def at_edges_by_chance(self, count: int, among: int) -> bool:
+        """Whether chance brings so many of some times within 50 ms of the begins and ends of loads."""
+        covered = sum(4 * round(to_us(WINDOW_MS)) * len(self._spans(quantity)[0]) for quantity in self._felt)
+        return chance_of(count, among, min(1.0, covered / max(1, self._lasts_us))) > _CHANCE
 
     def overlapped(self, label: str) -> NDArray[np.bool_]:
         """Return which labels of a name lie while a load lasts that holds two of them or more, far from its ends."""
@@ -171,6 +171,32 @@ class FeltLoads:
         after = np.append(ends, np.iinfo(np.int64).max)[np.searchsorted(ends, begins)]
         return begins, np.minimum(np.minimum(after, np.append(begins[1:], last[-1:])), last)
 
+    def strong(self, label: str, names: Iterable[str], times: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which times lie in or beside loads that are about as strong as those with a label, but have none.
+
+        Ends of loads have labels of names of an end anywhere in them, as they may be felt late, begins those of other
+        names beside them. A load is as strong that has half the peak that loads with a label have at the median.
+        """
+        assert self._loads is not None
+        begins, ends = self._spans(self._quantity)
+        if not len(begins):
+            return np.zeros(len(times), np.bool_)
+        reach, is_end = round(to_us(2 * WINDOW_MS)), recipes.neuron_of("touch", label) == "lift"
+        same = [self.times(name) for name in names if (recipes.neuron_of("touch", name) == "lift") == is_end]
+        until = (ends if is_end else begins) + reach
+        has = np.diff(np.searchsorted(np.sort(np.concatenate(same)), [begins - reach, until]), axis=0)[0] > 0
+        shares = np.linspace(0.0, 1.0, 4 * _LOOKS)[:, None]
+        peaks = self._loads.values_at("peak", np.rint(begins + shares * (ends - begins)).astype(np.int64)).max(axis=0)
+        strong = ~has & (peaks >= 0.5 * np.median(peaks[has] if has.any() else np.inf))
+        load = np.searchsorted(begins, times + reach, side="right") - 1
+        inside: NDArray[np.bool_] = (load >= 0) & (ends[load] + reach >= times) & strong[load]
+        return inside
+
+    @property
+    def count(self) -> int:
+        """How many loads there are."""
+        return len(self._spans(self._quantity)[0])
+
     def rank(self, label: str, reach_ms: float) -> int:
         """Return how many labels of a name, and begins of loads, have no pair that near; or ends, if that is fewer."""
         assert self._loads is not None
@@ -182,39 +208,67 @@ class FeltLoads:
     def distances(self, labels: Iterable[str]) -> dict[str, Off]:
         """Return by how much labels lie after what was felt, of each name of which most lie at one distance.
 
-        What was felt are the begins or the ends of loads, whichever more labels follow. Where no distance is the same,
-        it is that of marks that a hand set live.
+        What was felt are the begins of loads, or the ends of names that say so, of other names whichever more labels
+        follow. Where no distance is the same, it is that of marks that a hand set live.
         """
         if self._loads is None:
             return {}
         found: dict[str, Off] = {}
         for quantity in dict.fromkeys((self._quantity, *self._felt)):
-            felt = [edge.t for edge in self._loads.edges(quantity, self._felt[quantity], 1.0, 1)]
             for label in labels:
+                felt = self._edges(label, quantity)
                 if label not in found and (off := _distance(self.times(label), felt)) is not None:
-                    found[label] = off
+                    found[label] = off._replace(changes_from_label=off.is_far and self._changes(label, off.ms))
         return found
 
-    def part_off(self, label: str) -> Alike | None:
-        """Return which labels of a name lie at one distance from what was felt, of those that lie near nothing felt."""
+    def _changes(self, label: str, ms: float) -> bool:
+        """Whether most loads rise, or fall, on the way from a label to where its load begins or ends."""
+        if ms >= 0 or self._loads is None:
+            return False
+        shares = np.linspace(*_MIDDLE, _LOOKS)[:, None]
+        times, way = self.times(label), round(to_us(-ms))
+        before, middle = (
+            self._loads.values_at("peak", np.rint(times + way * at).astype(np.int64)).mean(axis=0)
+            for at in (shares - 1.0, shares)
+        )
+        falls = (before >= PEAK) & (middle < _FALLEN * before)
+        return bool(max((middle > before).mean(), falls.mean()) >= _MOST)
+
+    def part_off(self, labels: Sequence[str]) -> tuple[NDArray[np.int64], Alike] | None:
+        """Return labels of some names, and which of them lie at one distance from what was felt, far from all of it.
+
+        The distance is counted from where the other labels of their name lie, as ends may be felt later than begins.
+        """
         if self._loads is None:
             return None
-        times = self.times(label)
-        away = np.flatnonzero(~self.felt_at(times)[1])
-        felt = (edge.t for edge in self._loads.edges(self._quantity, self._felt[self._quantity], 1.0, 1))
-        found = [alike for edge in felt if (alike := same_distance(times[away], edge, WINDOW_MS)) is not None]
-        best = max(found, key=lambda alike: int(alike.members.sum()), default=None)
-        return None if best is None else Alike(best.ms, np.isin(np.arange(len(times)), away[best.members]))
+        times = [self.times(label) for label in labels]
+        edges = [self._edges(label, self._quantity) for label in labels]
+        pairs = []
+        for t, felt in zip(times, edges, strict=True):
+            # Of a name without a meaning it is the edge that more of its labels lie at.
+            apart, index = max((_apart(t, edge) for edge in felt), key=lambda pair: _near(*pair))
+            near = np.abs(apart) <= WINDOW_MS
+            usual_ms = float(np.median(apart[near])) if _near(apart, index) >= _LEAST else 0.0
+            pairs.append((apart - usual_ms, index))
+        together = np.concatenate(times)
+        alike = _alike(pairs, list(map(len, times)), WINDOW_MS)
+        order = np.argsort(together, kind="stable")
+        return None if alike is None else (together[order], alike._replace(members=alike.members[order]))
+
+    def _edges(self, label: str, quantity: str) -> list[NDArray[np.int64]]:
+        """Return when loads begin, or end, or both, as a name of labels says which it is of."""
+        assert self._loads is not None
+        begins, ends = (np.sort(edge.t) for edge in self._loads.edges(quantity, self._felt[quantity], 1.0, 1))
+        neuron = recipes.neuron_of("touch", label)
+        return [begins] if neuron == "contact" else [ends] if neuron == "lift" else [begins, ends]
 
 
 def _distance(times: NDArray[np.int64], felt: Sequence[NDArray[np.int64]]) -> Off | None:
     """Return by how much labels lie after begins or ends of loads; None where it is not the same of most."""
-    steady = [felt_edge for edge in felt for felt_edge in _steady(times, edge)]
-    near = [felt_edge for felt_edge in steady if abs(felt_edge[0].ms) <= WINDOW_MS]
-    if alike := near or steady:
-        return min(alike, key=lambda found_edge: (-found_edge[0].alike, found_edge[1]))[0]
-    by_hand = [felt_edge for edge in felt for felt_edge in _by_hand(times, edge)]
-    return min(by_hand, key=lambda found_edge: found_edge[1])[0] if by_hand else None
+    steady = [off for edge in felt for off in _steady(times, edge)]
+    near = [off for off in steady if abs(off.ms) <= WINDOW_MS]
+    found = near or steady or [off for edge in felt for off in _by_hand(times, edge)]
+    return min(found, key=lambda off: off.disorder, default=None)
 
 
 class Alike(NamedTuple):
@@ -229,10 +283,21 @@ def same_distance(times: NDArray[np.int64], others: NDArray[np.int64], beyond_ms
 
     None where they are fewer than five, or as many as chance may bring to one distance.
     """
-    apart, index = _apart(times, np.sort(others))
-    is_near = np.zeros(len(times), np.bool_)
+    return _alike([_apart(times, np.sort(others))], [len(times)], beyond_ms)
+
+
+def _alike(
+    pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]], counts: Sequence[int], beyond_ms: float
+) -> Alike | None:
+    """Return which of so many times of several kinds lie at one distance from others, by the pairs of each kind."""
+    first = np.cumsum([0, *counts])
+    apart = np.concatenate([pair[0] for pair in pairs])
+    index = np.concatenate([pair[1] + begin for pair, begin in zip(pairs, first[:-1], strict=True)])
+    is_near = np.zeros(first[-1], np.bool_)
     is_near[index[np.abs(apart) <= beyond_ms]] = True
-    apart, index = apart[~is_near[index]], index[~is_near[index]]
+    order = np.argsort(apart, kind="stable")
+    order = order[~is_near[index[order]]]
+    apart, index = apart[order], index[order]
     stops = np.searchsorted(apart, apart + _SAME_MS, side="right")
     counts = [len(np.unique(index[k:stop])) for k, stop in enumerate(stops)]
     most = max(counts, default=0)
@@ -240,7 +305,7 @@ def same_distance(times: NDArray[np.int64], others: NDArray[np.int64], beyond_ms
     if most < _LEAST or _by_chance(most, left, len(apart), _SAME_MS) > _CHANCE:
         return None
     here = slice(begin := counts.index(most), stops[begin])
-    members = np.zeros(len(times), np.bool_)
+    members = np.zeros(first[-1], np.bool_)
     members[index[here]] = True
     return Alike(float(np.median(apart[here])), members)
 
@@ -256,6 +321,11 @@ def _apart(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[NDArray[n
     return apart[order], label_index[order]
 
 
+def _near(apart: NDArray[np.float64], index: NDArray[np.int64]) -> int:
+    """Return how many times lie near enough to be aligned, by their distances."""
+    return len(np.unique(index[np.abs(apart) <= WINDOW_MS]))
+
+
 def _reached(times: NDArray[np.int64], felt: NDArray[np.int64]) -> int:
     """Return how many of these times lie up to the farthest from a label, at most as many as there are labels.
 
@@ -266,8 +336,8 @@ def _reached(times: NDArray[np.int64], felt: NDArray[np.int64]) -> int:
     return min(len(times), int(np.count_nonzero(last > first)))
 
 
-def _by_hand(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple[Off, float]]:
-    """Yield the distance around which most labels lie from these times as a hand sets them, with its spread, ms."""
+def _by_hand(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[Off]:
+    """Yield the distance around which most labels lie from these times as a hand sets them."""
     least = int(np.ceil(max(_LEAST, _SHARE * len(times))))
     if _reached(times, felt) < least or len(felt) > _MOST_A_LABEL * len(times):
         return
@@ -287,11 +357,13 @@ def _by_hand(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tupl
     np.minimum.at(nearest, label_index, np.abs(apart - ms))
     within_ms = _STEP_MS * np.ceil(_DEVIATIONS * _NORMAL * float(np.median(nearest)) / _STEP_MS)
     if abs(ms) <= _HAND_MS:
-        yield _off(ms, apart, label_index, np.abs(apart - ms) <= within_ms, len(times), float(within_ms)), spread_ms
+        here = np.abs(apart - ms) <= within_ms
+        yield _off(ms, spread_ms, apart, label_index, here, len(times), float(within_ms))
 
 
 def _off(
     ms: float,
+    spread_ms: float,
     apart: NDArray[np.float64],
     label_index: NDArray[np.int64],
     here: slice | NDArray[np.bool_],
@@ -301,7 +373,7 @@ def _off(
     """Return the distance of labels whose pairs lie here."""
     near = np.unique(label_index[here][np.abs(apart[here]) <= WINDOW_MS])
     alike = np.unique(label_index[here])
-    return Off(ms, len(alike), len(alike) - len(near), labels, within_ms)
+    return Off(ms, len(alike), len(alike) - len(near), labels, spread_ms, within_ms)
 
 
 def chance_of(least: int, total: int, share: float) -> float:
@@ -322,16 +394,16 @@ def _by_chance(least: int, labels: int, pairs: int, spread_ms: float) -> float:
     return stretches * chance_of(least, labels, share)
 
 
-def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple[Off, float]]:
-    """Yield the distances that most labels have from one of these times, each with its spread, ms."""
+def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[Off]:
+    """Yield the distances that most labels have from one of these times, each ms."""
     least = max(_LEAST, _SHARE * len(times))
     if _reached(times, felt) < least or len(felt) > _MOST_A_LABEL * len(times):
         return
     apart, label_index = _apart(times, felt)
     for k, end in enumerate(np.searchsorted(apart, apart + _SAME_MS, side="right")):
         if end - k >= least and len(np.unique(label_index[k:end])) >= least:
-            off = _off(float(np.median(apart[k:end])), apart, label_index, slice(k, end), len(times))
-            yield off, float(apart[end - 1] - apart[k])
+            ms, spread_ms = float(np.median(apart[k:end])), float(apart[end - 1] - apart[k])
+            yield _off(ms, spread_ms, apart, label_index, slice(k, end), len(times))
 
 
 def early(labels: Mapping[str, NDArray[np.int64]], first_us: int, last_us: int) -> str:

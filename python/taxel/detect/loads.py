@@ -123,6 +123,16 @@ class Loads:
             self._changes[quantity] = [curve.changes() for curve in self._curves[quantity]]
         return self._changes[quantity][k]
 
+    def values_at(self, quantity: str, times: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return what a quantity is at times on the one clock, in their shape; 0 before it is known."""
+        values, example = np.zeros(times.shape), np.rint(times / APART_US).astype(np.int64)
+        for k in np.unique(example).tolist():
+            t, of_example = self.changes(quantity, k)
+            here = example == k
+            index = np.searchsorted(t, times[here] - self._shift[k], side="right")
+            values[here] = np.concatenate([[0.0], of_example])[index]
+        return values
+
     def values(self, quantity: str, parts: Iterable[Stretch]) -> NDArray[np.float64]:
         """Return what a quantity is after each of its changes in parts of the examples."""
         inside = [np.empty(0)]

@@ -33,8 +33,6 @@ _GAP_US = 200_000
 _SAME_MS = 50.0
 #: Labels or detections are those that lie where loads begin or end if this share more of them does than of the others.
 _FITS = 0.3
-#: Detections that are false lie in loads without a label where this share of all loads has one, ...
-_LABELLED = 0.5
 #: ... and, in a recording unlike the training, only where this share of the labels is found.
 _FOUND = 0.8
 #: Detections are far too many that are false so many times as often as there are labels.
@@ -380,43 +378,37 @@ class Measured:
         return cause, left.without(np.zeros(len(left.missed), np.bool_), at)
 
     def _unlabelled(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
-        """Return how many false lie where a load has no label, and how many missed far from its begin and end."""
-        scored = self._scores[label]
-        if not self._felt.are_known or (self._differs(left) and scored.found < _FOUND * scored.events):
+        """Return how many false lie in strong loads without a label, and how many missed far from any load's edge.
+
+        Weak loads without a label may be noise, and labels where nothing is felt may be of weak touches.
+        """
+        scored, differs = self._scores[label], self._differs(left)
+        if not self._felt.are_known or (differs and scored.found < _FOUND * scored.events):
             return None
-        reach = round(to_us(2 * self._window_ms))
-        names = sorted({name for example in self._examples for name in example.labels})
-        labels = np.sort(np.concatenate([self._labels(name) for name in names]))
-        beside = np.diff(np.searchsorted(labels, [left.false - reach, left.false + reach]), axis=0)[0] > 0
-        felt, where = self._felt.felt_at(left.false)[1] & ~beside, "where a load begins or ends that has no label"
-        if self._by_chance(int(felt.sum()), len(felt), self._felt.covered()):
-            felt[:] = False
-        if 2 * int(felt.sum()) <= len(felt):
-            # What is told before a load has ended, as a release, lies within it.
-            within, covered_us = self._felt.without_label(left.false, self._labels(label), reach, _LABELLED)
-            within &= ~beside
-            if within.sum() > felt.sum() and not self._by_chance(int(within.sum()), len(within), covered_us):
-                felt, where = within, f"in a load that has no label of {label}"
-        unfelt = ~self._felt.felt_at(left.missed)[1]
-        if self._differs(left):
-            unfelt[:] = False
-        count = int(felt.sum()) + int(unfelt.sum())
-        if not count or 2 * count <= left.total:
+        names = {name for example in self._examples for name in example.labels}
+        strong = self._felt.strong(label, names, left.false)
+        unfelt = ~self._felt.felt_at(left.missed)[1] & (not differs)
+        count, mistakes = int(strong.sum()), int(strong.sum()) + int(unfelt.sum())
+        if 2 * mistakes <= left.total:
             return None
         parts = []
-        if felt.any():
-            n = int(felt.sum())
-            parts.append(f"{n} of {len(felt)} false {lie(n)} {where}")
-        if unfelt.any():
-            n = int(unfelt.sum())
-            where = "one does" if parts else "a load begins or ends"
-            parts.append(f"{n} of {len(unfelt)} missed {lie(n)} more than {WINDOW_MS:.0f} ms from where {where}")
-        times = np.sort(np.concatenate([left.missed[unfelt], left.false[felt]]))
-        named = ", ".join(self._place(t) for t in times[:_NAMED])
-        measured = f"{', and '.join(parts)}, as at {named}"
-        return Cause("unlabelled_loads", (label,), count, measured, "a look at these labels"), left.without(
-            unfelt, felt
+        if count:
+            parts.append(f"{count} of {len(strong)} false {lie(count)} in loads without a label, as strong as others")
+        if n := int(unfelt.sum()):
+            parts.append(
+                f"{n} of {len(unfelt)} missed {lie(n)} more than {WINDOW_MS:.0f} ms from where a load begins or ends"
+            )
+        times = left.false[strong] if count else left.missed[unfelt]
+        measured = f"{', and '.join(parts)}, as at {', '.join(self._place(t) for t in np.sort(times)[:_NAMED])}"
+        is_most = 2 * count >= left.total
+        cause = Cause(
+            "unlabelled_loads" if count else "unfelt_labels",
+            (label,),
+            mistakes,
+            measured,
+            "labels of these loads too" * is_most,
         )
+        return cause, left.without(unfelt, strong)
 
     def _place(self, t: int) -> str:
         return f"{self._seconds(t):.3f} s{_of(self._examples[int(_example_of(t))], self._examples)}"
@@ -426,8 +418,7 @@ class Measured:
 
     def _by_chance(self, count: int, among: int, covered_us: int) -> bool:
         """Whether as many times lie by chance in so much of the recordings."""
-        share = min(1.0, covered_us / max(1, self._lasts_us))
-        return chance_of(count, among, share) > _CHANCE
+        return chance_of(count, among, min(1.0, covered_us / max(1, self._lasts_us))) > _CHANCE
 
 
 def _of_clock(cause: Callable[..., Cause], ms: float, measured: str, fits: str) -> Cause:
@@ -461,18 +452,24 @@ def overlapping(label: str, count: int, labels: int, mistakes: int) -> Cause:
 def stretch_of(labels: NDArray[np.int64], members: NDArray[np.bool_], examples: Sequence[Example]) -> str:
     """Return from when to when some of the labels (us, on one clock) lie in one recording; "" where it is no part.
 
-    Nearly all labels between the first and the last of them must be among them.
+    Nearly all labels between the first and the last there must be among them, and nearly all of them there.
     """
-    places = np.flatnonzero(members)
-    if not len(places):
-        return ""
+    # The densest stretch: each of the labels adds to it, each of the others takes away as many as `_STRETCH` allows.
     recording = _example_of(labels)
-    first, last = places[0], places[-1]
-    if recording[first] != recording[last] or len(places) < _STRETCH * (last - first + 1):
+    best, first, last, worth, begin = 0.0, 0, -1, 0.0, 0
+    for k, is_member in enumerate(members):
+        if worth <= 0 or recording[k] != recording[begin]:
+            worth, begin = 0.0, k
+        worth += 1 if is_member else -_STRETCH / (1 - _STRETCH)
+        if worth > best:
+            best, first, last = worth, begin, k
+    if members[first : last + 1].sum() < _STRETCH * members.sum():
         return ""
     here = np.flatnonzero(recording == recording[first])
     starts, ends = first == here[0], last == here[-1]
-    begin_s, end_s = (_seconds(labels[k], examples) for k in (first, last))
+    # Rounded so that the first and the last are within.
+    begin_s, end_s = (10 * _seconds(labels[k], examples) for k in (first, last))
+    begin_s, end_s = np.floor(begin_s) / 10, np.ceil(end_s) / 10
     example = examples[recording[first]]
     if starts and ends:
         return _of(example, examples).replace(" of", "in", 1)

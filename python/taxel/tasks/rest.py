@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import checked_path, instance, number
 from taxel._base.errors import helped, refused
-from taxel._base.messages import warn
+from taxel._base.messages import collected, warn
 from taxel._base.number_text import float_of
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
@@ -386,6 +386,14 @@ def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
         return _without_touch(_before(labels, recording), recording, source)
     except ProblemError:
         return None
+
+
+def has_rest(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> bool:
+    """Return whether a training has a tare of a recording that holds no touch."""
+    with collected():  # what it warns of, the training does
+        tare = tare_if_any(labels, recording)
+    source = recorded(recording)
+    return tare is not None and held_by_tare([Example(source, {}, tare)]) < min(TOUCH, source.array.taxels)
 
 
 def _measured(recording: Recording, source: Events | Frames, stop_us: int, start_us: int | None = None) -> Tare:

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from taxel._base.arguments import finite, flag, integer, mapping
 from taxel._base.errors import refused
 from taxel._base.messages import counted, three_digits
@@ -24,8 +26,8 @@ from taxel.tasks.rest import GivenTare, check_tare
 
 #: Largest number of unpaired labels that a warning names.
 _NAMED = 5
-#: Readouts are known at other times whose delays differ by more, ms.
-_APART_MS = 10.0
+#: Readouts know at other times whose delays differ by more, ms.
+_APART_MS = 1.0
 #: How a user gets the file of a plain rule, and uses it.
 _RULE_FILE = "--rule FILE writes it, for taxel detect --readout FILE"
 
@@ -221,7 +223,8 @@ class Training:
         lines += [*self._better(), *self._advised(), *self._aligned()]
         if self.options.shift_ms:
             lines.append(f"labels moved by {self.options.shift_ms:+g} ms before, as asked")
-        lines += [*self._kinds(), *self._known_apart()]
+        lines += [f"{label}: {chosen}" for label, chosen in self.made.chosen.items()]
+        lines += self._kinds()
         if recipe is not None:
             about = self.made.recipe.about
             lines += ["", f"recipe {recipe}" + (f": {about}" if about else "")]
@@ -251,25 +254,11 @@ class Training:
     def _kinds(self) -> Iterator[str]:
         """Yield the labels that are learnt as kinds of touch, and what ends of touches are called."""
         recipe = self.options.recipe
-        if recipe is None:
-            return
-        for label in recipes.kinds(recipe, self.readout.labels):
+        if recipe is not None and (kinds := recipes.kinds(recipe, self.readout.labels)):
             yield (
-                f"{label}: learnt as a kind of touch, told at an age of the touch; its begin is called "
+                f"{', '.join(kinds)}: learnt as a kind of touch, told at an age of the touch; its begin is called "
                 f"{recipes.names_of(recipe, 'contact')}; its end {recipes.names_of(recipe, 'lift')}"
             )
-
-    def _known_apart(self) -> Iterator[str]:
-        """Yield the labels that the readout that is written knows at another time than those that were scored."""
-        folds = [trained.readout.neurons for trained in self.scored.trained]
-        for label, neuron in self.readout.neurons.items():
-            delays_ms = [neurons[label].delay_ms for neurons in folds if label in neurons]
-            if delays_ms and max(abs(neuron.delay_ms - ms) for ms in delays_ms) > _APART_MS:
-                yield (
-                    f"{label}: the readout that is written is known {neuron.delay_ms:.0f} ms after what the sensor "
-                    f"felt, those that were scored {min(delays_ms):.0f} to {max(delays_ms):.0f} ms, as each chose the "
-                    "age of a touch on its own training data: the score is of theirs"
-                )
 
     def _levels(self) -> Iterator[str]:
         """Yield the levels that the training data gave, if they did."""
@@ -292,7 +281,7 @@ class Training:
 
     def _scores(self, label: str) -> Iterator[str]:
         """Yield how the neuron and the plain rule of a label scored on the same labels."""
-        yield _line(label, "neuron", self.scored.together[label])
+        yield _line(label, "neuron", self.scored.together[label]) + self._written(label)
         plain = self.scored.plain
         rule = None if plain is None else plain.rules[label]
         if plain is None or plain.together is None:
@@ -301,6 +290,18 @@ class Training:
             yield f"no plain rule for {label}: none is better than to detect nothing"
         else:
             yield f"{_line(label, 'plain rule', plain.together[label])}; tuned on all: {rule._compared()}"
+
+    def _written(self, label: str) -> str:
+        """Return when the readout that is written knows, where folds chose other ages of a touch; else ""."""
+        folds = [trained.readout.neurons for trained in self.scored.trained]
+        delay_ms = self.readout.neurons[label].delay_ms
+        if all(abs(delay_ms - neurons[label].delay_ms) <= _APART_MS for neurons in folds if label in neurons):
+            return ""
+        scores = [outcome.score.by_label[label] for outcome in self.outcomes if outcome.score is not None]
+        known_ms = np.concatenate([score.delays_ms for score in scores])
+        return (
+            f"; the readout that is written {three_digits(float(np.median(known_ms)), '+')} ms" if len(known_ms) else ""
+        )
 
     def _better(self) -> Iterator[str]:
         """Yield the labels of which the plain rule is better, or as good and sooner; and the rules that are lacking."""

@@ -24,7 +24,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["chosen", "fitting", "for_labels", "kinds", "knows", "names", "names_of", "read", "spelling"]
+__all__ = ["chosen", "fitting", "for_labels", "kinds", "knows", "names", "names_of", "neuron_of", "read", "spelling"]
 
 #: The recipe of recordings that no other fits: its levels are shares of the running range, of any unit.
 _ANY = "gait_channel"
@@ -59,7 +59,7 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in Path(__file__).parent.glob("*.toml")))
 
 
-def fitting(source: Events | Frames, labels: Sequence[str] = ()) -> str:
+def fitting(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool = True) -> str:
     """Return the name of the recipe that fits a recording, by what it holds, and its labels.
 
     Parameters
@@ -68,7 +68,9 @@ def fitting(source: Events | Frames, labels: Sequence[str] = ()) -> str:
     labels : sequence of str
         What is to be learnt. Contact, lift and kinds of touch of a grid have one recipe whatever the unit; steps, as
         "foot_off", and no labels have that of the unit. Where there is none, contact and foot off of a grid have that
-        of touches, if each is of one label, and all else that of channels.
+        of touches, if each is of one label, and so have those of channels; all else that of channels.
+    rests : bool
+        Whether the rest of its taxels is known, as touches of channels are told from.
 
     Examples
     --------
@@ -82,10 +84,10 @@ def fitting(source: Events | Frames, labels: Sequence[str] = ()) -> str:
     >>> fitting(Frames([[[0.0] * 6] * 6], [0], unit="V"), ["soft", "hard"])
     'touch'
     """
-    return chosen(source, labels)[0]
+    return chosen(source, labels, rests=rests)[0]
 
 
-def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, str]:
+def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool = True) -> tuple[str, str]:
     """Return the name of the recipe that fits a recording and its labels, as `fitting`, and for what it is taken.
 
     Examples
@@ -105,8 +107,11 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
         sensor = counted(array.taxels, "channel" if array.is_channels else "taxel")
         # Of these it knows contact and lift alone; a contact without its lift may be that of a step.
         kinds = {_listed(recipes[grids], label) for label in labels} if grids is not None else set()
+        ends = [] if grids is None else [_own(recipes[grids], label) for label in labels]
         if "lift" in kinds and None not in kinds:
             return str(grids), f"{' and '.join(labels)} on {sensor}"
+        if rests and ends and None not in ends and len(set(ends)) == len(ends):
+            steps = str(grids), f"{' and '.join(labels)} on {sensor}"
         grids = None
     elif grids is None or not labels:
         grids, sensor = None, counted(array.taxels, "taxel")
@@ -207,6 +212,17 @@ def knows(recipe: str, label: str) -> bool:
     (True, False)
     """
     return _listed(read(recipe), text("label", label)) is not None
+
+
+def neuron_of(recipe: str, label: str) -> str | None:
+    """Return the recipe's neuron that a label names, also as an end of a step; None of any other label.
+
+    Examples
+    --------
+    >>> neuron_of("touch", "left toe off"), neuron_of("touch", "Grip"), neuron_of("touch", "ball")
+    ('lift', 'contact', None)
+    """
+    return _own(read(recipe), text("label", label))
 
 
 def kinds(recipe: str, labels: Sequence[str]) -> tuple[str, ...]:
