@@ -13,25 +13,30 @@ RTL = Path(__file__).parents[1]
 PAGE = RTL.parent / "docs" / "hardware.md"
 BEGIN, END = "<!-- pins: made from colorlight_i9.lpf by rtl/tools/pins.py -->\n", "<!-- end of pins -->\n"
 
-#: What is connected to a signal.
+#: What is connected to a signal, and whether the board drives it.
 WIRES = {
-    "button_n": "the extension board's button, to ground; pulled up",
-    "rx": "serial line, from the extension board's USB adapter",
-    "tx": "serial line, to the same",
-    "ramp": "high while the ramp rises, low while it falls back",
-    "csel_reg_clk_out": "clock of the chain of 74HC164",
-    "csel_reg_din_out": "data of the first of them, A and B",
-    "record_sync": "high while a recording runs",
-    "frame_sync_out": "a pulse of 10 ns a frame, for an oscilloscope",
-    "col_change_sync": "a pulse of 10 ns a step",
-    "col_read_sync": "high during a read",
-    "row_read_sync": "high while a line is read",
-    "comparators": "these sense lines",
+    "clk25": ("in", "the module's oscillator, 25 MHz"),
+    "button_n": ("in", "the extension board's button, to ground; pulled up"),
+    "rx": ("in", "serial line, from the host: the extension board's USB adapter"),
+    "tx": ("out", "serial line, to the host: the same"),
+    "ramp": ("out", "high while the ramp rises, low while it falls back"),
+    "csel_reg_clk_out": ("out", "clock of the chain of 74HC164"),
+    "csel_reg_din_out": ("out", "data of the first of them, A and B"),
+    "record_sync": ("out", "high while a recording runs"),
+    "frame_sync_out": ("out", "a pulse of 10 ns a frame, for an oscilloscope"),
+    "col_change_sync": ("out", "a pulse of 10 ns a step"),
+    "col_read_sync": ("out", "high during a read"),
+    "row_read_sync": ("out", "high while a line is read"),
+    "eth_reset_n": ("out", "the PHY's reset"),
+    "eth_tx_clk": ("out", "RGMII to the PHY"),
+    "eth_tx_ctl": ("out", "RGMII to the PHY"),
+    "eth_tx_data": ("out", "RGMII to the PHY, bit by bit"),
+    "comparators": ("in", "the comparators of these sense lines; pulled down"),
 }
 
 
-def located(lpf: str) -> list[tuple[str, int | None, str]]:
-    """Return signal, index and connector's pin of each pin on a connector, in the order of the file."""
+def located(lpf: str) -> list[tuple[str, int | None, str, str]]:
+    """Return signal, index, connector's pin and ball of each pin, in the order of the file."""
     found, connector, numbers = [], "", iter(())
     for line in lpf.splitlines():
         if said := re.match(r"# (P\d), pins? (\d+)(?: (?:to|and) (\d+))?", line):
@@ -39,18 +44,19 @@ def located(lpf: str) -> list[tuple[str, int | None, str]]:
             numbers = iter(range(first, last + 1))
         elif line.startswith("#"):
             connector = "" if line.startswith(("# The", "# Pins")) else connector
-        elif connector and (pin := re.match(r'LOCATE COMP "(\w+)(?:\[(\d+)\])?" SITE', line)):
-            found.append((pin[1], None if pin[2] is None else int(pin[2]), f"{connector}, {next(numbers)}"))
+        elif pin := re.match(r'LOCATE COMP "(\w+)(?:\[(\d+)\])?" SITE "(\w+)"', line):
+            place = f"{connector}, {next(numbers)}" if connector else "on the module"
+            found.append((pin[1], None if pin[2] is None else int(pin[2]), place, pin[3]))
     return found
 
 
 def table(lpf: str) -> str:
     """Return the table: one row a signal, of a bus one for eight pins that follow each other on a connector."""
-    rows = ["| signal | connector, pin | wire |", "|---|---|---|"]
+    rows = ["| signal | connector, pin | ball | direction | wire |", "|---|---|---|---|---|"]
     pins = located(lpf)
     k = 0
     while k < len(pins):
-        signal, index, place = pins[k]
+        signal, index, place, _ball = pins[k]
         count = 1
         if index is not None:
             here = place.split(",")[0]
@@ -62,9 +68,11 @@ def table(lpf: str) -> str:
             ):
                 count += 1
         last = pins[k + count - 1]
+        direction, wire = WIRES[signal]
         name = f"`{signal}`" if index is None else f"`{signal}[{index}]` to `[{last[1]}]`"
-        where = place if count == 1 else f"{place} to {last[2].split(', ')[1]}"
-        rows.append(f"| {name} | {where} | {WIRES[signal]} |")
+        where = place if count == 1 or "," not in place else f"{place} to {last[2].split(', ')[1]}"
+        balls = " ".join(pin[3] for pin in pins[k : k + count])
+        rows.append(f"| {name} | {where} | {balls} | {direction} | {wire} |")
         k += count
     return "\n".join(rows) + "\n"
 
