@@ -393,7 +393,9 @@ class Measured:
             return None
         parts = []
         if count:
-            parts.append(f"{count} of {len(strong)} false {lie(count)} in loads without a label, as strong as others")
+            parts.append(
+                f"{count} of {len(strong)} false {lie(count)} in loads without a label of {label}, as strong as others"
+            )
         if n := int(unfelt.sum()):
             parts.append(
                 f"{n} of {len(unfelt)} missed {lie(n)} more than {WINDOW_MS:.0f} ms from where a load begins or ends"
