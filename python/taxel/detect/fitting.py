@@ -247,7 +247,9 @@ def learn(examples: EncodedExamples, recipe: Recipe, array: Array | None, report
         fitting, learners[label], points[label] = best.fitting, best.learner, best.point
         if differs := _differing(best.point, recipe._choices_of(label)[0]):
             by, by_first = differs
-            chosen[label] = f"learnt by {by}: {best.wrong} missed and false in the training data, {first_wrong} by {by_first}"
+            chosen[label] = (
+                f"learnt by {by}: {best.wrong} missed and false in the training data, {first_wrong} by {by_first}"
+            )
         delays[label], ranges[label] = fitting.delay_ms, fitting.seen(learners[label])
         if fitting.alignment is not None:
             of_all = np.array(fitting.places)[fitting.alignment.example]
