@@ -231,8 +231,9 @@ class FeltLoads:
             self._loads.values_at("peak", np.rint(times + way * at).astype(np.int64)).mean(axis=0)
             for at in (shares - 1.0, shares)
         )
-        falls = (before >= PEAK) & (middle < _FALLEN * before)
-        return bool(max((middle > before).mean(), falls.mean()) >= _MOST)
+        changes = {"contact": middle > before, "lift": (before >= PEAK) & (middle < _FALLEN * before)}
+        neuron = recipes.neuron_of("touch", label)
+        return bool(max(share.mean() for name, share in changes.items() if neuron in (None, name)) >= _MOST)
 
     def part_off(self, labels: Sequence[str]) -> tuple[NDArray[np.int64], Alike] | None:
         """Return labels of some names, and which of them lie at one distance from what was felt, far from all of it.
