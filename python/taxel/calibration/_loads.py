@@ -35,7 +35,7 @@ class Load(NamedTuple):
         Recorded under the load; the mean of each taxel is used.
     load : float, above 0
     unit : {"N", "kPa"}
-        Force in all, however it is spread, or the same pressure at every taxel.
+        Total force, however it is spread, or the same pressure at every taxel.
     taxel : (int, int), optional
         Column and row of the only taxel that bears it.
 

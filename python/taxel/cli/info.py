@@ -66,11 +66,11 @@ def info(
 ) -> None:
     """Summarise a recording: contents, losses, rates, pressure, and dead, stuck or noisy taxels.
 
-    Of spike trains that taxel encode wrote: how many, their kind, duration and spikes.
+    For spike trains that taxel encode wrote: number, kind, duration and spikes.
 
-    Of a ROS bag without --topic: the topics that hold numbers, with shapes and rates.
+    For a ROS bag without --topic: the topics that hold numbers, with shapes and rates.
 
-    Of several recordings, as of a folder: a row each, and their sum.
+    For several recordings, such as a folder: a row for each, and their sum.
 
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
