@@ -280,7 +280,7 @@ def _page(facts: dict[str, Any]) -> list[str]:
     rows = [*_contents(facts), *_rates(facts), *_losses(facts), ("verdict", facts["verdict"])]
     rows += [("remark", line) for line in facts["remarks"]]
     missing = [("not in file", line) for line in facts["lost"]]
-    # What was left out of a bag, or has other times, concerns all that follows.
+    # Remarks on data left out of a bag, or on other times, concern all rows that follow.
     rows = [*missing, *rows] if facts["kind"] == "ros" else [*rows, *missing]
     lines = [head, *(f"  {name:<19} {value}" for name, value in rows)]
     return [*lines, *(f"{kind} written to {facts[kind]}" for kind in ("picture", "table") if kind in facts)]
