@@ -72,7 +72,7 @@ class HeaderTable:
         header = tuple(name.strip() for name in first)
         repeated = next((name for name, count in Counter(header).items() if name and count > 1), None)
         if repeated is not None:
-            raise FormatError(f"{location}, line {line}: column {shown(repeated)} is there twice")
+            raise FormatError(f"{location}, line {line}: column {shown(repeated)} appears twice")
         return cls(str(location), header, ())
 
     @classmethod

@@ -116,7 +116,7 @@ def _names(path: Path, head: bytes) -> list[str]:
         return names
     repeated = next((name for name, n in Counter(names).items() if n > 1), None)
     if repeated is not None:
-        raise FormatError(f"{path}, line 1: column {shown(repeated)} is there twice")
+        raise FormatError(f"{path}, line 1: column {shown(repeated)} appears twice")
     return names
 
 
