@@ -415,7 +415,7 @@ def nth(noun: str, chosen: SupportsIndex, length: int) -> int:
     Raises
     ------
     IndexError : the number is out of range
-    ProblemError : no whole number, as a span of time
+    ProblemError : not a whole number, as a span of time
     """
     try:
         n = operator.index(chosen)

@@ -186,7 +186,7 @@ def text_of(path: Path, *, otherwise: str = "") -> list[str]:
 
     Raises
     ------
-    FormatError : no text
+    FormatError : not a text
     OSError : the file is not there, or cannot be read
     """
     text = read_text(path, TEXT, otherwise)

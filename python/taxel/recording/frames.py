@@ -161,7 +161,7 @@ def calibrate(source: RecordedSource, rate_hz: float | None = None, rest: Tare |
 
     Raises
     ------
-    ProblemError : no calibration, or one of another array
+    ProblemError : not a calibration, or a calibration of another array
     """
     calibration = source.sensor.calibration()
     if calibration is None:

@@ -134,7 +134,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
 
     Raises
     ------
-    ProblemError : none of these
+    ProblemError : another object
 
     Notes
     -----
