@@ -59,7 +59,7 @@ BAD_JSON = {
     "digits": ('{"a": ' + "9" * 5000 + "}", "not JSON: .*4300"),
     "nan": ('{"a": NaN}', "not JSON: NaN is no number"),
     "infinity": ('{"a": -Infinity}', "not JSON: -Infinity is no number"),
-    "twice": ('{"b": 1, "a": {"c": 1, "c": 2}}', "not JSON: 'c' stands twice"),
+    "twice": ('{"b": 1, "a": {"c": 1, "c": 2}}', "not JSON: 'c' appears twice"),
     "half": ('{"a": 1', "not JSON"),
     "empty": ("", "not JSON"),
 }

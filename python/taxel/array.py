@@ -406,7 +406,7 @@ class Array:
 
         Raises
         ------
-        ProblemError : no array
+        ProblemError : not an array
 
         Examples
         --------

@@ -33,7 +33,7 @@ class Port:
     Parameters
     ----------
     place : str
-        As "COM3" or "/dev/ttyACM0", for `Cable` and `Device`.
+        For example "COM3" or "/dev/ttyACM0", for `Cable` and `Device`.
     kind : {"usb", "pci", "bluetooth", "other"}
     product, maker, serial : str or None
         The description of a USB device.
@@ -111,7 +111,7 @@ class Cable:
     baud : int, bits/s, from 300 to 4000000
         Baud rate of a serial port; 8 data bits, no parity, 1 stop bit (reading: the manual gives no settings).
     timeout : float, s, above 0
-        How long the board may take to answer.
+        Longest time that the board may take to answer.
 
     Raises
     ------
@@ -163,7 +163,7 @@ class Cable:
         ------
         DeviceError : the board refuses the command (the error names the rule), or does not answer
         OSError : the cable was pulled
-        ProblemError : no command
+        ProblemError : not a command
 
         Examples
         --------
@@ -231,7 +231,7 @@ class Cable:
         Parameters
         ----------
         within : float, s
-            How long to try.
+            Longest time to try.
 
         Returns
         -------
@@ -240,7 +240,7 @@ class Cable:
         Raises
         ------
         DeviceError : no board answers within that time
-        ProblemError : no number
+        ProblemError : not a number
         """
         return Greeting(**self._line.reopen(number("within", within)))
 
@@ -265,7 +265,7 @@ class Cable:
 
     @contextlib.contextmanager
     def floor(self, ticks: int) -> Iterator[None]:
-        """Set the noise floor within a context, as for a tare; the previous one is restored at its end.
+        """Set the noise floor within a context, for example for a tare; the previous floor is restored at its end.
 
         Parameters
         ----------
@@ -313,18 +313,18 @@ class Device:
     place : str
         A serial port (`ports` lists them), or host:port.
     array : Array, optional
-        The sensor. Default: one of the size that the board reports.
+        The sensor. Default: an array of the size that the board reports.
     baud : int, bits/s, from 300 to 4000000
         Baud rate of a serial port.
     timeout : float, s, above 0
-        How long the board may take to answer.
+        Longest time that the board may take to answer.
     patience : float, s
-        How long to try to reconnect after the cable was pulled.
+        Longest time to try to reconnect after the cable was pulled.
 
     Raises
     ------
     OSError : the line cannot be opened
-    DeviceError : no board answers there, or one of another size than `array`
+    DeviceError : no board answers there, or a board of another size than `array`
     ProblemError : invalid arguments
 
     Examples
@@ -371,7 +371,7 @@ class Device:
         return self._try(self._read)
 
     def apply(self, registers: Registers | str) -> Registers:
-        """Set all registers but `record`, or a preset by its name; return the contents of the registers afterwards.
+        """Set all registers except `record`, or a preset by its name; return the contents of the registers afterwards.
 
         After each write the registers satisfy the rules. A preset does not change the version of the wire
         (`Registers.with_preset`).

@@ -58,7 +58,7 @@ class Frames(FrozenColumns):
 
     def __init__(self, values: ArrayLike, t: ArrayLike, *, unit: str = "counts", array: Array | None = None) -> None:
         self.values: NDArray[np.float32] = frozen_numbers("values", values, np.float32)
-        # What is not copied is read-only, a part of other frames or what a reader has checked.
+        # Values that are not copied are read-only: a part of other frames, or values that a reader has checked.
         if not (isinstance(values, np.ndarray) and np.may_share_memory(self.values, values)):
             _refuse_infinite("values", self.values)
         self.t: NDArray[np.int64] = frozen_column("t", t, np.int64, "us")

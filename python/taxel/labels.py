@@ -233,7 +233,7 @@ def source_of(topic: str) -> str:
     >>> source_of("/palm/left")
     'palm_left'
     """
-    # What the name of a source in a .mcap may be.
+    # Names that a source in a .mcap may have.
     return re.sub("[^A-Za-z0-9_-]", "_", topic.strip("/"))[-64:]
 
 

@@ -146,7 +146,7 @@ def test_recordings_of_other_arrays_are_left_out_where_one_fits(
 def test_how_labels_name_trials_of_a_file_is_said_in_short_lines(tmp_path: Path, capsys) -> None:
     file, labels = write_plate(tmp_path, count=5), tmp_path / "labels.csv"
     code, said, _ = call(capsys, "info", file)
-    assert (code, said.splitlines()[-1]) == (0, "labels name a trial in their column recording, as subj900/00")
+    assert (code, said.splitlines()[-1]) == (0, "labels name a trial in their column recording, for example subj900/00")
     names = f"subj900/00, subj900/01, subj900/02 and 2 more of {file}"
     labels.write_text("recording,label,t_us\n" + "".join(f"{name},contact,9000\n" for name in "abcde"))
     command = ("train", file, "--labels", labels, "-o", tmp_path / "r.json")
@@ -157,10 +157,12 @@ def test_how_labels_name_trials_of_a_file_is_said_in_short_lines(tmp_path: Path,
     assert (code, "must have the column recording, with names as subj900/00" in error) == (2, True), error
     code, _, error = call(capsys, "info", file, "--picture", tmp_path / "p.png")
     assert code == 2
-    assert f"a picture or a table is of one: taxel convert {file} FOLDER writes each to a separate file" in error
+    assert (
+        f"a picture or a table shows one recording: taxel convert {file} FOLDER writes each to a separate file" in error
+    )
     assert call(capsys, "convert", file, tmp_path / "each")[0] == 0
     code, _, error = call(capsys, "info", tmp_path / "each", "--picture", tmp_path / "p.png")
-    assert (code, "a picture or a table is of one: name its file" in error) == (2, True), error
+    assert (code, "a picture or a table shows one recording: name its file" in error) == (2, True), error
 
 
 def test_detections_go_to_a_table(folder: Path, trained: Path, capsys) -> None:

@@ -267,7 +267,7 @@ def test_a_folder_of_tables_without_a_layout_says_the_same(tmp_path: Path) -> No
 
 def test_a_text_without_numbers_prints_no_layout(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("of a hand\n")
-    with pytest.raises(FormatError, match=r"not a recording; recordings are .* \(docs/files\.md\)$"):
+    with pytest.raises(FormatError, match=r"not a recording; taxel reads .* \(docs/files\.md\)$"):
         taxel.open(tmp_path / "a.txt")
 
 

@@ -169,7 +169,7 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
     ("table", "arguments", "text"),
     [
         ("recording,label\na,b\n", [], "no column 't_us'"),
-        ("recording,t_us,label,t_us\na,1,b,2\n", [], "column 't_us' is there twice"),
+        ("recording,t_us,label,t_us\na,1,b,2\n", [], "column 't_us' appears twice"),
         ("recording,t_us,label\n", [], "names no trial"),
         (GOOD.replace("touches.npz", "other.npz", 1), [], "line 2: recording 'other.npz' is not among those given"),
         (GOOD.replace("touches.npz", "other.npz"), [], "is not among those given"),

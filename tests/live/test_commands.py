@@ -71,7 +71,7 @@ def test_taxel_record_keeps_the_registers_of_a_sensor_of_ones_own(tmp_path: Path
 @pytest.mark.parametrize(
     ("more", "reason"),
     [
-        ([], "--rate-hz and --bits belong together"),
+        ([], "--rate-hz and --bits: give both"),
         (["--rate-hz", "500", "--preset", "2 kHz"], "--rate-hz and --preset"),
         (["--rate-hz", "500", "--remote", "zenoh:127.0.0.1:7447/left"], "--rate-hz and --remote"),
     ],

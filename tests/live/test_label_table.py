@@ -333,7 +333,7 @@ def test_a_file_system_that_cannot_exchange_files_is_written_too(table: Path, ta
 def test_what_was_acknowledged_is_damaged(table: Path, tables) -> None:
     mark(tables, table, "heel", 1)
     (table.parent / ".walk.notes.csv.acknowledged").write_text("[]")
-    with pytest.raises(FormatError, match=r"not what taxel saved of the labels.*delete it to go on"):
+    with pytest.raises(FormatError, match=r"not what taxel saved of the labels.*delete it to continue"):
         mark(tables, table, "toe", 2)
     assert sorted(held(table)) == [("heel", 1)]
 

@@ -103,7 +103,7 @@ def test_a_table_names_recordings_by_path_name_or_stem(tmp_path: Path) -> None:
     [
         ("label,t_us,host_ns\na,5,soon\n", "line 2: host_ns is 'soon'; must be whole ns"),
         ("label,t_us,host_ns\na,5,-1\n", "line 2: host_ns must be ns since 1970"),
-        ("label,t_us,t_us\na,5,5\n", "line 1: column 't_us' is there twice"),
+        ("label,t_us,t_us\na,5,5\n", "line 1: column 't_us' appears twice"),
         ("label,host_ns\na,5\n", "line 1: no column 't_us'"),
     ],
 )

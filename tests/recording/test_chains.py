@@ -313,7 +313,7 @@ def test_in_any_chain_of_steps_nothing_goes_lost_unsaid(tmp_path: Path, seed: in
                 m.board = [(c.t, c.change) for c in exact.board_changes]
             case kind:
                 made = recording.is_slice or recording.is_on_clock or not m.datagrams
-                whose = {"by whose clock"} if recording.is_on_clock else set()
+                whose = {"the clock of the times"} if recording.is_on_clock else set()
                 file = tmp_path / f"{k}{kind}"
                 if kind == ".lsa" and not m.datagrams and any(r[4] is not None for r in m.rows) is False:
                     continue

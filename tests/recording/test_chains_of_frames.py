@@ -274,7 +274,7 @@ def test_in_any_chain_of_steps_frames_and_what_is_beside_them_stay_or_are_said_t
                     with pytest.raises(taxel.ProblemError, match="holds 2 sources"):
                         taxel.convert(recording, file)
                     continue
-                whose = {"by whose clock"} if recording.is_on_clock else set()
+                whose = {"the clock of the times"} if recording.is_on_clock else set()
                 lost = taxel.convert(recording, file)
                 after = {of: one.through(kind) for of, one in models.items()}
                 for word in {word for _, words in after.values() for word in words} | whose | m.lost:
@@ -306,7 +306,7 @@ def test_of_a_board_beside_a_stream_each_has_its_own_clock_until_they_share_one(
         part, shared = both.between(a, b), host.between(a + BEGAN // 1000, b + BEGAN // 1000)
         expected = [k for k in range(30) if a <= 1000 * k < b]
         assert (part.events.intensity - 60).tolist() == expected
-        with pytest.raises(taxel.ProblemError, match=r"its sources \(board, imu\) have each its own"):
+        with pytest.raises(taxel.ProblemError, match=r"its sources \(board, imu\) have different clocks"):
             _ = part.sources
         assert (shared.events.intensity - 60).tolist() == expected
         assert shared.sources["imu"].frames().values.ravel().tolist() == expected

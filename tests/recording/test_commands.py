@@ -90,7 +90,7 @@ def test_info_writes_its_picture_once(walk: Path, tmp_path: Path) -> None:
     assert (again.returncode, again.stderr.count("\n")) == (2, 1)
     assert "exists already" in again.stderr
     assert run("info", walk, "--picture", picture, "--overwrite").returncode == 0
-    assert "a picture ends in" in run("info", walk, "--picture", tmp_path / "a.txt").stderr
+    assert "the name of a picture must end in" in run("info", walk, "--picture", tmp_path / "a.txt").stderr
 
 
 def test_info_of_an_unfinished_file_says_so(walk: Path, tmp_path: Path) -> None:
@@ -117,7 +117,7 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
     [
         (("info",), "FILE is missing"),
         (("info", "nothing.mcap"), "nothing.mcap: no such file or directory"),
-        (("info", "."), ".: holds no recording; there are .mcap"),
+        (("info", "."), ".: holds no recording; taxel reads .mcap"),
         (("convert", "WALK", "walk.xyz"), "must be .mcap, .lsa, .npz, .csv"),
         (("convert", "WALK", "WALK"), "exists already"),
         (("convert", "WALK", "a.npz", "--array", "6x6"), "holds its own sensor, Array("),
@@ -192,7 +192,7 @@ def test_info_says_what_spike_trains_are_and_other_commands_refuse_them_by_name(
     said = json.loads(run("info", path, "--json").stdout)
     assert (said["trains"], said["spikes"], said["trains_kind"]) == (3, 3, kind)
     refused = run("train", path, "-o", tmp_path / "r.json")
-    assert (refused.returncode, "spike trains, as taxel encode writes them, no recording" in refused.stderr) == (
+    assert (refused.returncode, "spike trains, as taxel encode writes them, not a recording" in refused.stderr) == (
         2,
         True,
     )

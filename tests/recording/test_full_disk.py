@@ -86,7 +86,7 @@ def test_an_existing_file_is_never_overwritten_unless_asked(tmp_path: Path, endi
 def test_a_pipe_or_a_device_is_never_replaced(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"a{ending}"
     os.mkfifo(path)
-    with pytest.raises(OSError, match="is no regular file"):
+    with pytest.raises(OSError, match="is not a regular file"):
         taxel.convert(some_events(5), path, overwrite=True)
     assert path.is_fifo()
 

@@ -86,7 +86,9 @@ def described(descr: str, shape: str) -> bytes:
 
 def test_a_declared_shape_of_a_million_millions_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
-    unreadable(npz(path, "t", described("<i8", f"({10**12},)")), r"x has shape \(400,\): must be one value an event")
+    unreadable(
+        npz(path, "t", described("<i8", f"({10**12},)")), r"x has shape \(400,\): must be one value for each event"
+    )
     with zipfile.ZipFile(path, "w") as archive:
         for name, kind in {"t": "<i8", "x": "<u2", "y": "<u2", "p": "|b1"}.items():
             archive.writestr(f"{name}.npy", described(kind, f"({10**12},)"))

@@ -376,7 +376,7 @@ STRANGE: dict[str, tuple[Callable[[], dict[str, Any]], str]] = {
     "a unit": (lambda: of_frames(3, unit=np.array("N" * 40_000_000)), "a larger limit"),
     "times": (lambda: of_frames(3, t=np.zeros(20_000_000, np.int64)), "a time for each of 3 frames"),
     "held": (lambda: as_events(held=np.zeros((9000, 9000), np.uint16)), "at most 4194304"),
-    "columns": (lambda: as_events(x=np.zeros(20_000_000)), "as many as t has"),
+    "columns": (lambda: as_events(x=np.zeros(20_000_000)), "as many as in t"),
     "complex frames": (lambda: of_frames(20_000, values=np.zeros((20_000, 8, 64), "c16")), "complex128"),
 }
 

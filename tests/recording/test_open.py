@@ -59,13 +59,13 @@ def npz(**columns: object) -> bytes:
         ("a.csv", b"t_us,x,y,p\n1,-2,3,0\n", "line 2, column x: is -2"),
         ("a.csv", b"t_us,x,y,p\n1.5,2,3,0\n", "line 2, column t_us"),
         ("a.csv", b"t_us,x,y,p,intensity\n1,2,3,0,70000\n", "column intensity: is 70000; must be 0 to 65535"),
-        ("a.csv", b"t_us,x0y0,x0y0\n0,1,2\n", "column 'x0y0' is there twice"),
+        ("a.csv", b"t_us,x0y0,x0y0\n0,1,2\n", "column 'x0y0' appears twice"),
         ("a.csv", b"t_us,x0y0,heel\n0,1,2\n", "column 'heel' among taxels"),
         ("a.csv", b"t_us,x0y0\n0,1\n0,2\n", "t[1] is 0 us, not after"),
         ("a.csv", b"t_us,x0y0\n0.5,1\n", "a.csv, line 2, column t_us: is 0.5; must be a whole number of us"),
         ("a.csv", b"t_us,x0y0\n0,1\n1,2,3\n", "line 3"),
         ("a.csv", b"t_us,x9999y9999\n0,1\n", "most are missing"),
-        ("a.txt", b"hello", "no recording; there are .mcap, .lsa, .npz, .csv, .h5"),
+        ("a.txt", b"hello", "not a recording; taxel reads .mcap, .lsa, .npz, .csv, .h5"),
         ("a.h5", b"\x89HDF\r\n\x1a\n", "not a whole HDF5 file"),
         ("a.h5", b"hello", "not with the magic of HDF5 (89 48 44 46)"),
         ("a.bag", b"#ROSBAG V2.0", "a ROS bag: choose one of its topics, or write [ros] in a layout file"),
@@ -153,7 +153,10 @@ def test_a_table_with_a_layout_beside_a_recording_is_left_out_with_a_warning(tmp
         (tmp_path / f"{name}.csv").write_text(f"time_s,a,b\n{rows}\n")
     assert len(taxel.open_all(tmp_path)) == 2
     taxel.convert(taxel.open(tmp_path / "day1.csv"), tmp_path / "day1.npz")
-    with pytest.warns(UserWarning, match=r": day2.csv left out, as beside recordings \(day1.npz\) tables"):
+    with pytest.warns(
+        UserWarning,
+        match=r": day2.csv left out, as tables and arrays are not read in a folder with recordings \(day1.npz\)",
+    ):
         assert [one.name for one in taxel.open_all(tmp_path)] == ["day1.npz"]
     (tmp_path / "day2.csv").unlink()
     with warnings.catch_warnings():

@@ -105,7 +105,7 @@ def test_a_folder_of_other_peoples_files_is_its_trials(tmp_path: Path, name: str
 
 
 def test_a_folder_without_a_recording_says_what_there_is_to_read(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"holds no recording; there are .mcap, .lsa"):
+    with pytest.raises(FormatError, match=r"holds no recording; taxel reads .mcap, .lsa"):
         taxel.open_all(tmp_path)
 
 

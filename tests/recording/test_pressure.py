@@ -66,7 +66,9 @@ def test_frames_rest_at_zero_and_events_without_intensities_have_no_pressure(tmp
     refused = run("info", tmp_path / "e.npz", "--table", tmp_path / "e.csv")
     assert (refused.returncode, "without intensities" in refused.stderr) == (2, True)
     assert not (tmp_path / "e.csv").exists()
-    assert "ends in .csv" in run("info", tmp_path / "f.npz", "--table", tmp_path / "f.txt").stderr
+    assert (
+        "the name of a table must end in .csv" in run("info", tmp_path / "f.npz", "--table", tmp_path / "f.txt").stderr
+    )
 
 
 @pytest.mark.parametrize("unit", ["N", "counts"])

@@ -170,7 +170,7 @@ def read_arrays(
 
     Raises
     ------
-    FormatError : no archive, damage, Python objects, or more bytes than a file may hold (names the array)
+    FormatError : not an archive, damage, Python objects, or more bytes than a file may hold (names the array)
     OSError : the file is not there, or cannot be read
     MemoryError : within the limits, but not within the memory that there is
 

@@ -197,7 +197,7 @@ def _converted(name: str, values: Any, unit: str | None) -> Any:
         # restored.
         rounded = np.rint(plain)
         return np.where(np.abs(plain - rounded) <= 1e-15 * np.abs(plain), rounded, plain)
-    except Exception:  # each library has errors of its own for units that do not fit
+    except Exception:  # each library has its own errors for units that do not fit
         right = "a plain number" if unit is None else f"a number of {unit}, or a quantity that converts to it"
         raise refused(name, f" is {shown(values)}: must be {right}") from None
 
@@ -415,7 +415,7 @@ def nth(noun: str, chosen: SupportsIndex, length: int) -> int:
     Raises
     ------
     IndexError : the number is out of range
-    ProblemError : no whole number, as a span of time
+    ProblemError : not a whole number, as a span of time
     """
     try:
         n = operator.index(chosen)

@@ -172,7 +172,7 @@ def of_json(location: str, text: str, most: int = BY_HAND, *, room: int = UNPACK
         values = dict(pairs)
         if len(values) < len(pairs):
             twice = next(name for name, count in Counter(name for name, _ in pairs).items() if count > 1)
-            raise FormatError(f"{location}: not JSON: {shown(twice)} is twice in one object")
+            raise FormatError(f"{location}: not JSON: {shown(twice)} appears twice in one object")
         return values
 
     def refuse(constant: str) -> NoReturn:

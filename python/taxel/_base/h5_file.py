@@ -110,7 +110,7 @@ class H5File(ReadingChild):
 
         Raises
         ------
-        FormatError : no texts, more of them than a file may hold, or damage
+        FormatError : not texts, more of them than a file may hold, or damage
         """
         entry = self.entries[name]
         if entry.dtype != "text":
@@ -155,7 +155,7 @@ class H5File(ReadingChild):
 
         Raises
         ------
-        FormatError : no numbers, more bytes than a file may hold, one that another dtype than a float does not hold,
+        FormatError : not numbers, more bytes than a file may hold, one that another dtype than a float does not hold,
             or damage
         MemoryError : within the limits, but not within the memory that there is
         """

@@ -55,7 +55,7 @@ def write_h5(
         assert child.stdin is not None  # pipes
         assert child.stdout is not None
         try:
-            # A child that has failed reads no more, and has said why.
+            # A child that has failed reads no more, and has reported why.
             with pipe_may_be_closed(), child.stdin as pipe:
                 pipe.write(json.dumps(search_path()).encode() + b"\n")
                 send(cast(BinaryIO, pipe))

@@ -72,7 +72,7 @@ class HeaderTable:
         header = tuple(name.strip() for name in first)
         repeated = next((name for name, count in Counter(header).items() if name and count > 1), None)
         if repeated is not None:
-            raise FormatError(f"{location}, line {line}: column {shown(repeated)} is there twice")
+            raise FormatError(f"{location}, line {line}: column {shown(repeated)} appears twice")
         return cls(str(location), header, ())
 
     @classmethod
@@ -186,7 +186,7 @@ def text_of(path: Path, *, otherwise: str = "") -> list[str]:
 
     Raises
     ------
-    FormatError : no text
+    FormatError : not a text
     OSError : the file is not there, or cannot be read
     """
     text = read_text(path, TEXT, otherwise)

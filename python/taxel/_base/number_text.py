@@ -10,7 +10,7 @@ def float_of(text: str) -> float:
 
     Raises
     ------
-    ValueError : no number, an underscore, or digits that are not ASCII
+    ValueError : not a number, an underscore, or digits that are not ASCII
 
     Examples
     --------
@@ -26,7 +26,7 @@ def int_of(text: str) -> int:
 
     Raises
     ------
-    ValueError : no whole number, an underscore, or digits that are not ASCII
+    ValueError : not a whole number, an underscore, or digits that are not ASCII
 
     Examples
     --------

@@ -240,10 +240,10 @@ def check_board(
 ) -> BoardCheck:
     """Check a board: its link by the pattern that it makes itself, then its converter at rest.
 
-    With the serial line the pattern is switched on, everything that arrives is compared with it, and then the
-    comparators' own values are looked at, for which nothing may touch the sensor; afterwards the registers are as
-    before. Without it the board must make the pattern already, as the Colorlight i9 does after its button was held for
-    two seconds, and only the link is checked.
+    With the serial line, the check switches the pattern on and compares all data that arrive with it. Then it checks
+    the values of the comparators, while nothing may touch the sensor. At the end the registers are as before. Without
+    the serial line, only the link is checked, and the board must already make the pattern, as the Colorlight i9 does
+    after its button was held for two seconds.
 
     Parameters
     ----------
@@ -254,11 +254,11 @@ def check_board(
     host : str
         The address of this machine to listen on; "0.0.0.0": all.
     array : Array, optional
-        The sensor. Default: of the size that the board reports; without a serial line 64 x 64.
+        The sensor. Default: the size that the board reports; without a serial line 64 x 64.
     preset : str, optional
-        Without a serial line: the preset that the board holds. Default: the one that explains the values best.
+        Without a serial line: the preset that the board holds. Default: the preset that explains the values best.
     seconds : float, s, 0.1 to 3600
-        For how long each of the two is received. A simulated board is slow: some frames are enough.
+        Duration of each of the two checks. For a simulated board, which is slow, some frames are enough.
     say : callable, optional
         Called with each `Finding` as it is made.
 

@@ -15,7 +15,7 @@ from taxel.board_check.received import DecodedValues
 from taxel.board_check.results import Difference, PatternCheck
 from taxel.wire import Registers
 
-#: After which the numbers of the pattern's frames begin anew.
+#: Number of frames after which the numbers of the pattern's frames begin again.
 _FRAMES = 65_536
 #: Frames that may be of the comparators still as the pattern is switched on.
 _AHEAD = 64

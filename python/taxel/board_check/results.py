@@ -12,12 +12,12 @@ from taxel.wire import Counts, Registers
 
 @dataclass(frozen=True)
 class Finding:
-    """Hold one thing that was looked at.
+    """Hold the result of one check.
 
     Parameters
     ----------
     name : str
-        As "address" or "values".
+        Such as "address" or "values".
     good : bool or None
         Whether it is as it must be; None where it is only reported.
     text : str
@@ -51,7 +51,7 @@ class Difference:
         The number of the pattern's frame.
     expected, value : int, ticks
     meaning : str
-        What it may mean.
+        Possible cause.
 
     Examples
     --------
@@ -75,23 +75,23 @@ class PatternCheck:
     Parameters
     ----------
     registers : Registers
-        Those of the board, or, without its serial line, the preset that explains the values best.
+        Registers of the board, or, without its serial line, the preset that explains the values best.
     version : int, 1 or more
         The version of the wire.
     datagrams, events, frames : int, 0 or more
-        How many arrived, and how many stamps have an event.
+        Number of datagrams and events that arrived, and number of stamps with an event.
     counts : Counts
-        What the decoder found missing or damaged.
+        Counts of data that were missing or damaged.
     taxels : int, 0 or more
-        How many taxels had an event.
+        Number of taxels with an event.
     wrong : int, 0 or more
         Events whose value is not the pattern's.
     behind : int, 0 or more
         Taxels that, at the end of some frame, hold a value further from the pattern's than the noise floor.
     first : Difference or None
-        The first of either.
+        The first difference of either kind.
     speed : float
-        The board's time that passes in a second of the host's, s; of a simulated board far below 1.
+        The board's time that passes in a second of the host's time, s; for a simulated board far below 1.
 
     Examples
     --------
@@ -119,9 +119,9 @@ class RestCheck:
     ----------
     registers : Registers
     faults : int, 0 or more
-        How often a comparator had not returned when its ramp began.
+        Number of times that a comparator had not returned when its ramp began.
     values : float, shape (rows, columns), ticks
-        The mean of each taxel; nan where it gave no value, which one that stays at 0 or 1 does.
+        The mean of each taxel; nan if it gave no value, as a taxel that stays at 0 or 1 does.
     noise : float, shape (rows, columns), ticks
         The standard deviation of each taxel, nan likewise.
     silent, full : bool, shape (rows, columns)
@@ -147,11 +147,11 @@ class BoardCheck:
     Parameters
     ----------
     findings : tuple of Finding
-        In the order in which they were looked at.
+        Results in the order of the checks.
     pattern : PatternCheck or None
-        None where nothing arrived that could be compared.
+        None if no data arrived that could be compared.
     rest : RestCheck or None
-        None where it was not looked at: without the serial line, or where no datagram arrived.
+        None if it was not checked: without the serial line, or if no datagram arrived.
 
     Examples
     --------
@@ -165,5 +165,5 @@ class BoardCheck:
 
     @property
     def good(self) -> bool:
-        """Whether nothing was found that must not be."""
+        """Whether no fault was found."""
         return all(finding.good is not False for finding in self.findings)

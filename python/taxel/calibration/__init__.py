@@ -1,4 +1,4 @@
-"""From a sensor's readings to N or kPa: of one array, on one day."""
+"""Conversion of a sensor's readings to N or kPa, for one array on one day."""
 
 from __future__ import annotations
 
@@ -32,33 +32,33 @@ __all__ = ["Calibration", "Load"]
 
 
 class Calibration(Saved):
-    """Turn readings into N on each taxel, or kPa at each: of one array, on one day.
+    """Convert readings to N on each taxel, or kPa at each taxel, for one array on one day.
 
     Made by `Calibration.law`, `Calibration.table`, `Calibration.fit`, `Calibration.load` or `Calibration.from_json`.
     A value is ``gain * curve(reading, rest)``, 0 where a taxel does not read more than `floor` above its rest.
 
-    Beside ``walk.mcap`` it is found by itself where it is saved as ``walk.calibration.json``, or, for all recordings of
-    the folder, as ``calibration.json``.
+    taxel finds the calibration of ``walk.mcap`` if it is saved beside it as ``walk.calibration.json``, or, for all
+    recordings of the folder, as ``calibration.json``.
 
     Attributes
     ----------
     array : Array
-        The sensor; frames of one with other rows, columns or taxels are refused.
+        The sensor; frames of a sensor with other rows, columns or taxels are refused.
     unit : {"N", "kPa"}
     reading_unit : str
-        What readings are in: "ticks" of a board, "counts" of a file.
+        Unit of the readings: "ticks" of a board, "counts" of a file.
     gain : float64, shape (rows, columns)
     rest : float64, shape (rows, columns), or None
-        What taxels read without a load, where it is known; NaN where it is not, and such taxels give 0.
+        Readings of the taxels without a load; NaN where it is not known, and such taxels give 0.
     floor : float, in readings
         The noise floor: a reading that is no more than this above rest is not a load.
     date : str
-        The day, as 2026-11-21.
+        The day, for example 2026-11-21.
     residual : float or None
-        Root mean square of what a fit misses the known loads by, as a share of each; None where there were no more
-        loads than unknowns, so that they fit themselves.
+        Root mean square of the fit's errors, each as a share of its known load; None if there were no more loads than
+        unknowns, so that the fit is exact.
     loads : tuple of (float, str, float)
-        The loads of a fit: each load, its unit, and what the calibration makes of the frames under it.
+        The loads of a fit: each load, its unit, and the load that the calibration computes from the frames under it.
     note : str
 
     Raises
@@ -148,17 +148,17 @@ class Calibration(Saved):
         ----------
         array : Array
         ramp : float, ticks
-            How long the board's ramp lasts (its register `ramp_time`).
+            Duration of the board's ramp (its register `ramp_time`).
         sensor : mapping, optional
             Parameters that differ from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm
             ...
         unit : {"N", "kPa"}
         gain : float or float64, shape (rows, columns)
         rest : Tare or float64 of the array's shape, optional
-            The law's own where it is left out.
+            Default: the rest of the law.
         floor : float, ticks
         date : str, optional
-            Today where it is left out.
+            Default: today.
         note : str
 
         Raises
@@ -197,7 +197,7 @@ class Calibration(Saved):
         date: str | None = None,
         note: str = "",
     ) -> Calibration:
-        """Interpolate linearly between known points: of one taxel for all, or of each.
+        """Interpolate linearly between known points, which are the same for all taxels or given for each.
 
         Parameters
         ----------
@@ -205,16 +205,16 @@ class Calibration(Saved):
         readings : float64, shape (points,) or (points, rows, columns), above rest, rising
             The same for all taxels except for their gains, or the readings of each taxel under the same values.
         values : float64, shape (points,), in `unit`, rising
-            A first point (0, 0) is added. Beyond the last point the last value holds.
+            A first point (0, 0) is added. Above the last point the last value is used.
         unit : {"N", "kPa"}
         reading_unit : str
-            What readings are in.
+            Unit of the readings.
         gain : float or float64, shape (rows, columns), above 0
         rest : Tare or float64, shape (rows, columns), in the unit `reading_unit`, optional
-            0 where it is left out.
+            Default: 0.
         floor : float, in the unit `reading_unit`, 0 or more
         date : str, optional
-            Today where it is left out.
+            Default: today.
         note : str
 
         Raises
@@ -246,8 +246,8 @@ class Calibration(Saved):
     ) -> Calibration:
         """Fit a calibration to known loads laid on the array.
 
-        The gain is the one with the least squares of relative error. Where the loads differ, the exponent of the curve
-        is fitted with it; where another exponent would do as well, a warning names it.
+        The gain is that with the least squares of relative error. If the loads differ, the exponent of the curve is
+        fitted too; if another exponent fits as well, a warning names it.
 
         Parameters
         ----------
@@ -258,16 +258,16 @@ class Calibration(Saved):
         start : Calibration, optional
             The calibration whose curve (a law, a table) is fitted; else a power of the reading.
         exponent : float, above 0, optional
-            Of the value by the reading's conductance or count, not to be fitted. Left out, it is 1 (of a law, its own)
-            where all loads are alike.
+            Exponent of the value as a function of the reading's conductance or count, if it is not to be fitted.
+            Default: fitted; if all loads are alike, 1, or the exponent of the law.
         each : bool
             A separate gain for each taxel that a load determines: uniform pressure (kPa), or a load on one
-            taxel. The others keep the common one.
+            taxel. The other taxels keep the common gain.
         rest : Tare or float64, shape (rows, columns), in the unit of the readings, optional
-            That of `start`, or 0, where it is left out.
+            Default: the rest of `start`, or 0.
         floor : float, in the unit of the readings, 0 or more
         date : str, optional
-            Today where it is left out.
+            Default: today.
         note : str
 
         Raises
@@ -319,9 +319,9 @@ class Calibration(Saved):
         Parameters
         ----------
         frames : Frames
-            Readings as the sensor gives them, rest and all.
+            Readings as the sensor gives them, with their rest.
         rest : Tare or float64, a number or the array's shape, optional
-            Today's, finite; the calibration's own where it is left out.
+            Today's rest, finite; default: the rest of the calibration.
 
         Returns
         -------
@@ -342,7 +342,7 @@ class Calibration(Saved):
         frames : Frames
             Frames in the calibration's unit.
         rest : Tare or float64, shape (rows, columns), in the unit of the readings, optional
-            Today's rest; the calibration's own where it is left out.
+            Today's rest; default: the rest of the calibration.
 
         Returns
         -------
@@ -419,7 +419,7 @@ class Calibration(Saved):
 
         Raises
         ------
-        FormatError : no calibration (names the entry)
+        FormatError : not a calibration (names the entry)
         """
         if not isinstance(text, str):
             raise refused("calibration", f" is {shown(text)}: must be JSON text")
@@ -460,7 +460,7 @@ class Calibration(Saved):
 
         Raises
         ------
-        ProblemError : no path
+        ProblemError : not a path
 
         Examples
         --------
@@ -474,7 +474,7 @@ class Calibration(Saved):
         )
 
     def described(self) -> str:
-        """Return what it is in a line: the curve, its day, its residual."""
+        """Return a line with the curve, the day and the residual."""
         (kind, values), count = next(iter(self._curve.to_dict().items())), len(self.loads)
         curve = {
             "power": f"power {values.get('exponent', 0):.3g}",

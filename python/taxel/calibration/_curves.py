@@ -1,4 +1,4 @@
-"""How a taxel turns what it reads into N or kPa: a power, a table, the law of fabric, amplifier and ramp."""
+"""Curves from readings to N or kPa: a power, a table, the law of fabric, amplifier and ramp."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Values = NDArray[np.float64]
 
 
 class Curve(Protocol):
-    """How a taxel of gain 1 turns readings into values, and back; both rise."""
+    """Conversion of readings to values, and back, by a taxel of gain 1; both rise."""
 
     def values(self, readings: Values, rest: Values) -> Values:
         """Return the values of readings, each with its rest."""

@@ -20,7 +20,7 @@ from taxel.frames import Frames
 
 #: What a calibration may be in: force on a taxel, or pressure at it.
 UNITS = ("N", "kPa")
-#: Range in which an exponent is searched: conductance of a fabric and counts of common sheets lie well within.
+#: Range in which an exponent is searched: conductance of a fabric and counts of common sheets are well within.
 _EXPONENTS = (0.2, 5.0)
 #: Exponents that miss the loads by less than this share (root mean square) count as equally good.
 _ALIKE = 1e-3
@@ -35,7 +35,7 @@ class Load(NamedTuple):
         Recorded under the load; the mean of each taxel is used.
     load : float, above 0
     unit : {"N", "kPa"}
-        Force in all, however it is spread, or the same pressure at every taxel.
+        Total force, however it is spread, or the same pressure at every taxel.
     taxel : (int, int), optional
         Column and row of the only taxel that bears it.
 

@@ -59,7 +59,7 @@ def program() -> NoReturn:
     os.environ.setdefault("MPLBACKEND", "Agg")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            # What a console's encoding lacks is shown escaped, as control characters are.
+            # Characters that a console's encoding lacks are shown escaped, like control characters.
             stream.reconfigure(errors="backslashreplace")
     try:
         # An interrupt within an import can come out of a library as another error: until then it ends the process.

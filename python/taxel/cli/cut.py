@@ -60,7 +60,8 @@ def cut(
 ) -> None:
     """Cut a recording by time, by region or by label.
 
-    Times are those of taxel info: the board's, or from the recording's beginning where they count from 1970.
+    Times are those of taxel info: the board's time, or, if times count from 1970, the time since the recording's
+    beginning.
 
     Example: taxel cut walk.mcap heel.mcap --from 1.5 --to 3 --rows 0:20
     """

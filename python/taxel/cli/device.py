@@ -181,10 +181,10 @@ def check(
 ) -> None:
     """Check a board: its link by a pattern that it makes itself, then its comparators at rest.
 
-    With its serial line the command switches the pattern on, compares every value that arrives, and looks at the
-    comparators, for which nothing may touch the sensor; then the registers are as before. Without it the board must
-    make the pattern already: hold the button of the Colorlight i9 for two seconds. Exit code 3: something is not as it
-    must be.
+    With its serial line the command switches the pattern on, compares every value that arrives, and checks the
+    comparators, while nothing may touch the sensor; at the end the registers are as before. Without the serial line,
+    the board must already make the pattern: hold the button of the Colorlight i9 for two seconds. Exit code 3: the
+    check found a fault.
 
     Example: taxel device check /dev/ttyACM0
     """

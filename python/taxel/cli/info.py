@@ -66,11 +66,11 @@ def info(
 ) -> None:
     """Summarise a recording: contents, losses, rates, pressure, and dead, stuck or noisy taxels.
 
-    Of spike trains that taxel encode wrote: how many, their kind, duration and spikes.
+    For spike trains that taxel encode wrote: number, kind, duration and spikes.
 
-    Of a ROS bag without --topic: the topics that hold numbers, with shapes and rates.
+    For a ROS bag without --topic: the topics that hold numbers, with shapes and rates.
 
-    Of several recordings, as of a folder: a row each, and their sum.
+    For several recordings, such as a folder: a row for each, and their sum.
 
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
@@ -285,7 +285,7 @@ def _page(facts: dict[str, Any]) -> list[str]:
     rows = [*_contents(facts), *_rates(facts), *_losses(facts), ("verdict", facts["verdict"])]
     rows += [("remark", line) for line in facts["remarks"]]
     missing = [("not in file", line) for line in facts["lost"]]
-    # What was left out of a bag, or has other times, concerns all that follows.
+    # Remarks on data left out of a bag, or on other times, concern all rows that follow.
     rows = [*missing, *rows] if facts["kind"] == "ros" else [*rows, *missing]
     lines = [head, *(f"  {name:<19} {value}" for name, value in rows)]
     return [*lines, *(f"{kind} written to {facts[kind]}" for kind in ("picture", "table") if kind in facts)]

@@ -93,9 +93,9 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
     JSON, written by the thread that made it: label; t_us, known_us, reported_us by the board's clock; slope_mv_per_ms;
     reported_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
-    which are counted. --panel shows the board in a browser; a slow viewer loses frames, never data. The
-    end of the standard input, where that is the source, ends the command. Exit code 3: nothing was received, or
-    something was lost after it had arrived; 2: the board has more taxels than the array.
+    which are counted. --panel shows the board in a browser; a slow viewer loses frames, never data. If the standard
+    input is the source, its end ends the command. Exit code 3: nothing was received, or data were lost after they had
+    arrived; 2: the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     Example: taxel live --readout ball.json --tare 0.05 --send lines+udp:127.0.0.1:9000 --send serial:/dev/ttyACM0

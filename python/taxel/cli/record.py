@@ -87,7 +87,7 @@ def record(
     empty trials in a row end the command with exit code 3. While it records, a key on the terminal, or a line on any
     other standard input, writes a note with that label and the board's time into the .mcap (add < /dev/null if the
     input is not for taxel). --source names what is received, each source with its own clock: frames of numbers, boards,
-    lines of numbers. Exit code 3: nothing was received, or something was lost after it had arrived, as bytes of a
+    lines of numbers. Exit code 3: nothing was received, or data were lost after they had arrived, such as bytes of a
     source of lines that are in no line; 2: the board has more taxels than --array.
 
     Example: taxel record --port 5208 walk.mcap

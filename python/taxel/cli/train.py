@@ -115,8 +115,8 @@ def train(
     """Train neurons to detect labelled events, and save them as a readout.
 
     Training starts from the recipe that fits the recordings and labels; --recipe, --encoder and --set change that. The
-    score is cross-validated: each fold is scored by neurons that were trained without it. The first line says so, or
-    why the score is that of the training data.
+    score is cross-validated: each fold is scored by neurons that were trained without it. The first line states that,
+    or why the score is that of the training data.
 
     Example: taxel train trials/ -o gait.json
     Example: taxel train walk.npz --labels events.csv --set neurons.contact.kappa=1.5 -o gait.json

@@ -90,6 +90,6 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
             return opened
         return [calibrate_by(sensor, calibration) for sensor in opened]
 
-    # What was opened now, so that the errors are those of the command, is what the panel asks for first.
+    # The panel asks first for the recording that was opened here, so that errors are those of the command.
     opened = {first.absolute(): opens(first)}
     return lambda file: opened.pop(file.absolute(), None) or opens(file)

@@ -25,7 +25,7 @@ from taxel.wire import FRAME_US
 
 __all__ = ["Playing", "play_live"]
 
-#: How often the screen is drawn anew, s.
+#: Interval at which the screen is drawn, s.
 _DRAW_EVERY_S = 0.1
 
 #: How long the host goes on receiving after the board's process has ended, s.

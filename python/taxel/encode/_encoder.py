@@ -194,7 +194,7 @@ class Encoder(Value):
 
         Raises
         ------
-        ProblemError : none of these, events without intensities, or one more than 0.1 s behind another
+        ProblemError : another object, events without intensities, or one more than 0.1 s behind another
             (names it; `Events.sorted` puts them in order); a parameter `tare` that is None, another array's, or more
             than half of the recording
 
@@ -332,7 +332,7 @@ class EncoderStream:
 
         Raises
         ------
-        ProblemError : neither, another array's, events without intensities, or frames out of order
+        ProblemError : neither events nor frames, another array, events without intensities, or frames out of order
 
         Examples
         --------

@@ -151,7 +151,7 @@ class Skin(Tared):
 
         Raises
         ------
-        ProblemError : no array, or more than a million afferents on it
+        ProblemError : not an array, or more than a million afferents on it
 
         Examples
         --------

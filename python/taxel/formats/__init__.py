@@ -4,7 +4,7 @@ Examples
 --------
 >>> from taxel import formats
 >>> formats.FORMATS["plate"].about
-'A footscan-type plate, one barefoot footfall a trial (jiku-data, SpeedPP2DS; J. Biomech. 41:1987, 2008).'
+'A footscan-type plate, one barefoot footfall in each trial (jiku-data, SpeedPP2DS; J. Biomech. 41:1987, 2008).'
 """
 
 from __future__ import annotations

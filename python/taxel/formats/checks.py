@@ -1,4 +1,4 @@
-"""Checks that readers of files share: that there are any, the size of a sensor, the range and the order of times."""
+"""Checks that readers of files share: that there are files, the size of a sensor, the range and the order of times."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PIECE = 1 << 16
 
 
 def candidates(path: Path, *patterns: str) -> list[Path]:
-    """Return the files of a folder that patterns fit, in the order of their names; of a file itself."""
+    """Return the files of a folder that patterns fit, in the order of their names; for a file, the file itself."""
     return sorted(file for pattern in patterns for file in path.glob(pattern)) if path.is_dir() else [path]
 
 
@@ -31,7 +31,7 @@ def files_at(path: str | Path, files: Callable[[Path], list[Path]], noun: str) -
 
     Raises
     ------
-    FormatError : there is none (says `noun` they are)
+    FormatError : there is none (names them by `noun`)
     ProblemError : `path` is not a path
     """
     file = Path(checked_path("path", path))
@@ -96,11 +96,11 @@ def ascending(location: str, t: NDArray[np.int64], first_line: int | Callable[[i
     location : str
     t : int64, us
     first_line : int, or function of int
-        The line of the first time, each in a line; or the line of each.
+        The line of the first time, if each time is in a line; or a function that gives the line of each.
 
     Raises
     ------
-    FormatError : a time that does not (names the line)
+    FormatError : a time that does not ascend (names the line)
     """
     back = np.flatnonzero(t[1:] <= t[:-1])
     if len(back):

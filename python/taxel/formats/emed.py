@@ -1,8 +1,8 @@
-"""novel emed plates: the ``.lst`` export, one page a frame, kPa on 64 x 95 sensors or other sizes.
+"""novel emed plates: the ``.lst`` export, a page for each frame, kPa on 64 x 95 sensors or other sizes.
 
-Each page has a head, the numbers of the printed columns, a line a row that begins with its number, and margins: the
-last column and the last line, ``Force``, are the forces of row and column in N, not sensors. Rows and columns that are
-not printed were not loaded. Pages without a frame's number are summaries and are skipped.
+Each page has a head, the numbers of the printed columns, a line for each row, which begins with the row's number, and
+margins: the last column and the last line, ``Force``, are the forces of row and column in N, not sensors. Rows and
+columns that are not printed were not loaded. Pages without a frame's number are summaries and are skipped.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _NEWTON = {"kPa": 0.1, "N/cm2": 1.0}
 
 
 def files(path: Path) -> list[Path]:
-    """Find the files of this format: ``.lst`` whose head names the matrix and the time a frame."""
+    """Find the files of this format: ``.lst`` whose head names the matrix and the time of a frame."""
     return [f for f in candidates(path, "*") if f.suffix.lower() == ".lst" and _is_export(f)]
 
 

@@ -1,4 +1,4 @@
-"""One force-sensitive channel a foot, five minutes of walking (PhysioNet, Gait in Neurodegenerative Disease 1.0.0).
+"""A force-sensitive channel of each foot, five minutes of walking (PhysioNet, Gait in Neurodegenerative Disease 1.0.0).
 
 A person is ``NAME.hea`` (WFDB header), ``NAME.let`` and ``NAME.rit`` (left and right, WFDB format 212) and ``NAME.ts``,
 the authors' step times. Values are raw counts, not N, and they drift.
@@ -130,7 +130,7 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
     Returns
     -------
     dict of int64 times, us
-        ``contact`` (the start of the first stride is one too) and ``foot_off``.
+        ``contact`` (including the start of the first stride) and ``foot_off``.
 
     Raises
     ------

@@ -1,7 +1,8 @@
-"""Grasps of an iCub hand, 60 taxels on five fingers, one object a file (icub_grasp_dataset).
+"""Grasps of an iCub hand, 60 taxels on five fingers, one object in each file (icub_grasp_dataset).
 
-A file ``OBJECT.csv.gz`` (or ``.csv``) holds grasps, one time slice a row: trial, slice, nine joint angles, the largest
-value of each finger, and twelve taxels a finger, thumb to little finger. The source has neither times nor a rate.
+A file ``OBJECT.csv.gz`` (or ``.csv``) holds grasps, a time slice in each row: trial, slice, nine joint angles, the
+largest value of each finger, and twelve taxels for each finger, thumb to little finger. The source has neither times
+nor a rate.
 """
 
 from __future__ import annotations

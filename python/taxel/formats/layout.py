@@ -1,8 +1,8 @@
-"""Layout files: what a recording lacks, in one TOML file beside it.
+"""Layout files: the facts that a recording lacks, in one TOML file beside it.
 
-A layout says of a sensor its rows, columns, pitch or places, side and heel; of readings whether they fall with
-pressure, their unit, their rate and what came before the first; and how to read a table or an array of another program.
-The keys are listed in docs/files.md.
+A layout states the rows, columns, pitch or places, side and heel of a sensor; whether readings fall with pressure,
+their unit, their rate and what was before the first; and how to read a table or an array of another program. The keys
+are listed in docs/files.md.
 """
 
 from __future__ import annotations
@@ -56,11 +56,11 @@ class Table:
     leave_out : list of str or int
         The columns that are not taxels, by name or number from 1, which may hold texts. All others are taxels.
     frame_lines : int, 1 or more, optional
-        Lines a frame, of which the first has its time; default: 1.
+        Number of lines of a frame, whose first line has its time; default: 1.
     frame_end : {"blank"}, optional
         An empty line ends a frame.
     frame_begin : str, optional
-        What the line of text above each frame begins with, as "Frame"; empty lines are then between frames too.
+        Beginning of the line of text above each frame, for example "Frame"; empty lines may then be between frames too.
     events : bool
         Whether each line is an event, in the columns x, y and p (the polarity: 1 for more pressure, 0 or -1 for less).
 
@@ -118,7 +118,7 @@ class Table:
 
 
 def _check_end(how: Table | PrintedFrames) -> None:
-    """Refuse what does not say where a frame of several lines ends."""
+    """Refuse a table that does not state where a frame of several lines ends."""
     if how.frame_lines is not None:
         integer("frame_lines", how.frame_lines, 1, 65_535)
     if how.frame_end is not None:
@@ -128,7 +128,7 @@ def _check_end(how: Table | PrintedFrames) -> None:
 
 
 def _column(name: str, value: object) -> None:
-    """Refuse what is neither the name of a column nor its number from 1."""
+    """Refuse anything except the name of a column or its number from 1."""
     if isinstance(value, str):
         text(name, value)
     else:
@@ -137,14 +137,14 @@ def _column(name: str, value: object) -> None:
 
 @dataclass(frozen=True)
 class Data:
-    """Say which array of another program's .npz or .h5 holds the frames; a .npy holds one array without a name.
+    """Name the array of another program's .npz or .h5 that holds the frames; a .npy holds one array without a name.
 
     Parameters
     ----------
     array : str, optional
         Of shape (frames, rows, columns) or (frames, taxels); in a group of a .h5 by its path, "run1/pressure".
     time : str, optional
-        An array of one time a frame; default: none.
+        An array with a time for each frame; default: none.
     time_unit : {"s", "ms", "us", "ns"}
 
     Raises
@@ -165,20 +165,20 @@ class Data:
 
 @dataclass(frozen=True)
 class PrintedFrames:
-    """Say where frames that a sensor prints are read, and how; keys as of a source of `taxel.live.Live`.
+    """State where and how frames that a sensor prints are read; the keys are those of a source of `taxel.live.Live`.
 
     Parameters
     ----------
     place : str
         "serial:COM3", "lines:-" ...
     baud : int, optional
-        Of a serial line.
+        Baud rate of a serial line.
     time : str, optional
         "t:ms", "1+2" ...; default: the time of arrival.
     columns, leave_out : list of str or int
         The names of the columns; those without values.
     frame_lines : int, 1 or more, optional
-        Lines a frame.
+        Number of lines of a frame.
     frame_end : {"blank"}, optional
         An empty line ends a frame.
 
@@ -220,7 +220,7 @@ class PrintedFrames:
 
 @dataclass(frozen=True)
 class Layout:
-    """Hold what a layout file says.
+    """Hold the contents of a layout file.
 
     Parameters
     ----------
@@ -231,27 +231,27 @@ class Layout:
     pitch_mm : float or (float, float), mm, optional
         As of `Array`.
     places : Places, optional
-        One a taxel, row by row.
+        A place for each taxel, row by row.
     side : {"left", "right"}, optional
-        The foot or hand that the sensor is of. For a recording of the other foot the places are mirrored.
+        The foot or hand of the sensor. For a recording of the other foot the places are mirrored.
     heel : {"top", "bottom"}, optional
         Rows, or end of the places, at which the heel is.
     falls : bool or float, optional
-        Whether readings fall with pressure, and are turned: to their negative, or, of a number, to that number less the
-        reading.
+        Whether readings fall with pressure, and are turned: to their negative, or, if it is a number, to that number
+        minus the reading.
     unit : str, optional
-        Of the readings, turned or not.
+        Unit of the readings, turned or not.
     rate_hz : float, Hz, above 0, optional
-        Frames a second, where the recording has no times.
+        Frames per second, if the recording has no times.
     zeros_before_s : float, s, above 0, at most 60, optional
-        How long the sensor read 0 before recordings whose first frame is loaded, as before trials that a contact
-        starts.
+        Time that the sensor read 0 before recordings whose first frame is loaded, for example if a contact starts a
+        trial.
     table : Table, optional
     data : Data, optional
     source : PrintedFrames, optional
-        Where its frames are read live.
+        Source from which its frames are read live.
     ros : mapping, optional
-        The topic and what else opens it, by the names of the arguments of `taxel.open`.
+        The topic and its options, by the names of the arguments of `taxel.open`.
     event_camera : Reduction, optional
         What is read of an event camera's file.
 
@@ -374,7 +374,7 @@ class Layout:
         return ",".join([self.source.place, *(f"{key}={value}" for key, value in keys.items())])
 
     def grid(self) -> Array | None:
-        """Return a sensor of its rows and columns; None if it does not say them."""
+        """Return a sensor of its rows and columns; None if it does not state them."""
         return None if self.rows is None or self.columns is None else Array(self.rows, self.columns)
 
     def array(self, taxels: int, stated: Array | None = None, side: str = "") -> Array:
@@ -383,7 +383,7 @@ class Layout:
         Parameters
         ----------
         taxels : int
-            How many taxels the recording holds.
+            Number of taxels of the recording.
         stated : Array, optional
             The sensor that the recording states, whose name and taxels, with their names, are kept.
         side : {"left", "right", ""}
@@ -475,7 +475,7 @@ def _known(before: str, values: Mapping[str, Any], names: list[str]) -> None:
 
 
 def as_size(value: object) -> str:
-    """Return the keys that say a size such as "5x12" or "5x12x2.5", for errors; "" of any other value.
+    """Return the keys that state a size such as "5x12" or "5x12x2.5", for errors; "" of any other value.
 
     Examples
     --------

@@ -34,7 +34,7 @@ def of_source(text: str) -> str:
 
     Raises
     ------
-    ProblemError : it states no array, or what a layout file cannot hold
+    ProblemError : it states no array, or a key that a layout file cannot hold
 
     Examples
     --------
@@ -82,7 +82,7 @@ def with_keys(path: Path, text: str, keys: Mapping[str, Any]) -> str:
         The file, for errors.
     text : str
     keys : mapping of str to value
-        By their names, of a key in a table as "ros.topic".
+        Values by the names of the keys; a key in a table is, for example, "ros.topic".
 
     Raises
     ------

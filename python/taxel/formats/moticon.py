@@ -1,7 +1,7 @@
-"""Moticon OpenGo insoles, 16 sensors a foot: the text export.
+"""Moticon OpenGo insoles, 16 sensors for each foot: the text export.
 
-Lines with ``#``, of which the last has the column names (separated by tabs), then a row a frame: time in s; for each
-foot 16 pressures in N/cm2, accelerations, rates, total force in N, centre of pressure; then the markers of the
+Lines with ``#``, of which the last has the column names (separated by tabs), then a row for each frame: time in s; for
+each foot 16 pressures in N/cm2, accelerations, rates, total force in N, centre of pressure; then the markers of the
 manufacturer's step detection.
 """
 

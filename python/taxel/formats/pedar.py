@@ -1,7 +1,7 @@
 """novel pedar insoles: the ``.asc`` export, usually 2 x 99 sensors in kPa.
 
-Some header lines, one of column names (``time[secs]``, then the sensors' numbers, left insole first), then a row a
-frame. Only the header has the frame rate.
+Some header lines, one of column names (``time[secs]``, then the sensors' numbers, left insole first), then a row for
+each frame. Only the header has the frame rate.
 """
 
 from __future__ import annotations

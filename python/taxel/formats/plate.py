@@ -1,4 +1,4 @@
-"""A footscan-type plate, one barefoot footfall a trial (jiku-data, SpeedPP2DS; J. Biomech. 41:1987, 2008).
+"""A footscan-type plate, one barefoot footfall in each trial (jiku-data, SpeedPP2DS; J. Biomech. 41:1987, 2008).
 
 A file ``subjNNN.h5`` holds one person: data sets ``imgNNN``, rows x columns x frames, 500 frames a second, heel at the
 low rows. Values are counts of unknown unit. The file's rows are interpolated, three from two; the reader reverts this.
@@ -137,7 +137,7 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
     three under which the fewest cells violate |3 (b - c) - (a - d)| <= 3, over the whole trial.
     """
     frames = _check_image(image)
-    # Cells outside of the box of all loaded columns and frames are 0 and lie on every line.
+    # Cells outside of the box of all loaded columns and frames are 0 and are on every line.
     box = tuple(_span(np.flatnonzero(frames.any(axis=axes))) for axes in ((0, 2), (0, 1)))
     y = frames[:, *box]
     rows = y.shape[0]

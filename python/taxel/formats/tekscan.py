@@ -1,8 +1,8 @@
 """Tekscan F-Scan insoles and I-Scan sheets: the ASCII export of a movie (``.asf``, ``.csv``, ``.txt``).
 
 Header lines ``KEY value``, then after ``ASCII_DATA @@`` for each frame a line ``Frame 7`` (I-Scan: with its time and
-the sum of its cells) and a line of cells a row, separated by commas, ``B`` for a cell that does not exist; ``@@`` ends
-the file. Only the header has the unit and the spacings.
+the sum of its cells) and a line of cells for each row, separated by commas, ``B`` for a cell that does not exist;
+``@@`` ends the file. Only the header has the unit and the spacings.
 """
 
 from __future__ import annotations
@@ -231,7 +231,7 @@ def _frames(file: Path, content: Iterator[str], begin: int, rows: int) -> Iterat
 def _times(file: Path, frames: Sequence[_Frame], period: float) -> NDArray[np.int64]:
     """Return the frames' times, us: those that they state if all do, else times computed from their numbers.
 
-    The two differ: a movie of 0.1 s a frame states steps of 0.1 and 0.11 s.
+    The two differ: a movie with 0.1 s for each frame states steps of 0.1 and 0.11 s.
     """
     if all(frame.time for frame in frames):
         seconds = np.array([text.number(frame.time, file, frame.line, "time") for frame in frames])

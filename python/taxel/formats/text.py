@@ -271,7 +271,7 @@ def blocks(
 ) -> Iterator[tuple[int, NDArray[np.float64]]]:
     """Yield the numbers of a table as `numbers` returns them, some rows after the others, each with its first line.
 
-    None among the rows stands for a line that is none.
+    None among the rows represents a line that is not a row.
 
     Raises
     ------

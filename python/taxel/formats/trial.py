@@ -33,9 +33,9 @@ class Trial:
         "subj003/17", "GaCo02_01 left": unique among the trials of a folder.
     person : str
     recorded : Frames or Events
-        Frames that are missing in the file are missing here too, so that times jump.
+        Frames that are missing in the file are missing here too, so times jump there.
     truth : mapping from event to int64, shape (events,), us
-        Ascending; "contact", "heel_off", "foot_off", as far as the data set has them.
+        Ascending; "contact", "heel_off", "foot_off", if the data set has them.
     source : str
         The origin of the reference times, in one sentence, which every figure states. "" without reference times.
     foot : str
@@ -50,7 +50,7 @@ class Trial:
     about : mapping
         Other information: condition, speed, age ...
     timed : bool
-        Whether the recording has times; else its frames are numbered, one a us.
+        Whether the recording has times; else its frames are numbered: frame k has the time k us.
     unread : tuple of str
         Names of further columns of the file, which are not read.
 
@@ -141,7 +141,7 @@ class Trial:
 
 
 def stances(ups: NDArray[np.int64], downs: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return each begin of a load with the end that follows it, shape (n, 2); both ascend and alternate."""
+    """Return each beginning of a load with the end that follows it, shape (n, 2); both ascend and alternate."""
     downs = downs[np.searchsorted(downs, ups[0]) :] if len(ups) else downs[:0]
     n = min(len(ups), len(downs))
     return np.stack([ups[:n], downs[:n]], axis=1)

@@ -11,6 +11,6 @@ __all__ = ["threads"]
 
 def threads(*, several: bool) -> threadpool_limits:
     """Limit NumPy and SciPy to one thread until the context ends, unless several are worth their cost."""
-    # SciPy has a pool of threads of its own, which can be limited only once it is loaded.
+    # SciPy has a separate pool of threads, which can be limited only after it is loaded.
     import_module("scipy.linalg")
     return threadpool_limits(None if several else 1)

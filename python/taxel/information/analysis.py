@@ -281,7 +281,7 @@ class _Answering(Question):
                 "no groups are named: what trials of one person, session or pose share counts as the label's"
             )
         runs = 1 + int(np.count_nonzero(self.labels[1:] != self.labels[:-1]))
-        # Recordings of a trial each may stand in any order.
+        # Recordings with one trial each may be in any order.
         ordered = len({id(trial.source) for trial in self.trials}) < len(self.trials)
         if ordered and runs == len(np.unique(self.labels)) and len(self.labels) > 2 * runs:
             self.notes.append(

@@ -32,7 +32,7 @@ TRIALS_A_RESPONSE = 7
 _CELLS = 1 << 21
 #: Units that are redrawn, or trials that are counted, by one call of NumPy.
 _DRAWN = 1 << 19
-#: Counts in which shares are told finely enough.
+#: Number of counts that distinguishes shares finely enough.
 _FINE = 1 << 36
 #: A tenth of a bit either way.
 _FIFTH = 0.2

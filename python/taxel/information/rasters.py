@@ -92,7 +92,7 @@ class _Sums:
         ends = [spikes.bins_to(window) for window in windows_us]
         self._ends = [np.where(silent, end.max(initial=0), end) for end in ends]
         self._common = np.zeros((spikes.trials, spikes.trials))
-        # Windows share one sum until the first trial ends within one of them; that window then has a sum of its own.
+        # Windows share one sum until the first trial ends within one of them; that window then has a separate sum.
         self._own: list[NDArray[np.float64] | None] = [None] * len(ends)
         self._bin = 0
         #: How many bins there are to the last window.

@@ -228,7 +228,7 @@ def spikes_of(
             continue
         length[k] = np.inf if trial.stop_us is None else trial.stop_us - contact_us[k]
         stop = contact_us[k] + min(length[k], window_us)
-        # The first sample lies before the start; the next is the first that may see the touch.
+        # The first sample is before the start; the next is the first that may see the touch.
         begin = trial.start_us - period_us + int(phases[k] * period_us)
         grid = np.arange(begin, int(np.ceil(stop)), period_us)
         if len(grid) < 2:

@@ -375,7 +375,7 @@ class _Curves:
         curve = (high - low) ** 2 / 8 * curved
         by_ends = np.maximum(at_low.sum(axis=0), at_high.sum(axis=0)) + curve
         by_state = np.maximum(a, 0) * rows.largest + np.maximum(b, 0) - rows.neuron.theta_0 + rounding
-        # What is no number is not proven, and no halves of it are numbers.
+        # A value that is not a number is not proven, and its halves are not numbers.
         below = np.nan_to_num(-np.minimum(by_ends, by_state), nan=-np.inf)
         settled = [_vague(*end) & ~(curve > end[1]) for end in (at_low, at_high)]
         return below, settled[0] | settled[1]

@@ -67,7 +67,7 @@ _MOST_WATCHED, _MOST_WATCHED_BYTES = 16, 1 << 20
 #: What an operating system answers that has no more space or descriptors, which the watched tables take.
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE)
 
-#: The beginning of a recording by which it is told from another one of the same name, bytes.
+#: Length of the beginning of a recording by which it is distinguished from another recording of the same name, bytes.
 _BEGINNING = 1 << 16
 
 #: RENAME_EXCHANGE of Linux (renameat2(2)), AT_FDCWD, and the answers of file systems that cannot exchange.
@@ -300,7 +300,7 @@ def _acknowledged(file: _File) -> Acknowledged:
     if _digest(file.text) == saved["after"]:
         return after
     # The writer was killed, and another program has written the table since: what either text may lack is in conflict,
-    # but for rows that were to be deleted and are gone.
+    # except rows that were to be deleted and are gone.
     gone = minus(known.labels, after.labels)
     return replace(after, labels=(*after.labels, *minus(gone, minus(gone, file.rows))), deleted=known.deleted)
 
@@ -520,7 +520,7 @@ class LabelTables:
                     elif file.descriptor is not None:
                         os.fsync(file.descriptor)
                     if joined.acknowledged != known or kept:
-                        # What was saved before tells the same about a table that was replaced.
+                        # The state that was saved before holds for a table that was replaced, too.
                         with contextlib.suppress(OSError) if kept else contextlib.nullcontext():
                             _save(file, {"acknowledged": to_json(joined.acknowledged), "next": None})
                     _sync_folder(path.parent)

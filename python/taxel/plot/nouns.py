@@ -159,7 +159,7 @@ def event_picture(events: Events, ax: Axes | None = None) -> Axes:
 
 
 def detections(found: Detections, ax: Axes | None = None) -> Axes:
-    """Draw each label's detections as marks over time (s), a row a label.
+    """Draw each label's detections as marks over time (s), a row for each label.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ def overview(recording: Recording, figure: None = None) -> Figure: ...
 @overload
 def overview(recording: Recording, figure: F) -> F: ...
 def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBase:
-    """Draw events a second (or the sum of pressure) over time, and each taxel's activity (or largest pressure).
+    """Draw events per second (or the sum of pressure) over time, and each taxel's activity (or largest pressure).
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def pressure(frames: Frames, above: float = 0.0, figure: None = None) -> Figure:
 @overload
 def pressure(frames: Frames, above: float = 0.0, *, figure: F) -> F: ...
 def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = None) -> FigureBase:
-    """Draw contact area, peak, sum and centre of pressure over time; of channels peak and sum.
+    """Draw contact area, peak, sum and centre of pressure over time; for channels, peak and sum.
 
     Parameters
     ----------

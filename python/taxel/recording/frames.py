@@ -105,7 +105,7 @@ def as_frames(source: RecordedSource, rate_hz: float | None = None, *, name: str
 def _draw(source: RecordedSource, period: int | None) -> Frames:
     events, held, interval = source.table, source.settings.held(), source.timing.interval
     assert isinstance(events, Events)  # the caller checked
-    # A value of 65 535 stands for an unknown one.
+    # A value of 65 535 means unknown.
     begins = None if held is None else np.where(held == UNKNOWN, 0, held)
     period = round(1e6 / FRAMES_HZ) if period is None else period
     return Frames.from_events(events, period, *(() if interval is None else interval()), held=begins)
@@ -161,7 +161,7 @@ def calibrate(source: RecordedSource, rate_hz: float | None = None, rest: Tare |
 
     Raises
     ------
-    ProblemError : no calibration, or one of another array
+    ProblemError : not a calibration, or a calibration of another array
     """
     calibration = source.sensor.calibration()
     if calibration is None:

@@ -37,7 +37,7 @@ from taxel.recording.recording import Recording
 from taxel.recording.verdict import Verdict
 
 T = TypeVar("T")
-#: What has a time of its own.
+#: Contents that have their own times.
 M = TypeVar("M", Note, BoardChange)
 
 

@@ -26,7 +26,7 @@ from taxel.recording.verdict import Verdict
 #: The name of the host's clock, us since 1970.
 HOST = "host"
 
-#: What has a time of its own.
+#: Contents that have their own times.
 M = TypeVar("M", Note, Zeroing, BoardChange)
 Times = Callable[[NDArray[np.int64]], NDArray[np.int64]]
 

@@ -369,7 +369,7 @@ def _refuse_folder(folder: Path, files: Sequence[Path], names: Sequence[str]) ->
     )
     hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
     known_kinds = (
-        f"there are {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and by a "
+        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and by a "
         "layout file .npy, .txt and other arrays and tables (docs/files.md)"
     )
     raise FormatError(f"{folder}: holds {problem}; {hint or known_kinds}")

@@ -355,7 +355,7 @@ def _by_first_bytes(path: Path) -> TaxelFile | Refusal:
         describes = advice(path, "describes a table or an array of another program")
         known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
         wrong = (
-            f"{starts}: not a recording; recordings are {known}; {describes}"
+            f"{starts}: not a recording; taxel reads {known}; {describes}"
             if head
             else (f"{path}: is empty: not a recording")
         )

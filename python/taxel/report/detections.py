@@ -371,7 +371,7 @@ def _potential(
             axes[0][0].set_ylabel(escaped(f"sum, {unit}"))
         trains = readout.trains_of(label, _trains(readout, outcome))
         detected_ms = to_ms(outcome.found[label].t)
-        # A neuron that forgets at once is at its threshold for less than what lies between two of many times.
+        # A neuron that forgets at once is at its threshold for less than the distance between two of many times.
         inputs = trains.times[np.abs(trains.times - at) < reach]
         after = np.linspace(0.0, trained.delay_ms + _AROUND * trained.neuron.tau, 40)
         times = np.concatenate([np.linspace(at - reach, at + reach, 600), (inputs[:, None] + after).ravel()])

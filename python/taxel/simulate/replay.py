@@ -69,7 +69,7 @@ class Replay:
         """
         known = None if self.recording is None else self.recording.registers
         if known is not None and not known.array.fits(self.array):
-            # A region of a sensor is played as a board of its own, at the frame rate of the whole one.
+            # A region of a sensor is played as a separate board, at the frame rate of the whole sensor.
             registers, _ = Registers._of_source(self.array, 1e6 / known.frame_us, int(known.ramp).bit_length())
             registers = registers.replace(noise_floor=known.noise_floor, wire_version=known.wire_version)
         else:

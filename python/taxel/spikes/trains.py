@@ -41,11 +41,11 @@ class SpikeTrains(FrozenColumns):
     start, stop : float, ms
         The window: a train without spikes was silent in it.
     values : float32, shape (spikes,), optional
-        A value a spike: polarity or bits of signed trains, the factor of the weight of graded ones.
+        A value for each spike: polarity or bits of signed trains, the factor of the weight of graded trains.
     kind : "unsigned", "signed" or "graded", optional
-        What the values mean, one for all trains. Signed trains are split by sign before a neuron reads them. The values
-        of graded trains multiply the weight; they are finite, of either sign, and never 0, which would be no spike.
-        Default: signed if there are `values`, else unsigned.
+        Meaning of the values, the same for all trains. Signed trains are split by sign before a neuron reads them. The
+        values of graded trains multiply the weight; they are finite, of either sign, and never 0, which would be no
+        spike. Default: signed if there are `values`, else unsigned.
 
     Raises
     ------
@@ -97,7 +97,7 @@ class SpikeTrains(FrozenColumns):
         *,
         kind: Kind | None = None,
     ) -> SpikeTrains:
-        """Build spike trains from one list of times a train.
+        """Build spike trains from a list of times for each train.
 
         Parameters
         ----------
@@ -151,7 +151,7 @@ class SpikeTrains(FrozenColumns):
     def __add__(self, other: SpikeTrains) -> SpikeTrains:
         """Return the spikes of both, train by train in order of time; the window holds both windows.
 
-        With graded trains, the spikes of unsigned ones have the value 1.
+        With graded trains, the spikes of unsigned trains have the value 1.
 
         Raises
         ------
@@ -191,8 +191,8 @@ class SpikeTrains(FrozenColumns):
     def side_by_side(cls, parts: Sequence[SpikeTrains]) -> SpikeTrains:
         """Return the trains of all parts as the inputs of one neuron: first those of part 0, then those of part 1.
 
-        Signed trains are split by sign first. If a part is graded, all are, and the spikes of the others have the
-        value 1.
+        Signed trains are split by sign first. If a part is graded, all trains are graded, and the spikes of the other
+        parts have the value 1.
 
         Parameters
         ----------
@@ -205,7 +205,7 @@ class SpikeTrains(FrozenColumns):
 
         Raises
         ------
-        ProblemError : no part, or something else than spike trains
+        ProblemError : no part, or a part that is not spike trains
 
         Examples
         --------
@@ -375,7 +375,7 @@ class SpikeTrains(FrozenColumns):
         return self.times.copy(), np.repeat(np.arange(len(self)), self.counts)
 
     def to_neo(self) -> list[Any]:
-        """Return one ``neo.SpikeTrain`` a train; values become the array annotation ``value``.
+        """Return a ``neo.SpikeTrain`` for each train; values become the array annotation ``value``.
 
         Trains that are graded have the annotation ``value_kind``, "graded".
 
@@ -404,12 +404,12 @@ class SpikeTrains(FrozenColumns):
         Returns
         -------
         SpikeTrains
-            Their window is the widest of those of `trains`. They are graded if all of `trains` have the annotation
+            Their window is the widest window of `trains`. They are graded if all of `trains` have the annotation
             ``value_kind`` that `to_neo` makes.
 
         Raises
         ------
-        ProblemError : something else than ``neo.SpikeTrain`` objects
+        ProblemError : an object that is not a ``neo.SpikeTrain``
         """
         try:
             foreign = next(([train] for train in trains if not hasattr(train, "rescale")), [])
@@ -430,7 +430,7 @@ class SpikeTrains(FrozenColumns):
         return cls.from_lists(times, start, stop, values, kind=kind)
 
     def to_pandas(self) -> Any:
-        """Return a table with a row a spike, ``train t_ms``, and ``value`` if there are values, train after train.
+        """Return a table, train after train: a row for each spike, ``train t_ms``, and ``value`` if there are values.
 
         Raises
         ------
@@ -449,10 +449,10 @@ class SpikeTrains(FrozenColumns):
         description: str = "spike trains of taxel",
         overwrite: bool = False,
     ) -> Path:
-        """Write the trains to an NWB file, one unit a train; return its path.
+        """Write the trains to an NWB file, a unit for each train; return its path.
 
-        The window becomes each unit's observation interval, values a column ``value``; of graded trains a further
-        column ``value_kind`` says so. NWB counts in seconds.
+        The window becomes each unit's observation interval, and values become a column ``value``; graded trains have a
+        further column ``value_kind``. NWB counts in seconds.
 
         Parameters
         ----------
@@ -484,19 +484,19 @@ class SpikeTrains(FrozenColumns):
     def from_nwb(
         cls, path: str | os.PathLike[str], *, start: float | None = None, stop: float | None = None
     ) -> SpikeTrains:
-        """Read the units of an NWB file, one train a unit in the order of its table.
+        """Read the units of an NWB file, a train for each unit, in the order of its table.
 
         Parameters
         ----------
         path : path
         start, stop : float, ms, optional
-            The window. Left out: the widest of the units' observation intervals; where the file has none, from 0 or the
-            first spike before it to the last.
+            The window. Default: the widest of the units' observation intervals; if the file has none, from 0, or the
+            first spike if it is earlier, to the last spike.
 
         Raises
         ------
-        FormatError : no NWB file; one without units, or units without spike times; one of which a link or a data set
-            leads to another file (names the file)
+        FormatError : not an NWB file; a file without units, or units without spike times; a file in which a link or a
+            data set leads to another file (names the file)
         FileNotFoundError : no such file
         """
         times, offsets, first, last, values, kind = read_nwb(path, start, stop)

@@ -40,7 +40,7 @@ class Columns:
 
     Raises
     ------
-    ProblemError : no whole number, or below 1
+    ProblemError : not a whole number, or below 1
 
     Examples
     --------

@@ -63,8 +63,8 @@ class Counts:
     dropped, resets : int
         Version 2: the number of datagrams that report dropped events, and of resets of the board.
     events_dropped : int
-        Version 2: the number of events that the board dropped by its own totals (kind 4), from its reset or from the
-        first totals on.
+        Version 2: the number of events that the board dropped by its own totals (kind 4), since its reset or since the
+        first totals.
     unknown_value : int
         Version 2: the number of differences from a value that was not received; their events have no intensity.
 

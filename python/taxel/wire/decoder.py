@@ -48,8 +48,8 @@ def decode(
         Version 1: the length of each datagram in bytes, if `data` is consecutive datagrams. Each is then decoded
         separately, so that an intensity never belongs to a change of the datagram before.
     columns : Columns, optional
-        Memory to reuse, with room for ``len(data) // 5 + 2`` events, of version 2 for ``len(data) // 2 + 32``: the
-        events are views of it, valid until it is filled again. By default, and with pairing "taxel", they have separate
+        Memory to reuse, with room for ``len(data) // 5 + 2`` events, for version 2 ``len(data) // 2 + 32``: the events
+        are views of it, valid until it is filled again. By default, and with pairing "taxel", they have separate
         memory.
 
     Returns
@@ -101,7 +101,7 @@ class Decoder:
     the bytes are cut into pieces: the decoder resynchronises at the next first byte. A change is returned once the next
     word (which may be its intensity), the end of its datagram (`end_of_datagram`) or of the stream (`finish`) is
     reached. Each intact datagram of version 2 is decoded once, whatever was lost, repeated, reordered or damaged; the
-    decoder accepts datagrams of one board only, that of the first intact one.
+    decoder accepts only datagrams of the board that sent the first intact datagram.
 
     Parameters
     ----------
@@ -109,9 +109,9 @@ class Decoder:
     array : Array, optional
         The sensor; default: the thesis' 64 x 64. Events outside it are counted and dropped.
     pairing : {"direct", "taxel"}
-        Version 1: which change an intensity belongs to. "direct": the word before it, if that is a change of the same
-        taxel. "taxel": the latest change of that taxel without an intensity, for boards that order words differently;
-        `finish` then returns all events, so it is meant for whole recordings.
+        Version 1: the change that an intensity belongs to. "direct": the word before it, if that is a change of the
+        same taxel. "taxel": the latest change of that taxel without an intensity, for boards that order words
+        differently; `finish` then returns all events, so it is meant for whole recordings.
     differences : bool
         Version 1: whether intensities are differences from the last value sent (the panel's "delta intensity"), which
         the bytes do not state. They are then summed from 0, so that `Events` hold values; these are correct from the
@@ -201,7 +201,7 @@ class Decoder:
         Parameters
         ----------
         columns : Columns
-            With room for ``len(data) // 5 + 2`` events, of version 2 for ``len(data) // 2 + 32``.
+            With room for ``len(data) // 5 + 2`` events, for version 2 ``len(data) // 2 + 32``.
         data : bytes, or anything with a contiguous buffer
         arrived : int, us, optional
             As in `push`.

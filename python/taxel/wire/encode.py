@@ -13,11 +13,11 @@ def encode(events: Events) -> bytes:
     Parameters
     ----------
     events : Events
-        On columns and rows 0 to 63.
+        Events on columns 0 to 63 and rows 0 to 63.
 
     Returns
     -------
-    bytes, 5 a change, 5 an intensity, 5 a marker
+    bytes, 5 for each change, 5 for each intensity, 5 for each marker
 
     Raises
     ------

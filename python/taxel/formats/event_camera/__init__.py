@@ -32,11 +32,11 @@ def trials(path: str | Path, reduction: Reduction | None = None) -> Iterator[Tri
     ----------
     path : str or Path
     reduction : Reduction, optional
-        Which of the events are read, and how; default: all, as they are.
+        Selection of the events; default: all, unchanged.
 
     Raises
     ------
-    FormatError : a file that is damaged, has no header or no event, or holds more than may be read
+    FormatError : a file that is damaged, has no header or no event, or is larger than the limit
     ImportError : faery is not installed (``pip install 'taxel[events]'``)
     ProblemError : a region beyond the sensor
     """

@@ -26,7 +26,7 @@ class CountWindows:
     array : Array
         The taxels of the events.
     first, last : int, us
-        The times of the first and the last event of the file, also where these are not counted.
+        The times of the first and the last event of the file, even if these are not counted.
     reduction : Reduction
         With a window.
 
@@ -55,7 +55,7 @@ class CountWindows:
         return True
 
     def frames(self) -> Frames:
-        """Return the frames; the time of each is the begin of its window."""
+        """Return the frames; the time of each is the beginning of its window."""
         t = (self._begin + np.arange(len(self._values), dtype=np.int64)) * self._window_us
         return Frames(frozen_whole(self._values), frozen(t), unit=self._unit, array=self._array)
 

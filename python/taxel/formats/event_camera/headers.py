@@ -1,4 +1,4 @@
-"""The headers of event cameras' files, and whether the bytes below them are whole words: faery does not say it.
+"""The headers of event cameras' files, and a check that the bytes below them are whole words; faery makes none.
 
 Sources: Prophesee's descriptions of EVT 2.0, EVT 3.0 and DAT; iniVation's of AEDAT 4.0, whose header is a flatbuffer.
 """

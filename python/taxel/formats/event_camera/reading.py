@@ -38,11 +38,12 @@ _COLUMNS: dict[str, np.dtype[Any]] = {
 def read(path: Path, reduction: Reduction) -> Events | Frames:
     """Read the events of a file, or their counts in windows.
 
-    The file is read twice, so that its arrays are made once: for their size, and for what they hold.
+    The file is read twice, first for the size of its arrays and then for their values, so that the arrays are made
+    once.
 
     Raises
     ------
-    FormatError : a file that is damaged, has no header or no event, or holds more than may be read
+    FormatError : a file that is damaged, has no header or no event, or is larger than the limit
     ImportError : faery is not installed
     ProblemError : a region or a taxel beyond the sensor
     """

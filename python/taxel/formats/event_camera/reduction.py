@@ -19,16 +19,16 @@ _LONGEST_MS = 3.6e6
 
 @dataclass(frozen=True)
 class Reduction:
-    """Say what is read of the events of a camera; the arguments are those of `taxel.open`.
+    """Select events of a camera; the arguments are those of `taxel.open`.
 
     Parameters
     ----------
     region : str, optional
-        Columns and rows as "A:B,C:D", of which B and D are not included; default: the whole sensor.
+        Columns and rows as "A:B,C:D", where B and D are not included; default: the whole sensor.
     bin : int, pixels, 1 or more, optional
         The side of the square of pixels that becomes a taxel; default: 1.
     window_ms : float, ms, whole us, optional
-        Frames of counts, one a window; default: events.
+        Read frames of counts, one for each window; default: events.
     polarity : {"both", "on", "off"}, optional
         Which events are read; default: both.
 
@@ -61,11 +61,11 @@ class Reduction:
 
     @property
     def is_given(self) -> bool:
-        """Whether any of it is."""
+        """Whether any of these is given."""
         return any(getattr(self, field.name) is not None for field in fields(self))
 
     def but(self, stated: Reduction | None) -> Reduction:
-        """Return what is given, and what a layout states of the rest."""
+        """Return the given values, and those of a layout for the others."""
         given = {field.name: value for field in fields(self) if (value := getattr(self, field.name)) is not None}
         return replace(stated or Reduction(), **given)
 
@@ -81,7 +81,7 @@ class Reduction:
 
     @property
     def unit(self) -> str:
-        """The unit of counts, which names a polarity that was chosen: what is trained on one does not fit the other."""
+        """The unit of counts, which names a chosen polarity: a training on one polarity does not fit the other."""
         chosen = "" if self.polarity in (None, "both") else f"{self.polarity} "
         return f"{chosen}events/{self.window_ms:g} ms"
 

@@ -27,16 +27,17 @@ class Topic:
     Parameters
     ----------
     topic, type, field : str
-        `field` is "" for a topic of images; for one without a definition too.
+        `field` is "" for a topic of images, and for a topic without a definition.
     shape : tuple of int
-        Its numbers (n,), or its rows and columns if the message states them; empty if unknown.
+        Shape of its numbers (n,), or its rows and columns if the message states them; empty if unknown.
     dtype : str
-        As "int16"; "" if unknown.
+        Type of its numbers, such as "int16"; "" if unknown.
     messages : int
     rate_hz : float, Hz, optional
-        By the bag's times; None with fewer messages than two.
+        Rate by the bag's times; None with fewer than two messages.
     trouble : str
-        Why it cannot be read: its type has no definition, or its images several channels; "" if it can.
+        Reason why it cannot be read: its type has no definition, or its images have several channels; "" if it can be
+        read.
     """
 
     topic: str
@@ -58,7 +59,7 @@ def topics(path: Path, types: Path | None = None, ros: str | None = None) -> lis
     types : Path, optional
         A folder of .msg or .idl files, for types that the bag does not define.
     ros : str, optional
-        A release of ROS, as "humble", whose types are used for those that neither defines.
+        A release of ROS, for example "humble", whose types are used if neither bag nor folder defines them.
 
     Raises
     ------

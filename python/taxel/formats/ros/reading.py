@@ -1,6 +1,6 @@
 """Frames of chosen topics of a ROS bag, with the times of their messages.
 
-One odd message does not decide for all: most of them say which length is read, and whether stamps count.
+A single odd message does not decide for all: the majority decides which length is read, and whether stamps count.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Chosen:
     ----------
     topic : str
     field : str, optional
-        A path, as "left.taxels"; default: the topic's only field with numbers.
+        A path, for example "left.taxels"; default: the topic's only field with numbers.
     array : Array, optional
         Messages of another length are left out; default: the length of most messages, in the rows and columns that
         they state, else in one row.
@@ -64,17 +64,17 @@ class Read:
     array : Array
     values : float32, shape (n, rows, columns)
     unit : str
-        "counts" of whole numbers, else "as sent".
+        "counts" for whole numbers, else "as sent".
     t : int64, shape (n,), us since 1970 as a rule
         The header's stamp, or the bag's time; it never falls.
     has_stamps : bool
         Whether the messages have a header.
     by_the_bag : int
-        How many of them have the bag's time, as their stamp is wrong, or those of most.
+        Number of messages with the bag's time, because their stamp, or the stamps of most messages, are wrong.
     left_out : int
-        How many messages have another length.
+        Number of messages that have another length.
     unread : tuple of str
-        The other topics of the bag, those that were chosen aside.
+        The other topics of the bag, without the chosen ones.
     """
 
     topic: str
@@ -98,7 +98,7 @@ def read(path: Path, chosen: Sequence[Chosen], types: Path | None = None, ros: s
     path : Path
     chosen : sequence of Chosen
     types, ros : Path and str, optional
-        As of `topics`.
+        As in `topics`.
 
     Raises
     ------

@@ -105,7 +105,7 @@ class TrainingRequests:
             if self._training is not None:
                 raise ProblemError("a training runs already: stop it first, or wait for its end")
             self._steps = Steps()
-            # A process of its own, so that it takes no time from what arrives.
+            # A separate process, so that it does not delay receiving.
             self._training = ChildProcess("taxel.tasks", ["train"], stdin=PIPE, stdout=PIPE, text=True)
         try:
             answer = self._answer(self._training, request | {"out": str(out), "overwrite": True})

@@ -41,8 +41,8 @@ STUCK_FROM = 3
 #: (median) move by at least this number of ticks.
 MOVES_FROM = 8
 #: ... It is noisy if it changed by itself in at least this number of bins of 50 ms, which are at least this share of
-#: those in which it changed, and at most this share of its changes went on in the direction of the one before: a touch
-#: goes on, noise turns back.
+#: those in which it changed, and at most this share of its changes continued in the direction of the change before: a
+#: touch continues, noise turns back.
 NOISY_FROM, NOISY_SHARE, NOISY_ON = 10, 0.5, 0.45
 
 #: A pixel of a camera is noisy too, "hot", if it has at least this number of events, so many spreads (as of normal
@@ -134,7 +134,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
 
     Raises
     ------
-    ProblemError : none of these
+    ProblemError : another object
 
     Notes
     -----

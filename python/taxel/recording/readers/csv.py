@@ -116,7 +116,7 @@ def _names(path: Path, head: bytes) -> list[str]:
         return names
     repeated = next((name for name, n in Counter(names).items() if n > 1), None)
     if repeated is not None:
-        raise FormatError(f"{path}, line 1: column {shown(repeated)} is there twice")
+        raise FormatError(f"{path}, line 1: column {shown(repeated)} appears twice")
     return names
 
 
@@ -163,7 +163,7 @@ def _csv_events(path: Path, names: list[str], blocks: Iterator[_Block], array: A
     kinds |= {"t_us": np.int64} | ({"present": np.bool_} if "intensity" in names else {})
     read = Growing(str(path), **{name: ((), kind) for name, kind in kinds.items()})
     for first, block in blocks:
-        # An empty intensity is an absent one; -1 stands for it while numbers are read.
+        # An empty intensity means none; -1 represents it while numbers are read.
         body = re.sub(rb",[ \t]*(?=,|\n|$)", b",-1", block) if "intensity" in names else block
         columns = dict(zip(names, _numbers(path, names, first, body, np.int64).T, strict=True))
         for name, (low, high, _) in _LIMITS.items():
@@ -224,7 +224,7 @@ def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: A
     else:
         sensor = array if called is None else replace(array, names=called)
     read = Growing(str(path), t=((), np.int64), values=((rows, columns), np.float32))
-    # A line may stand for many taxels that are not there.
+    # A line may be about many taxels that do not exist.
     at_once = max(1, _AT_ONCE // (rows * columns))
     for first, body in blocks:
         table = _numbers(path, names, first, body, np.float64)

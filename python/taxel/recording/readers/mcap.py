@@ -237,7 +237,8 @@ class _Source:
         remarks = self.remarks()
         counts = self.counted() or remarks.counts or {}
         of_2 = decoded.version_2
-        # What this computer dropped or the file lost is missing among the board's numbers too, and is counted apart.
+        # Datagrams that this computer dropped or the file lost are missing among the board's numbers too, and are
+        # counted separately.
         skipped = remarks.condition["skipped_numbers"]
         of_2["missing"] -= min(of_2["missing"], skipped)
         return {
@@ -254,7 +255,7 @@ class _Source:
     def counts_of_stream(self, read: _core.Samples) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and lines of a stream, by cause."""
         found, counts = read.found["damage"], self.counted() or self.remarks().counts or {}
-        # What was in no line is not in the file.
+        # Bytes that are in no line are not in the file.
         lost = {cause: max(n, counts.get("decoder", {}).get(cause, 0)) for cause, n in found.items()}
         return {"samples": len(read.t), **lost, "received": self.counted().get("received"), **self.rebuilt()}
 

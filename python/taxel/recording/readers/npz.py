@@ -93,7 +93,7 @@ def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], a
         raise FormatError(f"{path}: damaged: its content is not what was written")
     values = columns.get("values")
     if values is not None and values.dtype.kind == "f" and values.flags.writeable:
-        # Of the NaNs of a damaged file some may be signalling ones, of which each computation would warn.
+        # A damaged file may hold signalling NaNs, of which each computation would warn.
         for k in range(0, len(values) if values.ndim else 0, step := max(1, PIECE_BYTES // max(1, values[:1].nbytes))):
             block = values[k : k + step]
             np.copyto(block, np.nan, where=np.isnan(block))

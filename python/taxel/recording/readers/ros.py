@@ -29,7 +29,7 @@ class Topics:
 
     Raises
     ------
-    ProblemError : no text, or more fields than topics
+    ProblemError : not a text, or more fields than topics
     """
 
     topic: str | Sequence[str] | None

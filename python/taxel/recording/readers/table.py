@@ -61,7 +61,7 @@ class _Head:
 
     path: Path
     how: Table
-    #: The number of the first line of numbers, and how many lines that are not empty stand above it.
+    #: The number of the first line of numbers, and the number of lines above it that are not empty.
     first: int
     above: int
     #: The names of all columns, and whether the table has them.
@@ -71,7 +71,7 @@ class _Head:
     left: Collection[int]
     #: Whether each line of numbers ends in a separator, after which there is no column.
     all_end: bool
-    #: The rows at which an empty line stands, as the lines are read.
+    #: The rows at which there is an empty line, as the lines are read.
     blanks: array[int] = field(default_factory=lambda: array("q"))
 
     @classmethod
@@ -101,7 +101,7 @@ class _Head:
         _refuse_skipped(path, how, skipped, len(names))
         named = not how.columns and not _are_of_frame(names, how)
         below = [cells(line, how.separator) for _, line in lines[named:]]
-        # A line of units may stand between names and numbers.
+        # A line of units may be between names and numbers.
         units = below[0] if named and len(below) > 1 else []
         in_units = are_units(names, units) and (how.missing is None or unquote(how.missing) not in units)
         above = named + in_units

@@ -110,7 +110,7 @@ def _header(source: RecordedSource) -> dict[str, Any]:
 
 def _provenance(source: RecordedSource) -> dict[str, Any]:
     """Return what a header states of the recording that a file was made of."""
-    # The verdict stands here and not with the final counts, so that a file that was cut still states it.
+    # The verdict is here and not with the final counts, so that a file that was cut still states it.
     converted = None if source.losses.verdict() is None else verdict_of(source)._held
     counts = dict(source.losses.counts())
     return {"lost": source.losses.lost(), "remarks": source.losses.remarks, "converted": converted, "counts": counts}
