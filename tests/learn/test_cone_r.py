@@ -439,7 +439,7 @@ def test_control_c_stops_a_fit_promptly_and_keeps_the_best_so_far(long_rows):
 
 def test_max_seconds_ends_a_fit_with_the_best_so_far_and_a_warning(long_rows):
     cone = made(ConeR, **LONG, max_seconds=0.2)
-    with pytest.warns(UserWarning, match="only proven to lie within"):
+    with pytest.warns(UserWarning, match="only proven to be within"):
         long_rows.fit(cone)
     assert cone.status_ == "stopped"
     with warnings.catch_warnings():
