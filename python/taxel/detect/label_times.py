@@ -32,8 +32,6 @@ _SHARE, _LEAST = 0.8, 5
 #: Marks that a hand sets live have a common distance of at most that, ms, and the same share of them lies in a stretch
 #: of at most that, ms; all but a few in so many standard deviations around it, in steps of that, ms.
 _HAND_MS, _HAND_SPREAD_MS, _DEVIATIONS, _STEP_MS = 500.0, 170.0, 3.0, 10.0
-#: Labels lie as tightly around two distances whose spreads differ by less, ms.
-_TIGHT_MS = 25.0
 #: A load changes from its label on where it has on the middle part of the way to where it is felt, looked at so often,
 #: of so many labels; what falls has fallen to that share.
 _MIDDLE, _LOOKS, _MOST, _FALLEN = (0.25, 0.75), 8, 0.85, 0.75
@@ -66,7 +64,7 @@ class Off(NamedTuple):
     @property
     def disorder(self) -> tuple[bool, float, float]:
         """How badly labels agree on the distance: that of a hand is worst, then that of few labels, then a wide one."""
-        return self.within_ms > 0.0, -self.alike / self.labels, self.spread_ms // _TIGHT_MS
+        return self.within_ms > 0.0, -round(self.alike / self.labels, 1), self.spread_ms
 
     @property
     def is_far(self) -> bool:
