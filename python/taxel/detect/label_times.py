@@ -62,11 +62,6 @@ class Off(NamedTuple):
     """Whether the load changes from the labels on: it is felt late, as what rises or falls slowly."""
 
     @property
-    def disorder(self) -> tuple[bool, float, float]:
-        """How badly labels agree on the distance: that of a hand is worst, then that of few labels, then a wide one."""
-        return self.within_ms > 0.0, -round(self.alike / self.labels, 1), self.spread_ms
-
-    @property
     def is_far(self) -> bool:
         """Whether more than a few of the labels lie too far from what was felt to be aligned."""
         return self.beyond > (1 - _SHARE) * self.alike
@@ -267,7 +262,7 @@ def _distance(times: NDArray[np.int64], felt: Sequence[NDArray[np.int64]]) -> Of
     steady = [off for edge in felt for off in _steady(times, edge)]
     near = [off for off in steady if abs(off.ms) <= WINDOW_MS]
     found = near or steady or [off for edge in felt for off in _by_hand(times, edge)]
-    return min(found, key=lambda off: off.disorder, default=None)
+    return min(found, key=lambda off: (off.within_ms > 0.0, -off.alike, off.spread_ms), default=None)
 
 
 class Alike(NamedTuple):
