@@ -109,8 +109,8 @@ class Evidence:
         """The distance that labels agree on best, begins before others: where they are off, it is the clock's."""
 
         def rank(label: str) -> tuple[Any, ...]:
-            off = self._distances[label]
-            return *off.disorder, recipes.neuron_of("touch", label) == "lift", off.spread_ms
+            off, is_end = self._distances[label], recipes.neuron_of("touch", label) == "lift"
+            return off.within_ms > 0.0, -round(off.alike / off.labels, 1), is_end, off.spread_ms
 
         sure = (label for label, off in self._distances.items() if not off.changes_from_label)
         best = min(sure, key=rank, default=None)

@@ -32,8 +32,6 @@ _SHARE, _LEAST = 0.8, 5
 #: Marks that a hand sets live have a common distance of at most that, ms, and the same share of them lies in a stretch
 #: of at most that, ms; all but a few in so many standard deviations around it, in steps of that, ms.
 _HAND_MS, _HAND_SPREAD_MS, _DEVIATIONS, _STEP_MS = 500.0, 170.0, 3.0, 10.0
-#: Labels lie as tightly around two distances whose spreads differ by less, ms.
-_TIGHT_MS = 25.0
 #: A load changes from its label on where it has on the middle part of the way to where it is felt, looked at so often,
 #: of so many labels; what falls has fallen to that share.
 _MIDDLE, _LOOKS, _MOST, _FALLEN = (0.25, 0.75), 8, 0.85, 0.75
@@ -62,11 +60,6 @@ class Off(NamedTuple):
     within_ms: float = 0.0
     changes_from_label: bool = False
     """Whether the load changes from the labels on: it is felt late, as what rises or falls slowly."""
-
-    @property
-    def disorder(self) -> tuple[bool, float, float]:
-        """How badly labels agree on the distance: that of a hand is worst, then that of few labels, then a wide one."""
-        return self.within_ms > 0.0, -self.alike / self.labels, self.spread_ms // _TIGHT_MS
 
     @property
     def is_far(self) -> bool:
@@ -269,7 +262,7 @@ def _distance(times: NDArray[np.int64], felt: Sequence[NDArray[np.int64]]) -> Of
     steady = [off for edge in felt for off in _steady(times, edge)]
     near = [off for off in steady if abs(off.ms) <= WINDOW_MS]
     found = near or steady or [off for edge in felt for off in _by_hand(times, edge)]
-    return min(found, key=lambda off: off.disorder, default=None)
+    return min(found, key=lambda off: (off.within_ms > 0.0, -off.alike, off.spread_ms), default=None)
 
 
 class Alike(NamedTuple):
