@@ -111,7 +111,8 @@ def test_a_folder_without_a_recording_says_what_there_is_to_read(tmp_path: Path)
 
 def test_a_folder_without_a_recording_names_bags_arrays_and_tables_too(tmp_path: Path) -> None:
     (tmp_path / "notes.pdf").write_bytes(b"%PDF")
-    with pytest.raises(FormatError, match=r"taxel reads .*ROS bags .*tekscan.*by a layout file \.npy, \.txt and") as said:
+    readable = r"taxel reads .*ROS bags .*tekscan.*by a layout file \.npy, \.txt and"
+    with pytest.raises(FormatError, match=readable) as said:
         taxel.open_all(tmp_path)
     assert "\n" not in str(said.value)
 
