@@ -480,9 +480,7 @@ def test_memory_that_is_missing_is_said_with_what_there_is(tmp_path: Path, monke
 
     taxel.convert(some_events(), tmp_path / "a.npz")
     monkeypatch.setattr("taxel.recording.readers.npz.read_arrays", fail)
-    with refused(
-        r"a.npz: needs more memory than is available \(\d+ bytes\); a larger limit", FormatError
-    ):
+    with refused(r"a.npz: needs more memory than is available \(\d+ bytes\); a larger limit", FormatError):
         taxel.open(tmp_path / "a.npz")
 
 
