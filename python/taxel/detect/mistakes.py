@@ -33,8 +33,6 @@ _GAP_US = 200_000
 _SAME_MS = 50.0
 #: Labels or detections are those that lie where loads begin or end if this share more of them does than of the others.
 _FITS = 0.3
-#: ... and, in a recording unlike the training, only where this share of the labels is found.
-_FOUND = 0.8
 #: Detections are far too many that are false so many times as often as there are labels.
 _FAR_MORE = 2
 #: Fewer events missed and false are few.
@@ -331,8 +329,22 @@ class Measured:
             names_fit = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
             verb = "is" if len(names) == 1 else "are"
             return cause(f"{measured}, while {names_fit}: {', '.join(names)} {verb} felt {side} there", "")
+        if count < _STRETCH * len(labels):
+            where = [self._stretch_in(k, names, missed) for k in np.unique(_example_of(missed)).tolist()]
+            measured += f", the other {len(labels) - count} of {len(labels)} labels do not"
+            more = f" and in {counted(len(where) - 1, 'other recording')} alike" if len(where) > 1 else ""
+            shifted = (
+                f"labels {where[0]}{more} {abs(round(ms, -1)):.0f} ms {side}, if the clock of the recording is right"
+            )
+            return cause(measured, shifted if all(where) else "")
         fitting = self._fitting(labels, false)
         return None if is_near and not fitting else _of_clock(cause, ms, measured, fitting)
+
+    def _stretch_in(self, k: int, names: Sequence[str], missed: NDArray[np.int64]) -> str:
+        """Return where the labels of an example lie that are missed; "" where these are no stretch."""
+        labels = np.sort(np.concatenate([self._labels(label) for label in names]))
+        here = labels[_example_of(labels) == k]
+        return stretch_of(here, np.isin(here, missed), self._examples)
 
     def _fitting(self, labels: NDArray[np.int64], detections: NDArray[np.int64]) -> str:
         """Return whether the labels or the detections lie where loads begin or end; "" where neither or both do."""
@@ -382,12 +394,12 @@ class Measured:
 
         Weak loads without a label may be noise, and labels where nothing is felt may be of weak touches.
         """
-        scored, differs = self._scores[label], self._differs(left)
-        if not self._felt.are_known or (differs and scored.found < _FOUND * scored.events):
+        # In a recording unlike the training, loads of noise or chatter look like touches.
+        if not self._felt.are_known or self._differs(left):
             return None
         names = {name for example in self._examples for name in example.labels}
         strong = self._felt.strong(label, names, left.false)
-        unfelt = ~self._felt.felt_at(left.missed)[1] & (not differs)
+        unfelt = ~self._felt.felt_at(left.missed)[1]
         count, mistakes = int(strong.sum()), int(strong.sum()) + int(unfelt.sum())
         if 2 * mistakes <= left.total:
             return None

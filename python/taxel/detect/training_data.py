@@ -40,6 +40,8 @@ _NOISIER, _WEAKER, _STRONGER = 1.5, 0.6, 1.7
 _MUCH_NOISE = 2.0
 #: So many touches tell something; this share fewer of them with a detection, or of the loaded taxels, is a difference.
 _LEAST, _FEWER = 5, 0.2
+#: The last such part of a recording is compared with the first; a taxel has moved by so many times the noise.
+_PARTS, _MOVED = 8, 5.0
 #: Two detections are close at this part of the shortest time between labels; this share of close ones is a difference.
 _CLOSE, _MANY = 0.5, 0.05
 
@@ -144,7 +146,12 @@ def unlike(readout: _Detector, example: Example, found: Detections) -> Unlike:
     is_counts = readout.unit is not None and are_counts(readout.unit)
     noisier = noise / data["noise"] if data["noise"] > 0.0 else 1.0
     sensor, detections = list(_of_noise(noisier, is_counts=is_counts)), list[str]()
-    if measured is not None:
+    if measured is not None and (count := _moved(source, data["noise"])):
+        # Touches are measured above the rest.
+        sensor.append(
+            f"{counted(count, 'taxel')} end with other readings than they began: a drift, or a load that stays"
+        )
+    elif measured is not None:
         sensor += _of_touches(data, measured, noisier, is_counts=is_counts)
         # Much noise makes loads of its own.
         detections += _undetected(data, measured, found) if noisier < _MUCH_NOISE else []
@@ -270,6 +277,20 @@ def _largest(
     first = np.maximum(np.searchsorted(t, begin, side="right") - 1, 0)
     stop = np.maximum(np.searchsorted(t, end), first + 1)
     return np.array([values[i:k].max() for i, k in zip(first.tolist(), stop.tolist(), strict=True)])
+
+
+def _moved(source: Events | Frames | SpikeTrains, noise: float) -> int:
+    """Return how many taxels of frames read more or less at the end, by so many times the noise; 0 if few do."""
+    if not isinstance(source, Frames) or len(source) < 2 * _FRAMES or noise <= 0.0:
+        return 0
+    part = len(source) // _PARTS
+    # Touches that come and go leave the lowest readings as they are.
+    first, last = (
+        np.nanquantile(values.astype(np.float64), 0.1, axis=0)
+        for values in (source.values[:part], source.values[-part:])
+    )
+    count = int(np.count_nonzero(np.abs(last - first) >= _MOVED * noise))
+    return count if count >= max(1.0, _FEWER * source.array.taxels) else 0
 
 
 def _noise(source: Events | Frames) -> float:

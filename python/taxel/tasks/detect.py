@@ -28,12 +28,13 @@ from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
+from taxel.recording.analysis.health import health, unchanging_taxels
 from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 from taxel.tasks.labels import GivenLabels, check_shift, few, moved, references, sources_without, titles_of
-from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, rest
+from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, rest, zero_by_unit
 
 #: Causes of a bad score that are of labels or of the recording, not of the readout.
 _OF_LABELS = ("shifted_labels", "window", "gaps", "unlabelled_loads", "overlapping_loads")
@@ -342,6 +343,8 @@ def _detected(
     with _naming(recording.title):
         _check_unit(readout, recording)
         taken = _rest(readout, recording, options.tare)
+        if options.tare is None:
+            zero_by_unit(recording)  # warns of taxels that do not rest there
         tare, begin_us = (None, None) if taken is None else (taken.tare, taken.detect_from_us)
         found, outside = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=begin_us)
     # Labels that the readout does not have do not count as missed.
@@ -418,6 +421,7 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
     if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
         # What else is measured is measured upside down.
         return [*lines, f"rest: {quiet.text(recording.path)}"], Unlike()
+    lines += _of_taxels(source)
     floors = noise_floors(readout)
     if tare is not None and floors and not isinstance(source, SpikeTrains):
         count = count_drifted(source, tare, max(floors))
@@ -429,6 +433,18 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
             )
     differs = unlike(readout, outcome.example, outcome.found)
     return [*lines, *differs.lines()], differs
+
+
+def _of_taxels(source: Events | Frames | SpikeTrains) -> Iterator[str]:
+    """Yield how many taxels are dead, and how many are stuck; nothing of counts, of which pixels may have no event."""
+    if isinstance(source, SpikeTrains) or (isinstance(source, Frames) and are_counts(source.unit)):
+        return
+    of_taxels = health(source)
+    masks = {"dead": of_taxels.dead, "stuck": of_taxels.stuck, "unchanging": unchanging_taxels(of_taxels, source)}
+    for word, mask in masks.items():
+        if mask.any():
+            y, x = np.argwhere(mask)[0]
+            yield f"{counted(int(mask.sum()), f'{word} taxel')}, as column {x}, row {y} (taxel info lists them)"
 
 
 def _of_gaps(recording: Recording, outcome: Outcome) -> Iterator[str]:

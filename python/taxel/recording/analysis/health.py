@@ -63,6 +63,8 @@ WORKS_FROM = 10
 _AT_ONCE = 1 << 17
 #: Row and column offsets of a taxel's neighbours.
 _OFFSETS = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
+#: Frames have noise where most taxels change in this share of them.
+_CHANGES = 0.2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,6 +114,12 @@ class Health:
             + f", {untested} not touched enough to say" * bool(untested)
             + ")"
         )
+
+
+def unchanging_taxels(of_taxels: Health, source: Events | Frames) -> NDArray[np.bool_]:
+    """Return which untested taxels of frames never change, while noise changes most: it does so in taxels that work."""
+    is_noisy = isinstance(source, Frames) and np.median(of_taxels.activity) >= _CHANGES * len(source)
+    return np.asarray(of_taxels.untested & (of_taxels.activity == 0) & is_noisy)
 
 
 def health(recorded: Events | Frames | Recorded) -> Health:

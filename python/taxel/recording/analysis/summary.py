@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from taxel.clock import doubt
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.analysis.health import health
+from taxel.recording.analysis.health import health, unchanging_taxels
 from taxel.recording.analysis.pressure import Series
 from taxel.recording.gaps import of_camera
 from taxel.recording.recording import Recording
@@ -26,9 +26,6 @@ _AT_TOP, _LEVELS = 3, 50
 _TIMES, _BELOW = 2, 3
 #: At most so many places of taxels are listed that were not touched enough: a large sensor may have millions.
 _PLACES = 100
-
-#: Frames have noise where most taxels change in this share of them.
-_CHANGES = 0.2
 
 
 def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
@@ -94,9 +91,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     # Above the rest of readings that fall is nothing but noise.
     facts["pressure"] = None if pressed is None or pressed.rest.falls else _pressure(pressed)
     of_taxels = health(table)
-    # Noise changes the readings of taxels that work, touched or not.
-    is_noisy = isinstance(table, Frames) and np.median(of_taxels.activity) >= _CHANGES * len(table)
-    unchanging = of_taxels.untested & (of_taxels.activity == 0) & is_noisy
+    unchanging = unchanging_taxels(of_taxels, table)
     return facts | {
         "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
         "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
