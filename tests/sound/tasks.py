@@ -90,7 +90,7 @@ SOUND: dict[str, Sound] = {
         options=tasks.DetectOptions(),
         progress=lambda *_: None,
     ),
-    "taxel.tasks.DetectOptions": plain(tasks.DetectOptions, tare=0.3, frame_us=192.0, window_ms=50.0),
+    "taxel.tasks.DetectOptions": plain(tasks.DetectOptions, tare=0.3, frame_us=192.0, window_ms=50.0, shift_ms=1.0),
     "taxel.tasks.rest": one(tasks.rest, tare=0.3),
     "taxel.tasks.info": one(tasks.info, tare=0.3),
     "taxel.tasks.encode": one(

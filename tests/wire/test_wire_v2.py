@@ -281,7 +281,7 @@ def test_nonsense_is_one_line():
     with pytest.raises(taxel.ProblemError, match="version is 3"):
         wire.Decoder(3)
     for wrong in ({"pairing": "taxel"}, {"differences": True}):
-        with pytest.raises(taxel.ProblemError, match="of version 1"):
+        with pytest.raises(taxel.ProblemError, match="for version 1"):
             Decoder(**wrong)
     with pytest.raises(taxel.ProblemError, match="lengths"):
         decode(b"", 2, lengths=[0])

@@ -160,7 +160,7 @@ class FeltLoads:
         """Return when loads began and ended, in order; one without an end lasts until the next, in its example."""
         assert self._loads is not None
         begins, ends = (np.sort(edge.t) for edge in self._loads.edges(quantity, self._felt[quantity], 1.0, 1))
-        last = begins // APART_US * APART_US + APART_US // 2
+        last = begins // APART_US * APART_US + APART_US // 2 - 1
         after = np.append(ends, np.iinfo(np.int64).max)[np.searchsorted(ends, begins)]
         return begins, np.minimum(np.minimum(after, np.append(begins[1:], last[-1:])), last)
 
