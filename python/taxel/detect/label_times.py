@@ -178,8 +178,7 @@ class FeltLoads:
         same = [self.times(name) for name in names if (recipes.neuron_of("touch", name) == "lift") == is_end]
         until = (ends if is_end else begins) + reach
         has = np.diff(np.searchsorted(np.sort(np.concatenate(same)), [begins - reach, until]), axis=0)[0] > 0
-        shares = np.linspace(0.0, 1.0, 4 * _LOOKS)[:, None]
-        peaks = self._loads.values_at("peak", np.rint(begins + shares * (ends - begins)).astype(np.int64)).max(axis=0)
+        peaks = self._loads.largest("peak", begins, ends)
         strong = ~has & (peaks >= 0.5 * np.median(peaks[has] if has.any() else np.inf))
         load = np.searchsorted(begins, times + reach, side="right") - 1
         inside: NDArray[np.bool_] = (load >= 0) & (ends[load] + reach >= times) & strong[load]

@@ -133,6 +133,16 @@ class Loads:
             values[here] = np.concatenate([[0.0], of_example])[index]
         return values
 
+    def largest(self, quantity: str, begins: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the largest value of a quantity between pairs of times on the one clock, each in one example."""
+        values, example = np.zeros(len(begins)), np.rint(begins / APART_US).astype(np.int64)
+        for k in np.unique(example).tolist():
+            here = example == k
+            values[here] = largest(
+                *self.changes(quantity, k), *(edge[here] - self._shift[k] for edge in (begins, ends))
+            )
+        return values
+
     def values(self, quantity: str, parts: Iterable[Stretch]) -> NDArray[np.float64]:
         """Return what a quantity is after each of its changes in parts of the examples."""
         inside = [np.empty(0)]
@@ -174,6 +184,17 @@ class Loads:
             return np.concatenate([t + by for t, by in zip(times, self._shift, strict=True)])
 
         return FoundTimes(shifted(t), shifted(known), np.concatenate(values))
+
+
+def largest(
+    t: NDArray[np.int64], values: NDArray[np.float64], begin: NDArray[np.int64], end: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return the largest value, of those that hold from each of some times on, in each touch."""
+    if not len(t):
+        return np.zeros(len(begin))
+    first = np.maximum(np.searchsorted(t, begin, side="right") - 1, 0)
+    stop = np.maximum(np.searchsorted(t, end), first + 1)
+    return np.array([values[i:k].max() for i, k in zip(first.tolist(), stop.tolist(), strict=True)])
 
 
 def lacks_neighbours(examples: Sequence[Example]) -> bool:

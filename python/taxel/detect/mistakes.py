@@ -33,6 +33,8 @@ _GAP_US = 200_000
 _SAME_MS = 50.0
 #: Labels or detections are those that lie where loads begin or end if this share more of them does than of the others.
 _FITS = 0.3
+#: Of what is wrong in a recording unlike the training, labels are a cause only where this share of them is found.
+_FOUND = 0.8
 #: Detections are far too many that are false so many times as often as there are labels.
 _FAR_MORE = 2
 #: Fewer events missed and false are few.
@@ -394,8 +396,10 @@ class Measured:
 
         Weak loads without a label may be noise, and labels where nothing is felt may be of weak touches.
         """
-        # In a recording unlike the training, loads of noise or chatter look like touches.
-        if not self._felt.are_known or self._differs(left):
+        scored = self._scores[label]
+        # In a recording unlike the training, loads of noise or chatter look like touches where much is missed or false.
+        sound = scored.found >= _FOUND * scored.events >= 2 * _FOUND * len(left.false)
+        if not self._felt.are_known or (self._differs(left) and not sound):
             return None
         names = {name for example in self._examples for name in example.labels}
         strong = self._felt.strong(label, names, left.false)

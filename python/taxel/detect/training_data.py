@@ -17,7 +17,7 @@ from taxel.detect.detector import _Detector
 from taxel.detect.examples import Example, check_examples
 from taxel.detect.floors import floor_of
 from taxel.detect.label_times import PEAK
-from taxel.detect.loads import Loads, clock_of, lacks_neighbours
+from taxel.detect.loads import Loads, clock_of, lacks_neighbours, largest
 from taxel.detect.tares import TOUCH
 from taxel.detections import Detections
 from taxel.events import Events
@@ -246,7 +246,7 @@ def _measured(given: Example) -> _Measured | None:
     begin, end = _touches(begins, ends, int(source.t[-1]))
     above = tare.off(_touched(source, begin, end)).values >= _core.touched_above(floor)
     share = above.mean(axis=0) if len(above) else np.zeros(source.array.shape)
-    peaks = _largest(*loads.changes(strength, 0), begin, end)
+    peaks = largest(*loads.changes(strength, 0), begin, end)
     return _Measured(_noise(source), peaks, begin, end, share >= _LOADED, share > 0.0)
 
 
@@ -266,17 +266,6 @@ def _touched(source: Events | Frames, begin: NDArray[np.int64], end: NDArray[np.
     inside = np.flatnonzero(during)
     chosen = inside[:: max(1, len(inside) // _LOOKS)]
     return Frames(source.values[chosen], source.t[chosen], unit=source.unit, array=source.array)
-
-
-def _largest(
-    t: NDArray[np.int64], values: NDArray[np.float64], begin: NDArray[np.int64], end: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Return the largest value, of those that hold from each of some times on, in each touch."""
-    if not len(t):
-        return np.zeros(len(begin))
-    first = np.maximum(np.searchsorted(t, begin, side="right") - 1, 0)
-    stop = np.maximum(np.searchsorted(t, end), first + 1)
-    return np.array([values[i:k].max() for i, k in zip(first.tolist(), stop.tolist(), strict=True)])
 
 
 def _moved(source: Events | Frames | SpikeTrains, noise: float) -> int:
