@@ -113,7 +113,8 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
 
 def _places(taxels: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return column and row of the first of some taxels."""
-    return [(int(x), int(y)) for y, x in np.argwhere(taxels)[:_PLACES]]
+    columns = taxels.shape[1]
+    return [(int(k % columns), int(k // columns)) for k in np.flatnonzero(taxels)[:_PLACES]]
 
 
 def _pressure(pressed: Series) -> dict[str, Any] | None:
