@@ -58,7 +58,7 @@ class Trained:
         truth = [] if labels is None else ["--truth", place / "a.csv"]
         code, out, _ = call(capsys, "detect", place / "a.npz", "--readout", self.file, "--tare", 2.0, *truth, *words)
         assert code == 0
-        said = ("do not rely", "what may help", "unlike", "gap", "outside", "missed", "false ")
+        said = ("do not rely", "what may help", "unlike", "gap", "stuck", "outside", "missed", "false ")
         return [
             line
             for line in out.splitlines()
@@ -146,3 +146,46 @@ def test_a_gap_and_what_it_holds_are_named(trained: Trained, tmp_path: Path, cap
         f"may have happened in a gap, as it ends just before: contact at {behind / 1e6:.3f}"[:-2]
     )
     assert "missed lie where the recording has no frames, and 1 of 1 false lies at the first frames" in lines[-1]
+
+
+def test_stuck_taxels_are_named_also_where_all_is_found(trained: Trained, tmp_path: Path, capsys: Any) -> None:
+    if trained.shape[0] == 1:
+        return
+    frames, labels = drawn(trained.shape, trained.rate, 9)
+    values = frames.values.copy()
+    values[:, 3, 10] = 1023
+    stuck = taxel.Frames(values, frames.t, unit="counts", array=frames.array)
+    assert "1 stuck taxel, as column 10, row 3 (taxel info lists them)" in trained.told(capsys, tmp_path, stuck, labels)
+
+
+def test_a_rest_that_moves_is_named_in_the_place_of_weak_touches(trained: Trained, tmp_path: Path, capsys: Any) -> None:
+    frames, labels = drawn(trained.shape, trained.rate, 10)
+    drift = np.rint(np.linspace(0, 60, len(frames)))[:, None, None]
+    moved = taxel.Frames(frames.values + drift, frames.t, unit="counts", array=frames.array)
+    lines = trained.told(capsys, tmp_path, moved, labels)
+    count = taxel.Array(*trained.shape).taxels
+    taxels = f"{count} taxel{'s' * (count > 1)}"
+    assert (
+        f"unlike the training: {taxels} end with other readings than they began: a drift, or a load that stays" in lines
+    )
+    assert not any("times as strong" in line for line in lines)
+
+
+def test_no_move_is_advised_where_only_a_part_of_the_labels_of_each_recording_is_off(
+    trained: Trained, tmp_path: Path, capsys: Any
+) -> None:
+    folder, rows = tmp_path / "days", ["recording,label,t_us\n"]
+    folder.mkdir()
+    for seed in (11, 12):
+        frames, labels = drawn(trained.shape, trained.rate, seed)
+        taxel.convert(frames, folder / f"{seed}.npz")
+        since = labels["contact"][12]
+        for label, times in labels.items():
+            rows += [f"{seed}.npz,{label},{t + 250_000 * (t >= since)}\n" for t in times]
+    (tmp_path / "days.csv").write_text("".join(rows))
+    _, out, _ = call(
+        capsys, "detect", folder, "--readout", trained.file, "--tare", 2.0, "--truth", tmp_path / "days.csv"
+    )
+    assert "--shift-ms" not in out
+    assert "what may help is labels from" in out
+    assert "this score" in out
