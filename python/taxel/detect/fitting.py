@@ -274,6 +274,8 @@ class _FittedPoint(NamedTuple):
 def _differing(point: Mapping[str, Any], first: Mapping[str, Any]) -> tuple[str, str] | None:
     """Return by what a point and the first one differ, as text; None where they do not."""
     keys = [key for key in dict(point) | dict(first) if point.get(key) != first.get(key)]
+    if "inputs" in keys:  # the rest suits these
+        keys = ["inputs"]
 
     def text(values: Mapping[str, Any]) -> str:
         of_key = {key: values.get(key, "as of all") for key in keys}
