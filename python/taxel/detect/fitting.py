@@ -85,7 +85,7 @@ class Trained(NamedTuple):
     fitted_levels : bool
         Whether the encoder's levels are of the training data (`Recipe`).
     chosen : mapping of str to str
-        Of labels with a point of `choose` that point and the first one, and the mistakes of both in the training data.
+        For each label, the chosen point of `choose`, the first one, and the mistakes of both in the training data.
     """
 
     recipe: Recipe

@@ -238,7 +238,7 @@ class FeltLoads:
         edges = [self._edges(label, self._quantity) for label in labels]
         pairs = []
         for t, felt in zip(times, edges, strict=True):
-            # Of a name without a meaning it is the edge that more of its labels lie at.
+            # A name without a meaning takes the edge near which more of its labels are.
             apart, index = max((_apart(t, edge) for edge in felt), key=lambda pair: _near(*pair))
             near = np.abs(apart) <= WINDOW_MS
             usual_ms = float(np.median(apart[near])) if _near(apart, index) >= _LEAST else 0.0

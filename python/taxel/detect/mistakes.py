@@ -33,7 +33,7 @@ _GAP_US = 200_000
 _SAME_MS = 50.0
 #: Labels or detections are those that lie where loads begin or end if this share more of them does than of the others.
 _FITS = 0.3
-#: Of what is wrong in a recording unlike the training, labels are a cause only where this share of them is found.
+#: Labels are a cause in a recording unlike the training only if this share of them is found.
 _FOUND = 0.8
 #: Detections are far too many that are false so many times as often as there are labels.
 _FAR_MORE = 2
@@ -365,7 +365,7 @@ class Measured:
         inside = np.isin(left.missed, self._felt.times(label)[overlapped])
         if 2 * (count := int(inside.sum())) <= len(left.missed):
             return None
-        # Of loads that overlap the other edges are labelled too: without them a label more lies in a load.
+        # Loads that overlap have labels of their other edges too; without such labels a load holds a label too many.
         names = {name for example in self._examples for name in example.labels} - {label}
         if names and not any(2 * int(self._felt.overlapped(name).sum()) >= count for name in names):
             return None

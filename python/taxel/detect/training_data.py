@@ -274,10 +274,9 @@ def _moved(source: Events | Frames | SpikeTrains, noise: float) -> int:
         return 0
     part = len(source) // _PARTS
     # Touches that come and go leave the lowest readings as they are.
-    first, last = (
-        np.nanquantile(values.astype(np.float64), 0.1, axis=0)
-        for values in (source.values[:part], source.values[-part:])
-    )
+    ends = np.stack([source.values[:part], source.values[-part:]]).astype(np.float64)
+    read = ~np.isnan(ends).any(axis=(0, 1))
+    first, last = np.quantile(ends[:, :, read], 0.1, axis=1)
     count = int(np.count_nonzero(np.abs(last - first) >= _MOVED * noise))
     return count if count >= max(1.0, _FEWER * source.array.taxels) else 0
 

@@ -36,6 +36,8 @@ from taxel.tare import Tare
 from taxel.tasks.labels import GivenLabels, check_shift, few, moved, references, sources_without, titles_of
 from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, rest, zero_by_unit
 
+#: At most so many frames are looked at for dead and stuck taxels.
+_LOOKS = 2000
 #: Causes of a bad score that are of labels or of the recording, not of the readout.
 _OF_LABELS = ("shifted_labels", "window", "gaps", "unlabelled_loads", "overlapping_loads")
 #: No event.
@@ -439,6 +441,9 @@ def _of_taxels(source: Events | Frames | SpikeTrains) -> Iterator[str]:
     """Yield how many taxels are dead, and how many are stuck; nothing of counts, of which pixels may have no event."""
     if isinstance(source, SpikeTrains) or (isinstance(source, Frames) and are_counts(source.unit)):
         return
+    if isinstance(source, Frames):
+        # What is dead or stuck is so in some of many frames too.
+        source = source[:: 1 + len(source) // _LOOKS]
     of_taxels = health(source)
     masks = {"dead": of_taxels.dead, "stuck": of_taxels.stuck, "unchanging": unchanging_taxels(of_taxels, source)}
     for word, mask in masks.items():
