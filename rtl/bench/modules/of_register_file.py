@@ -47,7 +47,8 @@ def broken(held, build):
 def attempt(held, build):
     """Return a write that is near what is allowed: number and value."""
     if random.random() < 0.2:
-        return 6, random.choice([*range(12), random.getrandbits(32)])
+        # Each number of a query; the two that are no registers, and what no query has, more often.
+        return 6, random.choice([*range(12), 8, 9, 10, random.getrandbits(32)])
     f = random.choice(FIELDS)
     # Where a rule is just kept, and one beside that.
     edges = {
@@ -137,5 +138,5 @@ async def every_command_is_answered_and_rules_are_kept(dut):
         refusals += not room
         for _ in range(random.choice([0, 0, 1, 7])):
             await clock()
-    assert min(kinds.values()) > 10
+    assert all(kinds.values())
     assert refusals > 50
