@@ -21,14 +21,13 @@ _NUMBERS = ("lost", "damaged", "noted")
 class Verdict(str):
     """State what a recording lost: a line of text with a status, and numbers by cause.
 
-    The page *What the output means* lists statuses, causes and wordings.
-
-    Made by `taxel.open`, or by `from_dict`.
+    The page *What the output means* lists the wordings. Made by `taxel.open`, or by `from_dict`.
 
     Attributes
     ----------
     status : {"complete", "complete after arrival", "unknown", "damaged", "unfinished", "nothing arrived", "lost"}
-        Listed from the best to the worst; for several parts, the worst.
+        Listed from the best to the worst; for several parts, the worst. "complete": version 2 of the wire counted;
+        "damaged": unusable bytes or doubtful times; "lost": perhaps also unfinished.
     lost : dict of int
         Losses by cause; for several parts, the sum.
     damaged : dict of int
@@ -50,6 +49,59 @@ class Verdict(str):
     Raises
     ------
     ProblemError : the class is called; a verdict comes from `taxel.open` or `from_dict`
+
+    Notes
+    -----
+    The causes; the text of the verdict uses the same words, or those in quotes.
+
+    Causes in `lost`:
+
+    - ``dropped_by_board`` ("times that the board dropped events"), ``events_dropped_by_board``: the same losses, by
+      flags and by the board's totals.
+    - ``dropped_by_kernel``: messages; with ``UDP_GRO`` several datagrams each.
+    - ``dropped_by_queue`` ("dropped by taxel's queue"), ``not_recorded`` ("received but not recorded").
+    - ``dropped_or_left_out``: arrival numbers that an unfinished file lacks.
+    - ``bytes_in_no_line``: after 65 536 bytes of a line; before the first line, bytes that are not text.
+    - ``lost_between_computers``, ``dropped_by_other_computer``, ``dropped_by_other_kernel``: with a bridge.
+    - ``lost_on_the_way``, ``lost_on_the_way_or_dropped``: lost or damaged. The second: perhaps counted above too, or
+      dropped by a kernel that does not count.
+    - ``lost_in_file``: datagrams, lines or frames. ``notes_lost_in_file`` (also zeroed taxels), ``detections_...``,
+      ``registers_...``, ``changes_...`` (also resets), ``markers_...``, ``held_values_...`` (those at the beginning).
+
+    Causes in `damaged`:
+
+    - ``datagrams_damaged``, ``bytes_skipped`` and others: unusable; datagrams also count as lost on the way.
+    - ``datagrams_of_another_board``: version 2: another board's number, or other contents under the same session and
+      number.
+    - ``datagrams_too_late``: by more than 65 536 numbers.
+    - ``datagrams_decoded_again``: version 1: their events are there twice. Without values, only those with several
+      times count.
+    - ``changes_between_senders``: two boards use one port; the real number is larger.
+    - ``events_out_of_order``: version 1: by up to 0.1 s; version 2: by more.
+    - ``jumps_of_time``, ``jumps_of_time_before_it``: version 1: ahead by 1 s or more, after a damaged stamp (6.5536 s
+      late) or a reset; the second: before this trial. Streams of numbers: ahead of arrival by more than a second and a
+      hundredth of the pause.
+    - ``stamps_out_of_order``, ``drifts_from_arrival``: streams: stamps step back, by less than a second; the clock was
+      off by more than a second and a hundredth of the time.
+    - ``bad_chunks``, ``large_chunks``, ``skipped_bytes``, ``torn_bytes``, ``repeated_in_file``, ``no_final_counts``:
+      damage in the file; messages there twice are read twice.
+    - ``bytes_after_end`` ("bytes behind its end not read"): something was appended, as by ``cat``: use `taxel.merge`.
+    - ``changed_since_recorded`` ("what it holds is not what was recorded"): checksums differ.
+    - ``no_summary`` ("the summary at the end missing or damaged"): cut after all data; other programs may refuse the
+      file.
+
+    Causes in `noted`:
+
+    - ``datagrams_repeated``: version 2: each counts once.
+    - ``events_repaired`` ("values repaired from the board's refresh"): they differed from the board's.
+    - ``events_overtaken``: version 2: by 0.1 s or less, in the network; times are right.
+    - ``resets`` (of the board), ``changes_of_address``: new address or port, the same or another board.
+    - ``bytes_of_unfinished_lines``: the beginning or the end did not arrive.
+    - ``clock_began_anew`` ("restarts of its clock"), ``missing_values``: streams: back by more than a second, then
+      times by arrival; ``nan``.
+    - ``silences`` ("no frame came for a second or more"), ``silent_ms``: of sources of frames;
+      ``silences_of_other_computer``, ``restarts_of_other_computer``: of a bridge.
+    - ``gaps``, ``gaps_us``: number and sum.
 
     Examples
     --------

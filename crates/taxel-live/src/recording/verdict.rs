@@ -1,6 +1,6 @@
 //! The verdict of a recording: what was lost or damaged at which stage, as a status, as numbers by cause and as one line.
 //!
-//! All wordings of verdicts are made here; `docs/outputs.md` lists them.
+//! All wordings of verdicts are made here; `docs/outputs.md` and `taxel.Verdict` list them.
 
 mod of_file;
 
