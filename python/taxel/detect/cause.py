@@ -31,7 +31,7 @@ class Cause:
     Parameters
     ----------
     kind : str
-        One of `taxel.detect.cause.KINDS`; the page on training explains each.
+        One of `taxel.detect.cause.KINDS`; see Notes.
     labels : tuple of str
         The labels that it concerns.
     mistakes : int, 0 or more
@@ -50,6 +50,39 @@ class Cause:
     Raises
     ------
     ProblemError : another kind, or a value of another type
+
+    Notes
+    -----
+    What was measured, by kind, and what helps. ``taxel detect --truth`` finds those with an asterisk.
+
+    - ``falling_values``: values fall when touched. ``falls = true`` in a layout file, or remove it.
+    - ``shifted_labels`` (*): most labels, or those of a part of the recording, are shifted by the same time, more than
+      50 ms (another clock, a video, a key press). ``--shift-ms MS``, and ``--window-ms MS`` for labels by hand.
+    - ``shifted_training`` (*): labels agree with the felt loads, but all detections are late or early.
+      ``taxel train --shift-ms MS`` for the training.
+    - ``few_labels``: fewer than four labels.
+    - ``unlabelled_source``: one source (a foot) has half the share found of another. A column ``source`` in the labels.
+    - ``levels``: loads reach fewer than two levels, as in another unit. ``--set fit_levels=true``.
+    - ``overlapping_loads`` (*): one load holds several labels of a name. A source or region for each load.
+    - ``foreign_labels``: labels are more than 50 ms from any load, or all at the beginning. Labels of this recording;
+      times in us.
+    - ``tare``: the tare holds a touch, or untouched taxels read above rest. ``--tare``.
+    - ``begun_loaded``: labels are in the first two frames, already loaded. ``zeros_before_s`` in a layout file.
+    - ``durations``, ``plain_rule``: a rule makes at most half the mistakes. ``--rule FILE`` writes it, for
+      ``taxel detect --readout FILE``.
+    - ``recipe``: another recipe, tried on the same folds, makes at most half the mistakes. ``--recipe NAME``.
+    - ``window`` (*): detections are within twice the window of missed labels. ``--window-ms MS``.
+    - ``gaps`` (*): missed labels are where frames are missing, false detections at the first frames after a gap.
+    - ``unlabelled_time``: a quarter of the time is before or after the labels. Label all events, or ``taxel cut``.
+    - ``label_name``: no input follows a kind's labels, or they are within touches. A name of begin or end; other times.
+    - ``other_name`` (*): false detections are at labels of another name.
+    - ``unlabelled_loads`` (*): false detections are in loads as strong as labelled loads. Label these too.
+    - ``unfelt_labels`` (*): missed labels are more than 50 ms from any load: touches are too weak or too slow.
+    - ``unlike_training`` (*): noise, strength or loaded taxels differ from the training. Train with such data too.
+    - ``indistinct_kinds``: nothing separates the kinds. Other kinds.
+    - ``overfitting``: at most half the mistakes on training data. More labels.
+    - ``many_false`` (*): more than twice as many false detections as labels.
+    - ``unknown``: no cause found.
 
     Examples
     --------
