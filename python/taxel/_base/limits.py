@@ -1,4 +1,4 @@
-"""Limits of the size of files, checked before memory is taken; errors name them, docs/files.md lists them.
+"""Limits of file sizes, checked before memory is taken; errors name them, docs/files.md lists those that users meet.
 
 Files may be damaged or malicious: a few bytes can claim 10^12 values. The limits are well above what current sensors
 record. Those of .mcap are in its reader (crates/taxel-live/src/recording/limits.rs).

@@ -1,5 +1,5 @@
 //! Limits of a recording in the live format. They are checked before memory is allocated, named in the error or the
-//! verdict, and documented in docs/files.md. A file may come from an untrusted source or a damaged disk, and a few
+//! verdict; docs/files.md lists those that users meet. A file may come from an untrusted source or a damaged disk, and a few
 //! bytes can claim a size of 2^64.
 
 use std::path::Path;
