@@ -1,6 +1,6 @@
-"""Parts of the documentation that are made from the program: figures, options of commands, public names.
+"""Parts of the documentation that are made from the program: figures, options of commands, keys, public names.
 
-A page asks for them by directives: ``.. studies::``, ``.. commands::`` and ``.. names:: MODULE``.
+A page asks for them by directives: ``.. studies::``, ``.. commands::``, ``.. keys::`` and ``.. names:: MODULE``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,10 @@ from sphinx.pycode import ModuleAnalyzer
 from taxel.cli import app as command_line
 from taxel_studies import STUDIES
 
-FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
+ROOT = Path(__file__).resolve().parents[1]
+FIGURES = ROOT / "benchmarks" / "results" / "figures"
+KEYS = ROOT / "crates" / "taxel-panel" / "web" / "keys.js"
+KEY = r'shown: "([^"]+)", text: "([^"]+)"'
 #: Characters; the values of longer constants are not shown.
 LONGEST_VALUE = 80
 VERDICTS = {True: "holds", False: "**does not hold**", None: "not judged"}
@@ -131,6 +134,20 @@ class Commands(FromProgram):
         return [line for name, one in commands.items() for line in command(f"taxel {name}", one)]
 
 
+class Keys(FromProgram):
+    """Every key of the panel's page, and what it does."""
+
+    def lines(self) -> list[str]:
+        """Return a table, a row a key."""
+        self.state.document.settings.env.note_dependency(str(KEYS))
+        return table(["key", ""], [[f"``{key}``", text] for key, text in keys()], "10 90")
+
+
+def keys() -> list[tuple[str, str]]:
+    """Return each key of the page as it is shown, and what it does."""
+    return re.findall(KEY, KEYS.read_text())
+
+
 def command(name: str, one: Any) -> list[str]:
     """Return a command's section, and those of its own commands; studies alike are shown once."""
     lines = [*heading(name), *paragraphs(one.help or ""), ""]
@@ -197,5 +214,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     app.add_directive("studies", Studies)
     app.add_directive("commands", Commands)
+    app.add_directive("keys", Keys)
     app.add_directive("names", Names)
     return {"parallel_read_safe": True}
