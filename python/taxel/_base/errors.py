@@ -17,7 +17,7 @@ _Error = TypeVar("_Error", bound=Error)
 #: What each remedy says, with the reader's name of the argument that helps.
 _REMEDIES = {
     "give": "give {}",
-    "go_on": "to continue nonetheless, give {}",
+    "go_on": "to continue anyway, give {}",
     "larger": "a larger {} reads more",
     "lay_out": "give {}, or rows and columns in a layout file, if they are a grid's taxels row by row",
     "pitch": "give {} with the pitch in mm, or pitch_mm in a layout file",
