@@ -161,7 +161,7 @@ def test_a_row_that_the_problem_does_not_have_is_one_clear_error():
     for row, said in (
         (("silence", 99, 5.0), "pattern 99: there are 8"),
         (("target", 0, 7), "pattern 0, target 7: the pattern has 1 targets"),
-        (("silence", 0, 1e6), "outside of what is asked for"),
+        (("silence", 0, 1e6), "is outside the time that is trained"),
         (("noise", 0, 1.0), 'row of kind "noise"'),
         (("target", 0, 0.5), "target 0.5: must be a whole number"),
     ):

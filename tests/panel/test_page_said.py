@@ -310,7 +310,7 @@ def test_without_a_board_the_tab_record_says_so(chromium: Any, recording: Path) 
     with shown(chromium, recording) as page:
         press(page, "2")
         shows(page, "record-state", "^No board$")
-        shows(page, "record-more", "^is listened to")
+        shows(page, "record-more", "^is connected: ")
         assert page.locator("#record-form").is_hidden(), "there is nothing to fill in"
 
 

@@ -182,7 +182,7 @@ def test_everything_beside_the_frames_is_kept(tmp_path: Path) -> None:
     assert (back.detections, back.columns, back.lost) == (of.main.marks.detections(), ["hip", "knee"], ("something",))
     assert (back.source, back.verdict, back.remarks) == (
         "an amplifier",
-        "the .npz does not say what was lost",
+        "losses unknown: the .npz does not record them",
         ("converted from a",),
     )
     assert not back.truncated

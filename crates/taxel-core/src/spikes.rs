@@ -107,7 +107,7 @@ impl SpikeTrains {
                 return Err(problem!("spike at {} ms: train {n} of {trains}", s.t));
             }
             if !(start <= s.t && s.t <= stop) {
-                return Err(problem!("train {n}: spike at {} ms lies outside the window {start} to {stop} ms", s.t));
+                return Err(problem!("train {n}: spike at {} ms is outside the window {start} to {stop} ms", s.t));
             }
             offsets[n + 1] += 1;
         }
@@ -287,7 +287,7 @@ pub fn check(
 ) -> Result<()> {
     check_values(kind, values, times.len())?;
     if !(start.is_finite() && stop.is_finite() && start <= stop) {
-        return Err(problem!("window {} to {} ms: start must not lie after stop", start, stop));
+        return Err(problem!("window {} to {} ms: start must not be after stop", start, stop));
     }
     let sound = offsets.first() == Some(&0) && offsets.last() == Some(&times.len()) && offsets.is_sorted();
     if !sound {
@@ -306,7 +306,7 @@ pub fn check(
                 ));
             }
             if t < start || t > stop {
-                return Err(problem!("train {n}, spike {k}: {t} ms lies outside the window {} to {} ms", start, stop));
+                return Err(problem!("train {n}, spike {k}: {t} ms is outside the window {} to {} ms", start, stop));
             }
         }
     }

@@ -277,7 +277,7 @@ impl Live {
         self.pipeline.check()?;
         if IN_CALLBACK.get() {
             let text =
-                "live: `stop` was called by its own `say`, and would wait for itself; call it from another thread";
+                "live: `say` must not call `stop`, which would wait for `say`: call it from another thread";
             return Err(ProblemError::new_err(text));
         }
         enter(py, |_| {

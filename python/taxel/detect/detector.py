@@ -58,13 +58,13 @@ class _Detector(Saved):
         unit = self._parts.get("unit")
         return None if unit is None else str(unit)
 
-    def _check_unit(self, unit: str, subject: str = "values") -> None:
+    def _check_unit(self, unit: str) -> None:
         """Refuse values in another unit than it was trained on, as its weights and thresholds are of that unit."""
         if self.unit not in (None, unit):
             how = ", as a calibration gives (Recording.calibrated)" if self.unit in FORCE_UNITS else ""
             raise ProblemError(
-                f"{subject} in {unit}, and the {self._WHAT} was trained on {self.unit}: must be in {self.unit}{how}, "
-                f"or train anew on recordings in {unit}"
+                f"values are in {unit}, but the {self._WHAT} was trained on {self.unit}: give values in {self.unit}{how}, "
+                f"or train a {self._WHAT} on recordings in {unit}"
             )
 
     def _with(self, **parts: Any) -> Self:

@@ -381,7 +381,7 @@ class Recording:
         >>> _ = taxel.convert(folder / "one.npz", folder / "one.mcap")
         >>> one = taxel.open(folder / "one.mcap")
         >>> one.verdict, one.remarks
-        ('the .npz does not say what was lost', ('converted from one.npz',))
+        ('losses unknown: the .npz does not record them', ('converted from one.npz',))
         """
         return self._contents.main.losses.remarks
 

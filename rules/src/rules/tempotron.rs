@@ -74,7 +74,7 @@ impl Tempotron {
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.tau_s() >= self.tau {
-            return Err(problem!("tau_s"; " is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
+            return Err(problem!("tau_s"; " is {} ms: must be below tau, {} ms", self.tau_s(), self.tau));
         }
         Ok(())
     }

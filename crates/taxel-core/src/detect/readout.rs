@@ -182,7 +182,7 @@ impl Readout {
             && !sensor.fits(array)
         {
             let same_shape = (sensor.rows, sensor.columns) == (array.rows, array.columns);
-            let difference = if same_shape { ", of which others exist" } else { "" };
+            let difference = if same_shape { ", but other taxels of it exist" } else { "" };
             let error = problem!(
                 "an array of {} x {} taxels: the readout was trained on {} x {}{difference}",
                 array.rows,

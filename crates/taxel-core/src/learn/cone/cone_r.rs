@@ -65,7 +65,7 @@ impl ConeR {
     pub fn check(&self) -> Result<()> {
         self.neuron.check()?;
         if self.neuron.time != Time::Grid {
-            return Err(problem!("time"; " is \"continuous\": 6.13 is a sum over grid points, must be \"grid\""));
+            return Err(problem!("time"; " is \"continuous\": must be \"grid\", as equation 6.13 is a sum over grid points"));
         }
         self.check_ranges()?;
         if self.lambdas.iter().sum::<f64>() == 0.0 {
@@ -382,7 +382,7 @@ impl ConeRProblem {
             let low = if row < silent { 0.0 } else { objective.kink_of_c().1 };
             if !(low <= share && share <= low + 1.0) {
                 return Err(problem!(
-                    "start"; ": the multiplier of row {row} is {share}, must lie from {low} to {}",
+                    "start"; ": the multiplier of row {row} is {share}, must be from {low} to {}",
                     low + 1.0
                 ));
             }

@@ -428,7 +428,7 @@ impl Exact {
             None => Status::Feasible,
             Some(_) => Status::Stopped,
         };
-        let open = || format!("the objective is only proven to lie within {gap:.1e} of its least value");
+        let open = || format!("the objective is only proven to be within {gap:.1e} of its least value");
         let reason = match (cut_short, unmet.or_else(|| (!known).then(open))) {
             (Some(why), Some(reason)) => Some(format!("{why}; {reason}")),
             (_, reason) => reason,

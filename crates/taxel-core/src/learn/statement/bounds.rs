@@ -87,7 +87,7 @@ pub(crate) fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
         let (low, high) = (lb.at(n), ub.at(n));
         if !(is_weight(low) && is_weight(high) && low <= high) {
             let bounds = if each.is_some() { format!("bounds of synapse {n}:") } else { "bounds".to_owned() };
-            return Err(problem!("{bounds} {low} to {high} mV: lb must not lie above ub, both within 1e100"));
+            return Err(problem!("{bounds} {low} to {high} mV: lb must not be above ub, both within 1e100"));
         }
     }
     Ok(())
