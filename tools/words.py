@@ -22,6 +22,13 @@ SOURCES = (
     "crates/taxel-panel/web/*.js",
     "crates/taxel-panel/web/*.html",
 )
+#: Comments, characters and texts of Rust and of the page's modules, of which the texts are read.
+RUST = re.compile(
+    r"""//[^\n]*|/\*.*?\*/|'(?:\\.|[^'\\])'|r(?P<hashes>\#+)".*?"(?P=hashes)|"(?P<text>(?:[^"\\]|\\.)*)\"""", re.DOTALL
+)
+SCRIPT = re.compile(
+    r"""//[^\n]*|/\*.*?\*/|(?P<quote>["`])(?P<text>(?:(?!(?P=quote))[^\\]|\\.)*)(?P=quote)""", re.DOTALL
+)
 #: The beginning of a sentence.
 BEGIN = r"(?:^|(?<=[.:;] ))"
 #: Patterns that the house no longer uses, each with what to write instead.
@@ -40,7 +47,7 @@ WORDS = {
     r"\bin the place of\b": "instead of",
     r"\bof (?:its|their|his|an) own\b|\bown one\b": "separate; its",
     r"\b(?:other|another|this|(?<!so )that|each) one\b(?! of)": "name the thing",
-    r"\bfrom [\w.]+(?: \w+)? on\b": "after, since, ... or later",
+    r"\bfrom (?!(?:now|then) on)[\w.]+(?: \w+)? on\b": "after, since, ... or later",
     r"\bstands?\b(?! for)": "is",
     r"\bbrings?\b": "gives, adds",
     r"\bto be had\b|\bbe had\b": "available",
@@ -64,11 +71,11 @@ def texts(path: Path) -> Iterator[tuple[int, str]]:
     elif path.suffix == ".html":
         yield 1, re.sub(r"<[^>]*>", lambda tag: "\n" * tag[0].count("\n"), written)
     else:
-        for number, line in enumerate(written.splitlines(), 1):
-            if not line.lstrip().startswith(("//", "*", "/*")):
-                yield from (
-                    (number, quoted) for quoted in re.findall(r'["`]((?:[^"`\\]|\\.)* (?:[^"`\\]|\\.)*)["`]', line)
-                )
+        for found in (SCRIPT if path.suffix == ".js" else RUST).finditer(written):
+            if " " in (text := found["text"] or ""):
+                # What is computed in a text, and a line of Rust that continues on the next.
+                text = re.sub(r"\$?\{[^{}]*\}", "", re.sub(r"\\\n *", "", text))
+                yield written.count("\n", 0, found.start()) + 1, text
 
 
 def findings(path: Path) -> Iterator[str]:

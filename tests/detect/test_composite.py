@@ -134,7 +134,7 @@ def test_inputs_that_do_not_exist_are_refused(neuron: tuple, more: dict, text: s
 
 
 def test_one_encoder_has_no_inputs() -> None:
-    with refused("a: inputs are .*: the encoder is no composite"):
+    with refused("a: inputs are .*: the encoder is not a composite"):
         Readout(PARTS["area"], {"a": (Neuron(), [1.0] * 4, 0.0, ("area",))})
     for call in (
         composite(1).encoder_of,

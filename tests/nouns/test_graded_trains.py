@@ -68,7 +68,7 @@ def test_nwb_files_and_neo_trains_without_a_kind_are_signed(tmp_path: Path) -> N
         ([1.0, float("nan")], "graded", r"values\[1\] is nan: must be finite"),
         ([1.0, float("-inf")], "graded", r"values\[1\] is -inf: must be finite"),
         ([1e39, 1.0], "graded", r"values\[0\]"),
-        ([1.0, 0.0], "graded", r"values\[1\] is 0: a graded value of 0 is no spike"),
+        ([1.0, 0.0], "graded", r"values\[1\] is 0: a graded value of 0 is not a spike"),
         ([1.0, -0.0], "graded", r"values\[1\] is 0"),
         ([1.0, 1e-60], "graded", r"values\[1\]"),
         ([1.0], "graded", "values: must be one a spike, 2"),

@@ -333,7 +333,7 @@ fn check_values(kind: SpikeKind, values: Option<&[f32]>, spikes: usize) -> Resul
     if kind == SpikeKind::Graded
         && let Some(k) = values.iter().position(|&value| value == 0.0)
     {
-        return Err(problem!("values"; "[{k}] is 0: a graded value of 0 is no spike, leave it out"));
+        return Err(problem!("values"; "[{k}] is 0: a graded value of 0 is not a spike, leave it out"));
     }
     Ok(())
 }

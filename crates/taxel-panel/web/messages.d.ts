@@ -813,7 +813,7 @@ export interface PresetDeleteRequest {
   name: string;
 }
 
-/** Begin: after the countdown (none where left out) record to `NAME.mcap`, or with an `index` of 1 to `NAME1.mcap`, for `length_s`, or else until `stop`. With `advance` the index moves on by itself after each recording, and the next countdown begins until `stop`. `label` is written into the recording as a note without a time: it holds for all of it, and is no event. `format` is `mcap` where left out; `lsa` holds raw bytes and no label. */
+/** Begin: after the countdown (none where left out) record to `NAME.mcap`, or with an `index` of 1 to `NAME1.mcap`, for `length_s`, or else until `stop`. With `advance` the index moves on by itself after each recording, and the next countdown begins until `stop`. `label` is written into the recording as a note without a time: it is about the whole recording, and is not an event. `format` is `mcap` where left out; `lsa` holds raw bytes and no label. */
 export interface RecordRequest {
   type: "record";
   id?: number;

@@ -63,8 +63,8 @@ class _Detector(Saved):
         if self.unit not in (None, unit):
             how = ", as a calibration gives (Recording.calibrated)" if self.unit in FORCE_UNITS else ""
             raise ProblemError(
-                f"values are in {unit}, but the {self._WHAT} was trained on {self.unit}: give values in {self.unit}{how}, "
-                f"or train a {self._WHAT} on recordings in {unit}"
+                f"values are in {unit}, but the {self._WHAT} was trained on {self.unit}: "
+                f"give values in {self.unit}{how}, or train a {self._WHAT} on recordings in {unit}"
             )
 
     def _with(self, **parts: Any) -> Self:

@@ -144,7 +144,7 @@ impl Readout {
                 Ok(Cow::Owned(Encoder::Composite(Composite { parts: parts.collect() })))
             }
             (_, names) => {
-                Err(problem!("inputs"; " are {names:?}: the encoder is no composite, so there are no others"))
+                Err(problem!("inputs"; " are {names:?}: the encoder is not a composite, so it has no other inputs"))
             }
         }
     }

@@ -172,7 +172,11 @@ impl Zeroing {
             let (rows, columns) = (array.rows, array.columns);
             return Err(problem!("taxel at row {y}, column {x}: there is no such taxel in {rows} x {columns}"));
         }
-        if rest.is_finite() { Ok(()) } else { Err(problem!("taxel at row {y}, column {x}: its rest is {rest}, must be finite")) }
+        if rest.is_finite() {
+            Ok(())
+        } else {
+            Err(problem!("taxel at row {y}, column {x}: its rest is {rest}, must be finite"))
+        }
     }
 }
 

@@ -44,10 +44,7 @@ pub(super) fn window(
             let train = side.train(p, n);
             if let Some(k) = train.iter().position(|&t| t < start || t > stop) {
                 let name = side.train_name(p, n);
-                return Err(problem!(
-                    "{name}, spike {k}: {} ms is outside the window {start} to {stop} ms",
-                    train[k]
-                ));
+                return Err(problem!("{name}, spike {k}: {} ms is outside the window {start} to {stop} ms", train[k]));
             }
         }
     }

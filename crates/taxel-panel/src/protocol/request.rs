@@ -78,8 +78,8 @@ pub(crate) enum Request {
     PresetDelete { name: Text<60> },
     /// Begin: after the countdown (none where left out) record to `NAME.mcap`, or with an `index` of 1 to `NAME1.mcap`, for
     /// `length_s`, or else until `stop`. With `advance` the index moves on by itself after each recording, and the next countdown
-    /// begins until `stop`. `label` is written into the recording as a note without a time: it holds for all of it, and is no
-    /// event. `format` is `mcap` where left out; `lsa` holds raw bytes and no label.
+    /// begins until `stop`. `label` is written into the recording as a note without a time: it is about the whole recording,
+    /// and is not an event. `format` is `mcap` where left out; `lsa` holds raw bytes and no label.
     Record(RecordRequest),
     /// End the recording, or its countdown; and the advance.
     Stop {},

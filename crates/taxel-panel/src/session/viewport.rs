@@ -260,7 +260,9 @@ impl Viewport {
         work: impl FnOnce(&mut SourcePosition) -> taxel_live::Result<T> + Send + 'static,
     ) -> Answer<T> {
         let Position::At(position) = &mut self.position else { return Err("the view follows the newest data".into()) };
-        let Some(mut position) = position.take() else { return Err("this view has ended: open the recording again".into()) };
+        let Some(mut position) = position.take() else {
+            return Err("this view has ended: open the recording again".into());
+        };
         let worked = tokio::task::spawn_blocking(move || {
             let outcome = work(&mut position);
             (position, outcome)

@@ -65,7 +65,9 @@ impl ConeR {
     pub fn check(&self) -> Result<()> {
         self.neuron.check()?;
         if self.neuron.time != Time::Grid {
-            return Err(problem!("time"; " is \"continuous\": must be \"grid\", as equation 6.13 is a sum over grid points"));
+            return Err(
+                problem!("time"; " is \"continuous\": must be \"grid\", as equation 6.13 is a sum over grid points"),
+            );
         }
         self.check_ranges()?;
         if self.lambdas.iter().sum::<f64>() == 0.0 {
