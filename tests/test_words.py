@@ -34,7 +34,7 @@ EXAMPLES = (
     "The rate is 40 mb/event.",
 )
 CLEAN = """\
-From now on there is no sensor; there are no more frames, and v stands for a version,
+From now on there is no sensor; there are no more frames, it is no better, and v stands for a version,
 so that one of them is each one of the two. What is this recording? What happens next?
 Read the options. The frames of a board begin at 0.
 """

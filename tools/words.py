@@ -41,7 +41,7 @@ WORDS = {
     r"\blies?\b": "is, are",
     r"\b(?:goes|went) (?:on|by|into|to|with|away)\b": "continues, is sent, is used",
     r"\banew\b": "again",
-    r"\b(?<![Tt]here )(?:is|are|was|were) no (?!more|longer|less|later|earlier)\w": "is not a",
+    r"\b(?<![Tt]here )(?:is|are|was|were) no (?!more|longer|less|later|earlier|better|worse|larger|smaller)\w": "is not a",
     r"\bat hand\b": "available",
     r"\bcomes? along\b": "is included",
     r"\bin the place of\b": "instead of",

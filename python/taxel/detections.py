@@ -236,7 +236,7 @@ class Detections(FrozenColumns):
         if not isinstance(other, Detections):
             return NotImplemented
         if (self.reported is None) != (other.reported is None):
-            raise ProblemError("detections with `reported` and without: only alike ones are merged")
+            raise ProblemError("some detections have `reported` and others do not: these cannot be merged")
         order = np.argsort(np.concatenate([self.t, other.t]), kind="stable")
         names = ["label", "t", "known", "slope", "repaired"] + ([] if self.reported is None else ["reported"])
         columns = {name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names}

@@ -73,7 +73,7 @@ class Tare(Saved):
     _text: str
 
     def __init__(self) -> None:
-        raise ProblemError("a tare is measured (Tare.take) or loaded (Tare.load), not built")
+        raise ProblemError("Tare: measure one by Tare.take, or load one by Tare.load")
 
     @classmethod
     def take(

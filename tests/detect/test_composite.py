@@ -284,7 +284,7 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
         ({"neurons": {"a": {"delay_ms": 4.0, "search": [{"inputs": ["b"]}]}}}, "neurons.a.search: inputs: no encoder"),
         ({"encoders": {"area": {"name": "areas"}}}, "recipe: encoders.area: encoder areas: must be one of"),
         ({"encoders": {"area": 3}}, "recipe: encoders.area"),
-        ({"encoders": 3}, "recipe: says no encoder"),
+        ({"encoders": 3}, "recipe: states no encoder"),
         ({"encoder": {"name": "fa1"}}, "both encoder and encoders"),
     ],
 )

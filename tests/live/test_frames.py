@@ -284,7 +284,10 @@ def test_values_that_fall_are_named_in_the_shell(tmp_path: Path, falls: bool) ->
     )
     said = done.stdout + done.stderr
     assert done.returncode == 0, said
-    assert ("values fall under touch: add ,falls=true to the source" in " ".join(said.split())) == falls
+    assert (
+        "values fall under touch: if smaller values mean more pressure, add ,falls=true to the source"
+        in " ".join(said.split())
+    ) == falls
 
 
 def test_the_report_says_how_many_detections_lie_outside_the_training(tmp_path: Path) -> None:

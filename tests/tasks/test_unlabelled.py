@@ -92,7 +92,7 @@ def test_detections_of_it_are_not_scored(feet: Path, tmp_path: Path, capsys: pyt
     labels, readout = table(tmp_path / "l.csv", rows(BEGINS, "left")), tmp_path / "r.json"
     train(taxel.open(feet), labels).readout.save(readout)
     _, out, _ = call(capsys, "detect", feet, "--readout", readout, "--truth", labels)
-    assert f"not scored, as no row of {labels} names it: contact of right" in out
+    assert f"not scored, because no row of {labels} names it: contact of right" in out
     found = taxel.tasks.detect(taxel.Readout.load(readout), taxel.open(feet), labels)
     assert found.score is not None
     assert found.score.false == 0

@@ -184,8 +184,10 @@ class _Check:
         driven = found.silent[:, : found.registers.lines]
         quiet = lines_of(driven)
         where = f"; {quiet}: their comparators, if no current flows there" if quiet else ""
-        words = f"comparators had not returned as their ramp began, {counted(found.faults, 'time')}{where}"
-        self.tell("comparators", found.faults == 0, words if found.faults else "all had returned as their ramps began")
+        words = f"comparators had not returned when their ramp began, {counted(found.faults, 'time')}{where}"
+        self.tell(
+            "comparators", found.faults == 0, words if found.faults else "all had returned when their ramps began"
+        )
         full = found.full[:, : found.registers.lines]
         end = f"{counted(int(full.sum()), 'taxel')} stay at the ramp's end, {found.registers.ramp} ticks"
         why = "no comparator is connected there, or the ramp does not reach its voltage"

@@ -80,7 +80,7 @@ def name_of(k: int, example: Example) -> str:
 
 
 class Outcome(NamedTuple):
-    """What a readout detected in an example, and how that scores where its labels are known.
+    """The detections of a readout in an example, and their score if its labels are known.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ def causes_text(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def check_examples(examples: Sequence[Example]) -> list[Example]:
-    """Return the examples with their sources read and their labels as columns of whole us; refuse what is no example.
+    """Return the examples with their sources read and their labels as columns of whole us; refuse anything else.
 
     Raises
     ------

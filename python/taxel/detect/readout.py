@@ -38,7 +38,7 @@ SILENCE_MS = 1000.0
 
 
 class FittedLearner(Protocol):
-    """What a readout needs of a fitted learner."""
+    """A fitted learner, as a readout needs it."""
 
     neuron_: Neuron
     weights_: NDArray[np.float64]
@@ -271,7 +271,7 @@ class Readout(_Detector):
         Returns
         -------
         list of str
-            What NIR cannot hold, one line each. It stands in the file's metadata, where `from_nir` finds it again.
+            A line for each thing that NIR cannot hold. The file's metadata hold it, where `from_nir` finds it again.
 
         Raises
         ------
@@ -391,7 +391,7 @@ def run(
     tare : Tare, optional
         The taxels' rest, where the encoder needs one and has none.
     wire_version : int, from 1 to 2, optional
-        Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
+        Of the wire that stamped the events: 1 counts 100 us, so that a stamp may be before its frame; 2 counts us.
         Left out: what the recording's registers hold, else 1.
 
     Returns

@@ -145,7 +145,7 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
     off = time - swing
     wrong = np.flatnonzero((np.diff(time, prepend=-np.inf) <= 0) | (stride <= 0) | (swing <= 0) | (swing >= stride))
     if len(wrong):
-        raise FormatError(f"{path.name}, line {wrong[0] + 1}: time, left stride and swing do not follow one another")
+        raise FormatError(f"{path.name}, line {wrong[0] + 1}: times must ascend, and 0 < swing < stride")
     strikes = np.unique(whole_us(path.name, np.concatenate([[time[0] - stride[0]], time])))
     return {"contact": strikes, "foot_off": whole_us(path.name, off)}
 

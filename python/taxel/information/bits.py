@@ -70,7 +70,7 @@ def confusion_matrix(
     except TypeError:
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers") from None
     if len(np.unique(order)) != len(order):
-        raise refused("classes", " names one twice")
+        raise refused("classes", " names a response twice")
     missing = np.setdiff1d(known, order)
     if len(missing):
         raise refused("classes", f" does not name {shown(missing[0].item())}")

@@ -86,7 +86,7 @@ class Recording:
 
     def __init__(self, contents: Contents) -> None:
         if not isinstance(contents, Contents):
-            raise refused("contents", f" is {shown(contents)}: a recording is opened by taxel.open(path), not built")
+            raise refused("contents", f" is {shown(contents)}: open a recording by taxel.open(path)")
         self._contents = contents
         main = contents.main
         self.path, self.name, self.kind = main.origin.path, main.origin.name, main.origin.kind

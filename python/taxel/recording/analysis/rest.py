@@ -119,8 +119,8 @@ class Rest:
         """Return what to do of values that fall; of the recording of a path it names the layout file."""
         layout, turning = Rest.turning(path)
         if layout:
-            return f"values fall from their rest as {layout} turns them: if that is wrong, leave falls out of it"
-        return f"values fall from their rest: if less means more pressure, write {turning}"
+            return f"values fall from their rest as {layout} turns them: if that is wrong, remove falls from the file"
+        return f"values fall from their rest: if smaller values mean more pressure, write {turning}"
 
     @staticmethod
     def turning(path: Path | None = None) -> tuple[str, str]:
