@@ -18,6 +18,7 @@ SOURCES = (
     "*.md",
     "docs/*.md",
     "python/**/*.py",
+    "python/**/*.j2",
     "crates/*/src/**/*.rs",
     "crates/taxel-panel/web/*.js",
     "crates/taxel-panel/web/*.html",
@@ -68,8 +69,8 @@ def texts(path: Path) -> Iterator[tuple[int, str]]:
         for node in ast.walk(ast.parse(written)):
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
                 yield node.lineno, re.sub(r"`[^`\n]*`", "", node.value)
-    elif path.suffix == ".html":
-        yield 1, re.sub(r"<[^>]*>", lambda tag: "\n" * tag[0].count("\n"), written)
+    elif path.suffix in (".html", ".j2"):
+        yield 1, re.sub(r"\{[{%].*?[}%]\}|<[^>]*>", lambda code: "\n" * code[0].count("\n"), written)
     else:
         for found in (SCRIPT if path.suffix == ".js" else RUST).finditer(written):
             if " " in (text := found["text"] or ""):

@@ -108,7 +108,7 @@ def test_an_example_is_left_out_of_what_is_not_known_of_it(tmp_path: Path) -> No
     more = Example(frames, truth, tare)
     with_it, without = (judge([known, more, *rest], recipe, 2).together for rest in ([unknown], []))
     assert with_it.rank == without.rank
-    with pytest.raises(taxel.ProblemError, match="unlabelled has 'contact', of which there are labels"):
+    with pytest.raises(taxel.ProblemError, match="unlabelled names 'contact', which has labels"):
         tune([Example(frames, truth, tare, unlabelled=["contact"])])
     assert np.array_equal(known._known(known_detections()).t, [1000])
 

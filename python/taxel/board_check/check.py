@@ -122,7 +122,7 @@ class _Check:
         named = ", ".join(f"{name} {count}" for name, count in lost.items() if count)
         unnumbered = values.version == 1
         none = (
-            "none that bytes show; datagrams of version 1 have no numbers"
+            "none that can be seen: datagrams of version 1 have no numbers"
             if unnumbered
             else "none: no number is missing"
         )

@@ -155,7 +155,7 @@ def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
         there = few(dict.fromkeys(recording.title for recording in recordings))
         warn(
             f"{table.path}: left out {count} of {few(strange)}, which {'is' if len(strange) == 1 else 'are'} "
-            f"not here; there {'is' if len(recordings) == 1 else 'are'} {there}",
+            f"not among the recordings: {there}",
             stacklevel=3,
         )
 
@@ -242,7 +242,10 @@ def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]
         left_out[row.source] += 1
     for side, count in left_out.items():
         (here,) = _SIDES - {side}
-        warn(f"{table.path}: left out {counted(count, 'event')} of the {side}; what is here is {here}", stacklevel=3)
+        warn(
+            f"{table.path}: left out {counted(count, 'event')} of the {side}; the recording is of the {here}",
+            stacklevel=3,
+        )
 
 
 def _noted(recording: Recording) -> dict[str, NDArray[np.int64]]:
@@ -337,9 +340,9 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
     if behind:
         (at, label), begin = behind[0], beginning_us(np.array([first]))
         warn(
-            f"{len(behind)} of the {total} events of {where} are behind the last that was recorded, at "
-            f"{(end - begin) / 1e6:.3f} s ({label} at {(at - begin) / 1e6:.3f} s): they count, and as missed if the "
-            "recording stopped before them",
+            f"{len(behind)} of the {total} events of {where} are later than the last recorded event, at "
+            f"{(end - begin) / 1e6:.3f} s ({label} at {(at - begin) / 1e6:.3f} s): they are scored, and count as "
+            "missed if the recording stopped before them",
             stacklevel=2,
         )
     outside = total - sum(map(len, inside.values()))
