@@ -218,9 +218,9 @@ fn only_a_taxel_that_exists_is_zeroed() {
     let z = Zeroing { t: 0, x: 0, y: 0, rest: 1.0, before: None };
     assert!(z.check(&array).is_ok());
     for (wrong, message) in [
-        (Zeroing { x: 1, y: 1, ..z }, "taxel at row 1, column 1: none there in 2 x 2"),
-        (Zeroing { x: 2, ..z }, "taxel at row 0, column 2: none there in 2 x 2"),
-        (Zeroing { rest: f64::NAN, ..z }, "taxel at row 0, column 0: a rest of NaN"),
+        (Zeroing { x: 1, y: 1, ..z }, "taxel at row 1, column 1: there is no such taxel in 2 x 2"),
+        (Zeroing { x: 2, ..z }, "taxel at row 0, column 2: there is no such taxel in 2 x 2"),
+        (Zeroing { rest: f64::NAN, ..z }, "taxel at row 0, column 0: its rest is NaN, must be finite"),
     ] {
         assert_eq!(wrong.check(&array).unwrap_err().to_string(), message);
     }
