@@ -167,7 +167,7 @@ class Detections(FrozenColumns):
             None if reported is None else frozen_column("reported", reported, np.int64, "us")
         )
         if self.reported is not None and len(self.reported) != len(labels):
-            raise refused("reported", f" has {len(self.reported)} entries: must be {len(labels)}, one a detection")
+            raise refused("reported", f" has {len(self.reported)} entries: must be {len(labels)}, one per detection")
         marks = frozen(np.zeros(len(labels), np.bool_)) if repaired is None else repaired
         self.repaired: NDArray[np.bool_] = frozen_column("repaired", marks, np.bool_)
         _core.check_detections(self._parts())

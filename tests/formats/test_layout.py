@@ -480,7 +480,7 @@ def test_a_layout_for_tables_says_nothing_of_a_board_s_recording_in_the_same_fol
 def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: Path) -> None:
     write_gaitpdb(tmp_path)
     (tmp_path / "layout.toml").write_text("[places]\nx = [1, 2]\ny = [1, 2]\n")
-    with pytest.raises(FormatError, match=r"layout\.toml: .*must be \(1, 8\), one a taxel"):
+    with pytest.raises(FormatError, match=r"layout\.toml: .*must be \(1, 8\), one per taxel"):
         taxel.open_all(tmp_path)
 
 

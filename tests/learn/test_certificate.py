@@ -354,7 +354,7 @@ def test_a_certificate_has_one_multiplier_a_row() -> None:
     trains = SpikeTrains.from_lists([[50.0], [60.0]], stop=100.0)
     cone = ConeX().fit([trains], [[40.0]])
     proof = dataclasses.replace(cone.certificate_, multipliers=np.ones(len(cone.certificate_.rows) + 1))
-    with pytest.raises(ProblemError, match=r"certificate: 2 multipliers for 1 row: must be one a row"):
+    with pytest.raises(ProblemError, match=r"certificate: 2 multipliers for 1 row: must be one per row"):
         check_certificate(cone.problem_, proof)
 
 

@@ -389,7 +389,7 @@ def test_progress_is_told_round_by_round():
         ({"lambdas": (1, 2, -3)}, r"lambdas\[2\] is -3"),
         ({"ub": float("inf")}, "ub is inf: must be finite"),
         ({"lb": [0.0, float("nan")]}, r"lb\[1\] is nan: must be finite"),
-        ({"lb": "low"}, 'lb is "low": must be a number, or one a synapse, mV'),
+        ({"lb": "low"}, 'lb is "low": must be a number, or one per synapse, mV'),
         ({"margin": 0.0}, "margin is 0 mV: must be above 0 in continuous time"),
         ({"slope": -1.0}, "slope is -1 mV/ms"),
         ({"slope": 0.1, "time": "grid"}, 'slope is 0.1 mV/ms: belongs to time "continuous"'),

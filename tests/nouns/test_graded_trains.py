@@ -71,7 +71,7 @@ def test_nwb_files_and_neo_trains_without_a_kind_are_signed(tmp_path: Path) -> N
         ([1.0, 0.0], "graded", r"values\[1\] is 0: a graded value of 0 is not a spike"),
         ([1.0, -0.0], "graded", r"values\[1\] is 0"),
         ([1.0, 1e-60], "graded", r"values\[1\]"),
-        ([1.0], "graded", "values: must be one a spike, 2"),
+        ([1.0], "graded", "values: must be one per spike, 2"),
         (None, "graded", "graded trains need values"),
         (None, "signed", "signed trains need values"),
         ([1.0, 1.0], "unsigned", "unsigned trains have no values"),

@@ -318,14 +318,14 @@ fn check_values(kind: SpikeKind, values: Option<&[f32]>, spikes: usize) -> Resul
     let Some(values) = values else {
         return match kind {
             SpikeKind::Unsigned => Ok(()),
-            SpikeKind::Signed | SpikeKind::Graded => Err(problem!("{} trains need values, one a spike", kind.name())),
+            SpikeKind::Signed | SpikeKind::Graded => Err(problem!("{} trains need values, one per spike", kind.name())),
         };
     };
     if kind == SpikeKind::Unsigned {
         return Err(problem!("unsigned trains have no values: choose kind signed or graded, or leave the values out"));
     }
     if values.len() != spikes {
-        return Err(problem!("values"; ": must be one a spike, {spikes}"));
+        return Err(problem!("values"; ": must be one per spike, {spikes}"));
     }
     if let Some(k) = values.iter().position(|value| !value.is_finite()) {
         return Err(problem!("values"; "[{k}] is {}: must be finite", format!("{}", values[k]).to_lowercase()));

@@ -140,7 +140,7 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
     rows = [line.split() for line in text.lines(path)]
     values = text.numbers(rows, path, 1, _TS_COLUMNS)
     if not len(values):
-        raise FormatError(f"{path.name}: empty; must hold one line a stride")
+        raise FormatError(f"{path.name}: empty; must hold one line per stride")
     time, stride, swing = values[:, 0], values[:, 1], values[:, 3]
     off = time - swing
     wrong = np.flatnonzero((np.diff(time, prepend=-np.inf) <= 0) | (stride <= 0) | (swing <= 0) | (swing >= stride))

@@ -61,7 +61,7 @@ def confusion_matrix(
     """
     truth, answered = words("labels", labels), words("responses", responses)
     if len(truth) != len(answered):
-        raise refused("responses", f" has {len(answered)} entries: must be {len(truth)}, one a label")
+        raise refused("responses", f" has {len(answered)} entries: must be {len(truth)}, one per label")
     if not len(truth):
         raise refused("labels", " is []: must hold a trial at least")
     try:

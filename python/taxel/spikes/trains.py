@@ -128,7 +128,7 @@ class SpikeTrains(FrozenColumns):
         if values is not None:
             valued, lengths = _by_train("values", bare("values", values), np.float32)
             if lengths != counts:
-                raise refused("values", ": must have the lengths of the trains, one value a spike")
+                raise refused("values", ": must have the lengths of the trains, one value per spike")
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         if stop is None:
             # Values that are not finite are refused below, with their positions.

@@ -66,7 +66,9 @@ class InformationOptions:
     def _chosen(self) -> Encoder | None:
         """Return the encoder; None of that which the answer chooses by itself."""
         if text("encoder", self.encoder) not in ("change_events", "fa1"):
-            raise refused("encoder", f" is {self.encoder}: must be change_events or fa1, which have one train a taxel")
+            raise refused(
+                "encoder", f" is {self.encoder}: must be change_events or fa1, which have one train per taxel"
+            )
         mapping("parameters", self.parameters)
         if self.encoder == "change_events" and not self.parameters:
             return None

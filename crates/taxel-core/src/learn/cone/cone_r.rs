@@ -181,7 +181,7 @@ impl ConeRProblem {
         check_examples(neuron, patterns, targets)?;
         if silence.len() != patterns.len() {
             let (lists, count) = (silence.len(), patterns.len());
-            return Err(problem!("silence"; ": {lists} lists for {count} patterns, must be one a pattern"));
+            return Err(problem!("silence"; ": {lists} lists for {count} patterns, must be one per pattern"));
         }
         for (p, windows) in silence.iter().enumerate() {
             check_silence(p, windows.as_deref())?;

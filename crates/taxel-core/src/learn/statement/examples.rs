@@ -15,7 +15,7 @@ pub fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<
     }
     if patterns.len() != targets.len() {
         return Err(problem!(
-            "targets"; ": {} lists for {} patterns, must be one a pattern (an empty one teaches silence)",
+            "targets"; ": {} lists for {} patterns, must be one per pattern (an empty one teaches silence)",
             targets.len(),
             patterns.len()
         ));
