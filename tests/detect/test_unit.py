@@ -116,10 +116,10 @@ def test_the_commands_and_the_page_name_both_units(tmp_path: Path, capsys) -> No
     assert code == 0, error
     assert load(readout).unit == "kPa"
     code, out, error = call(capsys, "detect", tmp_path / "counts.npz", "--readout", readout, "--tare", "0.3")
-    said = "values in counts, and the readout was trained on kPa: must be in kPa, as a calibration gives"
+    said = "values are in counts, but the readout was trained on kPa: give values in kPa, as a calibration gives"
     assert (code, out, error.count("\n"), said in error) == (2, "", 1, True), error
     handler = TrainingRequests(Opening(), ShownFiles())
-    with refused("values in counts, and the readout was trained on kPa"):
+    with refused("values are in counts, but the readout was trained on kPa"):
         handler.detect(tmp_path / "counts.npz", None, readout)
     labels, _, found = handler.detect(tmp_path / "kPa.npz", None, readout)
     assert (labels, len(found) > 0) == (["contact"], True)
