@@ -241,7 +241,7 @@ def test_a_forked_child_that_uses_its_parents_live_gets_one_clear_error(what):
         }
         said = forked(calls[what])
     assert said == (
-        f"ProblemError: live: belongs to process {os.getpid()}, whose threads a forked child has not; "
+        f"ProblemError: live: belongs to process {os.getpid()}; a forked child does not have its threads: "
         "begin a new one in the child"
     )
     assert live.stop().nothing_came

@@ -34,7 +34,7 @@ EXAMPLES = (
     "The rate is 40 mb/event.",
 )
 CLEAN = """\
-There is no sensor; there are no more frames, and v stands for a version,
+From now on there is no sensor; there are no more frames, it is no better, and v stands for a version,
 so that one of them is each one of the two. What is this recording? What happens next?
 Read the options. The frames of a board begin at 0.
 """
@@ -65,6 +65,16 @@ def test_code_is_skipped(tmp_path: Path) -> None:
     assert ":4: " in line
 
 
+def test_texts_of_rust_are_read_over_several_lines(tmp_path: Path) -> None:
+    """Without what is computed in them, and without characters that look like the beginning of a text."""
+    [line] = found(
+        tmp_path / "a.rs",
+        f'// {EXAMPLES[7]}\nlet a = (\'"\', r#"{EXAMPLES[7]}"#);\nlet b = "{{told}}: it is \\\n    {EXAMPLES[7]}";\n',
+    )
+    assert ":3: " in line
+
+
 def test_texts_of_the_page_are_read(tmp_path: Path) -> None:
     assert len(found(tmp_path / "a.js", f'// {EXAMPLES[0]}\nconst told = "{EXAMPLES[7]}";\n')) == 1
+    assert len(found(tmp_path / "b.js", f"const text = `\n${{told}} is the\n{EXAMPLES[7]}`;\n")) == 1
     assert len(found(tmp_path / "a.html", f'<p title="anew thing">{EXAMPLES[7]}</p>\n')) == 1

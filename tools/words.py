@@ -18,9 +18,17 @@ SOURCES = (
     "*.md",
     "docs/*.md",
     "python/**/*.py",
+    "python/**/*.j2",
     "crates/*/src/**/*.rs",
     "crates/taxel-panel/web/*.js",
     "crates/taxel-panel/web/*.html",
+)
+#: Comments, characters and texts of Rust and of the page's modules, of which the texts are read.
+RUST = re.compile(
+    r"""//[^\n]*|/\*.*?\*/|'(?:\\.|[^'\\])'|r(?P<hashes>\#+)".*?"(?P=hashes)|"(?P<text>(?:[^"\\]|\\.)*)\"""", re.DOTALL
+)
+SCRIPT = re.compile(
+    r"""//[^\n]*|/\*.*?\*/|(?P<quote>["`])(?P<text>(?:(?!(?P=quote))[^\\]|\\.)*)(?P=quote)""", re.DOTALL
 )
 #: The beginning of a sentence.
 BEGIN = r"(?:^|(?<=[.:;] ))"
@@ -34,13 +42,13 @@ WORDS = {
     r"\blies?\b": "is, are",
     r"\b(?:goes|went) (?:on|by|into|to|with|away)\b": "continues, is sent, is used",
     r"\banew\b": "again",
-    r"\b(?<![Tt]here )(?:is|are|was|were) no (?!more|longer|less|later|earlier)\w": "is not a",
+    r"\b(?<![Tt]here )(?:is|are|was|were) no (?!more|longer|less|later|earlier|better|worse|larger|smaller)\w": "is not a",
     r"\bat hand\b": "available",
     r"\bcomes? along\b": "is included",
     r"\bin the place of\b": "instead of",
     r"\bof (?:its|their|his|an) own\b|\bown one\b": "separate; its",
     r"\b(?:other|another|this|(?<!so )that|each) one\b(?! of)": "name the thing",
-    r"\bfrom [\w.]+(?: \w+)? on\b": "after, since, ... or later",
+    r"\bfrom (?!(?:now|then) on)[\w.]+(?: \w+)? on\b": "after, since, ... or later",
     r"\bstands?\b(?! for)": "is",
     r"\bbrings?\b": "gives, adds",
     r"\bto be had\b|\bbe had\b": "available",
@@ -61,14 +69,14 @@ def texts(path: Path) -> Iterator[tuple[int, str]]:
         for node in ast.walk(ast.parse(written)):
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
                 yield node.lineno, re.sub(r"`[^`\n]*`", "", node.value)
-    elif path.suffix == ".html":
-        yield 1, re.sub(r"<[^>]*>", lambda tag: "\n" * tag[0].count("\n"), written)
+    elif path.suffix in (".html", ".j2"):
+        yield 1, re.sub(r"\{[{%].*?[}%]\}|<[^>]*>", lambda code: "\n" * code[0].count("\n"), written)
     else:
-        for number, line in enumerate(written.splitlines(), 1):
-            if not line.lstrip().startswith(("//", "*", "/*")):
-                yield from (
-                    (number, quoted) for quoted in re.findall(r'["`]((?:[^"`\\]|\\.)* (?:[^"`\\]|\\.)*)["`]', line)
-                )
+        for found in (SCRIPT if path.suffix == ".js" else RUST).finditer(written):
+            if " " in (text := found["text"] or ""):
+                # What is computed in a text, and a line of Rust that continues on the next.
+                text = re.sub(r"\$?\{[^{}]*\}", "", re.sub(r"\\\n *", "", text))
+                yield written.count("\n", 0, found.start()) + 1, text
 
 
 def findings(path: Path) -> Iterator[str]:

@@ -19,7 +19,7 @@ Solve = Callable[[Any, Any], tuple[str, Any, float]]
 
 
 def draw(n: int, p: int, seed: int = 0) -> tuple[Any, Any]:
-    """Draw one spike a train on whole ms 1 to 200, shape (p, n), and the target of each pattern."""
+    """Draw one spike per train on whole ms 1 to 200, shape (p, n), and the target of each pattern."""
     random = np.random.default_rng(seed)
     return random.integers(1, END + 1, (p, n)).astype(float), END * (1 + np.arange(p) % 3) / 4
 

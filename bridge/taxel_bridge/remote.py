@@ -208,7 +208,7 @@ class Remote(RemoteBoard):
         """Begin another session: it must be of the same sensor, and the clocks are compared again."""
         about = dict(with_taxel_errors(self._zenoh.names, _ASK_S)).get(self.name)
         if about is not None and json.loads(about)["array"] != self._described:
-            raise DeviceError("the board there is another one now; make a new Remote")
+            raise DeviceError("another board is at this address now; make a new Remote")
         feed.begin_session()
         self._compare(feed, _AT_FIRST)
 

@@ -55,7 +55,7 @@ class Places:
                 continue
             values = numbers(name, getattr(self, name), np.float64).copy()
             if values.ndim not in (1, 2) or values.shape != np.shape(self.x):
-                raise refused(name, f" has shape {values.shape}: must be one a taxel, as x, {np.shape(self.x)}")
+                raise refused(name, f" has shape {values.shape}: must be one per taxel, as x, {np.shape(self.x)}")
             object.__setattr__(self, name, frozen(values))
         if self.unit is not None:
             text("unit", self.unit, ("mm",))
@@ -69,7 +69,7 @@ class Places:
             if values is None:
                 continue
             if values.size != there.size or (values.ndim == 2 and values.shape != there.shape):
-                raise refused("places", f": {name} has shape {values.shape}: must be {array.shape}, one a taxel")
+                raise refused("places", f": {name} has shape {values.shape}: must be {array.shape}, one per taxel")
             # Files hold no NaN.
             values = np.where(there, values.reshape(there.shape), float(name == "area"))
             wrong = ~np.isfinite(values) | ((values <= 0) if name == "area" else False)
@@ -118,7 +118,7 @@ class Array:
     name : str
     places : Places, optional
         The place of each taxel, instead of a pitch.
-    names : sequence of str, one a taxel, row by row, optional
+    names : sequence of str, one per taxel, row by row, optional
         The name of each taxel, such as a column of a table; "" for one without a name.
 
     Raises
@@ -168,7 +168,9 @@ class Array:
             names = tuple(text("names", entry) for entry in several("names", self.names))
             places = self.rows * self.columns
             if len(names) != places:
-                raise refused("names", f" has {counted(len(names), 'entry', 'entries')}: must be one a taxel, {places}")
+                raise refused(
+                    "names", f" has {counted(len(names), 'entry', 'entries')}: must be one per taxel, {places}"
+                )
             object.__setattr__(self, "names", names)
 
     @classmethod

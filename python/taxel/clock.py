@@ -69,7 +69,7 @@ class Clock:
     def _lines(self) -> list[tuple[int, _core._ClockLine]]:
         lines = _core.clock_lines(self.board_us, self.arrived_ns)
         if not lines:
-            raise ProblemError("clock: no datagram holds a time, so there is nothing to compare")
+            raise ProblemError("clock: no datagram holds a time, so no clocks can be compared")
         return lines
 
     @cached_property

@@ -167,7 +167,7 @@ class Detections(FrozenColumns):
             None if reported is None else frozen_column("reported", reported, np.int64, "us")
         )
         if self.reported is not None and len(self.reported) != len(labels):
-            raise refused("reported", f" has {len(self.reported)} entries: must be {len(labels)}, one a detection")
+            raise refused("reported", f" has {len(self.reported)} entries: must be {len(labels)}, one per detection")
         marks = frozen(np.zeros(len(labels), np.bool_)) if repaired is None else repaired
         self.repaired: NDArray[np.bool_] = frozen_column("repaired", marks, np.bool_)
         _core.check_detections(self._parts())
@@ -236,7 +236,7 @@ class Detections(FrozenColumns):
         if not isinstance(other, Detections):
             return NotImplemented
         if (self.reported is None) != (other.reported is None):
-            raise ProblemError("detections with `reported` and without: only alike ones are merged")
+            raise ProblemError("some detections have `reported` and others do not: these cannot be merged")
         order = np.argsort(np.concatenate([self.t, other.t]), kind="stable")
         names = ["label", "t", "known", "slope", "repaired"] + ([] if self.reported is None else ["reported"])
         columns = {name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names}

@@ -216,7 +216,7 @@ class Cable:
 
         Returns
         -------
-        list of str, one a line
+        list of str, one per line
 
         Raises
         ------

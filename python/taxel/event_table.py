@@ -96,7 +96,9 @@ def _time(table: HeaderTable) -> int:
         )
     missing = "t_us" if any(name.lower() in _LABELS for name in table.header) else "label"
     frames = next((name for name in table.header if name.lower().rstrip("s") in _FRAMES), None)
-    counts = "" if frames is None else f"; {shown(frames)} holds no times: that of a frame is its number / rate"
+    counts = (
+        "" if frames is None else f"; {shown(frames)} holds numbers of frames: the time of a frame is its number / rate"
+    )
     raise FormatError(f"{table.location}, line 1: no column {missing!r}; there are {there}{counts}; {_RIGHT}")
 
 

@@ -242,7 +242,9 @@ class Events(FrozenColumns):
         if not isinstance(other, Events):
             return NotImplemented
         if not self.array.fits(other.array):
-            raise ProblemError(f"events of {self.array!r} and of {other.array!r}: only those of one array are merged")
+            raise ProblemError(
+                f"events of {self.array!r} and of {other.array!r}: only events of one array can be merged"
+            )
         tables = (self, other)
         ticks = present = None
         if self.intensity is not None or other.intensity is not None:

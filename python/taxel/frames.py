@@ -66,7 +66,7 @@ class Frames(FrozenColumns):
             found = counted(self.values.ndim, "dimension")
             raise refused("values", f" have {found}: must have three (n, rows, columns)")
         if len(self.t) != len(self.values):
-            raise refused("t", f" has shape {self.t.shape}: must be ({len(self.values)},), one time a frame")
+            raise refused("t", f" has shape {self.t.shape}: must be ({len(self.values)},), one time per frame")
         back = np.flatnonzero(self.t[1:] <= self.t[:-1])
         if len(back):
             k = int(back[0])

@@ -73,7 +73,7 @@ class Tare(Saved):
     _text: str
 
     def __init__(self) -> None:
-        raise ProblemError("a tare is measured (Tare.take) or loaded (Tare.load), not built")
+        raise ProblemError("Tare: measure one by Tare.take, or load one by Tare.load")
 
     @classmethod
     def take(
@@ -128,7 +128,7 @@ class Tare(Saved):
         instance("frames", frames, Frames)
         if not self.array.fits(frames.array):
             (rows, columns), (of_rows, of_columns) = frames.array.shape, self.array.shape
-            others = ", of which others exist" if frames.array.shape == self.array.shape else ""
+            others = ", but other taxels of it exist" if frames.array.shape == self.array.shape else ""
             expected = f"{of_rows} x {of_columns}{others}"
             raise ProblemError(f"frames of {rows} x {columns} taxels: the tare is of {expected}")
         self.array._warn_apart(frames.array, "the frames")

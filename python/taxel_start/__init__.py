@@ -7,7 +7,7 @@ import sys
 def _leave_out_current_folder() -> None:
     """Leave out the current folder, where no more than an empty entry of PYTHONPATH put it on the path.
 
-    A folder of recordings may hold Python files of strangers. A checkout, where taxel itself lies, stays.
+    A folder of recordings may hold Python files of strangers. A checkout that contains taxel itself stays.
     """
     named = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     try:

@@ -5,7 +5,7 @@ use taxel_core::{Result, SpikeKind, SpikeTrains, problem};
 /// Refuses graded trains, on behalf of `reader`, which reads no values.
 pub(crate) fn check_ungraded(pattern: &SpikeTrains, reader: &str) -> Result<()> {
     if pattern.kind == SpikeKind::Graded {
-        return Err(problem!("{reader} takes no graded trains: their spikes have values, which it does not read"));
+        return Err(problem!("{reader} takes no graded trains: their spikes have values, and it does not read values"));
     }
     Ok(())
 }

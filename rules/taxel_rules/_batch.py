@@ -36,7 +36,7 @@ class BatchLearner(SpikeLearner):
             The same trains in each; signed ones split into ON and OFF, graded ones are refused. Of any length: a whole
             recording is a pattern.
         targets : sequence of float sequences, ms
-            Target spike times, one list a pattern, ascending; empty for a pattern without spikes.
+            Target spike times, one list per pattern, ascending; empty for a pattern without spikes.
 
         Returns
         -------

@@ -74,7 +74,7 @@ class EpochLearner(SpikeLearner):
         patterns : sequence of SpikeTrains
             The same trains in each; signed ones split into ON and OFF, graded ones are refused.
         targets : sequence of float sequences, ms
-            Target spike times, one list a pattern; empty for a pattern without spikes.
+            Target spike times, one list per pattern; empty for a pattern without spikes.
         start : float64, shape (trains,), mV, optional
             Initial weights, instead of random ones.
         progress : function of (epochs done, share of patterns right), optional

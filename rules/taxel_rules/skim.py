@@ -120,7 +120,7 @@ class SKIM(BatchLearner):
             The same trains in each; signed ones split into ON and OFF, graded ones are refused. Of any length: a whole
             recording is a pattern.
         targets : sequence of float sequences, ms
-            Target spike times, one list a pattern, ascending; empty for a pattern without spikes.
+            Target spike times, one list per pattern, ascending; empty for a pattern without spikes.
 
         Returns
         -------

@@ -174,7 +174,7 @@ class Tempotron(Learner):
         """
         fired, truth = self.predict(patterns), _labels(labels)
         if len(truth) != len(fired) or not truth:
-            raise refused("labels", f": {len(truth)} for {len(fired)} patterns, must be one a pattern")
+            raise refused("labels", f": {len(truth)} for {len(fired)} patterns, must be one per pattern")
         return float(np.mean(fired == np.array(truth)))
 
     def peak(self, weights: ArrayLike, pattern: SpikeTrains) -> tuple[float, float, float]:

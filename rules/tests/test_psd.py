@@ -22,7 +22,7 @@ def test_the_change_is_the_current_at_targets_less_that_at_spikes(options):
 
 
 def test_constants_that_make_no_sense_are_one_clear_error():
-    with pytest.raises(ProblemError, match="tau_2 is 12 ms: must lie below tau_1, 10 ms"):
+    with pytest.raises(ProblemError, match="tau_2 is 12 ms: must be below tau_1, 10 ms"):
         PSD(tau_2=12.0, **GIVEN)
     with pytest.raises(ProblemError, match='refractory is 1 ms: must be 0 unless after_spike is "membrane"'):
         PSD(refractory=1.0, after_spike="subtract", **GIVEN)

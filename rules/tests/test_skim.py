@@ -154,7 +154,7 @@ def test_control_c_stops_it_promptly():
     [
         ({"tau": 0.0}, "tau is 0 ms"),
         ({"kernel": "box"}, 'kernel is "box": must be "alpha"'),
-        ({"kernel": "double_exponential", "tau_s": 20.0}, "tau_s is 20 ms: must lie below tau, 15 ms"),
+        ({"kernel": "double_exponential", "tau_s": 20.0}, "tau_s is 20 ms: must be below tau, 15 ms"),
         ({"pulse_ms": 0.0}, "pulse_ms is 0 ms"),
         ({"ridge": -1.0}, "ridge is -1: must be 0 or more"),
         ({"branches": 10}, "spread: none was published for a layer of branches, give one"),

@@ -81,7 +81,7 @@ def test_a_shift_in_time_moves_spikes_and_nothing_else():
     ("options", "said"),
     [
         ({"tau": 0.0}, "tau is 0 ms: must be above 0"),
-        ({"tau_s": 12.0}, "tau_s is 12 ms: must lie below tau, 10 ms"),
+        ({"tau_s": 12.0}, "tau_s is 12 ms: must be below tau, 10 ms"),
         ({"theta_0": -1.0}, "theta_0 is -1"),
         ({"step_ms": 0.0}, "step_ms is 0"),
         ({"after_spike": "keep"}, 'after_spike is "keep": must be "subtract", "membrane" or "reset"'),
@@ -131,5 +131,7 @@ def test_a_grid_of_more_points_than_can_be_had_is_one_clear_error_beforehand():
         lambda: SKIM(step_ms=1e-9).fit([trains], [[20.0]]),
         lambda: SKIM(step_ms=1e-9).rows(trains),
     ):
-        with pytest.raises(ProblemError, match=r"step_ms is 0.000000001 ms: makes 6.0e10 grid points, at most"):
+        with pytest.raises(
+            ProblemError, match=r"step_ms is 0.000000001 ms: makes 6.0e10 grid points, more than the limit of"
+        ):
             call()

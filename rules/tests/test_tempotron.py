@@ -200,7 +200,7 @@ def test_spikingjelly_agrees_by_its_kept_numbers():
     ("options", "said"),
     [
         ({"tau": 0.0}, "tau is 0 ms"),
-        ({"tau_s": 15.0}, "tau_s is 15 ms: must lie below tau, 15 ms"),
+        ({"tau_s": 15.0}, "tau_s is 15 ms: must be below tau, 15 ms"),
         ({"theta_0": 0.0}, "theta_0 is 0"),
         ({"eta": -1.0}, "eta is -1"),
         ({"momentum": 1.0}, "momentum is 1: must be 0 or more and below 1"),

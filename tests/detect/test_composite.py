@@ -134,7 +134,7 @@ def test_inputs_that_do_not_exist_are_refused(neuron: tuple, more: dict, text: s
 
 
 def test_one_encoder_has_no_inputs() -> None:
-    with refused("a: inputs are .*: the encoder is no composite"):
+    with refused("a: inputs are .*: the encoder is not a composite"):
         Readout(PARTS["area"], {"a": (Neuron(), [1.0] * 4, 0.0, ("area",))})
     for call in (
         composite(1).encoder_of,
@@ -284,7 +284,7 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
         ({"neurons": {"a": {"delay_ms": 4.0, "search": [{"inputs": ["b"]}]}}}, "neurons.a.search: inputs: no encoder"),
         ({"encoders": {"area": {"name": "areas"}}}, "recipe: encoders.area: encoder areas: must be one of"),
         ({"encoders": {"area": 3}}, "recipe: encoders.area"),
-        ({"encoders": 3}, "recipe: says no encoder"),
+        ({"encoders": 3}, "recipe: states no encoder"),
         ({"encoder": {"name": "fa1"}}, "both encoder and encoders"),
     ],
 )

@@ -461,7 +461,7 @@ def test_a_noisy_mat_in_force_or_pressure_rests_at_0_for_info_train_and_detect(
 
 
 def squares(sides: list[int]) -> tuple[Frames, dict[str, list[int]]]:
-    """Return frames at 100 Hz of touches that load squares of so many taxels at once, one a second."""
+    """Return frames at 100 Hz of touches that load squares of so many taxels at once, one per second."""
     values = np.random.default_rng(1).normal(0, 1, (100 * (len(sides) + 2), 12, 12))
     starts = 100 + 100 * np.arange(len(sides))
     for start, side in zip(starts, sides, strict=True):

@@ -323,7 +323,7 @@ def test_a_label_left_out_is_not_detected():
         (
             ("duration", 300, 1.0, 1, "end"),
             {"labels": ("tap", "press")},
-            "one rule for both kinds, the duration (ms) of the touch, when it ends: below 300 tap, from there on press",
+            "one rule for both kinds, the duration (ms) of the touch, when it ends: below 300 tap, otherwise press",
         ),
     ],
 )

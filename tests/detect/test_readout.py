@@ -89,7 +89,7 @@ def test_delayed_copies_are_heard_live_as_a_learner_saw_them(encoder: taxel.enco
     weights = np.random.default_rng(5).normal(0.0, 1.0, len(trains))
     readout = Readout(encoder, {"a": (neuron, weights)}, array=ARRAY, delays_ms=delays_ms)
     found = run(readout, events)
-    assert len(found) > 5, "something must be said to compare"
+    assert len(found) > 5, "something must be detected, to compare"
     # A readout's grid begins at the frame of its first spike, which is a multiple of the step, as is the trains' start.
     fired = neuron.run(weights, trains) - encoder.latency_ms
     assert np.abs(found.t[: len(fired)] / 1000.0 - fired).max() < 1e-3
@@ -315,7 +315,7 @@ def test_files_that_are_no_readout_are_refused_by_name(readout: Readout, tmp_pat
 def test_a_readout_listens_to_recordings_events_and_frames_only(readout: Readout, source: object) -> None:
     with pytest.raises(taxel.ProblemError, match="source is"):
         run(readout, source)
-    with pytest.raises(taxel.ProblemError, match="a readout listens to"):
+    with pytest.raises(taxel.ProblemError, match="a readout reads"):
         readout.stream(tare=tare()).push(source)  # type: ignore[arg-type]
 
 

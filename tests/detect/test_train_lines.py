@@ -104,7 +104,7 @@ def test_one_rule_tells_kinds_at_a_frame_of_a_touch_and_says_which_lies_below(tm
         for kind in ("large", "small")
     ]
     rule = re.fullmatch(
-        r"one rule for both kinds, the area (\S+) ms after the onset: below (\S+) small, from there on large", said[0]
+        r"one rule for both kinds, the area (\S+) ms after the onset: below (\S+) small, otherwise large", said[0]
     )
     assert rule, said[0]
     assert said[0] == said[1]

@@ -59,9 +59,9 @@ def test_values_in_another_unit_are_refused_by_a_file_too(own: str, other: str) 
         if other == own:
             assert len(run(again, pressed(other), tare=tare))
             continue
-        with refused(f"values in {other}, and the .* was trained on {own}: must be in {own}.* train anew"):
+        with refused(f"values are in {other}, but the .* was trained on {own}: give values in {own}.* train a "):
             run(again, pressed(other), tare=tare)
-        with refused(f"values in {other}, and the .* was trained on {own}"):
+        with refused(f"values are in {other}, but the .* was trained on {own}"):
             again.stream(tare=tare).push(pressed(other))
 
 
@@ -74,9 +74,9 @@ def test_events_are_ticks(own: str) -> None:
             made.stream(tare=tare).push(events())
             continue
         for reads in (partial(run, made, tare=tare), made.stream(tare=tare).push):
-            with refused(f"values in ticks, and the .* was trained on {own}"):
+            with refused(f"values are in ticks, but the .* was trained on {own}"):
                 reads(events())
-        with refused(f"live values in ticks, and the .* was trained on {own}"):
+        with refused(f"live values are in ticks, but the .* was trained on {own}"):
             Live(0, host="127.0.0.1", readout=made, tare=tare)
 
 
@@ -116,16 +116,16 @@ def test_the_commands_and_the_page_name_both_units(tmp_path: Path, capsys) -> No
     assert code == 0, error
     assert load(readout).unit == "kPa"
     code, out, error = call(capsys, "detect", tmp_path / "counts.npz", "--readout", readout, "--tare", "0.3")
-    said = "values in counts, and the readout was trained on kPa: must be in kPa, as a calibration gives"
+    said = "values are in counts, but the readout was trained on kPa: give values in kPa, as a calibration gives"
     assert (code, out, error.count("\n"), said in error) == (2, "", 1, True), error
     handler = TrainingRequests(Opening(), ShownFiles())
-    with refused("values in counts, and the readout was trained on kPa"):
+    with refused("values are in counts, but the readout was trained on kPa"):
         handler.detect(tmp_path / "counts.npz", None, readout)
     labels, _, found = handler.detect(tmp_path / "kPa.npz", None, readout)
     assert (labels, len(found) > 0) == (["contact"], True)
     code, _, error = call(capsys, "live", "--readout", readout, "--tare", "0.05", "--seconds", "0.1")
     last = error.splitlines()[-1]
-    assert (code, "live values in ticks, and the readout was trained on kPa" in last) == (2, True), error
+    assert (code, "live values are in ticks, but the readout was trained on kPa" in last) == (2, True), error
 
 
 def test_a_training_on_two_units_says_which_recording_is_in_which(tmp_path: Path, capsys) -> None:

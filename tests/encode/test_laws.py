@@ -132,7 +132,7 @@ def test_events_out_of_order_are_heard_as_a_stream_hears_them_or_refused(encoder
     wanted = spikes_of(encoder.encode(heard))
     assert sorted(spikes + spikes_of(stream.finish())) == wanted
     if len(far):
-        with pytest.raises(taxel.ProblemError, match=rf"event {far[0]} at .* behind event .*Events\.sorted\(\)"):
+        with pytest.raises(taxel.ProblemError, match=rf"event {far[0]} at .* before event .*Events\.sorted\(\)"):
             encoder.encode(events)
     else:
         assert spikes_of(encoder.encode(events)) == wanted
@@ -200,7 +200,7 @@ def test_events_backwards_are_refused_by_whoever_takes_a_whole_recording(encoder
     events = touch(np.random.default_rng(18), ARRAY)[::-1]
     readout = taxel.Readout(encoder, {"a": (taxel.Neuron(), np.ones(encoder.trains(ARRAY) * (1 + encoder.signed)))})
     for take in (encoder.encode, taxel.Tare.take, lambda x: taxel.detect.run(readout, x, tare=rest(ARRAY))):
-        with pytest.raises(taxel.ProblemError, match=r"event \d+ at \d+ us: lies more than 0.1 s behind event"):
+        with pytest.raises(taxel.ProblemError, match=r"event \d+ at \d+ us: is more than 0.1 s before event"):
             take(events)
         take(events.sorted())
 
@@ -435,7 +435,7 @@ def test_what_cannot_be_encoded_is_refused(encoder):
     refuses("without intensities", Events([5], [0], [0], [1], array=ARRAY))
     refuses("begun with events", heard, frame)
     refuses("begun with frames", frame, heard)
-    refuses("times ascend", frame, frame)
+    refuses("times must ascend", frame, frame)
     refuses("begun for .* 3 x 4", Events([5], [0], [0], [1], array=Array(4, 4), intensity=[5]))
     refuses("begun for 3 x 4", Frames(np.zeros((1, 4, 4)), [0]))
     refuses("Frames.held fills the missing", Frames(np.full((1, 3, 4), np.nan), [0], array=ARRAY))

@@ -156,7 +156,7 @@ def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls
     table(tmp_path, lines(rows), f"{falls}[table]\ntime_column = 1\n")
     shown = CliRunner().invoke(app, ["info", str(tmp_path / "step.txt")]).stdout
     of_it = (
-        "as step.layout.toml turns them: if that is wrong, leave falls out of it"
+        "as step.layout.toml turns them: if that is wrong, remove falls from the file"
         if falls
         else "write falls = true in a layout file beside"
     )
@@ -480,7 +480,7 @@ def test_a_layout_for_tables_says_nothing_of_a_board_s_recording_in_the_same_fol
 def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: Path) -> None:
     write_gaitpdb(tmp_path)
     (tmp_path / "layout.toml").write_text("[places]\nx = [1, 2]\ny = [1, 2]\n")
-    with pytest.raises(FormatError, match=r"layout\.toml: .*must be \(1, 8\), one a taxel"):
+    with pytest.raises(FormatError, match=r"layout\.toml: .*must be \(1, 8\), one per taxel"):
         taxel.open_all(tmp_path)
 
 

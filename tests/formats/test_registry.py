@@ -216,4 +216,4 @@ def test_the_command_line_says_what_is_in_it_trial_by_trial(
         assert len({one["file"] for one in every}) == len(every) == len(trials)
         assert {one["kind"] for one in every} == {name}
         assert all(one["file"].startswith(str(place)) for one in every)
-    assert taxel.open_all(tmp_path)[0].verdict == f"the {name} recording does not say what was lost"
+    assert taxel.open_all(tmp_path)[0].verdict == f"losses unknown: the {name} recording does not record them"

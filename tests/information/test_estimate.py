@@ -105,7 +105,7 @@ def test_draws_are_averaged_before_they_are_held():
     assert together.bits == pytest.approx(0, abs=0.005)
     assert np.mean([estimate(labels, random.permutation(labels), redraws=2).bits for _ in range(40)]) > 0.005
     one = estimate(labels, labels, redraws=2)
-    assert one.corrected == pytest.approx(1 + 1 / (2 * 60 * np.log(2)))  # one response a label, two in all
+    assert one.corrected == pytest.approx(1 + 1 / (2 * 60 * np.log(2)))  # one response per label, two in all
     assert one.bits == one.most == 1.0
 
 
@@ -205,8 +205,8 @@ def test_the_rule_rarely_takes_a_setting_that_is_too_cheap():
     ("call", "text"),
     [
         (lambda: estimate(["a", "a"], ["a", "b"]), "must be two at least"),
-        (lambda: estimate(["a", "b"], ["a"]), "one a label"),
-        (lambda: estimate(["a", "b"], ["a", "b"], groups=["x"]), "one a trial"),
+        (lambda: estimate(["a", "b"], ["a"]), "one per label"),
+        (lambda: estimate(["a", "b"], ["a", "b"], groups=["x"]), "one per trial"),
         (lambda: estimate(["a", "b"], [1, 2]), "two kinds"),
         (lambda: estimate(["a", "b"], ["a", "b"], confidence=1.0), "between 0 and 1"),
         (lambda: folds(["a"] * 5, count=2), "must be two at least"),

@@ -72,7 +72,7 @@ def test_a_class_that_a_training_set_lacks_is_said():
     ("call", "text"),
     [
         (lambda: nested_predictions([[[1.0, 2.0], [3.0, 1.0]]], [3], [0, 1], count=2), "not symmetric"),
-        (lambda: nested_predictions([np.eye(4)], [4, 4], [0, 1, 0, 1], count=2), "one a matrix"),
+        (lambda: nested_predictions([np.eye(4)], [4, 4], [0, 1, 0, 1], count=2), "one per matrix"),
         (lambda: nested_predictions([np.eye(4)], [4], [0, 1, 0, 1], count=2, ridges=[0.0]), "above 0"),
         (lambda: nested_predictions([np.eye(4)], [4], [0, 0, 0, 0], count=2), "must be two at least"),
         (lambda: ConeRReadout().predict([]), "not fitted"),

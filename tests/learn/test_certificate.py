@@ -161,7 +161,7 @@ def test_a_row_that_the_problem_does_not_have_is_one_clear_error():
     for row, said in (
         (("silence", 99, 5.0), "pattern 99: there are 8"),
         (("target", 0, 7), "pattern 0, target 7: the pattern has 1 targets"),
-        (("silence", 0, 1e6), "outside of what is asked for"),
+        (("silence", 0, 1e6), "is outside the time that is trained"),
         (("noise", 0, 1.0), 'row of kind "noise"'),
         (("target", 0, 0.5), "target 0.5: must be a whole number"),
     ):
@@ -354,7 +354,7 @@ def test_a_certificate_has_one_multiplier_a_row() -> None:
     trains = SpikeTrains.from_lists([[50.0], [60.0]], stop=100.0)
     cone = ConeX().fit([trains], [[40.0]])
     proof = dataclasses.replace(cone.certificate_, multipliers=np.ones(len(cone.certificate_.rows) + 1))
-    with pytest.raises(ProblemError, match=r"certificate: 2 multipliers for 1 row: must be one a row"):
+    with pytest.raises(ProblemError, match=r"certificate: 2 multipliers for 1 row: must be one per row"):
         check_certificate(cone.problem_, proof)
 
 

@@ -104,7 +104,7 @@ def test_an_empty_window_and_a_misspelt_parameter_are_one_clear_error_each():
         OnlineConeR(window=0)
     with pytest.raises(ProblemError, match="no parameter 'lambda'"):
         OnlineConeR().set_params(**{"lambda": 1})
-    with pytest.raises(ProblemError, match="must be one a pattern"):
+    with pytest.raises(ProblemError, match="must be one per pattern"):
         OnlineConeR().fit([], [])
     with pytest.raises(ProblemError, match="start: a window starts from its own last fit"):
         OnlineConeR().fit(*zip(*stream(0, 2), strict=True), start=[0.0])

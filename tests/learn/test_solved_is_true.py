@@ -270,7 +270,9 @@ def test_a_grid_of_more_points_than_can_be_had_is_one_clear_error_beforehand():
         lambda: neuron.run([1.0] * 3, trains),
         lambda: neuron.run_many([[1.0] * 3], trains),
     ):
-        with pytest.raises(ProblemError, match=r"step_ms is 0.000000001 ms: makes 6.0e10 grid points, at most"):
+        with pytest.raises(
+            ProblemError, match=r"step_ms is 0.000000001 ms: makes 6.0e10 grid points, more than the limit of"
+        ):
             call()
 
 

@@ -284,7 +284,10 @@ def test_values_that_fall_are_named_in_the_shell(tmp_path: Path, falls: bool) ->
     )
     said = done.stdout + done.stderr
     assert done.returncode == 0, said
-    assert ("values fall under touch: add ,falls=true to the source" in " ".join(said.split())) == falls
+    assert (
+        "values fall under touch: if smaller values mean more pressure, add ,falls=true to the source"
+        in " ".join(said.split())
+    ) == falls
 
 
 def test_the_report_says_how_many_detections_lie_outside_the_training(tmp_path: Path) -> None:
@@ -362,7 +365,7 @@ def test_numbers_that_a_program_passes_are_frames(tmp_path: Path) -> None:
 
 def test_a_readout_of_another_unit_or_shape_is_refused(tmp_path: Path) -> None:
     for options, why in [
-        ("array=2x2,unit=kPa", "live values in kPa, and the readout was trained on N.*state unit=N in --source"),
+        ("array=2x2,unit=kPa", "live values are in kPa, but the readout was trained on N.*state unit=N in --source"),
         ("array=2x3,unit=N", "trained on 2 x 2"),
         ("array=2x2,columns=a:b:c", "lines have 3 values: must be 4 a frame"),
         ("array=2x2,frame_lines=3", "lines have 1 values, 3 lines a frame: must be 4 a frame"),

@@ -144,7 +144,7 @@ def test_a_table_that_cannot_be_read_is_not_written(text: bytes, said: str, tabl
     mark(tables, table, "heel", 1)
     table.write_bytes(text)
     os.utime(table, (1, 1))
-    with pytest.raises(ProblemError, match=f"{said}.*nothing was saved: mend the table"):
+    with pytest.raises(ProblemError, match=f"{said}.*nothing was saved: correct the table"):
         mark(tables, table, "toe", 2)
     assert table.read_bytes() == text
     for read in (lambda: tables.read(table, OWN), lambda: taxel.Labels(table)):

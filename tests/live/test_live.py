@@ -351,7 +351,7 @@ def test_stop_from_within_say_is_one_error() -> None:
 
     live = Live(0, host=LOOPBACK, array=SMALL, readout=touch(), say=say)
     play(presses(2), live.address[1])
-    with pytest.raises(ProblemError, match="`stop` was called by its own `say`"):
+    with pytest.raises(ProblemError, match="`say` must not call `stop`"):
         for _ in live:
             pass
     with contextlib.suppress(ProblemError):

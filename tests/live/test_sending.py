@@ -138,7 +138,7 @@ def test_an_unplugged_serial_line_loses_lines_and_is_opened_again(tmp_path: Path
 
         until(lambda: press()["sent"] > 0)
         unplug(ends)
-        until(lambda: "the line has hung up" in str(press()["trouble"]))
+        until(lambda: "the line was disconnected" in str(press()["trouble"]))
         until(lambda: "No such file" in str(press()["trouble"]))
         ends = plug()
         before = live.counters["sent"][0]

@@ -154,7 +154,7 @@ def test_on_a_grid_every_kernel_fires_at_the_first_point_at_or_above_the_thresho
 
 
 def test_the_exponential_kernel_is_refused_in_continuous_time():
-    with pytest.raises(ProblemError, match="only jumps"):
+    with pytest.raises(ProblemError, match="changes only in jumps"):
         Neuron(kernel="exponential")
 
 

@@ -86,7 +86,7 @@ def test_a_pitch_that_makes_no_sense_is_refused(value: Any) -> None:
     ("make", "match"),
     [
         (lambda: Array(2, 2, 1.0, places=Places(np.zeros(4), np.zeros(4))), "both given"),
-        (lambda: Array(2, 2, places=Places(np.zeros(3), np.zeros(3))), "one a taxel"),
+        (lambda: Array(2, 2, places=Places(np.zeros(3), np.zeros(3))), "one per taxel"),
         (lambda: Places(np.zeros(3), np.zeros(4)), "y has shape"),
         (lambda: Places(np.zeros(3), np.zeros(3), unit="inch"), "unit"),
         (lambda: Array(1, 2, places=Places([0.0, np.nan], [0.0, 0.0])), "x of row 0, column 1 is nan: must be finite"),
@@ -243,7 +243,7 @@ def test_recordings_of_other_pitches_merge_and_the_loss_is_said(tmp_path: Path) 
 
 def test_names_of_taxels_go_with_them_and_are_never_grounds_to_refuse(tmp_path: Path) -> None:
     called, other, nameless = Array(2, 2, names=["a", "b", "c", "d"]), Array(2, 2, names="efgh"), Array(2, 2)
-    with pytest.raises(ProblemError, match="names has 3 entries: must be one a taxel, 4"):
+    with pytest.raises(ProblemError, match="names has 3 entries: must be one per taxel, 4"):
         Array(2, 2, names=["a", "b", "c"])
     assert called.fits(other)
     assert called.fits(nameless)

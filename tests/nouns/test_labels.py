@@ -303,7 +303,7 @@ def test_the_page_refuses_a_table_of_another_program_and_leaves_it_alone(tmp_pat
     before = place.read_bytes()
     handler = LabelRequests(Opening())
     edit = (None, {"text": "ball", "t": 5})
-    with pytest.raises(taxel.ProblemError, match=r"line 1: no column 'label'; .*: mend the table, then try again"):
+    with pytest.raises(taxel.ProblemError, match=r"line 1: no column 'label'; .*: correct the table, then try again"):
         handler.change(place, "walk.mcap", 1, [[edit]])
     assert place.read_bytes() == before
 

@@ -119,10 +119,10 @@ def _values(of: SpikeTrains, k: int) -> np.ndarray:
 @pytest.mark.parametrize(
     ("add", "said"),
     [
-        (lambda: drawn(1, 3) + Events([], [], [], [], array=Array(3, 5)), "only those of one array"),
-        (lambda: trains(1, signed=True) + trains(1, signed=False), "only alike ones"),
-        (lambda: trains(1, signed=True) + trains(1, signed=True, n=4), "only equally many"),
-        (lambda: found(1, 3) + found(1, 3, said=True), "only alike ones"),
+        (lambda: drawn(1, 3) + Events([], [], [], [], array=Array(3, 5)), "only events of one array"),
+        (lambda: trains(1, signed=True) + trains(1, signed=False), "only trains of one kind"),
+        (lambda: trains(1, signed=True) + trains(1, signed=True, n=4), "only equal numbers"),
+        (lambda: found(1, 3) + found(1, 3, said=True), "these cannot be merged"),
     ],
 )
 def test_what_does_not_go_together_is_refused(add: Callable[[], Any], said: str) -> None:

@@ -58,7 +58,7 @@ def test_the_rate_of_an_array_is_stated_on_the_page(chromium: Any, tmp_path: Pat
         press(page, "4")
         page.locator("#reading summary").click()
         page.locator("#rate").fill("100")
-        page.get_by_role("button", name="Read it so").click()
+        page.get_by_role("button", name="Save and read again").click()
         shows(page, "clock", r"^5\.\d+ s$")
         assert (tmp_path / "mat.layout.toml").read_text() == "rate_hz = 100.0\n# mine\nunit = 'counts'\n"
         page.reload()
@@ -79,7 +79,7 @@ def test_the_topic_of_a_bag_is_chosen_on_the_page(chromium: Any, tmp_path: Path)
         shows(page, "topic", "/hand/palm taxels")
         page.locator("#reading-rows").fill("24")
         page.locator("#reading-columns").fill("32")
-        page.get_by_role("button", name="Read it so").click()
+        page.get_by_role("button", name="Save and read again").click()
         shows(page, "source", r"^hand\.bag · .*24 × 32")
         text = (tmp_path / "hand.layout.toml").read_text()
         assert "[ros]" in text

@@ -137,7 +137,7 @@ def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chr
         shows(
             page,
             "silence-text",
-            rf"^The line is silent: nothing from serial:{plug}.* since \d+\.\d+ s of the source, for",
+            rf"^The line is silent: nothing has arrived from serial:{plug}.* since \d+\.\d+ s by the clock",
         )
         shows(page, "state-word", "^Silent, Recording")
         page.wait_for_timeout(1500)  # a silence counts from a second on

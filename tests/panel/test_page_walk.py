@@ -251,7 +251,7 @@ def test_values_that_fall_are_said_above_the_maps_with_what_to_do(chromium: Any,
         shows(
             page,
             "silence",
-            r"^The values fall from their rest.* “falls = true” is written into a\.layout\.toml beside the rec",
+            r"^The values fall from their rest.* writes “falls = true” into a\.layout\.toml beside the rec",
         )
     (tmp_path / "a.layout.toml").write_text("falls = true\n")
     with shown(chromium, tmp_path / "a.npz") as page:

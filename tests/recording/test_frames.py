@@ -182,7 +182,7 @@ def test_everything_beside_the_frames_is_kept(tmp_path: Path) -> None:
     assert (back.detections, back.columns, back.lost) == (of.main.marks.detections(), ["hip", "knee"], ("something",))
     assert (back.source, back.verdict, back.remarks) == (
         "an amplifier",
-        "the .npz does not say what was lost",
+        "losses unknown: the .npz does not record them",
         ("converted from a",),
     )
     assert not back.truncated
@@ -303,7 +303,7 @@ def test_a_side_that_a_layout_states_names_the_source_of_labels(tmp_path: Path) 
     rows = [("left", 10_000), ("right", 20_000), ("", 30_000), ("right", 40_000)]
     labels = tmp_path / "events.csv"
     labels.write_text("recording,source,label,t_us\n" + "".join(f"P1,{side},heel,{t}\n" for side, t in rows))
-    with pytest.warns(UserWarning, match="left out 2 events of the right; what is here is left"):
+    with pytest.warns(UserWarning, match="left out 2 events of the right; the recording is of the left"):
         (events,) = references(labels, [taxel.open(tmp_path / "P1.csv")])
     assert events["heel"].tolist() == [10_000, 30_000]
 

@@ -41,7 +41,7 @@ def opened(table: Events | Frames, folder: Path) -> taxel.Recording:
 @pytest.mark.parametrize("begin_us", [0, BEGIN_US])
 def test_a_verdict_names_the_gaps_of_stamps(tmp_path: Path, begin_us: int) -> None:
     verdict = opened(walk((20_000_000, 23_500_000), begin_us=begin_us), tmp_path).verdict
-    assert verdict == "the .npz does not say what was lost; 1 gap of 3.5 s at 20.0 s"
+    assert verdict == "losses unknown: the .npz does not record them; 1 gap of 3.5 s at 20.0 s"
     assert (verdict.status, verdict.noted) == ("unknown", {"gaps": 1, "gaps_us": 3_500_000})
     assert taxel.Verdict.from_dict(json.loads(json.dumps(verdict.to_dict()))) == verdict
 
@@ -63,7 +63,7 @@ def test_a_recording_that_counts_its_losses_has_its_gaps_in_a_line_of_info(tmp_p
 
 
 def test_one_frame_that_is_missing_is_no_gap(tmp_path: Path) -> None:
-    assert opened(walk((5_000_000, 5_020_000)), tmp_path).verdict == "the .npz does not say what was lost"
+    assert opened(walk((5_000_000, 5_020_000)), tmp_path).verdict == "losses unknown: the .npz does not record them"
 
 
 @pytest.mark.parametrize("rate", [200.0, 13_000.0])
@@ -77,7 +77,7 @@ def test_a_camera_that_is_silent_for_longer_than_chance_has_a_gap(tmp_path: Path
             table = Frames(values, 5000 * np.arange(len(values)), unit="events/5 ms")
         folder = tmp_path / str(k)
         folder.mkdir()
-        assert opened(table, folder).verdict == f"the .npz does not say what was lost{said}"
+        assert opened(table, folder).verdict == f"losses unknown: the .npz does not record them{said}"
 
 
 def test_silence_of_a_board_or_of_a_camera_without_noise_is_no_gap(tmp_path: Path) -> None:
@@ -91,7 +91,7 @@ def test_silence_of_a_board_or_of_a_camera_without_noise_is_no_gap(tmp_path: Pat
     ):
         folder = tmp_path / str(k)
         folder.mkdir()
-        assert opened(table, folder).verdict == "the .npz does not say what was lost", k
+        assert opened(table, folder).verdict == "losses unknown: the .npz does not record them", k
 
 
 def test_the_table_of_a_folder_has_gaps_and_bad_taxels_and_no_verdict_that_says_nothing(tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ def test_a_library_that_ends_is_said_to(tmp_path: Path, monkeypatch: pytest.Monk
     taxel.convert(some_events(20), path)
     child.write_text("import os, signal\nprint('{}', flush=True)\nos.kill(os.getpid(), signal.SIGSEGV)\n")
     monkeypatch.setattr(h5_file, "_CHILD", child)
-    with pytest.raises(FormatError, match="reading it ended the library, status -11"):
+    with pytest.raises(FormatError, match="the library crashed while reading it, status -11"):
         taxel.open(path)
 
 

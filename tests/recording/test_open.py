@@ -125,11 +125,11 @@ def test_raw_bytes_need_no_magic_and_say_whether_they_are_complete(tmp_path: Pat
     rec = taxel.open(path)
     assert not rec.truncated
     assert rec.events == events
-    assert rec.verdict == "the .lsa does not say what was lost"
+    assert rec.verdict == "losses unknown: the .lsa does not record them"
     assert "short by whole turns of 6.5536 s" in rec.remarks[0]
     (tmp_path / "a.lss").unlink()
     assert taxel.open(path).truncated
-    assert "a.lss is not there" in taxel.open(path).verdict
+    assert "a.lss is missing" in taxel.open(path).verdict
     path.write_bytes(b"\x89MCAP0\r\n")
     assert len(taxel.open(path).events) == 0
     assert "bytes skipped" in taxel.open(path).verdict

@@ -211,7 +211,7 @@ def test_the_command_line_shows_and_writes_one_source(
         ({"imu": 3}, "source imu is 3"),
         (["imu"], 'source "imu": must be'),
         ({"imu": "given,columns=a,speed=3"}, 'has no option "speed"'),
-        ({"imu": "given,columns=a,rate=3"}, "rate is of frames: state array=ROWSxCOLUMNS too"),
+        ({"imu": "given,columns=a,rate=3"}, "rate is only for frames: state array=ROWSxCOLUMNS too"),
     ],
 )
 def test_a_source_that_is_none_is_refused_and_leaves_no_file(tmp_path: Path, sources: object, said: str) -> None:

@@ -37,8 +37,8 @@ def test_a_verdict_says_what_became_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "noise.lsa").write_bytes(np.random.default_rng(3).integers(0, 256, 999, np.uint8).tobytes())
     verdicts = {path.name: taxel.open(path).verdict for path in sorted(tmp_path.glob("*.*")) if path.suffix != ".lss"}
     assert "in the bytes that came" in verdicts["noise.lsa"]
-    assert verdicts["noise.lsa"].startswith("not finished, as noise.lss is not there")
-    assert verdicts["back.mcap"] == "the .lsa does not say what was lost"
+    assert verdicts["noise.lsa"].startswith("not finished: noise.lss is missing")
+    assert verdicts["back.mcap"] == "losses unknown: the .lsa does not record them"
     assert verdicts["cut0.5.mcap"].startswith("not finished: what came last is missing")
     assert "LOST in the file" in verdicts["spoilt.mcap"]
 
@@ -109,7 +109,7 @@ def test_remarks_of_merged_recordings_have_their_names_where_they_differ(tmp_pat
     both = taxel.merge([one, two], gap_us=10)
     assert "a.mcap: converted from a.lsa" in both.remarks
     assert "b.mcap: converted from b.lsa" in both.remarks
-    assert both.verdict == "the .lsa does not say what was lost"
+    assert both.verdict == "losses unknown: the .lsa does not record them"
     taxel.convert(both, tmp_path / "both.mcap")
     again = taxel.open(tmp_path / "both.mcap")
     assert (again.remarks, again.verdict) == (both.remarks, both.verdict)

@@ -218,7 +218,7 @@ def test_of_a_chunk_without_its_index_and_without_the_end_of_the_file_not_all_is
     assert verdict is not None
     # The last counts tell of the notes.
     assert (verdict.status, verdict.lost) == ("lost", {"notes_lost_in_file": gone})
-    assert "what else was there is not known" in verdict
+    assert "what else the file held is unknown" in verdict
     # The summary of a finished recording tells.
     verdict = assert_told(tmp_path / "b.mcap", data[:begin] + bytes(end - begin) + data[end:], of, "as finished")
     assert verdict is not None
@@ -275,4 +275,4 @@ def test_damaged_final_counts_are_not_believed(whole: Path, tmp_path: Path) -> N
     verdict = assert_told(tmp_path / "a.mcap", bytes(data), held_by(taxel.open(whole)), "the counts")
     assert verdict is not None
     assert (verdict.status, verdict.lost, verdict.damaged) == ("damaged", {}, {"no_final_counts": 1})
-    assert verdict.startswith("the final counts are damaged: what was lost since the last before them is not known; ")
+    assert verdict.startswith("the final counts are damaged: losses after the counts before them are unknown; ")

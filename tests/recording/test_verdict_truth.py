@@ -279,7 +279,7 @@ def test_what_another_program_changed_in_a_finished_file_is_damage(change: str, 
         return
     assert anew.verdict.damaged.get("changed_since_recorded") == 1, anew.verdict.to_dict()
     assert anew.verdict.status in ("damaged", "lost")
-    assert "what it holds is not what was recorded" in anew.verdict
+    assert "its content is not what was recorded" in anew.verdict
     if change == "its neighbour":
         assert anew.verdict.lost.get("lost_in_file", 0) > 0
     # A .h5 is written and opened in processes of their own.
@@ -593,7 +593,7 @@ def test_conversions_keep_a_verdict_with_its_numbers(kind: str, tmp_path: Path) 
     taxel.convert(tmp_path / "a.mcap", tmp_path / f"b.{kind}")
     second = taxel.open(tmp_path / f"b.{kind}").verdict
     if kind in ("csv", "lsa"):
-        assert second.startswith(f"the .{kind} does not say what was lost")
+        assert second.startswith(f"losses unknown: the .{kind} does not record them")
         # Version 1 cannot tell reordered datagrams from damaged stamps.
         assert second.status == ("damaged" if "events out of order" in second else "unknown")
     else:
@@ -800,7 +800,7 @@ def test_what_stands_behind_the_end_of_a_file_is_told(tmp_path: Path, appended: 
     assert recording.verdict.damaged == {"bytes_after_end": len(more)}
     assert recording.verdict.status == "damaged"
     bytes_ = "1 byte" if len(more) == 1 else f"{len(more)} bytes"
-    assert recording.verdict.startswith(f"damage in the file: {bytes_} behind its end not read; while recording: ")
+    assert recording.verdict.startswith(f"damage in the file: {bytes_} after its end not read; while recording: ")
 
 
 def test_what_two_generations_of_a_file_lost_adds_up(tmp_path: Path) -> None:
@@ -887,7 +887,7 @@ def test_a_second_board_with_the_numbers_of_the_first_is_told(seed: int, tmp_pat
         assert verdict.noted.get("datagrams_repeated", 0) == len(again) - other
         assert at_least(verdict, "damaged")
         assert "nothing lost;" not in verdict
-    assert told.startswith("nothing lost but what another board sent; in the bytes that came: ")
+    assert told.startswith("nothing lost except what another board sent; in the bytes that came: ")
 
 
 def test_a_source_of_which_nothing_arrived_hides_no_loss_of_another() -> None:

@@ -361,7 +361,7 @@ def test_taxels_have_flaws_by_their_own_seeds(listener):
     for nonsense in ({"dead": 2.0}, {"gain": -1.0}):
         with pytest.raises(ProblemError, match=r"^(dead|gain) is .*: must be"):
             Flaws(**nonsense)
-    with pytest.raises(ProblemError, match="is not a flaw"):
+    with pytest.raises(ProblemError, match="is unknown: must be one of"):
         Flaws(seeds={"cold": 1})
 
 

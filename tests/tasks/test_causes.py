@@ -293,9 +293,9 @@ def test_labels_near_nothing_are_refused_in_one_line_that_names_the_option(tmp_p
     assert error.startswith(
         "taxel: labels: 0 of 12 labels lie within 50 ms of anything that was felt; what may help is "
     )
-    assert error.endswith("; to continue nonetheless, give --labels-as-given\n")
+    assert error.endswith("; to continue anyway, give --labels-as-given\n")
     assert not (tmp_path / "r.json").exists()
-    with pytest.raises(taxel.ProblemError, match="to continue nonetheless, give labels_as_given") as refusal:
+    with pytest.raises(taxel.ProblemError, match="to continue anyway, give labels_as_given") as refusal:
         taxel.train(taxel.open(recording), labels)
     assert refusal.value.argument == "labels_as_given"
 
@@ -318,7 +318,7 @@ def test_on_a_terminal_it_is_a_question(
     monkeypatch.setattr("typer.confirm", lambda question, **_: asked.append(question) or answer)
     words = ("train", recording, "--labels", labels, "--tare", "0.5", "--folds", 0, "-o", tmp_path / "r.json")
     code, _, error = call(capsys, *words)
-    assert asked == ["Train on these labels nonetheless?"]
+    assert asked == ["Train on these labels anyway?"]
     assert "0 of 12 labels lie within 50 ms of anything that was felt" in error
     assert (code, (tmp_path / "r.json").exists()) == ((0, True) if answer else (2, False))
 

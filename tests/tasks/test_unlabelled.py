@@ -92,7 +92,7 @@ def test_detections_of_it_are_not_scored(feet: Path, tmp_path: Path, capsys: pyt
     labels, readout = table(tmp_path / "l.csv", rows(BEGINS, "left")), tmp_path / "r.json"
     train(taxel.open(feet), labels).readout.save(readout)
     _, out, _ = call(capsys, "detect", feet, "--readout", readout, "--truth", labels)
-    assert f"not scored, as no row of {labels} names it: contact of right" in out
+    assert f"not scored, because no row of {labels} names it: contact of right" in out
     found = taxel.tasks.detect(taxel.Readout.load(readout), taxel.open(feet), labels)
     assert found.score is not None
     assert found.score.false == 0
@@ -108,7 +108,7 @@ def test_an_example_is_left_out_of_what_is_not_known_of_it(tmp_path: Path) -> No
     more = Example(frames, truth, tare)
     with_it, without = (judge([known, more, *rest], recipe, 2).together for rest in ([unknown], []))
     assert with_it.rank == without.rank
-    with pytest.raises(taxel.ProblemError, match="unlabelled has 'contact', of which there are labels"):
+    with pytest.raises(taxel.ProblemError, match="unlabelled names 'contact', which has labels"):
         tune([Example(frames, truth, tare, unlabelled=["contact"])])
     assert np.array_equal(known._known(known_detections()).t, [1000])
 

@@ -213,10 +213,10 @@ impl<'a> Stop<'a> {
 mod tests {
     #[test]
     fn a_number_that_nobody_reads_digit_by_digit_is_in_scientific_notation() {
-        let told = |value: f64| problem!("tau"; " is {value} ms: must lie below 1.5").to_string();
-        assert_eq!(told(1e308), "tau is 1e308 ms: must lie below 1.5");
-        assert_eq!(told(-5e-324), "tau is -5e-324 ms: must lie below 1.5");
-        assert_eq!(told(1_700_000_000_000_000_000.0), "tau is 1700000000000000000 ms: must lie below 1.5");
+        let told = |value: f64| problem!("tau"; " is {value} ms: must be below 1.5").to_string();
+        assert_eq!(told(1e308), "tau is 1e308 ms: must be below 1.5");
+        assert_eq!(told(-5e-324), "tau is -5e-324 ms: must be below 1.5");
+        assert_eq!(told(1_700_000_000_000_000_000.0), "tau is 1700000000000000000 ms: must be below 1.5");
         assert_eq!(problem!("up to {}.", 1e30).to_string(), "up to 1e30.");
         assert_eq!(problem!("é {} é", 1e30).to_string(), "é 1e30 é");
     }

@@ -264,7 +264,7 @@ impl<'a> EventsView<'a> {
                 (latest, row) = (t, k);
             } else if latest.abs_diff(t) > FARTHEST_BACK_US.unsigned_abs() {
                 return Err(problem!(
-                    "event {k} at {t} us: lies more than 0.1 s behind event {row} at {latest} us; put them in order of \
+                    "event {k} at {t} us: is more than 0.1 s before event {row} at {latest} us; put them in order of \
                      time with Events.sorted()"
                 ));
             }
@@ -294,7 +294,7 @@ impl<'a> EventsView<'a> {
         let (columns, rows) = (self.array.columns, self.array.rows);
         for (k, (&x, &y)) in self.x.iter().zip(self.y).enumerate() {
             if x >= columns || y >= rows {
-                return Err(problem!("event {k}: row {y}, column {x} lies outside {rows} rows x {columns} columns"));
+                return Err(problem!("event {k}: row {y}, column {x} is outside {rows} rows x {columns} columns"));
             }
         }
         Ok(())

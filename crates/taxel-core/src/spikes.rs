@@ -107,7 +107,7 @@ impl SpikeTrains {
                 return Err(problem!("spike at {} ms: train {n} of {trains}", s.t));
             }
             if !(start <= s.t && s.t <= stop) {
-                return Err(problem!("train {n}: spike at {} ms lies outside the window {start} to {stop} ms", s.t));
+                return Err(problem!("train {n}: spike at {} ms is outside the window {start} to {stop} ms", s.t));
             }
             offsets[n + 1] += 1;
         }
@@ -287,7 +287,7 @@ pub fn check(
 ) -> Result<()> {
     check_values(kind, values, times.len())?;
     if !(start.is_finite() && stop.is_finite() && start <= stop) {
-        return Err(problem!("window {} to {} ms: start must not lie after stop", start, stop));
+        return Err(problem!("window {} to {} ms: start must not be after stop", start, stop));
     }
     let sound = offsets.first() == Some(&0) && offsets.last() == Some(&times.len()) && offsets.is_sorted();
     if !sound {
@@ -306,7 +306,7 @@ pub fn check(
                 ));
             }
             if t < start || t > stop {
-                return Err(problem!("train {n}, spike {k}: {t} ms lies outside the window {} to {} ms", start, stop));
+                return Err(problem!("train {n}, spike {k}: {t} ms is outside the window {} to {} ms", start, stop));
             }
         }
     }
@@ -318,14 +318,14 @@ fn check_values(kind: SpikeKind, values: Option<&[f32]>, spikes: usize) -> Resul
     let Some(values) = values else {
         return match kind {
             SpikeKind::Unsigned => Ok(()),
-            SpikeKind::Signed | SpikeKind::Graded => Err(problem!("{} trains need values, one a spike", kind.name())),
+            SpikeKind::Signed | SpikeKind::Graded => Err(problem!("{} trains need values, one per spike", kind.name())),
         };
     };
     if kind == SpikeKind::Unsigned {
         return Err(problem!("unsigned trains have no values: choose kind signed or graded, or leave the values out"));
     }
     if values.len() != spikes {
-        return Err(problem!("values"; ": must be one a spike, {spikes}"));
+        return Err(problem!("values"; ": must be one per spike, {spikes}"));
     }
     if let Some(k) = values.iter().position(|value| !value.is_finite()) {
         return Err(problem!("values"; "[{k}] is {}: must be finite", format!("{}", values[k]).to_lowercase()));
@@ -333,7 +333,7 @@ fn check_values(kind: SpikeKind, values: Option<&[f32]>, spikes: usize) -> Resul
     if kind == SpikeKind::Graded
         && let Some(k) = values.iter().position(|&value| value == 0.0)
     {
-        return Err(problem!("values"; "[{k}] is 0: a graded value of 0 is no spike, leave it out"));
+        return Err(problem!("values"; "[{k}] is 0: a graded value of 0 is not a spike, leave it out"));
     }
     Ok(())
 }

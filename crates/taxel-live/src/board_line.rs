@@ -147,7 +147,7 @@ impl BoardLine {
                 Err(Error::Core(CoreError::Interrupted)) | Ok(_) => return opened,
                 Err(error) if begun.elapsed() >= within => {
                     let seconds = within.as_secs_f64();
-                    return Err(self.device(&format!("no board there after {seconds} s ({error})")));
+                    return Err(self.device(&format!("no board answered within {seconds} s ({error})")));
                 }
                 Err(_) => std::thread::sleep(ASK_EVERY),
             }

@@ -214,10 +214,10 @@ impl Live {
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         if options.record_later && options.record.is_some() {
-            return Err(problem!("recordings that begin later, and one from the beginning: choose one").into());
+            return Err(problem!("record and record_later are both given: choose one of them").into());
         }
         if let (None, false, Some(source)) = (&options.record, options.record_later, others.texts.first()) {
-            return Err(problem!("source {} without a recording: nothing would keep it", source.name()).into());
+            return Err(problem!("source {} without a recording: nothing would save it", source.name()).into());
         }
         let sources = others.open(options.first_line_wait(others.stop)?)?;
         Self::begin(input, options, sources, readout, sinks, None)
@@ -424,7 +424,7 @@ impl Live {
         match (numbers, frames) {
             (Some(numbers), _) => numbers.sample(arrived_ns, values),
             (None, Some(frames)) => frames.sample(name, arrived_ns, values),
-            (None, None) => Err(problem!("source {name:?}: none of numbers has that name").into()),
+            (None, None) => Err(problem!("source {name:?}: no source of numbers has this name").into()),
         }
     }
 
@@ -496,7 +496,7 @@ impl Live {
     /// cannot be created: then the one that runs goes on. What ended that one early, or `File` if its end cannot be written.
     pub fn record(&self, record: &Record) -> Result<Option<LiveSummary>> {
         if !self.shared.options.record_later {
-            return Err(problem!("a recording while listening: begin without one, for later ones").into());
+            return Err(problem!("record: this pipeline was not begun for recordings that begin later").into());
         }
         self.handle().record(record)
     }

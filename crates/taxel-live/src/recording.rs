@@ -204,7 +204,7 @@ impl Header {
             return Err(problem!("a sensor of {rows} x {columns} taxels; at most {} are read", limits::TAXELS));
         }
         if !(-limits::TIME_US..=limits::TIME_US).contains(&self.decoding.origin_us) {
-            return Err(problem!("origin_us"; " is {}: must lie within 142 years of 0", self.decoding.origin_us));
+            return Err(problem!("origin_us"; " is {}: must be within 142 years of 0", self.decoding.origin_us));
         }
         if let Some(stream) = &self.stream {
             stream.check(&self.name)?;

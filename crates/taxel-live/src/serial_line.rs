@@ -109,7 +109,7 @@ impl SerialLine {
     ///
     /// # Errors
     ///
-    /// Those of the system: the line has hung up.
+    /// Those of the system: the line was disconnected.
     pub fn read(&mut self, bytes: &mut [u8], within: Duration) -> io::Result<usize> {
         let read = match &mut self.0 {
             Stream::Port(port) => {
@@ -128,7 +128,7 @@ impl SerialLine {
     ///
     /// # Errors
     ///
-    /// Those of the system: the line has hung up.
+    /// Those of the system: the line was disconnected.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         passed(match &mut self.0 {
             Stream::Port(port) => port.set_timeout(AT_ONCE).map_err(io::Error::from).and_then(|()| port.write(bytes)),
@@ -197,9 +197,9 @@ fn passed(result: io::Result<usize>) -> io::Result<usize> {
     result.or_else(|error| match error.kind() {
         ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted => Ok(0),
         ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe => {
-            Err(io::Error::new(ErrorKind::NotConnected, "the line has hung up"))
+            Err(io::Error::new(ErrorKind::NotConnected, "the line was disconnected"))
         }
-        _ => Err(io::Error::new(ErrorKind::NotConnected, format!("the line has hung up: {error}"))),
+        _ => Err(io::Error::new(ErrorKind::NotConnected, format!("the line was disconnected: {error}"))),
     })
 }
 

@@ -145,7 +145,7 @@ fn what_came_there_comes_here_and_as_of_this_clock() {
     let bridged = came(&received);
     assert_eq!((bridged.missing, bridged.dropped, bridged.refused, bridged.ended), (0, 0, 0, true));
     assert_eq!(bridged.dropped_by_kernel.are_known(), !ways::is_portable());
-    let verdict = if ways::is_portable() { "what was lost is not known" } else { "nothing lost" };
+    let verdict = if ways::is_portable() { "losses unknown" } else { "nothing lost" };
     assert!(received.verdict.text.starts_with(verdict), "{}", received.verdict.text);
     let (there, here) = (near.recorded(), far.recorded());
     assert_eq!(there.len(), 3000);

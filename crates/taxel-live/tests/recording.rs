@@ -329,7 +329,7 @@ fn what_a_kernel_does_not_count_is_unknown_unless_the_board_numbers_what_it_send
     let uncounted = RecordingCounts { dropped_by_kernel: KernelDrops::UNKNOWN, ..sound.clone() };
     let verdict = uncounted.verdict();
     assert_eq!(verdict.status, RecordingStatus::Unknown);
-    assert_eq!(verdict.text, "what was lost is not known: the kernel does not count what it drops");
+    assert_eq!(verdict.text, "losses unknown: the kernel does not count what it drops");
     let numbered = RecordingCounts { missing: Some(0), ..uncounted.clone() }.verdict();
     assert_eq!((numbered.status, numbered.text.as_str()), (RecordingStatus::Complete, "nothing lost"));
     let missing = RecordingCounts { missing: Some(5), dropped_by_queue: 2, recorded: 8, ..uncounted.clone() }.verdict();

@@ -246,12 +246,12 @@ fn a_line_that_hangs_up_while_it_is_read_is_an_error_that_says_so() {
                 matches!(&error, Error::Socket { source, .. } if source.kind() == ErrorKind::NotConnected),
                 "{error}"
             );
-            assert!(error.to_string().contains(": the line has hung up"), "{error}");
+            assert!(error.to_string().contains(": the line was disconnected"), "{error}");
         });
         let error = line.command(Command { register: 4, value: 1 }, Stop::never()).unwrap_err().to_string();
-        assert!(error.contains(": the line has hung up"), "{error}");
+        assert!(error.contains(": the line was disconnected"), "{error}");
         let error = line.reopen(Duration::from_millis(100), Stop::never()).unwrap_err().to_string();
-        assert!(error.contains(": no board there after 0.1 s ("), "{error}");
+        assert!(error.contains(": no board answered within 0.1 s ("), "{error}");
     });
 }
 

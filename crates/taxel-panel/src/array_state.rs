@@ -615,7 +615,7 @@ mod tests {
         }
         state.apply_one(&change(100, 0, 51));
         state.update_curve();
-        assert_eq!(state.time_columns().curve(0).sum, 0, "the floor is no touch");
+        assert_eq!(state.time_columns().curve(0).sum, 0, "the noise floor is not a touch");
         state.apply_one(&change(200, 0, 58));
         state.apply_one(&change(300, 3, 78));
         state.update_curve();

@@ -127,7 +127,7 @@ fn number(id: Id) -> u64 {
 }
 
 fn board(hub: &Hub) -> Answer<Arc<LiveSource>> {
-    hub.live().ok_or_else(|| "no board is listened to".into())
+    hub.live().ok_or_else(|| "no board is connected".into())
 }
 
 /// Whether the live source may restart: on another address, or with another meaning of intensities.
@@ -223,7 +223,7 @@ fn record(hub: &Arc<Hub>, request: RecordRequest) -> Answer {
         return Err(Refusal::of_field("advance", "needs an index and a length"));
     }
     if hub.live().is_none() {
-        return Err("no board is listened to: nothing to record".into());
+        return Err("no board is connected: nothing to record".into());
     }
     let plan = RecordingPlan {
         name: name.0,
@@ -314,7 +314,7 @@ async fn health(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<Message> {
 async fn cut(hub: &Hub, shown: Option<&OpenRecording>, (start_us, stop_us): (i64, i64), to: &str) -> Answer<Message> {
     let OpenRecording { name, trial, indexed } = shown.ok_or("cut: open a recording first")?.clone();
     if start_us >= stop_us {
-        return Err(Refusal::of_field("stop_us", "must lie after start_us"));
+        return Err(Refusal::of_field("stop_us", "must be after start_us"));
     }
     let (path, us) = (hub.folder.file(&name)?, indexed.us());
     let out = hub.folder.file(to).map_err(|error| Refusal::of_field("name", error))?;

@@ -230,7 +230,7 @@ impl ClientSession {
 
     async fn handle(&mut self, text: &str) -> Result<(), Closing> {
         let Ok(keys) = serde_json::from_str::<Map<String, Value>>(text) else {
-            return self.refuse(Value::Null, String::new(), "no JSON object".into()).await;
+            return self.refuse(Value::Null, String::new(), "not a JSON object".into()).await;
         };
         let id = keys.get("id").cloned().unwrap_or(Value::Null);
         let is_id = match &id {

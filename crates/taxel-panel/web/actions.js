@@ -44,7 +44,7 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
     const order = ["system", "dark", "light"];
     const next = order[(order.indexOf(settings.values.theme) + 1) % order.length];
     settings.set("theme", next);
-    notify(`theme: ${next === "system" ? "as the system has it" : next}`);
+    notify(`theme: ${next === "system" ? "the system’s" : next}`);
   };
   const picture = () => savePicture(pictureOf(player, lanes)).then(() => notify("picture saved"), failed);
   /** Sets the rest of the watched taxel to its held value, for the readout too. */

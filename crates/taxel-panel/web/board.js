@@ -98,7 +98,7 @@ class Control {
     }
   }
 
-  /** @returns {number} what stands there, in the register's unit; NaN where that is no number */
+  /** @returns {number} the number in the field, in the register's unit; NaN if it is not a number */
   read() {
     const text = this.input.value.trim().replace(",", ".");
     return text === "" ? NaN : Math.round(Number(text) * this.unit.per);
@@ -140,7 +140,7 @@ class Control {
     if (this.wanted === null && !(same && document.activeElement === this.input)) this.show();
   }
 
-  /** What was typed is gone, what the board holds stands there again. */
+  /** Replaces what was typed by the value that the board holds. */
   restore() {
     this.wanted = null;
     this.show();
@@ -285,7 +285,7 @@ export class Board {
    * @param {number | null} frame_us
    */
   showRecorded(values, frame_us) {
-    write(part("registers-why", HTMLElement), values ? "Of a recording: what the registers held." : "This recording holds no registers of a board.");
+    write(part("registers-why", HTMLElement), values ? "The values of the registers during the recording." : "This recording holds no registers of a board.");
     part("registers-held", HTMLElement).hidden = !values;
     if (values) this.show(values, frame_us, null, true, false);
   }
@@ -294,8 +294,8 @@ export class Board {
   take(message) {
     part("registers-held", HTMLElement).hidden = !this.hasRegisters;
     if (!this.hasRegisters) return write(part("registers-why", HTMLElement), "A source of numbers has no registers.");
-    const assumed = message.known || message.stated ? "" : "; these are those of a board at reset";
-    write(part("registers-why", HTMLElement), this.writable ? "" : `No control line: registers are neither read nor set${assumed}. Choose a port above.`);
+    const assumed = message.known || message.stated ? "" : "; the values below are those of a board at reset";
+    write(part("registers-why", HTMLElement), this.writable ? "" : `No control line, so registers cannot be read or set${assumed}. Choose a port above.`);
     this.show(message.values, message.frame_us, message.preset, message.known, message.stated);
   }
 

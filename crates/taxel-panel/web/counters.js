@@ -8,13 +8,13 @@ import { short, integer } from "./words.js";
 
 /** @type {Record<string, string>} where data can be lost */
 const LOSSES = {
-  kernel: "messages that the socket's buffer had no room for",
-  queue: "datagrams that found no room before the decoder",
-  wire: "datagrams that never arrived whole",
-  damaged: "bytes that were not words",
+  kernel: "messages dropped because the socket's buffer was full",
+  queue: "datagrams dropped because the queue before the decoder was full",
+  wire: "datagrams lost or damaged on the way",
+  damaged: "bytes that are not valid words",
   outside: "taxels outside the array",
-  readout: "events that found no room before the readout",
-  panel: "events that only this panel's curves and its view of the past lack",
+  readout: "events dropped because the queue before the readout was full",
+  panel: "events missing only in this panel's curves and its view of the past",
 };
 
 /**

@@ -180,7 +180,7 @@ export class Labels {
   /** Takes back the last change of labels that was made in this window. */
   undo() {
     // The server takes back what it has carried out.
-    this.saved = this.saved.then(() => this.save({ type: "undo" })).then(() => notify("took back the last change of labels"), this.failed);
+    this.saved = this.saved.then(() => this.save({ type: "undo" })).then(() => notify("undid the last change of labels"), this.failed);
   }
 
   /** Makes a label and chooses it. @param {{ label: string, t_us: number, source?: string, replaces_us?: number | null }} label */
@@ -235,7 +235,7 @@ export class Labels {
     this.offerName();
     this.conflict.show(this.file ? this.files.get(this.file) : undefined);
     write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
-    this.lane.dataset.hint = this.file ? "Labels: click here to mark one" : "Labels: open a recording, or start one";
+    this.lane.dataset.hint = this.file ? "Labels: click here to add a label" : "Labels: open a recording or start one first";
     this.showPlace();
     part("train-line", HTMLElement).hidden = !labels.length;
     // Who has made labels knows how, and needs the room.
@@ -260,7 +260,7 @@ export class Labels {
   showPlace() {
     const table = this.file ? this.files.get(this.file) : undefined;
     const how = this.server.saves ? "Saving" : table?.labels.length ? "Saved" : "To be saved";
-    write(part("label-place", HTMLElement), table ? `${how} in ${table.path}` : "Open a recording, or start one, and mark what happens in it.");
+    write(part("label-place", HTMLElement), table ? `${how} in ${table.path}` : "Open a recording or start one, then label its events.");
   }
 
   /** The row of a label, made again only where it is another. @param {Label} label @returns {HTMLElement} */
@@ -349,7 +349,7 @@ export class Labels {
       const count = this.counts[i];
       const [first, last] = [marks[0].t_us, marks[marks.length - 1].t_us];
       write(count, integer(marks.length));
-      const name = `${counted(marks.length, "label")} from ${seconds(first)} to ${seconds(last)}: show them closer`;
+      const name = `${counted(marks.length, "label")} from ${seconds(first)} to ${seconds(last)}: zoom in`;
       entitle(count, "aria-label", name);
       entitle(count, "title", name);
       count.style.left = `${from.toFixed(1)}px`;

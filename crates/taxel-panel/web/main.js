@@ -608,7 +608,7 @@ addEventListener("beforeunload", (event) => {
 });
 if (fragment.get("token")) server.open();
 else {
-  connection.why = "the address lacks its token: copy the whole line that taxel printed";
+  connection.why = "the address has no token: copy the whole line that taxel printed";
   writeState();
   failed(new Error(connection.why));
 }

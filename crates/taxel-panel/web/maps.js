@@ -167,7 +167,7 @@ export class Maps {
   name() {
     const title = this.geometry.kind === "channels" ? "Channels" : quantity(this.values.unit);
     write(part("pressure-title", HTMLElement), title);
-    entitle(part("pressure-frame", HTMLElement), "aria-label", `${title}: arrow keys move the crosshair, Escape takes it away`);
+    entitle(part("pressure-frame", HTMLElement), "aria-label", `${title}: arrow keys move the crosshair, Escape hides it`);
     entitle(part("pressure-alone", HTMLElement), "aria-label", `${title} alone, larger`);
   }
 

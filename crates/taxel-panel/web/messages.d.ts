@@ -49,7 +49,7 @@ export interface BagTopic {
   trouble: string;
 }
 
-/** What another program's text of a table lacks. A row without a `label` says that the note at `replaces_us` counts no more. */
+/** How a table that another program saved differs from what was acknowledged. A row without a `label` says that the note at `replaces_us` no longer counts. */
 export interface Conflict {
   conflict_id: number;
   /** Acknowledged by `done`, and not in it. */
@@ -101,7 +101,7 @@ export interface FrameRecording {
   left_s: number | null;
 }
 
-/** A source of frames; sources stand side by side in `array`. */
+/** A source of frames; sources are side by side in `array`. */
 export interface FrameSourceInfo {
   name: string;
   /** Its first column. */
@@ -190,7 +190,7 @@ export interface LiveFrames {
   begin_us: number;
 }
 
-/** What was lost, by cause. */
+/** Counts of lost data, by cause. */
 export interface Lost {
   /** Messages; `null` where the system does not count them. */
   kernel: number | null;
@@ -198,7 +198,7 @@ export interface Lost {
   queue: number;
   /** Datagrams of version 2 that never arrived intact. */
   wire: number;
-  /** Bytes that were no words. */
+  /** Bytes that were not valid words. */
   damaged: number;
   /** Taxels outside the array. */
   outside: number;
@@ -305,7 +305,7 @@ export interface Hello {
   /** False: no board, recordings only (`taxel view`). */
   live: boolean;
   array: ArrayInfo | null;
-  /** The options of the session by their names in Python, but for sensor, registers, readout and tare; null without a board. */
+  /** The options of the session by their names in Python, except sensor, registers, readout and tare; null without a board. */
   options: Record<string, unknown> | null;
   /** Where datagrams are received. */
   udp: string | null;
@@ -345,7 +345,7 @@ export interface Hello {
   most_credits: number;
 }
 
-/** What the board holds, or what it is assumed to hold; at the beginning and after every change. */
+/** The registers that the board holds, or is assumed to hold; at the beginning and after every change. */
 export interface Registers {
   type: "registers";
   /** False: they were not read from the board; they are the preset that was named on the command line, or what the board held before a reset (a new session of version 2, or its greeting on the serial line), until they are read again, which is at once. */
@@ -388,7 +388,7 @@ export interface Counters {
   arrival: Arrival;
   /** Null in the first quarter of a second. */
   pace: Pace | null;
-  /** What is wrong, where the taxels of frames rest elsewhere after a gap than by the tare. */
+  /** What is wrong if, after a gap, the rest of the taxels of frames differs from the tare. */
   rest_shift: string | null;
   /** Whether the values of frames fall under touch, so that no pressure is shown. */
   falls: boolean;
@@ -461,7 +461,7 @@ export interface Places {
   addresses: InterfaceAddress[];
 }
 
-/** What arrives from a source of lines, when asked. */
+/** The lines that arrive from a source, on request. */
 export interface SourcePreview {
   type: "source_preview";
   /** The last lines that arrived. */
@@ -625,7 +625,7 @@ export interface Labels {
   /** The table beside the recording. */
   path: string;
   labels: Label[];
-  /** What another program's text of the table lacks. */
+  /** How another program's text of the table differs from what was acknowledged. */
   conflict: Conflict | null;
 }
 
@@ -813,7 +813,7 @@ export interface PresetDeleteRequest {
   name: string;
 }
 
-/** Begin: after the countdown (none where left out) record to `NAME.mcap`, or with an `index` of 1 to `NAME1.mcap`, for `length_s`, or else until `stop`. With `advance` the index moves on by itself after each recording, and the next countdown begins until `stop`. `label` is written into the recording as a note without a time: it holds for all of it, and is no event. `format` is `mcap` where left out; `lsa` holds raw bytes and no label. */
+/** Begin: after the countdown (none where left out) record to `NAME.mcap`, or with an `index` of 1 to `NAME1.mcap`, for `length_s`, or else until `stop`. With `advance` the index moves on by itself after each recording, and the next countdown begins until `stop`. `label` is written into the recording as a note without a time: it is about the whole recording, and is not an event. `format` is `mcap` where left out; `lsa` holds raw bytes and no label. */
 export interface RecordRequest {
   type: "record";
   id?: number;
@@ -900,7 +900,7 @@ export interface HealthRequest {
   id?: number;
 }
 
-/** Train a readout on the labels of the recording shown, of a file with several trials on those that have labels, as `taxel train --labels notes` does, into `NAME.readout.json` beside it, which it replaces. Answered when the training has ended; `trained` comes before. One training runs at a time. Labels of which nearly none lies near anything felt are refused, with the field `labels_as_given`, unless it is true. */
+/** Train a readout on the labels of the recording shown, as `taxel train --labels notes` does; of a file with several trials, on the trials that have labels. The readout replaces `NAME.readout.json` beside the recording. Answered when the training has ended; `trained` comes before. One training runs at a time. If nearly no label is near anything felt, the request is refused with the field `labels_as_given`, unless that is true. */
 export interface TrainRequest {
   type: "train";
   id?: number;
@@ -919,7 +919,7 @@ export interface TrainStopRequest {
   id?: number;
 }
 
-/** Read what this view shows with a readout or a plain rule of the folder. A recording: answered by `detections`. The board: from now on, for all clients; the source begins anew, as with `delta_intensity`. A readout that needs a tare uses that of the command, else what the taxels hold now. */
+/** Read what this view shows with a readout or a plain rule of the folder. A recording: answered by `detections`. The board: from now on, for all clients; the source begins again, as with `delta_intensity`. A readout that needs a tare uses that of the command, else what the taxels hold now. */
 export interface ReadOutRequest {
   type: "read_out";
   id?: number;
@@ -943,7 +943,7 @@ export interface ListenRequest {
   port: number;
 }
 
-/** Receive another source instead, as `taxel live --source` names it. Time, values and the past that can be viewed begin anew. Refused while a recording runs. */
+/** Receive another source instead, as `taxel live --source` names it. Time, values and the past that can be viewed begin again. Refused while a recording runs. */
 export interface ReadSourceRequest {
   type: "read_source";
   id?: number;
@@ -985,7 +985,7 @@ export interface DescribeRequest {
   topic?: string | null;
 }
 
-/** Whether the board sends differences from the value before, not values. Earlier events were decoded with the other meaning, so the source begins anew: time, values, the past that can be viewed, a readout with its tare. Refused while a recording runs. */
+/** Whether the board sends differences from the value before, not values. Earlier events were decoded with the other meaning, so the source begins again: time, values, the past that can be viewed, a readout with its tare. Refused while a recording runs. */
 export interface DeltaIntensityRequest {
   type: "delta_intensity";
   id?: number;

@@ -145,7 +145,7 @@ export class Recorder {
     part("record-form", HTMLElement).hidden = !this.able;
     if (!status || status.state === "idle") {
       write(big, this.able ? "Ready" : "No board");
-      write(more, this.able ? "" : "is listened to: taxel live --panel records one");
+      write(more, this.able ? "" : "is connected: start taxel live --panel to record");
       bar.hidden = true;
       return;
     }

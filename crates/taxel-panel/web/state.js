@@ -23,17 +23,17 @@ const FIRST_WITHIN_S = 1;
 function silence(counters, address, isBoard, firewall) {
   if (!counters) return null;
   const { arrival, board_us, seconds: elapsed_s, taring } = counters;
-  const since = `since ${seconds(board_us)} of the ${isBoard ? "board" : "source"}, for ${short(1e6 * arrival.silent_s)}`;
+  const since = `for ${short(1e6 * arrival.silent_s)}, since ${seconds(board_us)} by the clock of the ${isBoard ? "board" : "source"}`;
   if (arrival.state === "nothing") {
     const text = isBoard
       ? `Nothing has arrived at ${address} so far. Is the board on, and does it send to this address and port?${firewall}`
       : `No frame has arrived from ${address} so far. Is it connected, and does it print lines of numbers?`;
     return elapsed_s < FIRST_WITHIN_S ? null : { word: "Nothing arrives", text };
   }
-  if (arrival.state === "lost" && !isBoard) return { word: "Silent", text: `The line is silent: nothing from ${address} ${since}.` };
-  if (arrival.state === "lost") return { word: "Lost", text: `The board is lost: nothing ${since}, though it sent a heartbeat every ${short(arrival.heartbeat_us ?? 0)} or sooner.` };
+  if (arrival.state === "lost" && !isBoard) return { word: "Silent", text: `The line is silent: nothing has arrived from ${address} ${since}.` };
+  if (arrival.state === "lost") return { word: "Lost", text: `The board is lost: nothing has arrived ${since}, though it sent a heartbeat at least every ${short(arrival.heartbeat_us ?? 0)}.` };
   if (taring) return { word: "Tare", text: "Taking a tare: leave the sensor at rest." };
-  return arrival.state === "quiet" ? { word: "Quiet", text: `Quiet: nothing ${since}.` } : null;
+  return arrival.state === "quiet" ? { word: "Quiet", text: `Quiet: nothing has arrived ${since}.` } : null;
 }
 
 /** @param {string} text @returns {string} with a capital and a full stop; empty if there is none */
@@ -46,20 +46,20 @@ function fall(opened) {
   if (!opened || !falling.length) return "";
   const names = falling.length < sources.length ? ` of ${falling.join(", ")}` : "";
   const file = `${opened.name.replace(/\.[^.]+$/, "")}.layout.toml`;
-  return `The values${names} fall from their rest, so that no pressure is shown. If less means more pressure, turn them: “falls = true” is written into ${file} beside the recording, which every command reads too.`;
+  return `The values${names} fall from their rest, so no pressure is shown. If smaller values mean more pressure, turn the values. This writes “falls = true” into ${file} beside the recording, which every command reads.`;
 }
 
 /** The same of the live source. @param {Hello | null} hello @param {Counters | null} counters @returns {string} */
 function liveFall(hello, counters) {
   if (!counters?.falls || !hello?.lines) return "";
-  return "The values fall from their rest, so that no pressure is shown. If less means more pressure, turn them: the source is read again with “falls=true”.";
+  return "The values fall from their rest, so no pressure is shown. If smaller values mean more pressure, turn the values. The source is then read again with “falls=true”.";
 }
 
 /** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */
 function preload(opened) {
   const sources = opened?.frames?.sources ?? [{ name: "", preload_at: opened?.preload_at ?? "" }];
   const loads = sources.filter((source) => source.preload_at).map(({ name, preload_at }) => (sources.length > 1 ? `${name}, ${preload_at}` : preload_at));
-  return loads.length ? `In the quiet stretch that the rest is taken from, something lay on ${loads.join("; ")}.` : "";
+  return loads.length ? `The rest was measured in a quiet time, but something pressed then on ${loads.join("; ")}.` : "";
 }
 
 /** @param {Opened | null} opened @param {Hello | null} hello @returns {string} how many frames there are, and rows and columns of each sensor */

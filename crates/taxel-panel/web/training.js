@@ -72,7 +72,7 @@ export class Training {
     part("train-next", HTMLElement).hidden = !next;
     write(part("train-detect", HTMLElement), next);
     // The page has no options of the command line.
-    write(part("train-how", HTMLElement), options.length ? `Options (${options.join(", ")}) are given in a shell, at the end of this command:` : "The same in a shell:");
+    write(part("train-how", HTMLElement), options.length ? `To set options such as ${options.join(", ")}, run this command in a shell and add them:` : "The same in a shell:");
   }
 
   /** Shows how far the training that runs is. @param {string} text as the command says it */

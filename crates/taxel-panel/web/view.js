@@ -130,7 +130,7 @@ export class View {
   takeHealth(health) {
     const kinds = /** @type {const} */ (["dead", "stuck", "noisy"]);
     const counts = kinds.map((kind) => `${health[kind].length} ${kind}`).join(", ");
-    write(part("health-info", HTMLElement), `${counts}, of ${counted(health.taxels, "taxel")}; ${health.untested} not touched enough to say`);
+    write(part("health-info", HTMLElement), `${counts}, of ${counted(health.taxels, "taxel")}; ${health.untested} not touched enough to say whether they work`);
     const items = kinds.flatMap((kind) =>
       health[kind].slice(0, 200).map(([x, y]) => {
         const button = make("button", { type: "button", class: "link" }, make("span", { class: `unwell ${kind}` }), ` ${kind}: row ${y}, column ${x}`);
@@ -164,7 +164,7 @@ export class View {
     write(part("cut-to-time", HTMLElement), seconds(to));
     const ready = this.source !== null && from !== null && to !== null;
     part("cut-write", HTMLButtonElement).disabled = !ready;
-    write(part("cut-why", HTMLElement), this.source === null ? "Open a recording first: what is cut comes out of it." : "");
+    write(part("cut-why", HTMLElement), this.source === null ? "Open a recording first: a cut writes a part of it to a file." : "");
     const name = part("cut-name", HTMLInputElement);
     if (!name.value && this.source) name.value = this.source.replace(/(\.[^.]+)$/, "-cut$1");
   }

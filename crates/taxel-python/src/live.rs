@@ -276,8 +276,7 @@ impl Live {
     fn stop(&self, py: Python<'_>) -> PyResult<Ended> {
         self.pipeline.check()?;
         if IN_CALLBACK.get() {
-            let text =
-                "live: `stop` was called by its own `say`, and would wait for itself; call it from another thread";
+            let text = "live: `say` must not call `stop`, which would wait for `say`: call it from another thread";
             return Err(ProblemError::new_err(text));
         }
         enter(py, |_| {

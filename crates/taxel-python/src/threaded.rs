@@ -31,7 +31,7 @@ impl<T: Send + Sync> Threaded<T> {
             return Ok(());
         }
         Err(ProblemError::new_err(format!(
-            "{}: belongs to process {}, whose threads a forked child has not; begin a new one in the child",
+            "{}: belongs to process {}; a forked child does not have its threads: begin a new one in the child",
             self.name, self.process
         )))
     }

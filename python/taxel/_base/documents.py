@@ -100,7 +100,7 @@ def object_of_json(location: str, text: str) -> dict[str, Any]:
     first = text.lstrip(" \t\r\n")[:1] if text[:1].isspace() else text[:1]
     if first != "{":
         begins = f"begins with {shown(first)}" if first else "empty"
-        raise FormatError(f"{location}: not JSON of an object: {begins}; must begin with '{{'")
+        raise FormatError(f"{location}: not a JSON object: {begins}; must begin with '{{'")
     values: dict[str, Any] = of_json(location, text, BY_TAXEL, room=_ROOM)
     return values
 

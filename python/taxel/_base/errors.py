@@ -17,14 +17,14 @@ _Error = TypeVar("_Error", bound=Error)
 #: What each remedy says, with the reader's name of the argument that helps.
 _REMEDIES = {
     "give": "give {}",
-    "go_on": "to continue nonetheless, give {}",
+    "go_on": "to continue anyway, give {}",
     "larger": "a larger {} reads more",
     "lay_out": "give {}, or rows and columns in a layout file, if they are a grid's taxels row by row",
     "pitch": "give {} with the pitch in mm, or pitch_mm in a layout file",
     "unfelt": (
-        "either the tare holds a touch, as it ends before the first label, which may be late (give {}), or readings "
-        "fall with pressure (falls = true in a layout file), or another source felt it (a column source in the "
-        "labels); taxel info shows what was touched"
+        "possible reasons: the tare holds a touch, as the first label, before which it ends, is late (give {}); "
+        "readings fall with pressure (write falls = true in a layout file); or another source felt the touch (add a "
+        "column source to the labels); taxel info shows what was touched"
     ),
 }
 

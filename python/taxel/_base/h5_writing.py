@@ -74,5 +74,5 @@ def write_h5(
         if answer.get("kind") == "ModuleNotFoundError":
             raise ModuleNotFoundError(answer["error"])
         if "done" not in answer:
-            why = answer.get("error", f"writing it ended the library, status {code}")
+            why = answer.get("error", f"the library crashed while writing it, status {code}")
             raise Error(f"{path}: HDF5 cannot be written ({why})")

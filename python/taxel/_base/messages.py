@@ -91,10 +91,10 @@ _NUMBER, _SECONDS = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)"), re.com
 
 
 def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
-    """Return texts, each of which is of a name, with the names before them: those that are of several once.
+    """Return texts with their names before them; a text that several names share is returned once.
 
-    Texts that differ in numbers alone are one, with their ranges, unless these are times. A text that is of all names
-    says so; of a single name no name is said.
+    Texts that differ only in numbers become one text with the ranges of the numbers, unless these are times. A text of
+    all names begins with how many these are; if there is a single name, it is left out.
 
     Parameters
     ----------
@@ -105,8 +105,8 @@ def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
 
     Examples
     --------
-    >>> of_names([("a", "2 of 4 lie far"), ("b", "3 of 4 lie far"), ("b", "noisy")], 2)
-    ['all 2: 2 to 3 of 4 lie far', 'b: noisy']
+    >>> of_names([("a", "2 of 4 are far"), ("b", "3 of 4 are far"), ("b", "noisy")], 2)
+    ['all 2: 2 to 3 of 4 are far', 'b: noisy']
     """
     alike: dict[str, dict[str, list[str]]] = {}
     for name, text in named:

@@ -126,7 +126,7 @@ class ReadingChild:
 
     def _end(self, patience_s: float) -> FormatError:
         """Return why the child has ended."""
-        why = f"reading it ended the library, status {self._child.wait()}"
+        why = f"the library crashed while reading it, status {self._child.wait()}"
         if self._is_late:
             why = f"the library has read nothing for {patience_s:g} s"
         return FormatError(f"{self.path}: not {self._kind} ({why})")

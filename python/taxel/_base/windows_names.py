@@ -25,7 +25,7 @@ def name_fault(path: str) -> str:
         if _DEVICE.match(name):
             return f"the name {name!r} is that of a device on Windows"
         if found := _FORBIDDEN.search(name):
-            return f"the name {name!r} has {found[0]!r}, which no name on Windows has"
+            return f"the name {name!r} has {found[0]!r}, which names on Windows cannot have"
         if name != ".." and name[-1] in ". ":
-            return f"the name {name!r} ends with {name[-1]!r}, which no name on Windows does"
+            return f"the name {name!r} ends with {name[-1]!r}, which names on Windows cannot"
     return ""

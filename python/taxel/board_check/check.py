@@ -122,7 +122,7 @@ class _Check:
         named = ", ".join(f"{name} {count}" for name, count in lost.items() if count)
         unnumbered = values.version == 1
         none = (
-            "none that bytes show; datagrams of version 1 have no numbers"
+            "none that can be seen: datagrams of version 1 have no numbers"
             if unnumbered
             else "none: no number is missing"
         )
@@ -184,8 +184,10 @@ class _Check:
         driven = found.silent[:, : found.registers.lines]
         quiet = lines_of(driven)
         where = f"; {quiet}: their comparators, if no current flows there" if quiet else ""
-        words = f"comparators had not returned as their ramp began, {counted(found.faults, 'time')}{where}"
-        self.tell("comparators", found.faults == 0, words if found.faults else "all had returned as their ramps began")
+        words = f"comparators had not returned when their ramp began, {counted(found.faults, 'time')}{where}"
+        self.tell(
+            "comparators", found.faults == 0, words if found.faults else "all had returned when their ramps began"
+        )
         full = found.full[:, : found.registers.lines]
         end = f"{counted(int(full.sum()), 'taxel')} stay at the ramp's end, {found.registers.ramp} ticks"
         why = "no comparator is connected there, or the ramp does not reach its voltage"

@@ -91,9 +91,7 @@ class Calibration(Saved):
     _curve: Curve
 
     def __init__(self) -> None:
-        raise ProblemError(
-            "a calibration is made (Calibration.law, .table, .fit) or loaded (Calibration.load), not built"
-        )
+        raise ProblemError("Calibration: make one by Calibration.law, .table or .fit, or load one by Calibration.load")
 
     @classmethod
     def _made(cls, array: Array, curve: Curve, unit: str, reading_unit: str, how: Mapping[str, Any]) -> Calibration:

@@ -52,7 +52,11 @@ def detect(
     ] = None,
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
     shift_ms: Annotated[
-        float, typer.Option(help="Move all labels of --truth by so many ms before all else, as those of another clock.")
+        float,
+        typer.Option(
+            help="Before all else, move all labels of --truth by this many ms, for example if their times are of "
+            "another clock."
+        ),
     ] = 0.0,
     lists: Annotated[
         bool,
@@ -186,7 +190,7 @@ def _score_lines(found: Detecting, labels: Sequence[str], truth: str | None, *, 
     yield f"against {truth} (window {found.window_ms:g} ms{shift}){read}:"
     yield from repr(found.score).split("\n")
     for label, sources in found.unlabelled.items():
-        yield f"not scored, as no row of {truth} names it: {label} of {', '.join(sources)}"
+        yield f"not scored, because no row of {truth} names it: {label} of {', '.join(sources)}"
     if found.not_scored:
         yield f"not scored, as the readout has {', '.join(labels)}: {', '.join(found.not_scored)}"
     if several:

@@ -179,7 +179,7 @@ def _confirmed(error: ProblemError) -> bool:
     if not _on_terminal():
         return False
     say(f"taxel: {error.args[0]}", err=True)
-    return typer.confirm("Train on these labels nonetheless?", err=True)
+    return typer.confirm("Train on these labels anyway?", err=True)
 
 
 def _on_terminal() -> bool:

@@ -36,7 +36,7 @@ _EARLY = 0.5
 
 
 class Ages(NamedTuple):
-    """The trains of the ages of a touch, one of which fires at every sample of it, and from which age on each, ms."""
+    """The trains of the ages of a touch, one of which fires at every sample of it, and when each begins, ms."""
 
     trains: range
     begin_ms: tuple[float, ...]
@@ -155,9 +155,10 @@ def in_frames(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cloc
 
     A frame shows a touch at a whole number of frames after its onset, so each age and delay is rounded up to whole
     frames, and points to try whose delays are then those of a point before are left out. As stamps are not regular,
-    each age begins half a frame early, and the age of a delay ends a frame later. Of events, whose state is known
-    at any time, all that holds only where a frame lasts longer than a delay, and ages begin in time. Of several
-    examples the longest frame counts. A recipe that names no neurons is trained as it is, and its delays are ages.
+    each age begins half a frame early, and the age of a delay ends a frame later. The state of events is known at any
+    time, so for events all that holds only where a frame lasts longer than a delay, and ages begin in time. If there
+    are several examples, the longest frame counts. A recipe that names no neurons is trained as it is, and its delays
+    are ages.
 
     Parameters
     ----------

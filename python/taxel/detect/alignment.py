@@ -35,7 +35,7 @@ class Alignment:
     Attributes
     ----------
     label : str
-    train : int, from 0 on, optional
+    train : int, 0 or more, optional
         The input that the labels were moved to, by its place among the encoder's trains (signed ones split into ON
         and OFF). None: no input has a spike near any label, and the labels stay as they were given.
     example : int64, shape (labels,)
@@ -73,7 +73,7 @@ class Alignment:
 
         Parameters
         ----------
-        example : int, from 0 on
+        example : int, 0 or more
 
         Returns
         -------
@@ -81,7 +81,7 @@ class Alignment:
 
         Raises
         ------
-        ProblemError : a number that is no whole one, or below 0
+        ProblemError : a number that is not whole, or below 0
         """
         paired = (self.example == integer("example", example, 0)) & ~self.unpaired
         felt: NDArray[np.int64] = self.given[paired] + np.rint(to_us(self.moved_ms[paired])).astype(np.int64)
@@ -111,10 +111,11 @@ def align(
 ) -> Alignment:
     """Return by how much the labels of one name move to what the sensor felt, which is chosen over all patterns.
 
-    The spikes of each input train, less the latency of the encoder, are scored as if they were detections. Of the
-    trains with nearly the fewest missed and false, those with the most found, of these the ones nearest to the labels
-    at the median, and of these the first gives each label the spike that is paired with it. Of the trains of ages, one
-    of which fires at every sample of a touch, the least age stands for all, with the spikes at which touches begin.
+    The spikes of each input train, less the latency of the encoder, are scored as if they were detections. One train
+    is chosen among those with nearly the fewest missed and false: first by the most found, then by the least distance
+    from the labels at the median, then by its place. It gives each label the spike that is paired with it. The least
+    age represents all trains of ages, one of which fires at every sample of a touch, by the spikes at which touches
+    begin.
 
     Parameters
     ----------
@@ -191,7 +192,7 @@ def _middle(scores: Mapping[int, Score]) -> int | None:
 
 
 def _best(scores: Mapping[int, Score], labels: int) -> int | None:
-    """Return the train that tells best when the events were felt; None where that one has no spike near any label."""
+    """Return the train that shows best when the events were felt; None if it has no spike near any label."""
     left = dict(scores)
     criteria: list[tuple[Callable[[Score], float], float]] = [
         (lambda score: score.missed + score.false, max(_ALIKE, _ALIKE_SHARE * labels)),

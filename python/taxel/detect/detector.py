@@ -1,4 +1,4 @@
-"""What makes detections and is saved as a file: the base of `Readout` and `PlainRule`, and their stream."""
+"""The base of `Readout` and `PlainRule`, which make detections and are saved as files, and their stream."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from taxel.wire import FRAME_US
 
 
 class _Detector(Saved):
-    """What a readout and a plain rule have in common: a file, and a stream."""
+    """Base of a readout and a plain rule: both have a file and a stream."""
 
     _text: str
     _parts: dict[str, Any]
@@ -58,13 +58,13 @@ class _Detector(Saved):
         unit = self._parts.get("unit")
         return None if unit is None else str(unit)
 
-    def _check_unit(self, unit: str, subject: str = "values") -> None:
+    def _check_unit(self, unit: str) -> None:
         """Refuse values in another unit than it was trained on, as its weights and thresholds are of that unit."""
         if self.unit not in (None, unit):
             how = ", as a calibration gives (Recording.calibrated)" if self.unit in FORCE_UNITS else ""
             raise ProblemError(
-                f"{subject} in {unit}, and the {self._WHAT} was trained on {self.unit}: must be in {self.unit}{how}, "
-                f"or train anew on recordings in {unit}"
+                f"values are in {unit}, but the {self._WHAT} was trained on {self.unit}: "
+                f"give values in {self.unit}{how}, or train a {self._WHAT} on recordings in {unit}"
             )
 
     def _with(self, **parts: Any) -> Self:
@@ -133,7 +133,7 @@ class _Detector(Saved):
         tare : Tare, optional
             The taxels' rest, where the encoder needs one and has none.
         wire_version : int, from 1 to 2
-            Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
+            Of the wire that stamped the events: 1 counts 100 us, so that a stamp may be before its frame; 2 counts us.
 
         Raises
         ------
@@ -157,7 +157,7 @@ class ReadoutStream:
     tare : Tare, optional
         The taxels' rest, where the encoder needs one and has none.
     wire_version : int, from 1 to 2
-        Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
+        Of the wire that stamped the events: 1 counts 100 us, so that a stamp may be before its frame; 2 counts us.
 
     Raises
     ------
@@ -226,7 +226,7 @@ class ReadoutStream:
             return Detections._from_parts(self._begin(x.array).push_events(x._parts()))
         if isinstance(x, Frames):
             return Detections._from_parts(self._begin(x.array).push_frames(x._parts()))
-        raise refused("x", f" is {shown(x)}: a readout listens to taxel.Events or taxel.Frames")
+        raise refused("x", f" is {shown(x)}: a readout reads taxel.Events or taxel.Frames")
 
     def advance(self, t_us: int) -> Detections:
         """Promise that nothing will come any more before a time; an earlier time changes nothing.

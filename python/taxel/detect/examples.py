@@ -80,7 +80,7 @@ def name_of(k: int, example: Example) -> str:
 
 
 class Outcome(NamedTuple):
-    """What a readout detected in an example, and how that scores where its labels are known.
+    """The detections of a readout in an example, and their score if its labels are known.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class Outcome(NamedTuple):
             return ""
         noun = "with an input outside what was seen in training"
         if self.outside is None:
-            return f"detections {noun}: not known, as the readout's file does not hold it"
+            return f"detections {noun}: unknown, as the readout's file does not hold the range"
         return f"detections {noun}: {self.outside} of {len(self.found)} ({self.outside / len(self.found):.0%})"
 
     @property
@@ -134,7 +134,7 @@ def causes_text(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def check_examples(examples: Sequence[Example]) -> list[Example]:
-    """Return the examples with their sources read and their labels as columns of whole us; refuse what is no example.
+    """Return the examples with their sources read and their labels as columns of whole us; refuse anything else.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
         tare = None if tare is None else instance(f"{name}: tare", tare, Tare)
         without = tuple(text(f"{name}: unlabelled", label) for label in several(f"{name}: unlabelled", unlabelled))
         if both := [label for label in without if label in times]:
-            raise ProblemError(f"{name}: unlabelled has {shown(both[0])}, of which there are labels")
+            raise ProblemError(f"{name}: unlabelled names {shown(both[0])}, which has labels")
         sound.append(Example(source, times, tare, text(f"{name}: group", group), name, without))
     return _padded(sound)
 

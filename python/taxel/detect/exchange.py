@@ -8,7 +8,7 @@ where an input spike adds ``w_in / tau_syn`` to the current times the spike's ar
 - double exponential: ``CubaLIF`` with ``tau_syn = tau_s``;
 - exponential: ``LIF``.
 
-What NIR cannot express stands in the graph's metadata, so that taxel reads back the very same readout.
+The graph's metadata hold the rest, which NIR cannot express, so that taxel reads back exactly the same readout.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def _check_ungraded(encoder: Encoder) -> None:
     """Refuse an encoder of graded spikes: the input spikes of a NIR graph have no values."""
     if encoder.kind == "graded":
         raise ProblemError(
-            f"NIR takes no graded trains: the input spikes of its graphs have no values, those of {encoder.name} have"
+            f"NIR takes no graded trains: the input spikes of its graphs have no values, but those of {encoder.name} do"
         )
 
 
@@ -110,7 +110,7 @@ def lost(readout: Parts) -> list[str]:
         " ones need not"
     )
     if readout.time == "continuous":
-        lines.append("continuous time: each simulator has a step of its own, and fires as late as that")
+        lines.append("continuous time: a simulator has a time step, and fires up to one step later")
     return lines
 
 
@@ -242,7 +242,7 @@ def _graph(readout: Parts, spike_ms: float | None) -> NIRGraph:
     nodes = [_gains(trained.neuron, spike_s) for trained in neurons]
     kinds = sorted({kind for kind, _, _ in nodes})
     if len(kinds) > 1:
-        raise ProblemError("NIR: exponential kernels and others need different nodes; export them as readouts apart")
+        raise ProblemError("NIR: exponential kernels and others need different nodes; export them as separate readouts")
     columns = {name: np.array([node[1][name] for node in nodes]) for name in nodes[0][1]}
     threshold = np.array([trained.neuron.theta_0 * readout.run_threshold / 1000.0 for trained in neurons])
     zero = np.zeros(len(neurons))
@@ -295,7 +295,7 @@ def _parts(
     """Return a readout's parts from nodes; the rest comes from the caller, the metadata, or by default."""
     encoder = encoder or (stored.encoder if stored is not None else None)
     if encoder is None:
-        raise ProblemError("NIR holds no encoder: say which with encoder=")
+        raise ProblemError("NIR holds no encoder: give encoder=")
     _check_ungraded(encoder)
     weights, delays_ms, nir_neurons = _layers(graph)
     spike_s = None if spike_ms is None else spike_ms / 1000.0
@@ -349,7 +349,7 @@ def _kernel(neurons: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any]
 def _threshold(neurons: Any, k: int) -> float:
     leak, threshold = float(neurons.v_leak[k]), float(neurons.v_threshold[k])
     if not threshold > leak:
-        raise FormatError(f"neurons[{k}]: threshold {threshold} V lies not above the rest, {leak} V")
+        raise FormatError(f"neurons[{k}]: threshold {threshold} V is not above the rest, {leak} V")
     # Potentials count from rest.
     return 1000.0 * (threshold - leak)
 
@@ -381,12 +381,12 @@ def _layers(graph: NIRGraph) -> tuple[NDArray[np.float64], list[float], Any]:
         if kind not in ("Linear", "Affine") or np.ndim(node.weight) != 2:
             raise FormatError(f"{name}: {kind} before the neurons, must be Linear (or Affine without bias)")
         if kind == "Affine" and np.any(node.bias):
-            raise FormatError(f"{name}: has a bias, which a readout has not")
+            raise FormatError(f"{name}: has a bias; a readout has none")
         before, delay_ms = alone(name), 0.0
         if before is not None and kinds[before] == "Delay":
             delays = np.unique(np.asarray(nodes[before].delay, np.float64))
             if len(delays) != 1:
-                raise FormatError(f"{before}: delays its inputs differently, must delay all alike")
+                raise FormatError(f"{before}: delays its inputs by different times, must delay all by the same time")
             delay_ms = 1000.0 * float(delays[0])
             before = alone(before)
         if before != source:

@@ -1,4 +1,4 @@
-"""Levels of an encoder from the training data, where those of the recipe lie outside what the sensor reads."""
+"""Levels of an encoder from the training data, where those of the recipe are outside what the sensor reads."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _NOISY_SHARE = 0.01
 
 
 class _Readings(NamedTuple):
-    """What loaded taxels of an example read."""
+    """The readings of loaded taxels of an example."""
 
     values: NDArray[np.float64]
     begins: float
@@ -45,7 +45,7 @@ class _Readings(NamedTuple):
 
 
 class LoadedLevels(NamedTuple):
-    """Hold how many of an encoder's levels lie within what loaded taxels read, and levels that do."""
+    """Hold how many of an encoder's levels are within what loaded taxels read, and levels that are."""
 
     within: int
     low: float
@@ -58,7 +58,7 @@ class LoadedLevels(NamedTuple):
 def fit_levels(recipe: Recipe, examples: Sequence[Example], parts: Iterable[Stretch]) -> Recipe:
     """Return a recipe with the levels that parts of (checked) examples give it; itself where its levels are within.
 
-    They are within if two of them or more lie between the 10th and the 90th percentile of what loaded taxels read;
+    They are within if two of them or more are between the 10th and the 90th percentile of what loaded taxels read;
     where taxels at rest have no noise that could cross it, a lower one counts too. The levels of the data are as many
     as there were: where a taxel is loaded, and quantiles of the loaded readings up to their median.
 
@@ -72,7 +72,7 @@ def fit_levels(recipe: Recipe, examples: Sequence[Example], parts: Iterable[Stre
 
 
 def loaded_levels(encoder: Encoder, examples: Sequence[Example], parts: Iterable[Stretch]) -> LoadedLevels | None:
-    """Return which levels lie within what parts of (checked) examples read; None without levels or loads."""
+    """Return which levels are within what parts of (checked) examples read; None without levels or loads."""
     if not _has_levels(encoder):
         return None
     each = [_readings(examples[k], start, stop) for k, start, stop in parts]

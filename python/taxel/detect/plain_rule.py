@@ -36,8 +36,8 @@ class PlainRule(_Detector):
         The number of loaded taxels, as `taxel.encode.ContactArea` counts them; the sum of their values above rest in
         the sensor's unit, as `taxel.encode.Moments` adds them; the largest sum over 3 x 3 taxels above a rest that
         follows the sensor, in units of its noise, as of `taxel.encode.LocalLoad` ("largest"); the largest value of a
-        taxel above such a rest, in units of its own noise, with what several add, as of `taxel.encode.Peak`; or how
-        long a touch lasts, with the age "end". In single precision.
+        taxel above such a rest, in units of that taxel's noise, with what several add, as of `taxel.encode.Peak`; or
+        how long a touch lasts, with the age "end". In single precision.
     threshold : float, above 0
         Number of taxels, the sensor's unit, units of noise, or ms.
     release : float, above 0, at most 1
@@ -66,7 +66,7 @@ class PlainRule(_Detector):
     A frame of events is the board's; its quantity is that after its last event, and its time the stamp with which the
     quantity passed the threshold. Silent frames count: taxels hold their values. Each of a `Frames` is one frame.
     The local load also changes while nothing comes, with its rest: it is computed 10 ms after the last stamp too, and
-    from 80 ms on after each further eighth of the time since it. Detections have no slope (NaN).
+    after the first 80 ms again after each further eighth of the time since it. Detections have no slope (NaN).
 
     Examples
     --------
@@ -122,7 +122,7 @@ class PlainRule(_Detector):
 
     @property
     def quantity(self) -> str:
-        """What is compared with the threshold: "area", "total", "local_load", "peak" or "duration"."""
+        """The quantity that is compared with the threshold: "area", "total", "local_load", "peak" or "duration"."""
         return str(self._parts["quantity"])
 
     @property
@@ -158,7 +158,7 @@ class PlainRule(_Detector):
 
     @property
     def tare(self) -> Tare | None:
-        """The taxels' rest, where it has one of its own."""
+        """The taxels' rest, if the rule holds one."""
         tare = self._parts.get("tare")
         return None if tare is None else Tare.from_json(json.dumps(tare))
 
@@ -168,7 +168,7 @@ class PlainRule(_Detector):
 
     @property
     def array(self) -> Array | None:
-        """The sensor of its own tare, or None where any will do."""
+        """The sensor of the tare that it holds, or None where any will do."""
         tare = self.tare
         return None if tare is None else tare.array
 
@@ -195,10 +195,10 @@ class PlainRule(_Detector):
         return self.quantity if unit is None else f"{self.quantity} ({escaped(unit)})"
 
     def _compared(self) -> str:
-        """Return what the rule compares, without its labels; with both of kinds, which one of them lies below."""
+        """Return what the rule compares, without its labels; of two kinds, which of them is below."""
         if self.age_ms is not None:
             below, above = (label or "nothing" for label in self._parts["labels"])
-            kinds = f"below {self.threshold:.3g} {below}, from there on {above}"
+            kinds = f"below {self.threshold:.3g} {below}, otherwise {above}"
             when = "of the touch, when it ends" if self.age_ms == "end" else f"{self.age_ms:g} ms after the onset"
             return f"one rule for both kinds, the {self._named_quantity} {when}: {kinds}"
         frames = "1 frame" if self.frames == 1 else f"{self.frames} frames"
@@ -216,5 +216,5 @@ def _labels(labels: object, age: float | str | None) -> list[str | None]:
         return list(_USUAL)
     pair = several("labels", labels) if not isinstance(labels, str) else []
     if len(pair) != 2:
-        raise refused("labels", f" is {shown(labels)}: must be two names, of which one may be None")
+        raise refused("labels", f" is {shown(labels)}: must be two names, and one of them may be None")
     return [None if label is None else text("labels", label) for label in pair]

@@ -98,7 +98,7 @@ class PlainScore:
         return self._where(than, lambda a, b: bool(a.found) and a.rank[0] < b.rank[0])
 
     def _where(self, than: Score, holds: Callable[[Score, Score], bool]) -> tuple[str, ...]:
-        """Return the labels with a rule whose score, and then the other one, are as asked."""
+        """Return the labels with a rule whose score fulfils a condition with the score in `than`."""
         others = instance("than", than, Score).by_label
         scores = {} if self.together is None else self.together.by_label
         ruled = [label for label in others if self.rules.get(label) is not None]

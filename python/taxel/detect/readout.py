@@ -38,7 +38,7 @@ SILENCE_MS = 1000.0
 
 
 class FittedLearner(Protocol):
-    """What a readout needs of a fitted learner."""
+    """A fitted learner, as a readout needs it."""
 
     neuron_: Neuron
     weights_: NDArray[np.float64]
@@ -52,7 +52,7 @@ class Readout(_Detector):
     encoder : Encoder
         With its parameters: they belong to the readout. A tare belongs to a board and a day and may be given later.
     neurons : mapping of str to a fitted learner, or to (Neuron, weights), with a delay in ms, with inputs
-        By label. All of the same `time` and `after_spike`; others are refused. Weights in mV, one a train of the
+        By label. All of the same `time` and `after_spike`; others are refused. Weights in mV, one per train of the
         encoder; where its spikes are signed first all ON trains, then all OFF (`SpikeTrains.split_by_sign`).
     array : Array, optional
         The sensor that it was trained on; it then accepts no other. Left out, any will do that gives as many
@@ -69,7 +69,7 @@ class Readout(_Detector):
         copy: first all trains at the first delay, then all at the second.
     inputs : mapping of str to sequence of str, optional
         By label, the parts of a `taxel.encode.Composite` whose trains a neuron receives, in any order; its weights are
-        one a train of these, in the encoder's order. A neuron that has none receives all trains.
+        one per train of these, in the encoder's order. A neuron that has none receives all trains.
 
     Raises
     ------
@@ -271,7 +271,7 @@ class Readout(_Detector):
         Returns
         -------
         list of str
-            What NIR cannot hold, one line each. It stands in the file's metadata, where `from_nir` finds it again.
+            A line for each thing that NIR cannot hold. The file's metadata hold it, where `from_nir` finds it again.
 
         Raises
         ------
@@ -391,7 +391,7 @@ def run(
     tare : Tare, optional
         The taxels' rest, where the encoder needs one and has none.
     wire_version : int, from 1 to 2, optional
-        Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
+        Of the wire that stamped the events: 1 counts 100 us, so that a stamp may be before its frame; 2 counts us.
         Left out: what the recording's registers hold, else 1.
 
     Returns

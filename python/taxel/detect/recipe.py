@@ -40,25 +40,25 @@ class Recipe:
         Several side by side are a `taxel.encode.Composite`, in a file tables ``[encoders.NAME]``.
     learner : mapping
         Parameters of `taxel.learn.ConeR` for all neurons, and `delay_ms`: how much later than the event a neuron is
-        trained to fire, the encoder's latency apart. Of a composite encoder also `inputs`: the names of the parts
-        whose trains a neuron receives, in any order; all where there is none.
+        trained to fire, the encoder's latency apart. With a composite encoder also `inputs`: the names of the parts
+        whose trains a neuron receives, in any order; default: all.
     neurons : mapping of str to mapping
         The same by label, before those for all; a `search` lists other points, each as changes of that neuron, and
-        `choose` points that every training tries in turn: one counts if it leaves so many `fewer` events of the
-        training data missed or false than the best before it, by default three and 5 % of the labels. Where there are
-        any neurons, only these labels are learnt.
+        `choose` points that every training tries in turn: a point counts if it leaves so many `fewer` events of
+        the training data missed or false than the best point before it, by default three and 5 % of the labels. Where
+        there are any neurons, only these labels are learnt.
     run_threshold : float, above 0
         See `taxel.Readout`.
     about, source : str
         What it is for, and where its values come from.
     align : bool
         Whether labels are moved to what the sensor felt (`Alignment`) before they are learnt: then `t` of a detection
-        is when the sensor felt the event. For labels that one input follows each time, as it does contact and lift;
-        labels that say of which kind a touch is have none, so recipes for them leave it off. Scores are against the
+        is when the sensor felt the event. Meant for labels that the same input follows each time, such as contact and
+        lift. Labels of the kinds of touches have no such input, so their recipes leave it off. Scores are against the
         labels as given.
     fit_levels : bool
         Whether an encoder with levels in the sensor's unit (`LevelCrossing`, `ThresholdIzhikevich`) gets others from
-        the training data, where fewer than two of its own lie within what loaded taxels of frames read there.
+        the training data, where fewer than two of the recipe's levels are within what loaded taxels of frames read.
 
     Raises
     ------
@@ -349,8 +349,8 @@ class Recipe:
         for key in changes if isinstance(changes, Mapping) else ():
             if text("key", key).partition(".")[0] in _OF_THE_FILE:
                 raise ProblemError(
-                    f"{key}: says for what a recipe's file is chosen, so a change of it does nothing: change learner "
-                    "or neurons, or write a recipe of your own"
+                    f"{key}: only decides when a recipe's file is chosen, so changing it has no effect: change learner "
+                    "or neurons, or write your own recipe"
                 )
         values = recipes.read(recipe)
         several_of = values.get("encoders")
@@ -375,8 +375,8 @@ def _encoder_of(values: Mapping[str, Any]) -> Encoder:
     single, each = values.get("encoder"), values.get("encoders")
     if isinstance(single, Mapping) == isinstance(each, Mapping):
         if single is not None and each is not None:
-            raise refused("recipe", ": says both encoder and encoders: name one of the two")
-        raise helped(ProblemError("recipe: says no encoder, as [encoder] does"), "encoder", "give")
+            raise refused("recipe", ": states both encoder and encoders: give one of them")
+        raise helped(ProblemError("recipe: states no encoder: add [encoder]"), "encoder", "give")
 
     def stated(encoder: Mapping[str, Any]) -> Encoder:
         return Encoder.from_json(parameters({n: None if v == "none" else v for n, v in encoder.items()}))

@@ -41,7 +41,7 @@ _TIMES = 4
 def held_by_tare(examples: Sequence[Example]) -> int:
     """Return how many taxels vary far more in the tare of an example than at its beginning, as a touch is in it.
 
-    Of several examples it is the largest number. A tare that is not of its own recording says nothing: 0.
+    If there are several examples, it is the largest number. A tare of another recording says nothing: 0.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _held(example: Example, share: float) -> int:
 
 
 def early_part(example: Example, share: float = _EARLY) -> Tare | None:
-    """Return the beginning of a tare that is of its own recording; None of another."""
+    """Return the beginning of an example's tare; None if the tare is of another recording."""
     tare, source = example.tare, example.source
     if tare is None or isinstance(source, SpikeTrains):
         return None
@@ -107,7 +107,7 @@ def loaded_at_rest(examples: Sequence[Example], encoder: Encoder) -> int:
 
     A taxel counts that does so 20 ms before each of the first four labels, or of the last four: at one of four such
     moments at least a touch is yet to begin, and noise is elsewhere each time. So it is a tare that does not fit from
-    the beginning, or one that the readings drifted away from. Of several examples it is the largest number.
+    the beginning, or one that the readings drifted away from. If there are several examples, it is the largest number.
     """
     return max((_loaded(example, encoder) for example in examples), default=0)
 

@@ -75,7 +75,7 @@ def tune(
     labels : sequence of str, optional
         Those to find rules for; default: all.
     window_ms : float, ms, 0 or more
-        How far a detection may lie from its label.
+        Largest distance of a detection from its label.
     noise_floor : float, 0 or more, in the sensor's unit (ticks)
         The board's.
     progress : function of (step, done, all), optional
@@ -93,8 +93,8 @@ def tune(
 
     Notes
     -----
-    Of equal rules the first counts: area before total before local load before peak, low thresholds before high, few
-    frames before many. A rule that misses and invents as many as there are labels is no better than none.
+    If rules are equal, the first counts: area before total before local load before peak, low thresholds before high,
+    few frames before many. A rule that misses and invents as many as there are labels is no better than none.
 
     Examples
     --------
@@ -237,9 +237,9 @@ def _for_kinds(
 
 
 def _between(areas: NDArray[np.float64], second: NDArray[np.bool_]) -> tuple[float, bool]:
-    """Return the threshold on log area with the fewest on its wrong side, and whether the second kind lies below it.
+    """Return the threshold on log area with the fewest on its wrong side, and whether the second kind is below it.
 
-    Of equal ones the threshold in the widest gap; an area of 0 counts as .5.
+    If thresholds are equal, the one in the widest gap counts; an area of 0 counts as .5.
     """
     order = np.argsort(areas, kind="stable")
     logs, ones = np.log(np.maximum(areas[order], 0.5)), second[order]

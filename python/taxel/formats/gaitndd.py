@@ -140,12 +140,12 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
     rows = [line.split() for line in text.lines(path)]
     values = text.numbers(rows, path, 1, _TS_COLUMNS)
     if not len(values):
-        raise FormatError(f"{path.name}: empty; must hold one line a stride")
+        raise FormatError(f"{path.name}: empty; must hold one line per stride")
     time, stride, swing = values[:, 0], values[:, 1], values[:, 3]
     off = time - swing
     wrong = np.flatnonzero((np.diff(time, prepend=-np.inf) <= 0) | (stride <= 0) | (swing <= 0) | (swing >= stride))
     if len(wrong):
-        raise FormatError(f"{path.name}, line {wrong[0] + 1}: time, left stride and swing do not follow one another")
+        raise FormatError(f"{path.name}, line {wrong[0] + 1}: times must ascend, and 0 < swing < stride")
     strikes = np.unique(whole_us(path.name, np.concatenate([[time[0] - stride[0]], time])))
     return {"contact": strikes, "foot_off": whole_us(path.name, off)}
 

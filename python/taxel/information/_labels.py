@@ -1,4 +1,4 @@
-"""Labels and groups, one a trial: texts or whole numbers."""
+"""Labels and groups, one per trial: texts or whole numbers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def words(name: str, values: ArrayLike) -> NDArray[np.generic]:
     if column.ndim == 1 and column.size == 0:
         return np.empty(0, np.int64)
     if column.ndim != 1 or column.dtype.kind not in "biuU":
-        raise refused(name, f" is {shown(values)}: must be texts or whole numbers, one a trial")
+        raise refused(name, f" is {shown(values)}: must be texts or whole numbers, one per trial")
     return column
 
 
@@ -46,7 +46,7 @@ def belonging(groups: ArrayLike, trials: int) -> NDArray[np.int64]:
     """Return the number of each trial's group."""
     names = words("groups", groups)
     if len(names) != trials:
-        raise refused("groups", f" has {len(names)} entries: must be {trials}, one a trial")
+        raise refused("groups", f" has {len(names)} entries: must be {trials}, one per trial")
     return numbered(distinct(names), names)
 
 
@@ -65,7 +65,7 @@ def labelled(y: ArrayLike, trials: int) -> tuple[NDArray[np.generic], NDArray[np
     """
     labels = words("y", y)
     if len(labels) != trials:
-        raise refused("y", f" has {len(labels)} entries: must be {trials}, one a trial")
+        raise refused("y", f" has {len(labels)} entries: must be {trials}, one per trial")
     classes, row = np.unique(labels, return_inverse=True)
     if len(classes) < 2:
         raise refused("y", f" names {len(classes)} class: must be two at least")

@@ -278,14 +278,16 @@ class _Answering(Question):
         self.notes += sorted(missing)[:3]
         if self.groups is None:
             self.notes.append(
-                "no groups are named: what trials of one person, session or pose share counts as the label's"
+                "no groups are named: what the trials of one person, session or pose have in common counts as "
+                "information about the label"
             )
         runs = 1 + int(np.count_nonzero(self.labels[1:] != self.labels[:-1]))
         # Recordings with one trial each may be in any order.
         ordered = len({id(trial.source) for trial in self.trials}) < len(self.trials)
         if ordered and runs == len(np.unique(self.labels)) and len(self.labels) > 2 * runs:
             self.notes.append(
-                "each label's trials are recorded together: a drift of the sensor would count as the label's"
+                "each label's trials are recorded together: a drift of the sensor would count as information about "
+                "the label"
             )
         if not self.ended:
             self.notes.append("trials have no stop_us: the length of a touch is known within the window only")

@@ -61,7 +61,7 @@ def confusion_matrix(
     """
     truth, answered = words("labels", labels), words("responses", responses)
     if len(truth) != len(answered):
-        raise refused("responses", f" has {len(answered)} entries: must be {len(truth)}, one a label")
+        raise refused("responses", f" has {len(answered)} entries: must be {len(truth)}, one per label")
     if not len(truth):
         raise refused("labels", " is []: must hold a trial at least")
     try:
@@ -70,7 +70,7 @@ def confusion_matrix(
     except TypeError:
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers") from None
     if len(np.unique(order)) != len(order):
-        raise refused("classes", " names one twice")
+        raise refused("classes", " names a response twice")
     missing = np.setdiff1d(known, order)
     if len(missing):
         raise refused("classes", f" does not name {shown(missing[0].item())}")

@@ -176,7 +176,7 @@ def estimate(
         array = np.empty(0, object)
     answered = np.stack([words("responses", row) for row in np.atleast_2d(array)]) if array.size else array
     if answered.ndim != 2 or answered.shape[1] != len(truth) or not len(truth):
-        raise refused("responses", f" has shape {array.shape}: must be ({len(truth)},), one a label, or draws of it")
+        raise refused("responses", f" has shape {array.shape}: must be ({len(truth)},), one per label, or draws of it")
     share = number("confidence", confidence)
     if not 0 < share < 1:
         raise refused("confidence", f" is {shown(confidence)}: must be between 0 and 1")

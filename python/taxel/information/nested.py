@@ -227,7 +227,7 @@ class Matrices:
             raise refused("grams", f" are of {[len(gram) for gram in self.squares]} trials: must all be of the same")
         self.features = [integer("features", count, 1) for count in several("features", features)]
         if len(self.features) != len(self.squares):
-            raise refused("features", f" has {len(self.features)} entries: must be {len(self.squares)}, one a matrix")
+            raise refused("features", f" has {len(self.features)} entries: must be {len(self.squares)}, one per matrix")
         self._residuals: dict[tuple[float, ...], NDArray[np.float64]] = {}
 
     def residual(self, matrix: int, ridge: float) -> NDArray[np.float64]:

@@ -71,7 +71,7 @@ class Question:
         if self.encoder is None:
             self.encoder = ChangeEvents(noise_floor=floor_of(self.trials))
         if not isinstance(self.encoder, ChangeEvents | FA1):
-            raise refused("encoder", f" is {shown(self.encoder)}: must be ChangeEvents or FA1, one train a taxel")
+            raise refused("encoder", f" is {shown(self.encoder)}: must be ChangeEvents or FA1, one train per taxel")
         sources = {id(trial.source): trial.source for trial in self.trials}
         held = {key: HeldValues(source) for key, source in sources.items()}
         self.held = [held[id(trial.source)] for trial in self.trials]

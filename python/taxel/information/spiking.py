@@ -122,7 +122,7 @@ class NeuronPerClass(Parameters, ABC):
         """
         found, labels = self.predict(patterns), words("y", y)
         if not 0 < len(labels) == len(found):
-            raise refused("y", f" has {len(labels)} entries: must be {max(1, len(found))}, one a pattern")
+            raise refused("y", f" has {len(labels)} entries: must be {max(1, len(found))}, one per pattern")
         return float(np.mean(found == labels))
 
     def __sklearn_tags__(self) -> Any:

@@ -161,7 +161,9 @@ def read_trials(
         if not row["label"]:
             raise FormatError(f"{where}: label is empty")
         if row["label"].lower() == "nan":
-            raise FormatError(f"{where}: label is {row['label']!r}, as tables write what is missing; name it otherwise")
+            raise FormatError(
+                f"{where}: label is {row['label']!r}, which tables use for a missing value; choose another name"
+            )
         more = {name: cell for name, cell in row.items() if name not in _KNOWN}
         trials.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), more, where))
         _inside(trials[-1], recording.name, spans[id(recording)], window_us)

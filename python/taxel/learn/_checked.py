@@ -58,8 +58,8 @@ def checked_examples(
             raise ProblemError(f"targets of pattern {p}: must ascend")
     for name, bound in (("lb", cone.lb), ("ub", cone.ub)):
         if np.ndim(bound) and np.size(bound) != trains:
-            raise refused(name, f": {np.size(bound)} bounds for {trains} trains, must be one a train, or one for all")
+            raise refused(name, f": {np.size(bound)} bounds for {trains} trains, must be one per train, or one for all")
     horizon = np.asarray(0.0 if cone.horizon is None else cone.horizon)
     if horizon.ndim and horizon.size != len(trained):
-        raise refused("horizon", f": {horizon.size} values, must be one, or one a pattern, {len(trained)}")
+        raise refused("horizon", f": {horizon.size} values, must be one, or one per pattern, {len(trained)}")
     return trained, times, silences

@@ -98,7 +98,7 @@ class SpikeLearner(Learner):
         ----------
         patterns : sequence of SpikeTrains
         targets : sequence of float sequences, ms
-            Target spike times, one list a pattern.
+            Target spike times, one list per pattern.
         window_ms : float, ms, 0 or more
             Largest distance of a spike from its target.
 

@@ -49,7 +49,7 @@ def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin
 
     Raises
     ------
-    ProblemError : a row that the problem does not have; multipliers that are not one a row
+    ProblemError : a row that the problem does not have; multipliers that are not one per row
 
     Examples
     --------
@@ -64,7 +64,7 @@ def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin
     flag("margin", margin)
     if len(certificate.rows) != len(certificate.multipliers):
         many = f"{counted(len(certificate.multipliers), 'multiplier')} for {counted(len(certificate.rows), 'row')}"
-        raise refused("certificate", f": {many}: must be one a row")
+        raise refused("certificate", f": {many}: must be one per row")
     cone, patterns = problem._restated()
     neuron = Neuron() if cone.neuron is None else cone.neuron
     rows = pattern_rows(cone, neuron, patterns, problem.targets, margin=problem.margin)

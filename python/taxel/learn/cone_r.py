@@ -47,7 +47,7 @@ class ConeR(SpikeLearner):
     lambdas : five floats, 0 or more
         Weights of l1, l2, B, C, D in the objective; only their ratios matter.
     lb, ub : float, or float sequence of shape (trains,), mV
-        Least and largest weight, for all synapses or one a synapse. All normalisers are computed at
+        Least and largest weight, for all synapses or one per synapse. All normalisers are computed at
         ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``, synapse by synapse.
     divide_b_by : {"B_max", "targets"}
         Divisor of B: its largest value, as printed, or the number of targets.
@@ -180,7 +180,7 @@ class ConeR(SpikeLearner):
         patterns : sequence of SpikeTrains
             The same trains in each, unsigned or graded; signed ones split into ON and OFF.
         targets : sequence of float sequences, ms
-            Target spike times, one list a pattern; empty for a pattern without spikes.
+            Target spike times, one list per pattern; empty for a pattern without spikes.
         silence : sequence of float sequences of shape (windows, 2), ms, optional
             The windows in which silence counts, one list of (start, stop) a pattern, ascending, ends included; None
             for one pattern, or for all: everywhere. Points outside have no row in D.
@@ -306,7 +306,7 @@ class ConeRProblem:
             bound = np.asarray(plain[name], np.float64)
             if bound.ndim and len(bound) != self._trains:
                 raise refused(
-                    name, f": {len(bound)} bounds for {self._trains} trains, must be one a train, or one for all"
+                    name, f": {len(bound)} bounds for {self._trains} trains, must be one per train, or one for all"
                 )
             if away(bound, 0.0)[silent if bound.ndim else ...].any():
                 raise refused(name, ": holds a train without a spike away from 0; lay the rows out with these bounds")
@@ -370,7 +370,7 @@ class ConeRProblem:
         if self._counted is None:
             return weights
         if weights.shape != (self._trains,):
-            raise refused("weights", f": {weights.size} for {self._trains} trains, must be one a train")
+            raise refused("weights", f": {weights.size} for {self._trains} trains, must be one per train")
         return weights[self._counted]
 
 

@@ -338,7 +338,7 @@ class ConeX(SpikeLearner):
         patterns : sequence of SpikeTrains
             The same trains in each, unsigned or graded; signed ones split into ON and OFF.
         targets : sequence of float sequences, ms
-            Target spike times, one list a pattern; empty for a pattern without spikes.
+            Target spike times, one list per pattern; empty for a pattern without spikes.
         start : ConeX, optional
             An earlier fit of a similar problem, whose active rows and multipliers are the starting point. The result is
             the same; in continuous time `margin_` may differ.

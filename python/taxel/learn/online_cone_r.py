@@ -170,10 +170,10 @@ class OnlineConeR(ConeR):
             raise refused("progress", ": a window reports none")
         trains, times = several("patterns", patterns), several("targets", targets)
         if len(trains) != len(times) or not trains:
-            raise refused("targets", f": {len(times)} lists for {len(trains)} patterns, must be one a pattern")
+            raise refused("targets", f": {len(times)} lists for {len(trains)} patterns, must be one per pattern")
         each = [None] * len(trains) if silence is None else several("silence", silence)
         if len(each) != len(trains):
-            raise refused("silence", f": {len(each)} lists for {len(trains)} patterns, must be one a pattern")
+            raise refused("silence", f": {len(each)} lists for {len(trains)} patterns, must be one per pattern")
         silences = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
         with self._locked():
             self._begin()

@@ -313,7 +313,7 @@ def _save(file: _File, saved: dict[str, Any]) -> None:
     }
     text = json.dumps({**about, **saved}, ensure_ascii=False).encode()
     if len(text) > MOST_SAVED:
-        raise ProblemError(f"{file.path}: more labels than the {MOST_SAVED} bytes of what taxel saves beside it hold")
+        raise ProblemError(f"{file.path}: too many labels: taxel saves at most {MOST_SAVED} bytes beside the table")
     state = state_path(file.path)
     with _new_file(state, _about(file), text) as name:
         os.replace(name, state)
@@ -505,7 +505,7 @@ class LabelTables:
                 except _BeingWritten:
                     continue
                 except FormatError as error:
-                    raise ProblemError(f"{error}; nothing was saved: mend the table, then try again") from None
+                    raise ProblemError(f"{error}; nothing was saved: correct the table, then try again") from None
                 kept = False
                 try:
                     if file.path != path:

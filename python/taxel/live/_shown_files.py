@@ -44,7 +44,7 @@ class ReadRest:
     ----------
     source : str
         Where the rest is known from.
-    values : float64, one a taxel, NaN where unknown
+    values : float64, one per taxel, NaN where unknown
     ticks_by_unit : float
     loaded_from : float
         From where on a value above rest is a load.

@@ -45,7 +45,7 @@ class StatedOptions:
         "Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.",
         commands="live record",
         metavar="ROWSxCOLUMNS[xMM]",
-        typed="As 24x20x5; without a pitch 2.67 mm, or unknown with --rate-hz.",
+        typed="For example 24x20x5. Default pitch: 2.67 mm, or unknown with --rate-hz.",
     )
     registers: str | Registers | None = option(
         None,
@@ -63,7 +63,7 @@ class StatedOptions:
     )
     tare: Tare | float | None = option(
         None,
-        "Rest of the taxels: a saved tare, or how many seconds of rest at the beginning to take a fresh one from.",
+        "Rest of the taxels: a saved tare, or the seconds at rest at the beginning, from which a fresh tare is taken.",
         metavar="FILE|SECONDS",
         typed="A recording of them at rest (taxel cut) is a tare too.",
     )
@@ -74,8 +74,9 @@ class StatedOptions:
     name: str = option("board", "The board's name among the sources of the recording.", commands="record")
     sources: Mapping[str, str] | str | Sequence[str] | None = option(
         None,
-        "What to receive, [NAME=]KIND:PLACE and KEY=VALUE after commas, as lines:-,array=16x16 or "
-        "serial:COM3,array=16x16: frames of numbers, a board (board:HOST:PORT), or further sources of a recording.",
+        "The source to receive: [NAME=]KIND:PLACE and, after commas, KEY=VALUE; for example lines:-,array=16x16 or "
+        "serial:COM3,array=16x16. It sends frames of numbers, is a board (board:HOST:PORT), or is a further source of "
+        "a recording.",
         commands="live record",
         flag="--source",
         metavar="[NAME=]KIND:PLACE",
@@ -90,7 +91,10 @@ class StatedOptions:
         5.0, "How far, in frames, a readout stays behind the host's clock while no events arrive.", least=0
     )
     gap_frames: float = option(
-        1.0, "At a gap in the sequence of version 2, frames to wait for what may only be late.", least=0, commands=""
+        1.0,
+        "With version 2 of the wire: how many frames to wait at a gap in the sequence, as the data may only be late.",
+        least=0,
+        commands="",
     )
     lines: bool = option(False, "Print one line of JSON for each detection, and nothing else.", flag="--json")
     send: str | Sequence[str] = option(

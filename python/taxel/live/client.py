@@ -409,7 +409,7 @@ def _connected(address: str, token: str) -> ClientConnection:
             proxy=None,
         ).__enter__()
     except InvalidHandshake as error:
-        raise ProblemError(f"panel at {address}: refuses the connection, perhaps for its token: {error}") from None
+        raise ProblemError(f"panel at {address}: refuses the connection; the token may be wrong: {error}") from None
 
 
 #: Number and type of the sections of a frame that are read.

@@ -67,8 +67,8 @@ class Live:
     readout : Readout or PlainRule, optional
         A trained readout or a plain rule; without one nothing is detected.
     tare : Tare or float, optional
-        Rest of the taxels: a saved tare, or how many seconds of rest at the beginning to take a fresh one from. For a
-        plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event
+        Rest of the taxels: a saved tare, or the seconds at rest at the beginning, from which a fresh tare is taken. For
+        a plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event
         on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at
         0.
     record : path, optional
@@ -79,14 +79,14 @@ class Live:
     name : str
         The board's name among the sources of the recording.
     sources : mapping of str to str or str or sequence of str, optional
-        What to receive, [NAME=]KIND:PLACE and KEY=VALUE after commas, as lines:-,array=16x16 or
-        serial:COM3,array=16x16: frames of numbers, a board (board:HOST:PORT), or further sources of a recording.
-        "board:HOST:PORT" is a board that sends to that address of this machine (array=ROWSxCOLUMNS, preset=NAME). Lines
-        of numbers come from "serial:PLACE" (baud=), "lines:PATH" (a pipe, or a file that grows; "-" is the standard
-        input), "lines+tcp:HOST:PORT" (connects), "lines+udp:HOST:PORT" (listens) and "given", what a program passes to
-        `sample`. With ``array=`` they are frames: a line each, or ``frame_lines=16``, or up to an empty line
-        (``frame_end=blank``). ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1; ``time=A+B``
-        adds seconds and nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns,
+        The source to receive: [NAME=]KIND:PLACE and, after commas, KEY=VALUE; for example lines:-,array=16x16 or
+        serial:COM3,array=16x16. It sends frames of numbers, is a board (board:HOST:PORT), or is a further source of a
+        recording. "board:HOST:PORT" is a board that sends to that address of this machine (array=ROWSxCOLUMNS,
+        preset=NAME). Lines of numbers come from "serial:PLACE" (baud=), "lines:PATH" (a pipe, or a file that grows; "-"
+        is the standard input), "lines+tcp:HOST:PORT" (connects), "lines+udp:HOST:PORT" (listens) and "given", what a
+        program passes to `sample`. With ``array=`` they are frames: a line each, or ``frame_lines=16``, or up to an
+        empty line (``frame_end=blank``). ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1;
+        ``time=A+B`` adds seconds and nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns,
         ``leave_out=A:B`` are those without values, ``unit=``, ``falls=`` (true, or the number that readings are
         subtracted from) and ``rate=`` (frames a second; default: measured). Lines without an array, as of an IMU, are
         recorded with the first source. "lsl:NAME" is a stream of the lab streaming layer.
@@ -100,7 +100,7 @@ class Live:
     guard_frames : float, 0 or more
         How far, in frames, a readout stays behind the host's clock while no events arrive.
     gap_frames : float, 0 or more
-        At a gap in the sequence of version 2, frames to wait for what may only be late.
+        With version 2 of the wire: how many frames to wait at a gap in the sequence, as the data may only be late.
     lines : bool
         Print one line of JSON for each detection, and nothing else.
     send : str or sequence of str

@@ -29,7 +29,7 @@ def van_rossum_spatial(
 
     Parameters
     ----------
-    a, b : SpikeTrains with one train a taxel, or several for each
+    a, b : SpikeTrains with one train per taxel, or several for each
         Signed trains are split into ON and OFF. If each taxel has several trains (all of one kind, then all of the
         next), each kind is smoothed separately.
     array : Array

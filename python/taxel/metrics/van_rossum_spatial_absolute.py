@@ -28,7 +28,7 @@ def van_rossum_spatial_absolute(
 
     Parameters
     ----------
-    a, b : SpikeTrains with one train a taxel, or several for each
+    a, b : SpikeTrains with one train per taxel, or several for each
         As for `van_rossum_spatial`.
     array : Array
     tau : float, ms, above 0

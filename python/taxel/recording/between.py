@@ -120,7 +120,7 @@ class Slices(Mapping[str, RecordedSource]):
         source = self._slices[name]
         if self._apart():
             raise ProblemError(
-                f"{self._origin.path}: a slice by one clock, but its sources ({', '.join(self)}) have different "
+                f"{self._origin.path}: was cut by one clock, but its sources ({', '.join(self)}) have different "
                 f"clocks; call on_clock(name) before between"
             )
         return source

@@ -41,7 +41,7 @@ def on_clock(contents: Contents, name: str) -> Contents:
     main, sources = contents.main, contents.sources
     path, label = main.origin.path, main.origin.label
     if main.timing.interval is not None and main.timing.clock_of is None:
-        raise ProblemError(f"{path}: a slice by its clock; call on_clock({name!r}) before between")
+        raise ProblemError(f"{path}: was cut by its own clock; call on_clock({name!r}) before between")
     if name not in (*sources, HOST):
         raise ProblemError(f"{path}: has no clock {name!r}; there are {', '.join((*sources, HOST))}")
     if main.timing.clock_of is not None:

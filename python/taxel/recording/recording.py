@@ -86,7 +86,7 @@ class Recording:
 
     def __init__(self, contents: Contents) -> None:
         if not isinstance(contents, Contents):
-            raise refused("contents", f" is {shown(contents)}: a recording is opened by taxel.open(path), not built")
+            raise refused("contents", f" is {shown(contents)}: open a recording by taxel.open(path)")
         self._contents = contents
         main = contents.main
         self.path, self.name, self.kind = main.origin.path, main.origin.name, main.origin.kind
@@ -381,7 +381,7 @@ class Recording:
         >>> _ = taxel.convert(folder / "one.npz", folder / "one.mcap")
         >>> one = taxel.open(folder / "one.mcap")
         >>> one.verdict, one.remarks
-        ('the .npz does not say what was lost', ('converted from one.npz',))
+        ('losses unknown: the .npz does not record them', ('converted from one.npz',))
         """
         return self._contents.main.losses.remarks
 

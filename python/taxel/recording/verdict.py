@@ -116,7 +116,7 @@ class Verdict(str):
 
     def __new__(cls, *_: object) -> Self:
         """Refuse a verdict built by hand."""
-        raise ProblemError("a verdict comes with a recording, or from Verdict.from_dict; it is not built")
+        raise ProblemError("Verdict: take the verdict of a recording, or make one by Verdict.from_dict")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Verdict._from, (self._held,)

@@ -104,7 +104,7 @@ def write_detections(
     title : str
     judged : str
         On what the scores of `listened` are: held-out data, or the readout's own training data.
-    held_out : list of Score, one a recording, or none
+    held_out : list of Score, one per recording, or none
         How readouts trained without each recording, or without parts of it, did on it.
     alignments : mapping of str to Alignment, optional
         By how much labels were moved to what the sensor felt before they were learnt; examples are those of `listened`.

@@ -417,7 +417,7 @@ class Converter(Value):
 
         Parameters
         ----------
-        line_v : sequence of float, V, one a step
+        line_v : sequence of float, V, one per step
             The sense lines, settled.
         every_us : float, us, above 0 and finite
             Time between two points.

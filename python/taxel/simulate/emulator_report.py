@@ -75,7 +75,9 @@ class EmulatorReport:
         late = ", ".join(f"{to_ms(self.late_us[q]):.2f} ms ({quantile})" for q, quantile in _QUANTILES.items())
         late = f"late by {late}; {self.late_frames} of {self.frames} by a frame or more"
         if self.held:
-            pace = "held" if self.late_frames <= 0.01 * self.frames else "held on the whole, but not frame by frame"
+            pace = (
+                "held" if self.late_frames <= 0.01 * self.frames else "reached on average, but single frames were late"
+            )
             return f"{self.wanted_hz:.0f} frames/s {pace}; frames were {late}"
         short = 100.0 * (1.0 - self.reached_hz / self.wanted_hz)
         return (

@@ -93,7 +93,7 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
             kind = _kind_of(h5)
             values, others = _lists(h5, "value")
             if not np.array_equal(offsets, others):
-                raise FormatError(f"{file}, units/value: must have the lengths of the trains, one value a spike")
+                raise FormatError(f"{file}, units/value: must have the lengths of the trains, one value per spike")
         watched = np.empty((0, 2))
         if "units/obs_intervals" in h5.entries and len(offsets) > 1:
             watched = 1000.0 * h5.numbers("units/obs_intervals").astype(np.float64)

@@ -128,7 +128,7 @@ class SpikeTrains(FrozenColumns):
         if values is not None:
             valued, lengths = _by_train("values", bare("values", values), np.float32)
             if lengths != counts:
-                raise refused("values", ": must have the lengths of the trains, one value a spike")
+                raise refused("values", ": must have the lengths of the trains, one value per spike")
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         if stop is None:
             # Values that are not finite are refused below, with their positions.
@@ -160,10 +160,12 @@ class SpikeTrains(FrozenColumns):
         if not isinstance(other, SpikeTrains):
             return NotImplemented
         if len(self) != len(other):
-            raise ProblemError(f"{counted(len(self), 'train')} and {len(other)}: only equally many are merged")
+            raise ProblemError(
+                f"{counted(len(self), 'train')} and {len(other)}: only equal numbers of trains can be merged"
+            )
         if self.signed != other.signed:
             first, second = sorted((self.kind, other.kind))
-            raise ProblemError(f"{first} and {second} trains: only alike ones are merged; see split_by_sign")
+            raise ProblemError(f"{first} and {second} trains: only trains of one kind can be merged; see split_by_sign")
         times = np.concatenate([self.times, other.times])
         train = np.concatenate(
             [np.repeat(np.arange(len(self)), self.counts), np.repeat(np.arange(len(self)), other.counts)]
@@ -217,7 +219,7 @@ class SpikeTrains(FrozenColumns):
         """
         each = [instance(f"parts[{n}]", part, SpikeTrains) for n, part in enumerate(several("parts", parts))]
         if not each:
-            raise refused("parts", ": there is none, one or more is needed")
+            raise refused("parts", ": is empty, must have one train or more")
         each = [trains.split_by_sign() if trains.signed else trains for trains in each]
         graded = any(trains.kind == "graded" for trains in each)
         return cls._of_own(
@@ -367,7 +369,9 @@ class SpikeTrains(FrozenColumns):
     def _ungraded(self, reader: str) -> SpikeTrains:
         """Return the trains; refuse graded ones on behalf of `reader`, which reads no values."""
         if self.kind == "graded":
-            raise ProblemError(f"{reader} takes no graded trains: their spikes have values, which it does not read")
+            raise ProblemError(
+                f"{reader} takes no graded trains: their spikes have values, and it does not read values"
+            )
         return self
 
     def to_numpy(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -1,9 +1,9 @@
-"""What a user asks for, as functions: recordings, labels and options in, a result out.
+"""The tasks of a user as functions: recordings, labels and options in, a result out.
 
 Each task takes opened recordings and a frozen dataclass of options, reports its progress by one callback (step, done,
 all), and returns a frozen result with `to_dict()` and `warnings`. No task writes a file; what a result holds is saved
 by its own methods. The command line and the page call these functions; ``python -m taxel.tasks NAME`` runs one in a
-process of its own (`taxel.tasks.__main__`).
+separate process (`taxel.tasks.__main__`).
 """
 
 from taxel.detect.cause import Cause as Cause

@@ -171,7 +171,7 @@ def calibrate(
     Raises
     ------
     ProblemError : nothing to calibrate by, options that contradict each other, nothing recorded under a load
-    FormatError : a table that is none
+    FormatError : a file that is not a table
 
     Examples
     --------
@@ -263,7 +263,7 @@ def read_loads(path: str | os.PathLike[str]) -> list[KnownLoad]:
 
     Raises
     ------
-    FormatError : a table that is none (names the line)
+    FormatError : a file that is not a table (names the line)
     """
     path, loads = Path(checked_path("path", path)), []
     for row in text.table(path, ["load", "unit", "from_s", "to_s"]):

@@ -53,7 +53,7 @@ class EncodeOptions:
     tare: GivenTare | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no encoder, before the recording is read."""
+        """Refuse anything but an encoder, before the recording is read."""
         check_tare(self.tare)
         self._chosen()
 
@@ -108,8 +108,8 @@ def encode(recording: Recording, options: EncodeOptions, *, progress: Progress |
 
     Raises
     ------
-    ProblemError : an encoder that is none, or that needs a tare; a tare that does not fit
-    FormatError : a file that is no tare
+    ProblemError : an encoder that is unknown or invalid, or that needs a tare; a tare that does not fit
+    FormatError : a file that is not a tare
 
     Examples
     --------

@@ -60,13 +60,15 @@ class InformationOptions:
     classifiers: Sequence[str] = ("neighbours",)
 
     def __post_init__(self) -> None:
-        """Refuse what is no encoder, before the recordings are read."""
+        """Refuse anything but an encoder, before the recordings are read."""
         self._chosen()
 
     def _chosen(self) -> Encoder | None:
         """Return the encoder; None of that which the answer chooses by itself."""
         if text("encoder", self.encoder) not in ("change_events", "fa1"):
-            raise refused("encoder", f" is {self.encoder}: must be change_events or fa1, which have one train a taxel")
+            raise refused(
+                "encoder", f" is {self.encoder}: must be change_events or fa1, which have one train per taxel"
+            )
         mapping("parameters", self.parameters)
         if self.encoder == "change_events" and not self.parameters:
             return None
@@ -114,17 +116,17 @@ def information(
     recordings : Recording or sequence of Recording
     labels : path or "notes", optional
         A table recording,t_us,label[,stop_us][,group] whose rows are trials; or each note of the recordings is a trial
-        from its time on. Without either each recording is a trial, and its folder's name the label.
+        that begins at its time. Without either each recording is a trial, and its folder's name is the label.
     options : InformationOptions, optional
     progress : function of (step, done, all), optional
     watch : function of (period, window, bits), optional
         Called with the bits of each setting of all taxels as they are known, draw by draw, so that a task that is
-        stopped has told them.
+        stopped has reported them.
 
     Raises
     ------
     ProblemError : labels that make no trials, or too few of them; options that do not fit
-    FormatError : a table that is none
+    FormatError : a file that is not a table
     """
     options = InformationOptions() if options is None else instance("options", options, InformationOptions)
     show = reporting(progress)

@@ -79,14 +79,14 @@ def references(
 
 
 def check_shift(shift_ms: float) -> None:
-    """Refuse a move of labels that is no number of ms within 41 days."""
+    """Refuse a shift of labels that is not a number of ms within 41 days."""
     finite("shift_ms", shift_ms, "ms", least=-3.6e9, most=3.6e9)
 
 
 def moved(
     events: Mapping[str, NDArray[np.int64]], recording: Recording, shift_ms: float
 ) -> dict[str, NDArray[np.int64]]:
-    """Return the labels of a recording so much later; those that then lie outside it are left out."""
+    """Return the labels of a recording so much later; those that are then outside it are left out."""
     if not shift_ms:
         return dict(events)
     first, last = span_us(recording)
@@ -94,9 +94,9 @@ def moved(
     inside = {label: times[(times >= first) & (times <= last)] for label, times in moved.items()}
     outside = sum(map(len, events.values())) - sum(map(len, inside.values()))
     if outside:
-        lie = "lies" if outside == 1 else "lie"
+        are = "is" if outside == 1 else "are"
         warn(
-            f"{counted(outside, 'label')} of {recording.title} {lie} outside it when moved by {shift_ms:g} ms: left out"
+            f"{counted(outside, 'label')} of {recording.title} {are} outside it when moved by {shift_ms:g} ms: left out"
         )
     return inside
 
@@ -155,7 +155,7 @@ def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
         there = few(dict.fromkeys(recording.title for recording in recordings))
         warn(
             f"{table.path}: left out {count} of {few(strange)}, which {'is' if len(strange) == 1 else 'are'} "
-            f"not here; there {'is' if len(recordings) == 1 else 'are'} {there}",
+            f"not among the recordings: {there}",
             stacklevel=3,
         )
 
@@ -242,7 +242,10 @@ def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]
         left_out[row.source] += 1
     for side, count in left_out.items():
         (here,) = _SIDES - {side}
-        warn(f"{table.path}: left out {counted(count, 'event')} of the {side}; what is here is {here}", stacklevel=3)
+        warn(
+            f"{table.path}: left out {counted(count, 'event')} of the {side}; the recording is of the {here}",
+            stacklevel=3,
+        )
 
 
 def _noted(recording: Recording) -> dict[str, NDArray[np.int64]]:
@@ -258,7 +261,7 @@ def _from_beginnings(
 ) -> list[dict[str, NDArray[np.int64]]]:
     """Return events by the times of their recordings, and say of which they are counted from the beginning.
 
-    Those are all events of a recording whose times count from 1970, if all lie within its duration. Sources of a file
+    Those are all events of a recording whose times count from 1970, if all are within its duration. Sources of a file
     count from the first of them; if they begin apart, the labels are refused.
     """
     begins: dict[tuple[Path, str], list[int]] = {}
@@ -285,7 +288,7 @@ def _from_beginnings(
 def _within(
     table: Labels, events: dict[str, NDArray[np.int64]], recording: Recording, argument: str
 ) -> dict[str, NDArray[np.int64]]:
-    """Return the events of a table that lie within a recording; refuse a table of which none does."""
+    """Return the events of a table that are within a recording; refuse a table without any."""
     if recording.clock is None and any(row.at_ns for row in table.rows):
         warn(
             f"the {kind_of_file(recording.kind)} holds no arrival times, so host_ns cannot show by how many periods of "
@@ -311,10 +314,10 @@ def _span(recording: Recording) -> str:
 
 
 def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where: str) -> dict[str, NDArray[np.int64]]:
-    """Return the events that lie within a recording; say which are left out as they do not, and which may not.
+    """Return the events within a recording; report which are left out, and which may be outside it.
 
     A frame holds until the next one would come. A board sends nothing where nothing changes, so that the end of its
-    recording may lie behind its last event: an event soon after that counts, and is named.
+    recording may be after its last event: an event soon after that counts, and is named.
     """
     total = sum(map(len, events.values()))
     if not total:
@@ -337,9 +340,9 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
     if behind:
         (at, label), begin = behind[0], beginning_us(np.array([first]))
         warn(
-            f"{len(behind)} of the {total} events of {where} are behind the last that was recorded, at "
-            f"{(end - begin) / 1e6:.3f} s ({label} at {(at - begin) / 1e6:.3f} s): they count, and as missed if the "
-            "recording stopped before them",
+            f"{len(behind)} of the {total} events of {where} are later than the last recorded event, at "
+            f"{(end - begin) / 1e6:.3f} s ({label} at {(at - begin) / 1e6:.3f} s): they are scored, and count as "
+            "missed if the recording stopped before them",
             stacklevel=2,
         )
     outside = total - sum(map(len, inside.values()))

@@ -38,7 +38,7 @@ class StreamReader:
 
         Returns
         -------
-        list of bytes, one a datagram, without its length
+        list of bytes, one per datagram, without its length
 
         Raises
         ------
@@ -56,7 +56,7 @@ class StreamReader:
 
         Returns
         -------
-        list of bytes, one a datagram, without its length
+        list of bytes, one per datagram, without its length
 
         Examples
         --------

@@ -56,7 +56,7 @@ impl Psd {
         let (tau_1, tau_2) = (self.tau_1, self.tau_2);
         self.check_ranges()?;
         if tau_2 >= tau_1 {
-            return Err(problem!("tau_2"; " is {tau_2} ms: must lie below tau_1, {tau_1} ms"));
+            return Err(problem!("tau_2"; " is {tau_2} ms: must be below tau_1, {tau_1} ms"));
         }
         Ok(PsdRule { peak: peak_factor(tau_1, tau_2), tau_1, tau_2 })
     }

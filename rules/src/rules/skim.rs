@@ -328,7 +328,7 @@ impl BatchRule for Skim {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
-            return Err(problem!("tau_s"; " is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
+            return Err(problem!("tau_s"; " is {} ms: must be below tau, {} ms", self.tau_s(), self.tau));
         }
         if self.thresholds.is_empty() {
             return Err(problem!("thresholds"; ": must hold at least one"));

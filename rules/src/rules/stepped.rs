@@ -169,7 +169,7 @@ impl SteppedNeuron {
             Parameter { name, ..Self::TIME_CONSTANT }.check(&value)?;
         }
         if values[1] >= values[0] {
-            return Err(problem!(names[1]; " is {} ms: must lie below {}, {} ms", values[1], names[0], values[0]));
+            return Err(problem!(names[1]; " is {} ms: must be below {}, {} ms", values[1], names[0], values[0]));
         }
         if self.refractory > 0.0 && self.after_spike != AfterSpike::Membrane {
             return Err(

@@ -74,7 +74,7 @@ impl Tempotron {
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.tau_s() >= self.tau {
-            return Err(problem!("tau_s"; " is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
+            return Err(problem!("tau_s"; " is {} ms: must be below tau, {} ms", self.tau_s(), self.tau));
         }
         Ok(())
     }
@@ -287,7 +287,7 @@ fn check_labelled(patterns: &[SpikeTrains], labels: &[bool]) -> Result<()> {
         return Err(problem!("patterns"; ": there is none, at least one is needed"));
     }
     if patterns.len() != labels.len() {
-        return Err(problem!("labels"; ": {} for {} patterns, must be one a pattern", labels.len(), patterns.len()));
+        return Err(problem!("labels"; ": {} for {} patterns, must be one per pattern", labels.len(), patterns.len()));
     }
     for (p, pattern) in patterns.iter().enumerate() {
         taxel_core::learn::check_pattern(p, pattern)?;

@@ -140,7 +140,7 @@ impl Converter {
     pub fn trace(&self, line_v: &[f64], every_us: f64, stop_us: f64) -> Result<Vec<Moment>> {
         self.check()?;
         if line_v.len() != self.steps {
-            return Err(problem!("voltages: {} of them, must be one a step, {}", line_v.len(), self.steps));
+            return Err(problem!("voltages: {} of them, must be one per step, {}", line_v.len(), self.steps));
         }
         if let Some(k) = line_v.iter().position(|v| !v.is_finite()) {
             return Err(problem!("voltages[{k}] is {}: must be finite", line_v[k]));

@@ -106,8 +106,8 @@ impl Detector {
         match self.unit().filter(|&trained| trained != unit) {
             None => Ok(()),
             Some(trained) => Err(problem!(
-                "live values in {unit}, and the {kind} was trained on {trained}: must be in {trained}, or train anew on \
-                 recordings in {unit}"
+                "live values are in {unit}, but the {kind} was trained on {trained}: give values in {trained}, or train a \
+                 {kind} on recordings in {unit}"
             )),
         }
     }
@@ -204,7 +204,7 @@ pub(super) fn usual_distance(t: &[i64]) -> Result<f64> {
         return Err(problem!("there are no frames: nothing can be detected"));
     }
     if apart.is_empty() {
-        return Err(problem!("one frame does not say how long it lasts: give frame_us"));
+        return Err(problem!("one frame does not show how long a frame lasts: give frame_us"));
     }
     let middle = apart.len() / 2;
     Ok(*apart.select_nth_unstable(middle).1 as f64)

@@ -22,7 +22,7 @@ pub(super) fn parts(name: &str, text: &str, formats: &[&'static str]) -> Result<
     };
     let stated = object.remove("format");
     let Some(stated) = stated else {
-        return Err(format(format!("does not say \"format\": {names}, so it is none")));
+        return Err(format(format!("has no \"format\": {names}, so it is not such a file")));
     };
     let Some(&name) = formats.iter().find(|&&name| stated == name) else {
         return Err(format(format!("format is {stated}, must be {names}")));
@@ -30,7 +30,7 @@ pub(super) fn parts(name: &str, text: &str, formats: &[&'static str]) -> Result<
     match object.remove("version") {
         Some(version) if version.as_u64() == Some(VERSION) => Ok((name, value)),
         Some(version) => Err(format(format!("version {version}, this taxel reads version {VERSION} only"))),
-        None => Err(format(format!("says no version, must be {VERSION}"))),
+        None => Err(format(format!("states no version, must be {VERSION}"))),
     }
 }
 

@@ -144,7 +144,7 @@ impl Readout {
                 Ok(Cow::Owned(Encoder::Composite(Composite { parts: parts.collect() })))
             }
             (_, names) => {
-                Err(problem!("inputs"; " are {names:?}: the encoder is no composite, so there are no others"))
+                Err(problem!("inputs"; " are {names:?}: the encoder is not a composite, so it has no other inputs"))
             }
         }
     }
@@ -182,7 +182,7 @@ impl Readout {
             && !sensor.fits(array)
         {
             let same_shape = (sensor.rows, sensor.columns) == (array.rows, array.columns);
-            let difference = if same_shape { ", of which others exist" } else { "" };
+            let difference = if same_shape { ", but other taxels of it exist" } else { "" };
             let error = problem!(
                 "an array of {} x {} taxels: the readout was trained on {} x {}{difference}",
                 array.rows,

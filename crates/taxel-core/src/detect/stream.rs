@@ -349,6 +349,6 @@ fn check_time(t: i64) -> Result<()> {
     if (-FARTHEST_US..=FARTHEST_US).contains(&t) {
         Ok(())
     } else {
-        Err(problem!("time {t} us: must lie within 2^52 us, {FARTHEST_US}, of 0"))
+        Err(problem!("time {t} us: must be within 2^52 us ({FARTHEST_US} us) of 0"))
     }
 }

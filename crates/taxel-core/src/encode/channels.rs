@@ -136,7 +136,7 @@ impl Channels {
             ));
         }
         if let Some(&t) = events.t.iter().find(|t| t.unsigned_abs() > FARTHEST) {
-            return Err(problem!("event at {t} us: lies too far from 0"));
+            return Err(problem!("event at {t} us: is too far from 0"));
         }
         events.check()
     }

@@ -149,7 +149,7 @@ impl Encoding for Moments {
             );
         }
         if self.centre && !self.graded {
-            return Err(problem!("centre"; " is given without graded: its place has graded spikes alone"));
+            return Err(problem!("centre"; " is given without graded: only graded spikes have it"));
         }
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }

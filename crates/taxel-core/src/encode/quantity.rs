@@ -44,7 +44,9 @@ impl Quantity {
             match quantity {
                 Self::Peak => {}
                 Self::Duration => {
-                    return Err(problem!("quantity"; " duration: is no load that changes during a touch"));
+                    return Err(
+                        problem!("quantity"; " duration: does not change during a touch; choose another quantity"),
+                    );
                 }
                 _ => array.check_neighbours(quantity.rule())?,
             }

@@ -121,9 +121,9 @@ impl StreamInput {
         match *self {
             StreamInput::Events { .. } => return Err(problem!("frame at {t} us: this stream was begun with events")),
             StreamInput::Frames { open } if t < open => {
-                return Err(problem!("frame at {t} us: must come at {open} us or later, times ascend"));
+                return Err(problem!("frame at {t} us: must be at {open} us or later, as times must ascend"));
             }
-            _ if t.unsigned_abs() > FARTHEST => return Err(problem!("frame at {t} us: lies too far from 0")),
+            _ if t.unsigned_abs() > FARTHEST => return Err(problem!("frame at {t} us: is too far from 0")),
             _ => {}
         }
         *self = StreamInput::Frames { open: t + 1 };

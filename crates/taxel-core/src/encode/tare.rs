@@ -41,7 +41,7 @@ impl Tare {
             return Err(problem!("tare: {} rests for {rows} x {columns} taxels: must be one each", self.rest.len()));
         }
         if self.start_us >= self.stop_us {
-            return Err(problem!("tare from {} to {} us: start must lie before stop", self.start_us, self.stop_us));
+            return Err(problem!("tare from {} to {} us: start must be before stop", self.start_us, self.stop_us));
         }
         if let Some(taxel) = self.rest.iter().position(|rest| rest.is_some_and(|r| !r.is_finite())) {
             return Err(problem!("tare: rest of the taxel at {} is not finite", self.array.position_text(taxel)));
@@ -77,7 +77,7 @@ impl Tare {
         let (from, to) = (&self.array, array);
         if !from.fits(to) {
             let others =
-                if (from.rows, from.columns) == (to.rows, to.columns) { ", of which others exist" } else { "" };
+                if (from.rows, from.columns) == (to.rows, to.columns) { ", but other taxels of it exist" } else { "" };
             return Err(problem!(
                 "tare of {} x {} taxels: the array has {} x {}{others}",
                 from.rows,
@@ -170,9 +170,13 @@ impl Zeroing {
         let Self { x, y, rest, .. } = *self;
         if x >= array.columns || y >= array.rows || array.exists.as_ref().is_some_and(|e| !e[array.index(x, y)]) {
             let (rows, columns) = (array.rows, array.columns);
-            return Err(problem!("taxel at row {y}, column {x}: none there in {rows} x {columns}"));
+            return Err(problem!("taxel at row {y}, column {x}: there is no such taxel in {rows} x {columns}"));
         }
-        if rest.is_finite() { Ok(()) } else { Err(problem!("taxel at row {y}, column {x}: a rest of {rest}")) }
+        if rest.is_finite() {
+            Ok(())
+        } else {
+            Err(problem!("taxel at row {y}, column {x}: its rest is {rest}, must be finite"))
+        }
     }
 }
 
@@ -274,7 +278,7 @@ impl TareBuilder {
             return Err(problem!("frame at {t} us: {} values, must be {}", values.len(), self.integrals.len()));
         }
         if t < self.present {
-            return Err(problem!("frame at {t} us after {} us: times ascend", self.present));
+            return Err(problem!("frame at {t} us comes after {} us: times must ascend", self.present));
         }
         if let Some(bad) = values.iter().find(|v| !v.is_finite()) {
             return Err(not_finite(t, *bad));
@@ -294,12 +298,12 @@ impl TareBuilder {
     ///
     /// `Problem` if there was no event, the interval is empty, or an event was later.
     pub fn finish(mut self, stop: i64, note: &str) -> Result<Tare> {
-        let Some(start) = self.start else { return Err(problem!("tare: nothing came")) };
+        let Some(start) = self.start else { return Err(problem!("tare: nothing has arrived")) };
         if stop <= start {
-            return Err(problem!("tare from {start} to {stop} us: start must lie before stop"));
+            return Err(problem!("tare from {start} to {stop} us: start must be before stop"));
         }
         if stop < self.present {
-            return Err(problem!("tare to {stop} us: something came at {} us, after it", self.present));
+            return Err(problem!("tare to {stop} us: something arrived later, at {} us", self.present));
         }
         for (integral, &held) in self.integrals.iter_mut().zip(self.held.values()) {
             integral.extend(stop, held);
@@ -311,7 +315,7 @@ impl TareBuilder {
         };
         let (rest, noise) = (of_each(Integral::mean), of_each(Integral::deviation));
         if rest.iter().all(Option::is_none) {
-            return Err(problem!("tare from {start} to {stop} us: no value came"));
+            return Err(problem!("tare from {start} to {stop} us: no value arrived"));
         }
         Ok(Tare { rest, noise, array: self.array, start_us: start, stop_us: stop, note: note.to_owned() })
     }

@@ -37,17 +37,14 @@ pub(super) fn window(
         })
     };
     let Some((start, stop)) = asked.or_else(widest) else {
-        return Err(problem!("window"; ": must be given, (start, stop) in ms, as lists of times do not say it"));
+        return Err(problem!("window"; ": must be given, (start, stop) in ms, as lists of times do not state it"));
     };
     for side in sides() {
         for (p, n) in (0..side.count).flat_map(|p| (0..side.trains).map(move |n| (p, n))) {
             let train = side.train(p, n);
             if let Some(k) = train.iter().position(|&t| t < start || t > stop) {
                 let name = side.train_name(p, n);
-                return Err(problem!(
-                    "{name}, spike {k}: {} ms lies outside the window {start} to {stop} ms",
-                    train[k]
-                ));
+                return Err(problem!("{name}, spike {k}: {} ms is outside the window {start} to {stop} ms", train[k]));
             }
         }
     }

@@ -113,8 +113,8 @@ impl Neuron {
         }
         if self.kernel == Kernel::Exponential && self.time == Time::Continuous {
             return Err(problem!(
-                "kernel"; " is \"exponential\" and time \"continuous\": its potential only jumps, at inputs, so it never crosses \
-                 the threshold at a time of its own; take time \"grid\" or another kernel"
+                "kernel"; " is \"exponential\" and time \"continuous\": its potential changes only in jumps, at inputs, so it crosses the \
+                 threshold only at inputs; take time \"grid\" or another kernel"
             ));
         }
         if let (Some(rearm), Time::Continuous) = (self.rearm, self.time) {

@@ -61,7 +61,7 @@ pub struct Baseline {
 
 impl Baseline {
     /// The tracked rest: it begins at `rest` ([`Value::NO_REST`] if unknown) and follows values nearer than `far` with
-    /// [`NEAR_S`], others with [`FAR_S`]; all in the sensor's unit, one entry a taxel.
+    /// [`NEAR_S`], others with [`FAR_S`]; all in the sensor's unit, one entry per taxel.
     #[must_use]
     pub fn tracked(rest: Vec<f64>, far: Vec<f32>) -> Self {
         Self { far, ..Self::new(rest, [NEAR_S, FAR_S, HELD_S].map(|s| s * 1e6)) }

@@ -62,7 +62,7 @@ options! {
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
         #[serde(skip_serializing)]
         array: Array = Array::thesis(), "commands" = "live record", "metavar" = "ROWSxCOLUMNS[xMM]",
-            "python" = "Array | None", "typed" = "As 24x20x5; without a pitch 2.67 mm, or unknown with --rate-hz.";
+            "python" = "Array | None", "typed" = "For example 24x20x5. Default pitch: 2.67 mm, or unknown with --rate-hz.";
         /// The board's registers, by a preset: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: those of a remote board, else
         /// those of a board of this array at reset.
         ///
@@ -79,7 +79,7 @@ options! {
         #[serde(skip_serializing)]
         readout: Option<String> = None, "metavar" = "FILE",
             "python" = "Readout | PlainRule | None", "typed" = "taxel train writes such files (JSON).";
-        /// Rest of the taxels: a saved tare, or how many seconds of rest at the beginning to take a fresh one from.
+        /// Rest of the taxels: a saved tare, or the seconds at rest at the beginning, from which a fresh tare is taken.
         ///
         /// For a plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event
         /// on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
@@ -98,8 +98,9 @@ options! {
         record_later: bool = false, "commands" = "";
         /// The board's name among the sources of the recording.
         name: String = "board".to_owned(), "commands" = "record";
-        /// What to receive, [NAME=]KIND:PLACE and KEY=VALUE after commas, as lines:-,array=16x16 or serial:COM3,array=16x16:
-        /// frames of numbers, a board (board:HOST:PORT), or further sources of a recording.
+        /// The source to receive: [NAME=]KIND:PLACE and, after commas, KEY=VALUE; for example lines:-,array=16x16 or
+        /// serial:COM3,array=16x16. It sends frames of numbers, is a board (board:HOST:PORT), or is a further source of a
+        /// recording.
         ///
         /// "board:HOST:PORT" is a board that sends to that address of this machine (array=ROWSxCOLUMNS, preset=NAME). Lines of
         /// numbers come from "serial:PLACE" (baud=), "lines:PATH" (a pipe, or a file that grows; "-" is the standard input),
@@ -123,7 +124,7 @@ options! {
         overwrite: bool = false, "commands" = "live record";
         /// How far, in frames, a readout stays behind the host's clock while no events arrive.
         guard_frames: f64 = 5.0, "minimum" = 0;
-        /// At a gap in the sequence of version 2, frames to wait for what may only be late.
+        /// With version 2 of the wire: how many frames to wait at a gap in the sequence, as the data may only be late.
         gap_frames: f64 = 1.0, "commands" = "", "minimum" = 0;
         /// Print one line of JSON for each detection, and nothing else.
         lines: bool = false, "flag" = "--json";

@@ -80,8 +80,8 @@ impl RestShift {
         #[allow(clippy::cast_precision_loss)]
         let gap_s = self.longest_ns as f64 / 1e9;
         Some(format!(
-            "after a gap of {gap_s:.1} s {} of {} taxels rest elsewhere than by the tare, by up to {farthest} {unit}, so that \
-             presses are missed: with nothing on the sensor, zero all on the page, or start again with --tare SECONDS",
+            "after a gap of {gap_s:.1} s, the rest of {} of {} taxels differs from the tare by up to {farthest} {unit}, so that \
+             presses are missed: with nothing on the sensor, click Zero all on the page, or start again with --tare SECONDS",
             shifted.len(),
             values.len()
         ))
@@ -108,7 +108,7 @@ mod tests {
             let values: Vec<f32> =
                 (0..TAXELS).map(|taxel| (REST + moved(taxel) + random.random_range(-1.7..1.7)) as f32).collect();
             if watch.take((at_s * 1e9) as i64, &values, Some(1.0)) {
-                assert!(found.is_none(), "told twice");
+                assert!(found.is_none(), "reported twice");
                 found = Some(watch.found(&[Some(REST); TAXELS], "counts"));
             }
         }
@@ -116,12 +116,12 @@ mod tests {
     }
 
     #[test]
-    fn a_rest_that_shifted_in_a_gap_is_told_with_how_many_taxels_and_how_far() {
+    fn a_rest_that_shifted_in_a_gap_is_reported_with_how_many_taxels_and_how_far() {
         for noise_floor in [10.0, 0.0] {
             let line = told(|taxel| if taxel < 76 { 32.0 - 64.0 * (taxel % 2) as f64 } else { 0.0 }, 2.4, noise_floor);
             let line = line.expect("a line");
             assert!(
-                line.starts_with("after a gap of 2.4 s 76 of 144 taxels rest elsewhere than by the tare, by up to 3"),
+                line.starts_with("after a gap of 2.4 s, the rest of 76 of 144 taxels differs from the tare by up to 3"),
                 "{line}"
             );
             assert!(line.contains("start again with --tare SECONDS"), "{line}");

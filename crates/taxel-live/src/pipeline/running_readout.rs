@@ -46,7 +46,7 @@ impl ReadoutSetup {
 #[allow(clippy::cast_possible_truncation)]
 fn tare_us(seconds: f64) -> taxel_core::Result<i64> {
     if !(1e-6..=3600.0).contains(&seconds) {
-        return Err(problem!("tare"; " is {seconds} s: must lie between 1 us and an hour, or be a taxel.Tare"));
+        return Err(problem!("tare"; " is {seconds} s: must be from 1 us to an hour, or a taxel.Tare"));
     }
     Ok((seconds * 1e6).round_ties_even() as i64)
 }

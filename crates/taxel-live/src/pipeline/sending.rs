@@ -222,7 +222,7 @@ impl SendingState {
                 }
                 Err(error) => {
                     let why = if error.kind() == ErrorKind::BrokenPipe {
-                        "the reader is gone".to_owned()
+                        "the reader has closed the pipe".to_owned()
                     } else {
                         error.to_string()
                     };

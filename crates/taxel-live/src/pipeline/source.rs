@@ -251,7 +251,9 @@ impl FromStr for SourceText {
             };
             source.rate_hz = number("rate", take("rate"))?;
             source.end = match (take("frame_lines"), take("frame_end")) {
-                (Some(_), Some(_)) => return Err(refused("frame_lines and frame_end: give one".to_owned())),
+                (Some(_), Some(_)) => {
+                    return Err(refused("frame_lines and frame_end: give one of them".to_owned()));
+                }
                 (Some(lines), None) => match lines.parse() {
                     Ok(lines @ 1..=65_535) => Some(FrameEnd::Lines(lines)),
                     _ => return Err(refused(format!("frame_lines is {lines:?}: must be a number from 1 to 65535"))),
@@ -370,7 +372,7 @@ impl SourceText {
             (self.rate_hz.is_some(), "rate"),
         ] {
             if is_stated {
-                return Err(problem!("{key} is of frames: state array=ROWSxCOLUMNS too").into());
+                return Err(problem!("{key} is only for frames: state array=ROWSxCOLUMNS too").into());
             }
         }
         let stream = StreamColumns::of_columns(first.columns);
@@ -381,7 +383,11 @@ impl SourceText {
         match first.dated[..] {
             [] => {}
             [column] => return Ok(of_dates(column)),
-            _ => return Err(problem!("dates in several columns are of frames: state array=ROWSxCOLUMNS too").into()),
+            _ => {
+                return Err(
+                    problem!("dates in several columns are only for frames: state array=ROWSxCOLUMNS too").into()
+                );
+            }
         }
         Ok(match &self.time {
             None => stream,
@@ -392,7 +398,7 @@ impl SourceText {
             }
             Some(StatedTime::Dates(column)) => of_dates(index_of("time", column, &stream.columns)?),
             Some(StatedTime::Sum(..)) => {
-                return Err(problem!("time=A+B is of frames: state array=ROWSxCOLUMNS too").into());
+                return Err(problem!("time=A+B is only for frames: state array=ROWSxCOLUMNS too").into());
             }
         })
     }
@@ -454,7 +460,9 @@ impl SourceText {
         layout.check()?;
         if self.rate_hz.is_none() {
             let Some(input) = input else {
-                return Err(problem!("rate=HZ is not stated: how many frames a second the program passes").into());
+                return Err(
+                    problem!("rate=HZ is missing: it states how many frames a second the program passes").into()
+                );
             };
             let mut lines = opened.map_or_else(|| OpenedLines::open(input), Ok)?;
             lines.wait(wait)?;

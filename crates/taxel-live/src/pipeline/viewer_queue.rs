@@ -236,7 +236,7 @@ mod tests {
         let piece = viewer.next().expect("one waits");
         assert_eq!(piece.missing + piece.changes.len() as u64, sent);
         assert_eq!(piece.before + piece.changes.len() as u64, sent);
-        assert_eq!(piece.held.expect("begins anew")[array.index(1, 2)], 7);
+        assert_eq!(piece.held.expect("begins again")[array.index(1, 2)], 7);
         assert!(piece.changes.len() <= MOST);
         drop(viewer);
         queue.push(&events(&[2000], 7), &held);

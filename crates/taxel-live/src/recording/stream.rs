@@ -19,7 +19,7 @@ use clock::StreamClock;
 pub struct StreamColumns {
     /// The names of all columns.
     pub columns: Vec<String>,
-    /// The column of the source's own clock; without one a line's time is its arrival time.
+    /// The column of the source's own clock; without one, a line's time is its arrival time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
     /// Unit of that clock, us.

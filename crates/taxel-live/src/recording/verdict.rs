@@ -24,10 +24,10 @@ pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wir
 const NO_LINE_LOST: &str = "nothing lost after arrival (lines without numbers cannot show what was lost before it)";
 
 /// The wording where a kernel does not count what it drops, and the board does not number what it sends.
-const UNCOUNTED: &str = "what was lost is not known: the kernel does not count what it drops";
+const UNCOUNTED: &str = "losses unknown: the kernel does not count what it drops";
 
 /// The wording where the record with the final counts is damaged.
-const NO_END: &str = "the final counts are damaged: what was lost since the last before them is not known";
+const NO_END: &str = "the final counts are damaged: losses after the counts before them are unknown";
 
 /// How much of a recording is there, from the best to the worst; of several parts the worst counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -232,7 +232,7 @@ impl Verdict {
             Basis::File(condition) => Self::of_file(*condition),
             Basis::Raw(unmarked, damage) => Self::of_raw(unmarked, &damage),
             Basis::Silent(kind) => {
-                let text = format!("the {kind} does not say what was lost");
+                let text = format!("losses unknown: the {kind} does not record them");
                 Self { status: RecordingStatus::Unknown, text, ..Self::default() }
             }
             Basis::Together(parts) => Self::combine(parts),
@@ -331,7 +331,7 @@ impl Verdict {
             };
             format!("LOST: {}{but}", words.join(", "))
         } else if knows && of_board(OTHER_BOARD) > 0 {
-            "nothing lost but what another board sent".to_owned()
+            "nothing lost except what another board sent".to_owned()
         } else if knows {
             "nothing lost".to_owned()
         } else if hidden && counted_by_kernel {
@@ -434,8 +434,8 @@ impl Verdict {
         if unmarked.is_some() {
             verdict.status = verdict.status.max(RecordingStatus::Unfinished);
         }
-        let unmarked = unmarked.map(|name| format!("not finished, as {name} is not there"));
-        let silent = "the .lsa does not say what was lost".to_owned();
+        let unmarked = unmarked.map(|name| format!("not finished: {name} is missing"));
+        let silent = "losses unknown: the .lsa does not record them".to_owned();
         verdict.text = unmarked.into_iter().chain([silent]).chain(damage).collect::<Vec<_>>().join("; ");
         verdict
     }

@@ -65,7 +65,7 @@ impl Indexed {
             Self::Frames(index) => index.frame_us(),
         };
         let (beyond, end) = match (first - t_us, t_us - last) {
-            (before, _) if before > late_us => (before, "before the begin"),
+            (before, _) if before > late_us => (before, "before the beginning"),
             (_, after) if after > late_us => (after, "after the end"),
             _ => return Ok(()),
         };
@@ -74,7 +74,7 @@ impl Indexed {
             1 => format!("{:.3} s", beyond as f64 / 1e6),
             us => format!("{} frames", beyond / us),
         };
-        Err(format!("a label {far} {end} of {name}: must lie within it"))
+        Err(format!("a label {far} {end} of {name}: must be within the recording"))
     }
 
     /// The `overview` message.

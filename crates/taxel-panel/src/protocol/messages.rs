@@ -33,7 +33,7 @@ pub(crate) enum Message {
         /// False: no board, recordings only (`taxel view`).
         live: bool,
         array: Option<ArrayInfo>,
-        /// The options of the session by their names in Python, but for sensor, registers, readout and tare; null without a board.
+        /// The options of the session by their names in Python, except sensor, registers, readout and tare; null without a board.
         #[cfg_attr(feature = "development", schemars(with = "Option<serde_json::Map<String, Value>>"))]
         options: Option<Box<LiveOptions>>,
         /// Where datagrams are received.
@@ -75,7 +75,7 @@ pub(crate) enum Message {
         /// Credits that the server counts, at most.
         most_credits: u32,
     },
-    /// What the board holds, or what it is assumed to hold; at the beginning and after every change.
+    /// The registers that the board holds, or is assumed to hold; at the beginning and after every change.
     Registers {
         /// False: they were not read from the board; they are the preset that was named on the command line, or what the board
         /// held before a reset (a new session of version 2, or its greeting on the serial line), until they are read again, which
@@ -116,7 +116,7 @@ pub(crate) enum Message {
         arrival: Arrival,
         /// Null in the first quarter of a second.
         pace: Option<Pace>,
-        /// What is wrong, where the taxels of frames rest elsewhere after a gap than by the tare.
+        /// What is wrong if, after a gap, the rest of the taxels of frames differs from the tare.
         rest_shift: Option<String>,
         /// Whether the values of frames fall under touch, so that no pressure is shown.
         falls: bool,
@@ -175,7 +175,7 @@ pub(crate) enum Message {
         /// The IPv4 addresses of the machine.
         addresses: Vec<InterfaceAddress>,
     },
-    /// What arrives from a source of lines, when asked.
+    /// The lines that arrive from a source, on request.
     SourcePreview {
         /// The last lines that arrived.
         lines: Vec<String>,
@@ -302,7 +302,7 @@ pub(crate) enum Message {
         /// The table beside the recording.
         path: String,
         labels: Vec<Label>,
-        /// What another program's text of the table lacks.
+        /// How another program's text of the table differs from what was acknowledged.
         conflict: Option<Conflict>,
     },
     /// By the rules of `taxel.Recording` health (`taxel info`). A taxel is reported dead or stuck only where its neighbours were
@@ -389,7 +389,7 @@ impl From<&Array> for ArrayInfo {
     }
 }
 
-/// What was lost, by cause.
+/// Counts of lost data, by cause.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
 pub(crate) struct Lost {
@@ -399,7 +399,7 @@ pub(crate) struct Lost {
     pub(crate) queue: u64,
     /// Datagrams of version 2 that never arrived intact.
     pub(crate) wire: u64,
-    /// Bytes that were no words.
+    /// Bytes that were not valid words.
     pub(crate) damaged: u64,
     /// Taxels outside the array.
     pub(crate) outside: u64,
@@ -524,7 +524,7 @@ pub(crate) struct FrameRecording {
     pub(crate) left_s: Option<f64>,
 }
 
-/// A source of frames; sources stand side by side in `array`.
+/// A source of frames; sources are side by side in `array`.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
 pub(crate) struct FrameSourceInfo {
@@ -584,7 +584,8 @@ pub(crate) struct Label {
     pub(crate) row: LabelRow,
 }
 
-/// What another program's text of a table lacks. A row without a `label` says that the note at `replaces_us` counts no more.
+/// How a table that another program saved differs from what was acknowledged. A row without a `label` says that the note at
+/// `replaces_us` no longer counts.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
 pub(crate) struct Conflict {

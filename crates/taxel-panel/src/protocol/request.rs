@@ -78,8 +78,8 @@ pub(crate) enum Request {
     PresetDelete { name: Text<60> },
     /// Begin: after the countdown (none where left out) record to `NAME.mcap`, or with an `index` of 1 to `NAME1.mcap`, for
     /// `length_s`, or else until `stop`. With `advance` the index moves on by itself after each recording, and the next countdown
-    /// begins until `stop`. `label` is written into the recording as a note without a time: it holds for all of it, and is no
-    /// event. `format` is `mcap` where left out; `lsa` holds raw bytes and no label.
+    /// begins until `stop`. `label` is written into the recording as a note without a time: it is about the whole recording,
+    /// and is not an event. `format` is `mcap` where left out; `lsa` holds raw bytes and no label.
     Record(RecordRequest),
     /// End the recording, or its countdown; and the advance.
     Stop {},
@@ -107,17 +107,17 @@ pub(crate) enum Request {
     Undo {},
     /// Requests `health` of what this view shows.
     Health {},
-    /// Train a readout on the labels of the recording shown, of a file with several trials on those that have labels, as `taxel
-    /// train --labels notes` does, into `NAME.readout.json` beside it, which it replaces. Answered when the training has ended;
-    /// `trained` comes before. One training runs at a time. Labels of which nearly none lies near anything felt are refused, with
-    /// the field `labels_as_given`, unless it is true.
+    /// Train a readout on the labels of the recording shown, as `taxel train --labels notes` does; of a file with several trials,
+    /// on the trials that have labels. The readout replaces `NAME.readout.json` beside the recording. Answered when the training
+    /// has ended; `trained` comes before. One training runs at a time. If nearly no label is near anything felt, the request is
+    /// refused with the field `labels_as_given`, unless that is true.
     Train { labels_as_given: Option<bool> },
     /// Requests `training`: how far the training that runs is.
     Training {},
     /// End the training that runs: it is refused, and writes nothing.
     TrainStop {},
     /// Read what this view shows with a readout or a plain rule of the folder. A recording: answered by `detections`. The board:
-    /// from now on, for all clients; the source begins anew, as with `delta_intensity`. A readout that needs a tare uses that of
+    /// from now on, for all clients; the source begins again, as with `delta_intensity`. A readout that needs a tare uses that of
     /// the command, else what the taxels hold now.
     ReadOut { readout: Text<110> },
     /// Write the stretch of the recording shown to a new file of the folder; what `taxel cut` does, so any of its endings.
@@ -125,7 +125,7 @@ pub(crate) enum Request {
     /// Receive the board's datagrams there instead. Refused while a recording runs.
     Listen { host: Text<255>, port: u16 },
     /// Receive another source instead, as `taxel live --source` names it. Time, values and the past that can be viewed begin
-    /// anew. Refused while a recording runs.
+    /// again. Refused while a recording runs.
     ReadSource { source: Text<1024> },
     /// Requests `source_preview`: what arrives from a source of lines, for two seconds at most.
     PreviewSource { source: Text<1024> },
@@ -139,7 +139,7 @@ pub(crate) enum Request {
     /// recording by it. Refused where options of the command say the same, and for a file that no layout file describes.
     Describe(DescribeRequest),
     /// Whether the board sends differences from the value before, not values. Earlier events were decoded with the other
-    /// meaning, so the source begins anew: time, values, the past that can be viewed, a readout with its tare. Refused while a
+    /// meaning, so the source begins again: time, values, the past that can be viewed, a readout with its tare. Refused while a
     /// recording runs.
     DeltaIntensity { on: bool },
     /// Requests `places`: where a board can be.

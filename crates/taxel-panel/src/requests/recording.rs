@@ -118,7 +118,7 @@ async fn run(hub: Arc<Hub>) {
 
 /// Makes one recording; returns its verdict.
 async fn record(hub: &Arc<Hub>, plan: &RecordingPlan) -> Result<String, String> {
-    let live = hub.live().ok_or("no board is listened to: nothing to record")?;
+    let live = hub.live().ok_or("no board is connected: nothing to record")?;
     let path = hub.folder.file(&plan.file()).map_err(|error| error.to_string())?;
     let record = Record { path, compression: Compression::None, overwrite: false };
     let failed = || "failed within taxel; please report it".to_owned();

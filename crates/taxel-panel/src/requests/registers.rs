@@ -64,7 +64,7 @@ fn hold(hub: &Hub, registers: Registers) {
 
 /// Writes the registers that differ from those that the board holds, or `all` of them.
 async fn write(hub: &Hub, target: Registers, all: bool) -> Answer {
-    let live = hub.live().ok_or("no board is listened to")?;
+    let live = hub.live().ok_or("no board is connected")?;
     if hub.board().control.is_none() {
         return Err(NOT_CONNECTED.into());
     }
@@ -105,7 +105,7 @@ pub(crate) async fn set(hub: &Hub, values: &Map<String, Value>) -> Answer {
             _ => wanted.push((name.clone(), number)),
         }
     }
-    let live = hub.live().ok_or("no board is listened to")?;
+    let live = hub.live().ok_or("no board is connected")?;
     ensure_known(hub).await?;
     let mut target = hub.board().registers;
     let refused = |reason: String| Refusal { field: field_of(&reason, &names), reason };
@@ -153,7 +153,7 @@ async fn write_presets(hub: &Hub, turn: OwnedMutexGuard<()>) -> Answer {
 /// `preset_apply`: writes the registers of a preset.
 pub(crate) async fn apply_preset(hub: &Hub, name: &str) -> Answer {
     reread_presets(hub).await?;
-    let live = hub.live().ok_or("no board is listened to")?;
+    let live = hub.live().ok_or("no board is connected")?;
     let array = live.array();
     ensure_known(hub).await?;
     let of_user = hub.presets().presets.get(name).cloned();

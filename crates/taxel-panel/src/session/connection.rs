@@ -83,7 +83,7 @@ impl Connection {
     /// Pings the client when it is time, and disconnects one that shows no sign of life.
     pub(super) async fn keep_alive(&mut self) -> Result<(), Closing> {
         if self.received.elapsed() > ALIVE_WITHIN {
-            return Err(Closing::With(POLICY, "no sign of life"));
+            return Err(Closing::With(POLICY, "the client does not answer"));
         }
         if self.pinged.elapsed() > PING_EVERY {
             self.pinged = Instant::now();

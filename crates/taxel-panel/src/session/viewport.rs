@@ -259,8 +259,10 @@ impl Viewport {
         &mut self,
         work: impl FnOnce(&mut SourcePosition) -> taxel_live::Result<T> + Send + 'static,
     ) -> Answer<T> {
-        let Position::At(position) = &mut self.position else { return Err("the view follows the newest".into()) };
-        let Some(mut position) = position.take() else { return Err("the view is gone: open it again".into()) };
+        let Position::At(position) = &mut self.position else { return Err("the view follows the newest data".into()) };
+        let Some(mut position) = position.take() else {
+            return Err("this view has ended: open the recording again".into());
+        };
         let worked = tokio::task::spawn_blocking(move || {
             let outcome = work(&mut position);
             (position, outcome)
@@ -455,7 +457,7 @@ impl Viewport {
         let t = self.t().ok_or("nothing is shown yet")?;
         if matches!(self.position, Position::Following) {
             // Playing the live source from now on would be a delay of zero, which is following.
-            return Err("the view follows the newest already; seek first".into());
+            return Err("the view already follows the newest data: seek first".into());
         }
         let (first, last) = self.index()?.range().unwrap_or((t, t));
         let at_end = t >= last && self.recording.is_some();

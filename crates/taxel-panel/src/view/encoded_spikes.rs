@@ -109,7 +109,7 @@ impl EncodedSpikes {
         since: Option<i64>,
     ) -> Result<Self> {
         if frames.numbered() {
-            let text = "spikes have times, and these frames are numbered, so their rate is not known";
+            let text = "spikes need times, but these frames have only numbers: state their rate";
             return Err(problem!("{text}").with_hint("rate_hz", Hint::Give).into());
         }
         let sensors = frames.sensors();

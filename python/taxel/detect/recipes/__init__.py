@@ -2,7 +2,7 @@
 
 A recipe's file says `about` what it is, its `source`, which recordings it `fits` ("events", units of frames, or "many
 UNIT": units of frames of a grid or of more than 32 channels, or "grids": frames of taxels with known neighbours, before
-what fits the unit, but for labels of steps, as "foot_off", or "UNIT/": units of grids that begin so, before all else),
+what fits the unit, except labels of steps, as "foot_off", or "UNIT/": units of grids that begin so, before all else),
 the encoder, or several as `encoders` by name, whether
 labels are moved to what the sensor felt (`align`), what all neurons share (`learner`), what is a neuron's own
 (`neurons`), which labels are `also` called otherwise, and the parameters of any `other` label, or whose they are;
@@ -70,7 +70,7 @@ def fitting(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool 
         "foot_off", and no labels have that of the unit. Where there is none, contact and foot off of a grid have that
         of touches, if each is of one label, and so have those of channels; all else that of channels.
     rests : bool
-        Whether the rest of its taxels is known, as touches of channels are told from.
+        Whether the rest of its taxels is known, from which touches of channels are distinguished.
 
     Examples
     --------
@@ -158,7 +158,7 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
         file = Path(__file__).parent / f"{recipe}.toml"
     values = read_json(file) if file.suffix.lower() == ".json" else read_toml(file)
     if not isinstance(values, dict):
-        raise FormatError(f"{file}: holds no recipe, which is values by name")
+        raise FormatError(f"{file}: must hold a recipe (values by name)")
     return values
 
 
@@ -204,7 +204,7 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
 
 
 def knows(recipe: str, label: str) -> bool:
-    """Return whether a recipe itself names a label, as a neuron or in `also`; names of steps are no touch's.
+    """Return whether a recipe itself names a label, as a neuron or in `also`; names of steps are not names of touches.
 
     Examples
     --------

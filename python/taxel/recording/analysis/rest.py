@@ -66,7 +66,7 @@ class Rest:
     ----------
     source : {"tare", "calibration", "unit", "quiet", "none"}
         A given tare; the calibration's own rest; 0, as the values are force or pressure; a quiet stretch; nothing.
-    values : float64, one a taxel, in the sensor's unit
+    values : float64, one per taxel, in the sensor's unit
         NaN for a taxel whose rest is not known. That of a quiet stretch is where the rest is tracked from.
     quiet_us : (int, int), us, optional
         The quiet stretch.
@@ -77,7 +77,7 @@ class Rest:
     falls : bool
         Whether values of frames go further below the rest of a quiet stretch than above it, and come back: less may
         mean more pressure.
-    preload : float64, one a taxel, in the sensor's unit, optional
+    preload : float64, one per taxel, in the sensor's unit, optional
         Of a grid: how much more than at rest a taxel read in the quiet stretch, where something lay on it then and was
         taken away; 0 elsewhere.
     preload_at : str
@@ -119,8 +119,8 @@ class Rest:
         """Return what to do of values that fall; of the recording of a path it names the layout file."""
         layout, turning = Rest.turning(path)
         if layout:
-            return f"values fall from their rest as {layout} turns them: if that is wrong, leave falls out of it"
-        return f"values fall from their rest: if less means more pressure, write {turning}"
+            return f"values fall from their rest as {layout} turns them: if that is wrong, remove falls from the file"
+        return f"values fall from their rest: if smaller values mean more pressure, write {turning}"
 
     @staticmethod
     def turning(path: Path | None = None) -> tuple[str, str]:

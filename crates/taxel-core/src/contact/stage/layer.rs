@@ -11,7 +11,7 @@ const FAINT_MPA: f32 = 2e-7;
 
 /// The layer, the bodies' motion, and the latest solutions.
 ///
-/// The layer is solved at even steps, one a frame for a ball or two, fewer where more taxels are touched than sweeps
+/// The layer is solved at even steps, one per frame for a ball or two, fewer where more taxels are touched than sweeps
 /// solve in time; between them stress follows straight lines.
 #[derive(Debug)]
 pub(super) struct LayerScene {

@@ -60,9 +60,9 @@ fn files_that_are_no_readout_are_refused_by_name() {
     let cases = [
         ("", "readout: not JSON"),
         ("[]", "readout: not a JSON object"),
-        ("{}", "readout: does not say \"format\": \"taxel readout\", so it is none"),
+        ("{}", "readout: does not say \"format\": \"taxel readout\", so it is not such a file"),
         (&good.replace("taxel readout", "other"), "readout: format is \"other\", must be \"taxel readout\""),
-        (&good.replace("\"version\": 1,", ""), "readout: says no version, must be 1"),
+        (&good.replace("\"version\": 1,", ""), "readout: states no version, must be 1"),
         (&good.replace("\"version\": 1,", "\"version\": 2,"), "readout: version 2, this taxel reads version 1 only"),
         (&good.replace("\"run_threshold\"", "\"threshold\""), "readout: threshold is not known: there is"),
         (&good.replace("\"neurons\"", "\"neuron\""), "readout: neuron is not known (did you mean neurons?): there is"),
@@ -218,9 +218,9 @@ fn only_a_taxel_that_exists_is_zeroed() {
     let z = Zeroing { t: 0, x: 0, y: 0, rest: 1.0, before: None };
     assert!(z.check(&array).is_ok());
     for (wrong, message) in [
-        (Zeroing { x: 1, y: 1, ..z }, "taxel at row 1, column 1: none there in 2 x 2"),
-        (Zeroing { x: 2, ..z }, "taxel at row 0, column 2: none there in 2 x 2"),
-        (Zeroing { rest: f64::NAN, ..z }, "taxel at row 0, column 0: a rest of NaN"),
+        (Zeroing { x: 1, y: 1, ..z }, "taxel at row 1, column 1: there is no such taxel in 2 x 2"),
+        (Zeroing { x: 2, ..z }, "taxel at row 0, column 2: there is no such taxel in 2 x 2"),
+        (Zeroing { rest: f64::NAN, ..z }, "taxel at row 0, column 0: its rest is NaN, must be finite"),
     ] {
         assert_eq!(wrong.check(&array).unwrap_err().to_string(), message);
     }

@@ -109,7 +109,7 @@ fn pieces_and_moves_of_time_change_nothing() {
         let events = events(seed as u64, 400);
         let end = events.t[399] + 100_000;
         let whole = run(stream(&neuron, 0.0, 192.0), &events, end);
-        assert!(whole.len() > 10, "something must be said to compare");
+        assert!(whole.len() > 10, "something must be detected, to compare");
 
         let mut random = StdRng::seed_from_u64(1000 + seed as u64);
         let (mut pieces, mut from) = (Vec::new(), 0);
@@ -169,7 +169,7 @@ fn silence_is_told_by_moving_time_on() {
     (event.x[0], event.y[0], event.p[0]) = (0, 0, true);
     let (mut live, mut out) = (stream(&neuron, 0.0, 192.0), Vec::new());
     live.push_events(event.view(), &mut out).unwrap();
-    assert_eq!(out, [], "the crossing lies ahead, and something could still come before it");
+    assert_eq!(out, [], "the crossing is ahead, and something could still come before it");
     live.advance(event.t[0] + 10 * 192, &mut out).unwrap();
     assert_eq!((out.len(), out[0].label.as_str()), (1, "contact"));
     assert!(out[0].slope > 0.0);

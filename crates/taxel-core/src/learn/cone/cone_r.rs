@@ -65,7 +65,9 @@ impl ConeR {
     pub fn check(&self) -> Result<()> {
         self.neuron.check()?;
         if self.neuron.time != Time::Grid {
-            return Err(problem!("time"; " is \"continuous\": 6.13 is a sum over grid points, must be \"grid\""));
+            return Err(
+                problem!("time"; " is \"continuous\": must be \"grid\", as equation 6.13 is a sum over grid points"),
+            );
         }
         self.check_ranges()?;
         if self.lambdas.iter().sum::<f64>() == 0.0 {
@@ -179,7 +181,7 @@ impl ConeRProblem {
         check_examples(neuron, patterns, targets)?;
         if silence.len() != patterns.len() {
             let (lists, count) = (silence.len(), patterns.len());
-            return Err(problem!("silence"; ": {lists} lists for {count} patterns, must be one a pattern"));
+            return Err(problem!("silence"; ": {lists} lists for {count} patterns, must be one per pattern"));
         }
         for (p, windows) in silence.iter().enumerate() {
             check_silence(p, windows.as_deref())?;
@@ -382,7 +384,7 @@ impl ConeRProblem {
             let low = if row < silent { 0.0 } else { objective.kink_of_c().1 };
             if !(low <= share && share <= low + 1.0) {
                 return Err(problem!(
-                    "start"; ": the multiplier of row {row} is {share}, must lie from {low} to {}",
+                    "start"; ": the multiplier of row {row} is {share}, must be from {low} to {}",
                     low + 1.0
                 ));
             }

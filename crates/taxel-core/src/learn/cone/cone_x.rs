@@ -68,7 +68,7 @@ parameters! {
 
 /// The end of silence, ms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "must be a number, or one a pattern, ms")]
+#[serde(untagged, expecting = "must be a number, or one per pattern, ms")]
 pub enum Horizon {
     /// The same in all patterns.
     All(f64),
@@ -97,7 +97,7 @@ impl Horizon {
     fn check(&self, patterns: usize) -> Result<()> {
         match self {
             Self::Each(values) if values.len() != patterns => {
-                Err(problem!("horizon"; ": {} values, must be one, or one a pattern, {patterns}", values.len()))
+                Err(problem!("horizon"; ": {} values, must be one, or one per pattern, {patterns}", values.len()))
             }
             _ => Ok(()),
         }
@@ -428,7 +428,7 @@ impl Exact {
             None => Status::Feasible,
             Some(_) => Status::Stopped,
         };
-        let open = || format!("the objective is only proven to lie within {gap:.1e} of its least value");
+        let open = || format!("the objective is only proven to be within {gap:.1e} of its least value");
         let reason = match (cut_short, unmet.or_else(|| (!known).then(open))) {
             (Some(why), Some(reason)) => Some(format!("{why}; {reason}")),
             (_, reason) => reason,

@@ -15,7 +15,7 @@ pub fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<
     }
     if patterns.len() != targets.len() {
         return Err(problem!(
-            "targets"; ": {} lists for {} patterns, must be one a pattern (an empty one teaches silence)",
+            "targets"; ": {} lists for {} patterns, must be one per pattern (an empty one teaches silence)",
             targets.len(),
             patterns.len()
         ));
@@ -51,7 +51,7 @@ pub(crate) fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, ta
         }
         if t < pattern.start || t > pattern.stop {
             return Err(problem!(
-                "pattern {p}, target {k}: {t} ms lies outside the pattern's window {} to {} ms",
+                "pattern {p}, target {k}: {t} ms is outside the pattern's window {} to {} ms",
                 pattern.start,
                 pattern.stop
             ));
@@ -83,7 +83,7 @@ pub(crate) fn check_silence(p: usize, windows: Option<&[[f64; 2]]>) -> Result<()
     for (k, &[start, stop]) in windows.unwrap_or_default().iter().enumerate() {
         if !(start.is_finite() && stop.is_finite() && start <= stop) {
             return Err(problem!(
-                "pattern {p}, window {k} of silence: {start} to {stop} ms, start must not lie behind stop, both finite"
+                "pattern {p}, window {k} of silence: {start} to {stop} ms, start must not be after stop, and both must be finite"
             ));
         }
         if start < before {

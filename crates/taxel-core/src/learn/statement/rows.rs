@@ -384,7 +384,7 @@ impl Statement {
         let Example { start, end, .. } = example;
         let last = if self.neuron.time == Time::Grid { end + rounding_ms(*end) } else { *end };
         if !(*start <= t && t <= last) {
-            return Err(problem!("pattern {pattern}: {t} ms lies outside of what is asked for, {start} to {end} ms"));
+            return Err(problem!("pattern {pattern}: {t} ms is outside the time that is trained, {start} to {end} ms"));
         }
         if self.neuron.time == Time::Grid && !self.is_point(example, t) {
             return Err(problem!(
@@ -394,8 +394,8 @@ impl Statement {
         }
         if !self.is_silent(example, t) {
             return Err(problem!(
-                "pattern {pattern}: {t} ms lies at a target, in its refractory time or in no window of silence, nothing is \
-                 asked there"
+                "pattern {pattern}: {t} ms is at a target, in its refractory time or outside the windows of silence, so \
+                 silence is not required there"
             ));
         }
         Ok(())

@@ -92,9 +92,9 @@ impl Verdict {
             (
                 rebuilt.bytes_after_end,
                 "bytes_after_end",
-                format!("{} behind its end not read", counted(rebuilt.bytes_after_end, "byte")),
+                format!("{} after its end not read", counted(rebuilt.bytes_after_end, "byte")),
             ),
-            (changed.into(), "changed_since_recorded", "what it holds is not what was recorded".to_owned()),
+            (changed.into(), "changed_since_recorded", "its content is not what was recorded".to_owned()),
             (repeated, "repeated_in_file", format!("{} there twice", counted(repeated, "message"))),
             (rebuilt.no_summary.into(), "no_summary", "the summary at the end missing or damaged".to_owned()),
         ] {
@@ -116,7 +116,7 @@ impl Verdict {
         }
         let lost_here = !lost.is_empty();
         if unknown {
-            bad.push("what else was there is not known".to_owned());
+            bad.push("what else the file held is unknown".to_owned());
         }
         let has_end = why.is_none() || rebuilt.no_end;
         if (why.is_some() || lost_here) && verdict.status == RecordingStatus::NothingArrived {

@@ -173,7 +173,7 @@ fn a_cut_takes_the_place_of_one_that_it_hardly_differs_from() {
         let fresh = solver.extend_gram();
         solver.replace_similar(&fresh);
         assert_eq!(solver.positions[fresh[0]].is_some(), exchanged, "it is held at once where one is near");
-        assert_eq!(solver.active.len(), 3 + usize::from(exchanged), "in the place of that");
+        assert_eq!(solver.active.len(), 3 + usize::from(exchanged), "instead of that");
         assert_eq!(solver.solve(Stop::never()).unwrap(), SolveOutcome::Optimal);
     }
     assert_eq!(solver.multipliers().inequalities.iter().map(|(id, _)| *id).collect::<Vec<_>>(), held[1..]);

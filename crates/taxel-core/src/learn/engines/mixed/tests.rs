@@ -110,7 +110,7 @@ impl Problem {
         let bounds = self.lower.iter().zip(&self.upper);
         assert!(found.weights.iter().zip(bounds).all(|(w, (l, u))| (*l..=*u).contains(w)), "a bound is crossed");
         assert!(found.inequality.iter().all(|z| *z >= 0.0), "a multiplier is below 0");
-        assert!(found.bound <= self.objective(&found.weights), "the bound lies above");
+        assert!(found.bound <= self.objective(&found.weights), "the bound is above");
     }
 
     fn assert_best(&self, found: &MixedMinimum) {
@@ -264,7 +264,7 @@ fn the_bound_holds_for_any_multipliers() {
                     pull: near(&exact.pull),
                 };
                 let bound = program.bound(&point) * program.cost;
-                assert!(bound <= objective, "{bound} lies above {objective}");
+                assert!(bound <= objective, "{bound} is above {objective}");
                 best = best.max(bound);
             }
             assert!(best >= objective * (1.0 - 1e-8), "no bound comes near");
@@ -340,7 +340,7 @@ fn rows_that_cannot_be_met_are_never_said_to_be() {
         problem.below.extend_from_slice(&problem.equal[..40]);
         problem.limit.push(problem.equal_to[0] - off);
         let found = problem.solve();
-        assert!(found.start.exact.is_none(), "rows are said to be met");
+        assert!(found.start.exact.is_none(), "rows are reported as met");
         assert!(found.weights.iter().all(|w| w.is_finite()));
     }
 }
