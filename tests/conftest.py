@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-#: Scripts that made kept data need packages that are not installed; the examples of CONTRIBUTING run where they are added.
+#: Scripts that made kept data need packages that are not installed; examples of CONTRIBUTING run where they are added.
 collect_ignore_glob = ["data/*", "contributing/*"]
 
 

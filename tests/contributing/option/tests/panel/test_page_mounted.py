@@ -3,10 +3,10 @@
 import inspect
 
 import pytest
+from tests.panel.pages import opened, shows
 
 from taxel.cli import main
 from taxel.live import Live, Panel
-from tests.panel.pages import opened, shows
 
 
 def test_the_option_is_seen_everywhere(chromium, capsys):
@@ -16,6 +16,9 @@ def test_the_option_is_seen_everywhere(chromium, capsys):
     assert "The surface that the sensor" in shown
     assert inspect.signature(Live).parameters["mounted_on"].default == "table"
     assert "mounted_on : str\n" in Live.__doc__
-    with Live(0, host="127.0.0.1", mounted_on="robot hand") as live, Panel(live) as panel:
-        with opened(chromium, panel.url) as page:
-            shows(page, "session-options", "mounted_on: robot hand")
+    with (
+        Live(0, host="127.0.0.1", mounted_on="robot hand") as live,
+        Panel(live) as panel,
+        opened(chromium, panel.url) as page,
+    ):
+        shows(page, "session-options", "mounted_on: robot hand")
