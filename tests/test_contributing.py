@@ -1,4 +1,4 @@
-"""The code in CONTRIBUTING works: added to a copy it gives a format, a study, an encoder, a rule, an option ..."""
+"""The examples of CONTRIBUTING work: added to a copy they give a format, a study, an encoder, a rule, an option ..."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ import pytest
 from taxel import _core
 
 ROOT = Path(__file__).resolve().parents[1]
-FORMAT, STUDY, ENCODER, RULE, PAGE, OPTION = "channel", "quiet", "binary", "echo", "clients", "mounted"
+EXAMPLES = ROOT / "tests" / "contributing"
+FORMAT, STUDY, ENCODER, RULE, PAGE, OPTION = "format", "study", "encoder", "rule", "page", "option"
 #: The tests that check the laws and registries of formats, studies, encoders, learning rules, and parts of the page.
 TESTS = {
     FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py", "tests/recording/test_memory.py"],
@@ -34,26 +35,30 @@ TESTS = {
 
 
 class Piece(NamedTuple):
-    """A fenced piece of CONTRIBUTING, whose first line names its file."""
+    """A file of an example, or a fenced piece of CONTRIBUTING whose first line names the file and the place in it."""
 
     path: str
     after: str
     text: str
 
 
-def pieces() -> list[Piece]:
-    said = (ROOT / "CONTRIBUTING.md").read_text()
+def lines(page: str) -> list[Piece]:
+    """Return the lines that a part of CONTRIBUTING adds to files."""
     found = re.findall(
-        r"^```(?:python\n#|(?:rust|js)\n//|html\n<!--) (\S+?)(?:, (at the end|after [^\n]+?))?(?: -->)?\n(.*?)^```",
-        said,
+        r"^```(?:python\n#|(?:rust|js)\n//|html\n<!--) (\S+?), (at the end|after [^\n]+?)(?: -->)?\n(.*?)^```",
+        page,
         re.MULTILINE | re.DOTALL,
     )
     return [Piece(*piece) for piece in found]
 
 
 def of(name: str) -> list[Piece]:
-    """Return the pieces of one addition: its files, and lines that name it."""
-    return [p for p in pieces() if name in p.path or (p.after and name in p.text)]
+    """Return the pieces of one example: its files, and the lines of the section that names its folder."""
+    folder = EXAMPLES / name
+    files = sorted(file for file in folder.rglob("*.*") if file.suffix in (".py", ".rs", ".js"))
+    sections = (ROOT / "CONTRIBUTING.md").read_text().split("\n## ")
+    (section,) = (section for section in sections if f"`tests/contributing/{name}`" in section)
+    return [*(Piece(str(file.relative_to(folder)), "", file.read_text()) for file in files), *lines(section)]
 
 
 def add(root: Path, piece: Piece) -> None:
@@ -63,11 +68,11 @@ def add(root: Path, piece: Piece) -> None:
         assert not file.exists(), f"{piece.path} is there already"
         file.write_text(piece.text)
         return
-    lines = file.read_text().splitlines(keepends=True)
+    there = file.read_text().splitlines(keepends=True)
     anchor = piece.after.removeprefix("after ").strip('"')
-    at = len(lines) if piece.after == "at the end" else 1 + next(k for k, line in enumerate(lines) if anchor in line)
+    at = len(there) if piece.after == "at the end" else 1 + next(k for k, line in enumerate(there) if anchor in line)
     gap = "\n\n" if piece.after == "at the end" else ""
-    file.write_text("".join([*lines[:at], gap, piece.text, *lines[at:]]))
+    file.write_text("".join([*there[:at], gap, piece.text, *there[at:]]))
 
 
 @pytest.fixture
@@ -93,11 +98,12 @@ def copy(tmp_path: Path) -> Path:
 
 def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
     """Run the tests of one addition, and those of its registry."""
-    tests = [test for test in TESTS[name] if (root / test).exists() or name not in test]
+    added = {piece.path for piece in of(name)}
+    tests = [test for test in TESTS[name] if (root / test).exists() or test not in added]
     # A missing line may break the imports of one test file; the other files then name it.
     quietly = ["-q", "-p", "no:cacheprovider", "--continue-on-collection-errors"]
     command = [sys.executable, "-m", "pytest", *quietly, *tests]
-    about = {STUDY: f"{name} or registry or without_weight", RULE: "echo or Echo or nothing_is_left_out"}
+    about = {STUDY: "quiet or registry or without_weight", RULE: "echo or Echo or nothing_is_left_out"}
     about[FORMAT] = "test_channel or registry or among_the_large"
     about[ENCODER] = "binary or nothing_is_left_out"
     about[OPTION] = "live or option"
@@ -106,51 +112,54 @@ def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*command, *chosen], cwd=root, env=environment, capture_output=True, text=True, check=False)
 
 
-def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
-    assert [(p.path, bool(p.after)) for p in of(FORMAT)] == [
-        ("python/taxel/formats/channel.py", False),
-        ("python/taxel/formats/__init__.py", True),
-        ("tests/formats/making.py", True),
-        ("tests/recording/large.py", True),
-        ("tests/formats/test_channel.py", False),
-    ]
-    assert [(p.path, bool(p.after)) for p in of(STUDY)] == [
-        ("studies/taxel_studies/quiet.py", False),
-        ("studies/taxel_studies/__init__.py", True),
-        ("studies/tests/test_quiet.py", False),
-    ]
-    assert [(p.path, bool(p.after)) for p in of(ENCODER)] == [
-        ("crates/taxel-core/src/encode/binary.rs", False),
-        ("crates/taxel-core/src/encode.rs", True),
-        ("python/taxel/encode/binary.py", False),
-        ("python/taxel/encode/__init__.py", True),
-        ("tests/encode/test_binary.py", False),
-        ("benchmarks/taxel_benchmarks/encode_binary.py", False),
-    ]
-    assert [(p.path, bool(p.after)) for p in of(RULE)] == [
-        ("rules/src/rules/echo.rs", False),
-        ("rules/src/rules.rs", True),
-        ("rules/taxel_rules/echo.py", False),
-        ("rules/taxel_rules/__init__.py", True),
-        ("rules/tests/test_echo.py", False),
-    ]
+def test_an_example_is_files_and_lines() -> None:
     folder = "crates/taxel-panel"
-    assert [(p.path, bool(p.after)) for p in of(PAGE)] == [
-        (f"{folder}/web/clients.js", False),
-        (f"{folder}/web/index.html", True),
-        *3 * [(f"{folder}/web/main.js", True)],
-        *(
-            (f"{folder}/src/{file}.rs", True)
-            for file in ("assets", "protocol/request", "requests", "protocol/messages")
-        ),
-        ("tests/panel/test_page_clients.py", False),
-    ]
-    assert [(p.path, bool(p.after)) for p in of(OPTION)] == [
-        ("crates/taxel-live/src/pipeline/options.rs", True),
-        ("tests/panel/test_page_mounted.py", False),
-    ]
-    every = [*of(FORMAT), *of(STUDY), *of(ENCODER), *of(RULE), *of(PAGE), *of(OPTION)]
-    assert sorted(pieces()) == sorted(every)
+    assert {name: [(p.path, bool(p.after)) for p in of(name)] for name in TESTS} == {
+        FORMAT: [
+            ("python/taxel/formats/channel.py", False),
+            ("tests/formats/test_channel.py", False),
+            ("python/taxel/formats/__init__.py", True),
+            ("tests/formats/making.py", True),
+            ("tests/recording/large.py", True),
+        ],
+        STUDY: [
+            ("studies/taxel_studies/quiet.py", False),
+            ("studies/tests/test_quiet.py", False),
+            ("studies/taxel_studies/__init__.py", True),
+        ],
+        ENCODER: [
+            ("benchmarks/taxel_benchmarks/encode_binary.py", False),
+            ("crates/taxel-core/src/encode/binary.rs", False),
+            ("python/taxel/encode/binary.py", False),
+            ("tests/encode/test_binary.py", False),
+            ("crates/taxel-core/src/encode.rs", True),
+            ("python/taxel/encode/__init__.py", True),
+        ],
+        RULE: [
+            ("rules/src/rules/echo.rs", False),
+            ("rules/taxel_rules/echo.py", False),
+            ("rules/tests/test_echo.py", False),
+            ("rules/src/rules.rs", True),
+            ("rules/taxel_rules/__init__.py", True),
+        ],
+        PAGE: [
+            (f"{folder}/web/clients.js", False),
+            ("tests/panel/test_page_clients.py", False),
+            (f"{folder}/web/index.html", True),
+            *3 * [(f"{folder}/web/main.js", True)],
+            *(
+                (f"{folder}/src/{file}.rs", True)
+                for file in ("assets", "protocol/request", "requests", "protocol/messages")
+            ),
+        ],
+        OPTION: [
+            ("tests/panel/test_page_mounted.py", False),
+            ("crates/taxel-live/src/pipeline/options.rs", True),
+        ],
+    }
+    assert sorted(TESTS) == sorted(folder.name for folder in EXAMPLES.iterdir())
+    added = [piece for name in TESTS for piece in of(name) if piece.after]
+    assert sorted(added) == sorted(lines((ROOT / "CONTRIBUTING.md").read_text()))
 
 
 @pytest.mark.parametrize("name", [FORMAT, pytest.param(STUDY, marks=pytest.mark.slow)])

@@ -23,7 +23,7 @@ INSTANCE = re.compile(rf"^ +taxel_({'|'.join(MODULES)}) (?:#\(.*\) )?(\w+) \(", 
 def test_quick_the_page_lists_every_crossing():
     sources = sorted(file for file in RTL.glob("taxel_*.sv") if file.stem.removeprefix("taxel_") not in MODULES)
     found = [(file.stem, name, MODULES[kind]) for file in sources for kind, name in INSTANCE.findall(file.read_text())]
-    page = (RTL.parent / "docs" / "hardware.md").read_text()
+    page = (RTL / "README.md").read_text()
     rows = [
         [cell.strip() for cell in line.split("|")[1:-1]] for line in page.splitlines() if line.startswith("| `taxel_")
     ]

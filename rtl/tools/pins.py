@@ -31,7 +31,7 @@ WIRES = {
     "eth_tx_clk": ("out", "RGMII to the PHY"),
     "eth_tx_ctl": ("out", "RGMII to the PHY"),
     "eth_tx_data": ("out", "RGMII to the PHY, bit by bit"),
-    "comparators": ("in", "the comparators of these sense lines; pulled down"),
+    "comparators": ("in", "sense lines; pulled down"),
 }
 
 
@@ -52,7 +52,7 @@ def located(lpf: str) -> list[tuple[str, int | None, str, str]]:
 
 def table(lpf: str) -> str:
     """Return the table: one row a signal, of a bus one for eight pins that follow each other on a connector."""
-    rows = ["| signal | connector, pin | ball | direction | wire |", "|---|---|---|---|---|"]
+    rows = ["| signal | connector, pin | ball | wire |", "|---|---|---|---|"]
     pins = located(lpf)
     k = 0
     while k < len(pins):
@@ -72,7 +72,7 @@ def table(lpf: str) -> str:
         name = f"`{signal}`" if index is None else f"`{signal}[{index}]` to `[{last[1]}]`"
         where = place if count == 1 or "," not in place else f"{place} to {last[2].split(', ')[1]}"
         balls = " ".join(pin[3] for pin in pins[k : k + count])
-        rows.append(f"| {name} | {where} | {balls} | {direction} | {wire} |")
+        rows.append(f"| {name} | {where} | {balls} | {direction}: {wire} |")
         k += count
     return "\n".join(rows) + "\n"
 
