@@ -23,6 +23,7 @@ from taxel.cli._commands import OWN, plugins
 from taxel.cli._opening import FileOptions
 from taxel.live import send
 from taxel.recording.text_options import TYPED, TextOptions
+from taxel.wire.registers import QUOTED_PRESETS
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -82,7 +83,11 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("record",), "FILE is missing; see taxel record --help"),
         (("convert", "walk.npz"), "TARGET is missing; see taxel convert --help"),
         (("cut", "walk.npz", "a.npz", "-o", "b.npz"), "OUT is given twice: a.npz and b.npz"),
-        (("live", "--readout", "a.json", "--readout=b.json"), "--readout is given twice: a.json and b.json"),
+        (
+            ("live", "--readout", "a.json", "--readout=b.json"),
+            "--readout is given twice: a.json and b.json; a command "
+            "reads out one: train one readout on the labels of both, or record and run taxel detect with each",
+        ),
         (("record", "a.mcap", "--bogus"), "No such option: --bogus"),
         (("bogus",), "No such command 'bogus'; see taxel --help"),
         (("trian",), "No such command 'trian'. Did you mean 'train'?; see taxel --help"),
@@ -351,6 +356,17 @@ def _commands(group: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[st
             yield (*path, name), command
 
 
+def test_a_preset_is_described_by_all_names() -> None:
+    options = [
+        option
+        for _, command in _commands(typer.main.get_command(app))
+        for option in command.params
+        if "--preset" in option.opts
+    ]
+    assert len(options) >= 3
+    assert all(QUOTED_PRESETS in option.help for option in options)
+
+
 def test_an_option_of_one_value_is_refused_where_it_is_given_twice() -> None:
     options = [
         (words, command, option)
@@ -363,4 +379,5 @@ def test_an_option_of_one_value_is_refused_where_it_is_given_twice() -> None:
         for typed in option.opts:
             with pytest.raises(taxel.ProblemError) as refused:
                 command.make_context(words[-1], [typed, "a", typed, "b"])
-            assert str(refused.value) == f"{max(option.opts, key=len)} is given twice: a and b", (words, typed)
+            said = str(refused.value).partition(";")[0]
+            assert said == f"{max(option.opts, key=len)} is given twice: a and b", (words, typed)

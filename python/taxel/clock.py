@@ -12,9 +12,13 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.arguments import shown
 from taxel._base.errors import refused
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 
 __all__ = ["Clock", "doubt"]
+
+#: Between fewer datagrams, differences of their delays look like a drift.
+_FEW = 10
 
 
 def doubt(drift_ppm: float, delay_us: float, median_us: float = 0.0) -> str | None:
@@ -180,8 +184,13 @@ class Clock:
     def __repr__(self) -> str:
         if not len(self.board_us):
             return "Clock(no datagram holds a time)"
-        late = np.percentile(self.delay_us, [50, 99])
-        return f"Clock(drift {self.drift_ppm:+.1f} ppm, delays {late[0]:.0f} us median, {late[1]:.0f} us 99 %)"
+        late, count = np.percentile(self.delay_us, [50, 99]), len(self.board_us)
+        drift = (
+            f"drift {self.drift_ppm:+.1f} ppm"
+            if count >= _FEW
+            else f"{counted(count, 'datagram')}, too few for a drift"
+        )
+        return f"Clock({drift}, delays {late[0]:.0f} us median, {late[1]:.0f} us 99 %)"
 
 
 def _whole(name: str, values: Any, unit: str) -> NDArray[np.int64]:

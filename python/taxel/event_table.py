@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -21,8 +22,13 @@ _RECORDINGS = ("recording", "trial", "versuch", "file", "filename", "datei", "au
 #: Columns that hold neither times of events nor labels.
 _OTHERS = ("recording", "source", "host_ns", "replaces_us")
 _US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
-#: Names of columns that number frames.
-_FRAMES = ("frame", "picture", "bild")
+#: Names of columns that number frames: frame, Frames, frame_number, "Frame #", Bildnummer, sample.
+_FRAMES = re.compile(
+    r"(frame|picture|image|bild|sample)(s|er)?[ _.-]*(#|n|nr|no|num|number|nummer|id|idx|index|count)?\.?",
+    re.IGNORECASE,
+)
+#: What is to be done with numbers of frames, which may be those of a video and count from 0 or 1: taxel does not guess.
+_CONVERT = "write t_us = FRAME * 1000000 / RATE (frame 250 at 100 frames/s is at 2500000)"
 _RIGHT = "must be label,t_us ..., or a column of texts and times with their unit, as label,time [s]"
 
 
@@ -95,10 +101,8 @@ def _time(table: HeaderTable) -> int:
             f"{table.location}, line 1: {names} are times; name that of the labels t_us, or leave one out"
         )
     missing = "t_us" if any(name.lower() in _LABELS for name in table.header) else "label"
-    frames = next((name for name in table.header if name.lower().rstrip("s") in _FRAMES), None)
-    counts = (
-        "" if frames is None else f"; {shown(frames)} holds numbers of frames: the time of a frame is its number / rate"
-    )
+    frames = next((name for name in table.header if _FRAMES.fullmatch(name)), None)
+    counts = "" if frames is None else f"; {shown(frames)} holds numbers of frames, not times: {_CONVERT}"
     raise FormatError(f"{table.location}, line 1: no column {missing!r}; there are {there}{counts}; {_RIGHT}")
 
 
@@ -130,8 +134,10 @@ def _us(location: str, name: str, cell: str, separator: str) -> int:
     if math.isnan(number):
         number, unit = seconds_of(cell), "s"
     elif not unit:
+        of_frames = f"; if these are numbers of frames, {_CONVERT}" if number.is_integer() else ""
         raise FormatError(
             f"{location}: {name} is {shown(cell)}; its unit is not known; name its column as '{name} [s]' or (ms)"
+            + of_frames
         )
     us = number * _US[unit]
     if not math.isfinite(us):

@@ -320,6 +320,8 @@ def test_a_label_left_out_is_not_detected():
         ),
         (("peak", 48, 1.0, 10), {"labels": ("begin", None)}, "peak (units of noise) >= 48, release 1, 10 frames"),
         (("area", 4, 0.5), {}, "area >= 4, release 0.5, 1 frame"),
+        (("total", 1674.2, 0.75), {"labels": (None, "end")}, "total (N) falls below 1260 after 1670 or more, 1 frame"),
+        (("total", 1_674_231.4), {}, "total (N) >= 1674230, release 1, 1 frame"),
         (
             ("duration", 300, 1.0, 1, "end"),
             {"labels": ("tap", "press")},

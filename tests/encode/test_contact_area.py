@@ -76,6 +76,17 @@ def test_a_lone_taxel_and_one_never_heard_of_are_no_contact():
     assert [len(ContactArea(tare=tare).encode(e).times) for e in (alone, unheard, both)] == [0, 0, 1]
 
 
+def test_a_noise_floor_of_0_is_of_whole_numbers_alone():
+    values = np.zeros((4, 2, 2), np.float32)
+    values[2:] = 1.0
+    frames = Frames(values, [0, 1000, 2000, 3000], unit="N")
+    encoder = ContactArea(noise_floor=0, levels=[2], tare=Tare.take(frames, stop_us=2000))
+    assert len(encoder.encode(frames).times) == 1
+    values[3] = 0.4
+    with refused("noise_floor is 0: only for whole numbers.* values in N need"):
+        encoder.encode(Frames(values, frames.t, unit="N"))
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [

@@ -123,6 +123,11 @@ def test_drawn_events_open_by_the_layout_that_is_printed_of_them(order, named, p
         ("1 2\n3 4\n5 6\n\n7 8\n9 1\n", "frame_lines = 2", "line 4: an empty line after 1 line of a frame"),
         ("1 2\n3 4\n\n1 2\n3 x\n", 'frame_end = "blank"', "line 5: column 2 is 'x', not a number"),
         ("0 2\n0 4\n\n0 2\n0 3\n", "frame_lines = 2\ntime_column = 1", "line 4: time 0 s does not ascend"),
+        (
+            "86399.96 2 3\n0.04 4 3\n",
+            "time_column = 1",
+            r"time 0\.04 s does not ascend from 86399\.96 s; if these are times of day, they begin anew at",
+        ),
         ("1714562289.75 2 3\n1714562289.73 4 3\n", "time_column = 1", r"562289\.73 s does not ascend from \d+\.75 s"),
         ("1 2\n3 4\n", "rows = 2\ncolumns = 2\n[table]", "2 columns; .* states 2 x 2 taxels; if 2 lines are"),
         ("1 2\n", 'frame_lines = 2\nframe_end = "blank"', "frame_end is given, and so is frame_lines: give one"),

@@ -273,7 +273,7 @@ def test_a_layout_names_a_data_set_in_a_group_by_its_path(tmp_path: Path) -> Non
     ("layout", "said"),
     [
         ('array = "2x3"', "unknown key array; a size is given by rows = 2, columns = 3; there are"),
-        ('array = "palm"', r"unknown key array; it belongs in \[data\]; there are"),
+        ('array = "palm"', r"unknown key array; it belongs in \[data\], for arrays in a file; there are"),
         (
             '[data]\narray = "2x3x4.5"',
             r"the layout states \[data\] array: a size is given by rows = 2, .*pitch_mm = 4.5",
@@ -344,7 +344,26 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
         ("pitch_mm = -1", "pitch_mm is -1: must be above 0"),
         ("pitch_mm = 2\n[places]\nx = [1]\ny = [1]", "both given"),
         ("[places]\nx = [1, 2]\ny = [1, 2]", "must be"),
-        ("[places]\nx = [1, 2]", "missing"),
+        ("[places]\nx = [1, 2]", r"\[places\]: y is missing"),
+        ("[source]\nbaud = 9600", r"\[source\]: place is missing"),
+        (
+            "[table]\nbaud = 9600",
+            r"unknown key table\.baud; it belongs in \[source\], for taxel live --source; there are",
+        ),
+        ("[table]\ntime = 't:ms'", r"table\.time; it belongs in \[data\], .* or \[source\], for taxel live"),
+        (
+            "[source]\ntime_column = 1",
+            r"source\.time_column; it belongs in \[table\], for recorded tables; there are place",
+        ),
+        (
+            "[source]\nseparator = ';'",
+            r"source\.separator; it belongs in \[table\], for recorded tables; there are place",
+        ),
+        ("[table]\nrows = 2", r"table\.rows; it belongs above the line \[table\]"),
+        ("[source]\nunit = 'N'", r"source\.unit; it belongs above the line \[source\]"),
+        ("[source]\nrate = 50", r"source\.rate; it is rate_hz, above the line \[source\]"),
+        ("[source]\narray = '2x3'", r"source\.array; a size is given by rows = 2, columns = 3"),
+        ("separator = ';'", r"unknown key separator; it belongs in \[table\], for recorded tables; there are rows"),
         ("side = 'up'", "side"),
         ("heel = 'left'", "heel"),
         ("falls = 'yes'", "falls"),

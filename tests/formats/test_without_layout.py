@@ -258,6 +258,29 @@ def test_a_table_of_one_frame_without_a_layout_prints_no_rate(tmp_path: Path) ->
     assert (frames.values.tolist(), frames.t.tolist()) == ([[[2.0, 3.0]]], [1_000_000])
 
 
+@pytest.mark.parametrize(
+    ("names", "times", "said"),
+    [
+        (["Uhrzeit"], [["23:59:59.9"], ["00:00:00.1"]], '["Uhrzeit"]  # "Uhrzeit" holds times, which do not ascend'),
+        (
+            ["Time"],
+            [["11:59:59 PM"], ["12:00:00 AM"]],
+            '["Time"]  # "Time" holds times in a form that taxel does not read',
+        ),
+        (["who"], [["me"], ["you"]], '["who"]'),
+    ],
+)
+def test_times_that_are_left_out_are_told_why(
+    tmp_path: Path, names: list[str], times: list[list[str]], said: str
+) -> None:
+    rows = [[*names, "a", "b"], *([*time, "1", "2"] for time in times)]
+    (tmp_path / "a.csv").write_text("".join(",".join(row) + "\n" for row in rows))
+    lines = layout_said_of(tmp_path / "a.csv")
+    assert f"leave_out = {said}" in lines.splitlines()
+    (tmp_path / "a.layout.toml").write_text(lines)
+    assert len(taxel.open(tmp_path / "a.csv").frames()) == 2
+
+
 def test_a_folder_of_tables_without_a_layout_says_the_same(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(lines(VALUES))
     (tmp_path / "read me.txt").write_text("of a hand")

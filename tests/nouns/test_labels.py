@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -285,6 +286,19 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
         ("time,t_s,event\n1,1,auf\n", "line 1: 'time' and 't_s' are times; name that of the labels t_us"),
         ("t_s,what,comment\n1,auf,late\n", "line 1: 'what' and 'comment' are texts; there are 't_s', 'what', "),
         ("t_s,value\n1,2\n", "line 1: no column 'label'; there are 't_s', 'value'; must be label,t_us"),
+        *(
+            (
+                f"{name};Ereignis\n250;auf\n",
+                rf"line 1: no column 't_us'; there are .*; '{re.escape(name)}' holds numbers of frames, not times: "
+                r"write t_us = FRAME \* 1000000 / RATE \(frame 250 at 100 frames/s is at 2500000\); must be",
+            )
+            for name in ("frame", "Frames", "frame_number", "Frame #", "frame nr.", "Bild", "Bildnummer", "sample_idx")
+        ),
+        (
+            "time,event\n250,auf\n",
+            r"time is '250'; its unit is not known; .*if these are numbers of frames, write t_us",
+        ),
+        ("time,event\n0.25,auf\n", r"its unit is not known; name its column as 'time \[s\]' or \(ms\)$"),
         ("start;Ereignis\n1;auf\n", "line 1: no column 't_us'; there are 'start', 'Ereignis'; must be label,t_us"),
         ("# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
         ("t_s;Ereignis\n1\n", "line 2: 1 cells, must have 2"),
@@ -295,6 +309,23 @@ def test_a_table_of_another_program_without_times_or_labels_is_refused(tmp_path:
     place.write_text(text)
     with pytest.raises(taxel.FormatError, match=said):
         taxel.Labels(place)
+
+
+def test_seconds_that_may_be_numbers_of_frames_are_asked_about(tmp_path: Path) -> None:
+    frames = taxel.Frames(np.zeros((100, 1, 2)), np.arange(100) * 20_000, unit="N")
+    taxel.convert(frames, tmp_path / "own.npz")
+    recording, place = taxel.open(tmp_path / "own.npz"), tmp_path / "labels.csv"
+    hint = r"\(0.000 to 1.980 s\); if these are numbers of frames, write t_us = FRAME \* 20000$"
+    place.write_text("label,t_s\nheel,30\ntoe,99\n")
+    with pytest.warns(UserWarning, match=hint), pytest.raises(taxel.ProblemError, match=f"none within .*{hint}"):
+        references(place, [recording])
+    place.write_text("label,t_s\nheel,1\ntoe,99\n")
+    with pytest.warns(UserWarning, match=f"1 of the 2 events .*{hint}"):
+        references(place, [recording])
+    for other in ("0.5", "101"):
+        place.write_text(f"label,t_s\nheel,1\ntoe,99\nheel,{other}\n")
+        with pytest.warns(UserWarning, match=r"left out: outside .* s\)$"):
+            references(place, [recording])
 
 
 def test_the_page_refuses_a_table_of_another_program_and_leaves_it_alone(tmp_path: Path) -> None:

@@ -402,6 +402,13 @@ def test_arrivals_of_a_busy_machine_put_two_boards_on_one_clock(seed: int) -> No
     assert after_10_s < 5, off
 
 
+def test_a_drift_is_not_stated_between_a_few_datagrams() -> None:
+    board_us = 1000 * np.arange(10)
+    few, enough = (Clock(board_us[:count], 5_000_000 + 1000 * board_us[:count]) for count in (3, 10))
+    assert repr(few) == "Clock(3 datagrams, too few for a drift, delays 0 us median, 0 us 99 %)"
+    assert "drift +" in repr(enough)
+
+
 EMULATED = """
 import sys
 import threading

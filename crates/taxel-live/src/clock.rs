@@ -379,6 +379,17 @@ mod tests {
     }
 
     #[test]
+    fn exact_datagrams_have_no_drift_however_few_they_are() {
+        for count in 1..40 {
+            let board_us: Vec<i64> = (0..count).map(|k| 1000 * k).collect();
+            let arrived_ns: Vec<i64> = board_us.iter().map(|t| 5_000_000 + 1000 * t).collect();
+            for (_, line) in BoardClock::offsets_of(&board_us, &arrived_ns) {
+                assert!(line.drift_ppm.abs() < 1e-6, "{count}: {line:?}");
+            }
+        }
+    }
+
+    #[test]
     fn after_a_pause_of_an_hour_the_line_still_holds_and_is_better_than_before() {
         for (seed, drift_ppm) in [200.0, -200.0, 35.0].into_iter().enumerate() {
             let mut link = SimulatedLink::new(seed as u64, drift_ppm, 1000);

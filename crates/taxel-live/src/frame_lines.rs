@@ -89,6 +89,7 @@ impl FrameLayout {
                 several @ 2.. if self.end == FrameEnd::Lines(1) && several * n == frame => {
                     format!(" (or add frame_lines={several}, or frame_end=blank where an empty line ends each frame)")
                 }
+                0 => " (name a column of times, as time=1:ms, and columns without values, as leave_out=1)".to_owned(),
                 _ => String::new(),
             };
             return Err(problem!(

@@ -144,12 +144,15 @@ def installing(extra: str) -> str:
     return f"pip install 'taxel[{extra}]'"
 
 
-def plain(value: float) -> str:
+def plain(value: float, digits: int = 17) -> str:
     """Return a number as people write it: a whole one of up to 16 digits without decimals or exponent.
+
+    It is rounded to `digits` significant digits; 17 change no number.
 
     Examples
     --------
-    >>> plain(4e7), plain(2.5), plain(float("inf"))
-    ('40000000', '2.5', 'inf')
+    >>> plain(4e7), plain(2.5), plain(float("inf")), plain(1674.2, 3)
+    ('40000000', '2.5', 'inf', '1670')
     """
-    return f"{value:.0f}" if float(value).is_integer() and abs(value) < 1e16 else f"{value:.15g}"
+    rounded = float(f"{value:.{digits}g}")
+    return f"{rounded:.0f}" if rounded.is_integer() and abs(rounded) < 1e16 else f"{rounded:.15g}"

@@ -34,6 +34,13 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JS
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace files that are written, if they exist.")]
 
 
+#: What can be done instead of giving an option twice.
+_INSTEAD = {
+    "--readout": "; a command reads out one: train one readout on the labels of both, or record and run taxel detect "
+    "with each"
+}
+
+
 class _Command(TyperCommand):
     """A command whose errors name options as they are typed, not as Python's arguments; an example is one line."""
 
@@ -60,7 +67,8 @@ class _Command(TyperCommand):
         typed, _, _ = parser.parse_args(list(args))
         for option in single:
             if len(values := typed.get(option.dest, ())) > 1:
-                raise ProblemError(f"{max(option.obj.opts, key=len)} is given twice: {values[0]} and {values[1]}")
+                name = max(option.obj.opts, key=len)
+                raise ProblemError(f"{name} is given twice: {values[0]} and {values[1]}{_INSTEAD.get(name, '')}")
 
     def invoke(self, ctx: Any) -> Any:
         """Run it."""

@@ -27,6 +27,7 @@ from taxel.live._stated_options import StatedOptions
 from taxel.live.remote import receiver_of
 from taxel.tare import Tare
 from taxel.wire import Registers
+from taxel.wire.registers import QUOTED_PRESETS
 
 __all__ = ["REDRAW_S", "counters_table", "exit_code", "for_live", "received", "with_live_options"]
 
@@ -67,6 +68,7 @@ def _parameter(field: Field[Any]) -> inspect.Parameter:
     words, kind, described = field.metadata["typed"], str(field.type), about(StatedOptions, field.name)
     flag = words.get("flag", "--" + field.name.replace("_", "-"))
     help_ = " ".join([described.pop("help"), *filter(None, [words.get("typed")])])
+    help_ = help_.replace("`taxel.wire.PRESETS`", QUOTED_PRESETS)
     plain = kind.removesuffix(" | None")
     default = field.default if plain in _TYPES else None
     read: Any = _TYPES.get(plain, str)

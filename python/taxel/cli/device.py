@@ -173,7 +173,8 @@ def check(
     preset: Annotated[
         str | None,
         typer.Option(
-            help="Without a serial line: the board's preset. Default: the preset that explains the values best."
+            help=f"Without a serial line: the board's preset, one of {QUOTED_PRESETS}. Default: the preset that "
+            "explains the values best."
         ),
     ] = None,
     seconds: Annotated[float, typer.Option(min=0.1, help="Duration of each part of the check, s.")] = 4.0,

@@ -16,7 +16,7 @@ import typer
 
 import taxel
 from taxel._base.files import check_writable, write_whole
-from taxel._base.messages import counted
+from taxel._base.messages import counted, plain
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -253,7 +253,7 @@ def _row(facts: dict[str, Any], *, with_unchanging: bool, with_gaps: bool, with_
 
 
 def _gaps(gaps: dict[str, Any] | None) -> str:
-    return "" if gaps is None else f"{gaps['count']} ({gaps['total_us'] / 1e6:.3g} s)"
+    return "" if gaps is None else f"{gaps['count']} ({plain(gaps['total_us'] / 1e6, 3)} s)"
 
 
 def _pages(facts: dict[str, Any]) -> list[str]:

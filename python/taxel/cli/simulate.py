@@ -10,7 +10,7 @@ import typer
 
 import taxel
 from taxel._base.files import check_writable, write_whole
-from taxel._base.messages import counted
+from taxel._base.messages import counted, plain
 from taxel._core import ProblemError
 from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._bar import bar
@@ -61,7 +61,7 @@ def simulate(
     contacts, force = taxel.simulate.truth(scene_file.acts(), preset=scene_file.preset, array=scene_file.array)
     about: dict[str, Any] = {"scene": str(scene), "seed": seed, "contacts": [contact._asdict() for contact in contacts]}
     about["peak_n"] = float(force.max())
-    lines = [f"{scene}: {counted(len(contacts), 'touch', 'touches')}, at most {force.max():.3g} N"]
+    lines = [f"{scene}: {counted(len(contacts), 'touch', 'touches')}, at most {plain(force.max(), 3)} N"]
     with bar(as_json) as show:
         if out is not None or movie is not None:
             played = taxel.simulate.play(

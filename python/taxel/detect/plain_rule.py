@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from taxel import _core
 from taxel._base.arguments import instance, integer, number, parameters, several, shown, text
 from taxel._base.errors import refused
-from taxel._base.messages import escaped
+from taxel._base.messages import escaped, plain
 from taxel.array import Array
 from taxel.detect.detector import _Detector
 from taxel.tare import Tare
@@ -182,9 +182,10 @@ class PlainRule(_Detector):
         if self.age_ms is not None:
             kinds = f"below it {first}, else {second}".replace("None", "nothing")
             when = "the end" if self.age_ms == "end" else f"{self.age_ms:g} ms"
-            return escaped(f"PlainRule({self.quantity} {self.threshold:g} at {when}: {kinds})")
+            return escaped(f"PlainRule({self.quantity} {plain(self.threshold, 6)} at {when}: {kinds})")
         found = ", ".join(f"{name} {label}" for name, label in (("onset", first), ("end", second)) if label is not None)
-        return escaped(f"PlainRule({self.quantity} >= {self.threshold:g}, release {self.release:g}, {frames}: {found})")
+        threshold = plain(self.threshold, 6)
+        return escaped(f"PlainRule({self.quantity} >= {threshold}, release {self.release:g}, {frames}: {found})")
 
     @property
     def _named_quantity(self) -> str:
@@ -198,14 +199,14 @@ class PlainRule(_Detector):
         """Return what the rule compares, without its labels; of two kinds, which of them is below."""
         if self.age_ms is not None:
             below, above = (label or "nothing" for label in self._parts["labels"])
-            kinds = f"below {self.threshold:.3g} {below}, otherwise {above}"
+            kinds = f"below {plain(self.threshold, 3)} {below}, otherwise {above}"
             when = "of the touch, when it ends" if self.age_ms == "end" else f"{self.age_ms:g} ms after the onset"
             return f"one rule for both kinds, the {self._named_quantity} {when}: {kinds}"
         frames = "1 frame" if self.frames == 1 else f"{self.frames} frames"
         if self._parts["labels"][0] is None:
-            below = f"below {self.release * self.threshold:.3g} after {self.threshold:.3g} or more"
+            below = f"below {plain(self.release * self.threshold, 3)} after {plain(self.threshold, 3)} or more"
             return f"{self._named_quantity} falls {below}, {frames}"
-        return f"{self._named_quantity} >= {self.threshold:g}, release {self.release:g}, {frames}"
+        return f"{self._named_quantity} >= {plain(self.threshold, 6)}, release {self.release:g}, {frames}"
 
 
 def _labels(labels: object, age: float | str | None) -> list[str | None]:

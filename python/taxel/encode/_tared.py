@@ -7,6 +7,9 @@ import json
 from collections.abc import Mapping
 from typing import Any, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from taxel._base.arguments import finite, integer, parameters, shown
 from taxel._base.errors import refused
 from taxel._core import ProblemError
@@ -52,6 +55,13 @@ class Tared(Encoder):
 
     def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
         encoder, source = self._with_rest_of(x)
+        # With a floor of 0 a taxel is loaded from half a tick on; values with fractions have no tick.
+        if isinstance(source, Frames) and getattr(self, "noise_floor", None) == 0 and _has_fractions(source.values):
+            raise refused(
+                "noise_floor",
+                f" is 0: only for whole numbers, above whose rest half a step is a load; values in {source.unit} need "
+                "the noise at rest, such as 0.01",
+            )
         return super(Tared, encoder).encode(source)
 
     def _with_rest_of(self, x: Events | Frames | Recorded) -> tuple[Self, Events | Frames | Recorded]:
@@ -90,3 +100,7 @@ class Tared(Encoder):
     def _from_values(cls, values: Mapping[str, Any]) -> Self:
         rest = values.get("tare")
         return super()._from_values({**values, "tare": rest and Tare.from_json(json.dumps(rest))})
+
+
+def _has_fractions(values: NDArray[np.float32]) -> bool:
+    return bool((np.nan_to_num(values) % 1).any())

@@ -19,6 +19,8 @@ __all__ = ["ascending", "candidates", "files_at", "in_s", "sensor", "table", "wh
 
 #: Times that are converted at once, so that little memory is taken beside them.
 _PIECE = 1 << 16
+#: Half a day, us.
+_NOON_US = 43_200_000_000
 
 
 def candidates(path: Path, *patterns: str) -> list[Path]:
@@ -106,7 +108,9 @@ def ascending(location: str, t: NDArray[np.int64], first_line: int | Callable[[i
     if len(back):
         k = int(back[0]) + 1
         line = first_line(k) if callable(first_line) else first_line + k
-        raise FormatError(f"{location}, line {line}: time {in_s(t[k])} s does not ascend from {in_s(t[k - 1])} s")
+        is_midnight = 0 <= t[k] < _NOON_US < t[k - 1] <= 2 * _NOON_US
+        hint = "; if these are times of day, they begin anew at midnight: write dates too" if is_midnight else ""
+        raise FormatError(f"{location}, line {line}: time {in_s(t[k])} s does not ascend from {in_s(t[k - 1])} s{hint}")
     return t
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -430,12 +430,16 @@ def layout_name(path: Path) -> str:
 
 def _values(document: dict[str, Any]) -> dict[str, Any]:
     """Return the values of a file by the names of the fields of `Layout`."""
-    _known("", document, [field.name for field in fields(Layout) if field.name != "path"])
+    _known("", document)
     values: dict[str, Any] = {}
     for name, value in document.items():
         if name in _TABLES:
             inner = mapping(name, value)
-            _known(f"{name}.", inner, _keys(_TABLES[name]))
+            _known(name, inner)
+            kind = _TABLES[name]
+            needed = [] if kind is dict else [f.name for f in fields(kind) if f.default is f.default_factory is MISSING]
+            if missing := [key for key in needed if key not in inner]:
+                raise ProblemError(f"[{name}]: {missing[0]} is missing")
             try:
                 values[name] = _TABLES[name](**inner)
             except (ProblemError, TypeError) as error:
@@ -458,20 +462,36 @@ _TABLES: dict[str, type[Any]] = {
 }
 
 
-def _keys(table: type[Any]) -> list[str]:
-    """Return the keys of a table; the mapping is that of a ROS bag."""
-    return ["topic", "field", "types", "ros"] if table is dict else [field.name for field in fields(table)]
+#: Keys of a live source (`taxel live --source`) that a layout states otherwise.
+_OTHERWISE = {"array": "rows and columns", "rate": "rate_hz"}
+#: What the tables are for that have keys alike.
+_FOR = {"table": ", for recorded tables", "source": ", for taxel live --source", "data": ", for arrays in a file"}
 
 
-def _known(before: str, values: Mapping[str, Any], names: list[str]) -> None:
+def _keys(table: str) -> list[str]:
+    """Return the keys of a table, "" for those that are in none; the mapping is that of a ROS bag."""
+    kind = _TABLES[table] if table else Layout
+    return ["topic", "field", "types", "ros"] if kind is dict else [f.name for f in fields(kind) if f.name != "path"]
+
+
+def _known(table: str, values: Mapping[str, Any]) -> None:
+    """Refuse a key that a table has not, and say where it belongs."""
+    names = _keys(table)
     unknown = next((name for name in values if name not in names), None)
-    if unknown is not None:
-        inner = next(
-            (f" in [{table}]" for table, group in _TABLES.items() if not before and unknown in _keys(group)), ""
-        )
-        of_size = as_size(values[unknown])
-        hint = f"; a size is given by {of_size}" if of_size else f"; it belongs{inner}" if inner else ""
-        raise ProblemError(f"unknown key {before}{unknown}{hint}; there are {', '.join(names)}")
+    if unknown is None:
+        return
+    hint = ""
+    if size := as_size(values[unknown]):
+        hint = f"a size is given by {size}"
+    elif table == "source" and unknown in _OTHERWISE:
+        hint = f"it is {_OTHERWISE[unknown]}, above the line [source]"
+    elif table and unknown in _keys(""):
+        hint = f"it belongs above the line [{table}]"
+    elif groups := [f"[{group}]{_FOR.get(group, '')}" for group in _TABLES if unknown in _keys(group)]:
+        hint = f"it belongs in {' or '.join(groups)}"
+    raise ProblemError(
+        f"unknown key {table}{'.' * bool(table)}{unknown}{f'; {hint}' * bool(hint)}; there are {', '.join(names)}"
+    )
 
 
 def as_size(value: object) -> str:

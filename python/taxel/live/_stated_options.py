@@ -49,8 +49,8 @@ class StatedOptions:
     )
     registers: str | Registers | None = option(
         None,
-        'The board\'s registers, by a preset: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: those of a remote board, '
-        "else those of a board of this array at reset.",
+        "The board's registers, by a preset: one of `taxel.wire.PRESETS`. Default: those of a remote board, else those"
+        " of a board of this array at reset.",
         commands="live record",
         flag="--preset",
     )

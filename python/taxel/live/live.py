@@ -60,8 +60,8 @@ class Live:
     array : Array, optional
         Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.
     registers : str or Registers, optional
-        The board's registers, by a preset: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: those of a remote board,
-        else those of a board of this array at reset. Or their contents. A smaller array drives fewer lines of a preset.
+        The board's registers, by a preset: one of `taxel.wire.PRESETS`. Default: those of a remote board, else those of
+        a board of this array at reset. Or their contents. A smaller array drives fewer lines of a preset.
     differences : bool
         The board sends intensity differences. The panel's "delta intensity".
     readout : Readout or PlainRule, optional

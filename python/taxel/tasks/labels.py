@@ -300,8 +300,16 @@ def _within(
         times = np.concatenate(list(events.values()))
         ends = " to ".join(f"{t / 1e6:.3f}" for t in np.unique([times.min(), times.max()]))
         content = f"{argument} is {table.path}: holds {counted(len(times), 'event')} ({ends} s)"
-        raise ProblemError(f"{content}, none within {_span(recording)}")
+        raise ProblemError(f"{content}, none within {_span(recording)}{_if_frames(times, recording)}")
     return inside
+
+
+def _if_frames(times: NDArray[np.int64], recording: Recording) -> str:
+    """Return the end of a message on times that are whole seconds, no more than there are frames; "" of others."""
+    t = recording.frames().t if recording.timed and not recording.has_events else np.empty(0, np.int64)
+    if len(t) < 2 or (times % 1_000_000).any() or times.max() > 1_000_000 * len(t):
+        return ""
+    return f"; if these are numbers of frames, write t_us = FRAME * {np.median(np.diff(t)):.0f}"
 
 
 def _span(recording: Recording) -> str:
@@ -347,5 +355,6 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
         )
     outside = total - sum(map(len, inside.values()))
     if outside:
-        warn(f"{outside} of the {total} events of {where} left out: outside {_span(recording)}", stacklevel=2)
+        hint = _if_frames(np.concatenate(list(events.values())), recording)
+        warn(f"{outside} of the {total} events of {where} left out: outside {_span(recording)}{hint}", stacklevel=2)
     return {label: t for label, t in inside.items() if len(t) or not len(events[label])}

@@ -24,8 +24,12 @@ impl Points {
     }
 
     /// The slope, at most `most` in magnitude, at which the points below the line are balanced about the mean time; the
-    /// search starts at `last`.
+    /// search starts at `last`, which stays if all points are on one side of the mean time, as those of a few
+    /// milliseconds.
     pub(super) fn slope(&self, last: f64, most: f64) -> f64 {
+        if self.all.iter().all(|point| point.0 <= 0.0) || self.all.iter().all(|point| point.0 >= 0.0) {
+            return last;
+        }
         let (mut low, mut high) = (-most, most);
         let mut narrow = |slope: f64| {
             if slope <= low || slope >= high {

@@ -63,8 +63,8 @@ options! {
         #[serde(skip_serializing)]
         array: Array = Array::thesis(), "commands" = "live record", "metavar" = "ROWSxCOLUMNS[xMM]",
             "python" = "Array | None", "typed" = "For example 24x20x5. Default pitch: 2.67 mm, or unknown with --rate-hz.";
-        /// The board's registers, by a preset: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: those of a remote board, else
-        /// those of a board of this array at reset.
+        /// The board's registers, by a preset: one of `taxel.wire.PRESETS`. Default: those of a remote board, else those of a
+        /// board of this array at reset.
         ///
         /// Or their contents. A smaller array drives fewer lines of a preset.
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]

@@ -940,6 +940,7 @@ mod tests {
             ("array=7x8,frame_end=blank,rate=9", "must be rows of 8: is it array=8x7?"),
             ("array=8x7,rate=9", "must be 56 a frame (or add frame_lines=8, or frame_end=blank"),
             ("array=8x9,rate=9", "must be 72 a frame"),
+            ("array=2x3,rate=9", "lines have 7 values: must be 6 a frame (name a column of times, as time=1:ms, and"),
         ] {
             let error = opened("rows", &frames, keys, FirstLineWait::default()).unwrap_err().to_string();
             assert!(error.contains(said), "{keys}: {error}");

@@ -275,6 +275,14 @@ class _TextTable:
         others = {k for k, stated in units.items() if stated and unit and stated != unit}
         return sorted((left | (others if 2 * count > len(units) else set())) - {time})
 
+    def unread_times(self, left: Sequence[int]) -> str:
+        """Return the comment on columns that are left out, if one of them holds times; else ""."""
+        for column in left:
+            if np.isfinite([seconds_of(row[column]) for row in self.body]).all():
+                return f"  # {self.called(column)} holds times, which do not ascend"
+        named = [column for column in times_of(self.names) if column in left]
+        return f"  # {self.called(named[0])} holds times in a form that taxel does not read" if named else ""
+
     def _in_brackets(self, column: int) -> str:
         within = _IN_BRACKETS.search(self.names[column]) if self.names else None
         return within[1] if within else ""
@@ -374,7 +382,8 @@ def _of_table(found: _TextTable, longer: float, begin: str) -> tuple[str, list[s
         lines = found.lines_of(times)
         table += [f"frame_lines = {lines}"] * (lines > 1)
     table += [] if time is None else found.of_time(time, longer)
-    table += [f"leave_out = [{', '.join(map(found.called, left))}]"] * bool(left)
+    unread = found.unread_times(left) if time is None else ""
+    table += [f"leave_out = [{', '.join(map(found.called, left))}]{unread}"] * bool(left)
     table += found.two_sides(taxels, left) if lines == 1 else []
     missing = {row[k] for row in found.body for k in taxels if row[k] in MISSING}
     table += [f"missing = {_quote(cell)}" for cell in sorted(missing - {"nan"} or missing)[-1:]]
