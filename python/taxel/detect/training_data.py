@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,11 @@ _PARTS, _MOVED = 8, 5.0
 _CLOSE, _MANY = 0.5, 0.05
 
 
+#: When a quantity changes, us, and what it is then.
+_Values: TypeAlias = NDArray[np.float64]
+_Changes: TypeAlias = tuple[NDArray[np.int64], _Values]
+
+
 @dataclass(frozen=True, eq=False)
 class _Measured:
     """Hold what was measured in an example."""
@@ -58,7 +63,7 @@ class _Measured:
     peaks: NDArray[np.float64]
     """The largest sum of all taxels above rest in each load, ..."""
     rises: NDArray[np.float64]
-    """... and how far that is above the sum before, if by more than noise, else 0: strong enough ones are touches."""
+    """... and how much more its taxels read then than before it, if more than noise: strong ones are touches."""
     begins: NDArray[np.int64]
     ends: NDArray[np.int64]
     loaded: NDArray[np.bool_]
@@ -254,30 +259,36 @@ def _measured(given: Example) -> _Measured | None:
     loads = Loads([example], [clock_of(given)], floor, reporting(None), sorted({quantity, strength}))
     begins, ends = (loads.off(edge, 0).t for edge in loads.edges(quantity, threshold, 1.0, 1))
     begin, end = _touches(begins, ends, int(source.t[-1]))
-    above = tare.off(_touched(source, begin, end)).values >= _core.touched_above(floor)
-    share = above.mean(axis=0) if len(above) else np.zeros(source.array.shape)
+    above = _core.touched_above(floor)
+    are_loaded = tare.off(_touched(source, begin, end)).values >= above
+    share = are_loaded.mean(axis=0) if len(are_loaded) else np.zeros(source.array.shape)
     sums = loads.changes(strength, 0)
     peaks = largest(*sums, begin, end)
-    return _Measured(_noise(source), peaks, _rises(*sums, begin, end, peaks), begin, end, share >= _LOADED, share > 0.0)
+    return _Measured(
+        _noise(source), peaks, _rises(source, above, sums, begin, end), begin, end, share >= _LOADED, share > 0.0
+    )
 
 
 def _rises(
-    t: NDArray[np.int64],
-    sums: NDArray[np.float64],
-    begin: NDArray[np.int64],
-    end: NDArray[np.int64],
-    peaks: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return how far the peak of each load is above the sum before it; 0 of one within the noise around it.
+    source: Events | Frames, above: float, sums: _Changes, begin: NDArray[np.int64], end: NDArray[np.int64]
+) -> _Values:
+    """Return how much more the taxels of each load read at its peak than just before it; 0 of one within the noise.
 
-    So the noise of a load that stays is no touch, nor that of a taxel beside it.
+    So the noise of a load that stays is no touch, nor is that of a taxel beside it.
     """
+    t, values = sums
+    held, rises = np.append(0.0, values), largest(t, values, begin, end)
     moments = np.linspace(begin - _AROUND_US, end + _AROUND_US, _SAMPLES)
-    held = np.append(0.0, sums)
-    before = held[np.searchsorted(t, begin)]
     apart = np.abs(np.diff(held[np.searchsorted(t, moments, side="right")], axis=0))
     noise = np.median(apart, axis=0) / _NORMAL_APART
-    return np.where(peaks - before > TIMES_NOISE * noise, peaks - before, 0.0)
+    if isinstance(source, Frames):
+        # A sum leaves out a loaded taxel that is alone: one that stays adds to it only with the noise of another.
+        edges = np.searchsorted(source.t, [begin, end])
+        for k, (first, last) in enumerate(edges.T.tolist()):
+            some = slice(first, max(last, first + 1), 1 + (last - first) // _SAMPLES)
+            more = source.values[some] - source.values[max(first - 1, 0)]
+            rises[k] = min(rises[k], np.nansum(np.where(more >= above, more, 0.0), axis=(1, 2)).max())
+    return np.where(rises > TIMES_NOISE * noise, rises, 0.0)
 
 
 def _touches(
