@@ -274,7 +274,7 @@ def _rises(
 ) -> _Values:
     """Return how much more the taxels of each load read at its peak than just before it; 0 of one within the noise.
 
-    So the noise of a load that stays is no touch, nor is that of a taxel beside it.
+    So neither the noise of a load that stays nor that of a taxel beside it makes touches.
     """
     t, values = sums
     held, rises = np.append(0.0, values), largest(t, values, begin, end)
