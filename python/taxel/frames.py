@@ -139,6 +139,11 @@ class Frames(FrozenColumns):
         values = _core.HeldValues(events._parts(), None, None if begins is None else begins.reshape(-1)).at(t)
         return cls(frozen(values).reshape(len(t), *array.shape), frozen(t), unit="ticks", array=array)
 
+    @cached_property
+    def _found(self) -> dict[str, Any]:
+        """Results of costly functions of these values, which never change (`taxel.recording.analysis.rest`)."""
+        return {}
+
     def __len__(self) -> int:
         return len(self.t)
 

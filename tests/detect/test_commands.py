@@ -155,14 +155,19 @@ def test_how_labels_name_trials_of_a_file_is_said_in_short_lines(tmp_path: Path,
     labels.write_text("label,t_us\ncontact,9000\n")
     code, _, error = call(capsys, *command)
     assert (code, "must have the column recording, with names as subj900/00" in error) == (2, True), error
-    code, _, error = call(capsys, "info", file, "--picture", tmp_path / "p.png")
+    code, _, error = call(capsys, "info", file, "--table", tmp_path / "p.csv")
     assert code == 2
-    assert (
-        f"a picture or a table shows one recording: taxel convert {file} FOLDER writes each to a separate file" in error
-    )
+    assert f"a table is of one recording: taxel convert {file} FOLDER writes each to a separate file" in error
     assert call(capsys, "convert", file, tmp_path / "each")[0] == 0
-    code, _, error = call(capsys, "info", tmp_path / "each", "--picture", tmp_path / "p.png")
-    assert (code, "a picture or a table shows one recording: name its file" in error) == (2, True), error
+    code, _, error = call(capsys, "info", tmp_path / "each", "--table", tmp_path / "p.csv")
+    assert (code, "a table is of one recording: taxel info " in error) == (2, True), error
+    for several in (file, tmp_path / "each"):
+        picture = tmp_path / f"{several.name}.svg"
+        code, said, _ = call(capsys, "info", several, "--picture", picture)
+        assert (code, said.splitlines()[-1 - (several == file)]) == (0, f"picture written to {picture}")
+        drawn = picture.read_text()
+        names = [recording.title.removeprefix(f"{recording.path.parent}/") for recording in taxel.open_all(several)]
+        assert [name for name in names if f"<!-- {name} -->" not in drawn] == []
 
 
 def test_detections_go_to_a_table(folder: Path, trained: Path, capsys) -> None:

@@ -110,13 +110,13 @@ SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
     "late": (
         late,
         "shifted_labels",
-        "40 of 40 missed have a false detection 320 ms earlier; the detections lie where loads begin or end",
+        "40 of 40 missed have a false detection 320 ms earlier; the detections are where loads begin or end",
         "labels 320 ms earlier (--shift-ms -320)",
     ),
     "of late labels": (
         of_late_labels,
         "shifted_training",
-        "a false detection 240 ms later; the labels lie where loads begin or end: those of the training were late",
+        "a false detection 240 ms later; the labels are where loads begin or end: those of the training were late",
         "a training on labels 240 ms earlier (taxel train --shift-ms -240)",
     ),
     "felt nowhere": (felt_nowhere, "shifted_labels", "either these labels are late or those of the training", "a look"),
@@ -134,13 +134,13 @@ SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
     ),
     "rising slowly": (rising_slowly, "window", "20 of 20 missed have a false detection 60 to 60 ms", "--window-ms 60"),
     "felt late": (felt_late, "shifted_labels", "170 ms later, while lift fits: contact is felt later there", ""),
-    "alike": (alike, "other_name", "20 of 20 false detections of lift lie within 100 ms of labels of contact", ""),
-    "misplaced": (misplaced, "unlabelled_loads", "6 of 6 false lie in loads without a label", "labels of these"),
-    "gap": (gap, "gaps", "missed lie where the recording has no frames, as ", ""),
+    "alike": (alike, "other_name", "20 of 20 false detections of lift are within 100 ms of labels of contact", ""),
+    "misplaced": (misplaced, "unlabelled_loads", "6 of 6 false are in loads without a label", "labels of these"),
+    "gap": (gap, "gaps", "missed are where the recording has no frames, as ", ""),
     "no releases": (
         no_releases,
         "unlabelled_loads",
-        "4 of 4 false lie in loads without a label of release",
+        "4 of 4 false are in loads without a label of release",
         "labels of these loads too",
     ),
 }
@@ -244,7 +244,7 @@ def test_a_detection_at_the_first_frames_behind_a_gap_is_of_the_gap(seed: int) -
         end + 40_000,
     ]
     first, *_ = causes_of([behind], 50.0)
-    assert "and 2 of 2 false lie at the first frames behind such a gap" in first.measured
+    assert "and 2 of 2 false are at the first frames behind such a gap" in first.measured
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -267,7 +267,7 @@ def test_training_says_from_when_on_labels_are_off(seed: int) -> None:
     begin_s = np.floor(made.example.labels["contact"][10] / 1e5) / 10
     assert cause.kind == "shifted_labels"
     said = re.fullmatch(
-        rf"10 of 20 labels lie (\d+) ms after where the sensor felt the others, all from {begin_s:.1f} s on",
+        rf"10 of 20 labels are (\d+) ms after where the sensor felt the others, all from {begin_s:.1f} s on",
         cause.measured,
     )
     assert said, cause.measured
@@ -361,7 +361,7 @@ def test_labels_of_footfalls_that_overlap_are_not_called_wrong(seed: int) -> Non
     frames = Frames(values, t, unit="kPa", array=ARRAY)
     (cause,) = evidence(frames, labels).causes({"heel strike": 12, "toe off": 12})[:1]
     assert (cause.kind, "of another recording" in cause.measured) == ("overlapping_loads", False)
-    assert "9 of 12 labels of heel strike lie while another load lasts" in cause.measured
+    assert "9 of 12 labels of heel strike are while another load lasts" in cause.measured
 
 
 @pytest.mark.parametrize(("found", "is_cause"), [(0, False), (8, False), (18, True)])

@@ -93,7 +93,7 @@ def test_touches_without_a_detection_and_detections_too_close_are_counted(
     [found] = taxel.tasks.detect(training.readout, taxel.open(path), labels_of(labels), DetectOptions(tare=2.0)).each
     assert found.outcome.score is not None
     assert found.outcome.score.false > 30
-    assert "detections of contact follow another one within" in said
+    assert "detections of contact follow another within" in said
     # A threshold of so many taxels is out of reach of small touches.
     rule = taxel.detect.PlainRule("total", 1e5, noise_floor=10.0, unit="counts")
     data = training.readout._parts["training"]

@@ -291,7 +291,7 @@ def test_labels_near_nothing_are_refused_in_one_line_that_names_the_option(tmp_p
     code, out, error = call(capsys, "train", recording, "--labels", labels, "-o", tmp_path / "r.json")
     assert (code, out, error.count("\n")) == (2, "", 1)
     assert error.startswith(
-        "taxel: labels: 0 of 12 labels lie within 50 ms of anything that was felt; what may help is "
+        "taxel: labels: 0 of 12 labels are within 50 ms of anything that was felt; what may help is "
     )
     assert error.endswith("; to continue anyway, give --labels-as-given\n")
     assert not (tmp_path / "r.json").exists()
@@ -319,7 +319,7 @@ def test_on_a_terminal_it_is_a_question(
     words = ("train", recording, "--labels", labels, "--tare", "0.5", "--folds", 0, "-o", tmp_path / "r.json")
     code, _, error = call(capsys, *words)
     assert asked == ["Train on these labels anyway?"]
-    assert "0 of 12 labels lie within 50 ms of anything that was felt" in error
+    assert "0 of 12 labels are within 50 ms of anything that was felt" in error
     assert (code, (tmp_path / "r.json").exists()) == ((0, True) if answer else (2, False))
 
 
@@ -363,7 +363,7 @@ def test_what_happens_while_a_touch_lasts_is_no_label_of_another_recording(seed:
     plan = Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example]))
     (cause,) = Evidence([example], check_examples([example]), plan).causes({"slip": 15})
     assert (cause.kind, cause.labels, cause.mistakes) == ("label_name", ("slip",), 15)
-    assert "lie within touches, which onset, release fit, and no recipe tells what happens while a" in cause.measured
+    assert "are within touches, which onset, release fit, and no recipe tells what happens while a" in cause.measured
     # Where no label fits the touches, labels may be of another recording.
     alone = example._replace(labels={"slip": labels["slip"]})
     causes = Evidence([alone], check_examples([alone]), plan).causes({"slip": 15})

@@ -30,10 +30,8 @@ from taxel.clock import doubt
 from taxel.spikes import SpikeTrains, to_ms
 
 if TYPE_CHECKING:
-    from taxel.frames import Frames
     from taxel.recording import Recording
     from taxel.recording.analysis.pressure import Series
-    from taxel.recording.analysis.rest import Rest
 
 app = App()
 
@@ -76,7 +74,6 @@ def info(
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
     """
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
-    from taxel.recording.analysis.pressure import above_rest  # noqa: PLC0415
     from taxel.recording.recognition import are_spike_trains  # noqa: PLC0415
     from taxel.tasks.labels import are_trials, trial_name  # noqa: PLC0415
 
@@ -98,11 +95,13 @@ def info(
         recordings = files.opener.open_trials(file)
         recording = recordings[0]
         if len(recordings) > 1 or len(recording.sources) > 1:
-            if picture is not None or table is not None:
+            if table is not None:
                 raise ProblemError(_several(file, recordings))
             infos = [taxel.tasks.info(each, tare) for each in recordings]
             of_each = [found.facts for found in infos]
-            say(*_of_several(file, of_each, as_json=as_json, each=each))
+            sensors = [source for each in recordings for source in each.sources.values() if not source.is_stream]
+            written = _draw(picture, sensors, tare, overwrite)
+            say(*_of_several(file, of_each, written, as_json=as_json, each=each))
             if are_trials(recordings) and not as_json:
                 say(f"labels name a trial in their column recording, for example {trial_name(recordings[0])}")
             say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
@@ -117,9 +116,7 @@ def info(
         text = "".join(f"{line}\n" for line in _lines(pressed))
         write_whole(table, lambda out: out.write(text.encode()), overwrite=overwrite)
         facts["table"] = str(table)
-    if picture is not None:
-        _draw(picture, recording, above_rest(recording, found.tare), overwrite)
-        facts["picture"] = str(picture)
+    facts |= _draw(picture, [recording], tare, overwrite)
     say(*([json.dumps(facts)] if as_json else _page(facts)))
 
 
@@ -143,46 +140,63 @@ def _spikes(file: Path, as_json: bool, *, drawn: bool) -> list[str]:
     return [f"{file}: spike trains", *(f"  {name:<19} {value}" for name, value in rows)]
 
 
-def _draw(picture: Path, recording: Recording, above: tuple[Frames, float, Rest] | None, overwrite: bool) -> None:
-    """Write rates, a map of the taxels and the pressure over time as a picture."""
+def _draw(picture: Path | None, sensors: Sequence[Recording], tare: str | None, overwrite: bool) -> dict[str, str]:
+    """Write rates, a map of the taxels and the pressure over time as a picture, if asked; return its place.
+
+    Each sensor has a panel.
+    """
+    if picture is None:
+        return {}
     import matplotlib as mpl  # noqa: PLC0415  loads slowly
 
+    from taxel._base.messages import collected  # noqa: PLC0415
     from taxel.plot import overview, pressure  # noqa: PLC0415
+    from taxel.recording.analysis.pressure import above_rest  # noqa: PLC0415
+    from taxel.tasks.rest import given_tare  # noqa: PLC0415
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt  # noqa: PLC0415
 
-    figure, kind = plt.figure(figsize=(11, 4 if above is None else 10), layout="constrained"), picture.suffix[1:]
-    if above is None:
-        overview(recording, figure)
-    else:
-        grid = figure.add_gridspec(2, 1, height_ratios=(2, 3))
-        overview(recording, figure.add_subfigure(grid[0]))
-        pressure(*above[:2], figure=figure.add_subfigure(grid[1]))
-    write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
+    columns, height = int(np.ceil(len(sensors) ** 0.5)), 4
+    rows = -(-len(sensors) // columns)
+    figure = plt.figure(layout="constrained")
+    for sensor, panel in zip(sensors, figure.subfigures(rows, columns, squeeze=False).flat, strict=False):
+        with collected():  # the facts have the same warnings
+            above = above_rest(sensor, None if tare is None else given_tare(tare, sensor))
+        if above is None:
+            overview(sensor, panel)
+        else:
+            height = 10
+            grid = panel.add_gridspec(2, 1, height_ratios=(2, 3))
+            overview(sensor, panel.add_subfigure(grid[0]))
+            pressure(*above[:2], figure=panel.add_subfigure(grid[1]))
+    figure.set_size_inches(11 * columns, height * rows)
+    write_whole(picture, lambda out: figure.savefig(out, format=picture.suffix[1:]), overwrite=overwrite)
+    return {"picture": str(picture)}
 
 
 def _several(file: Path, recordings: Sequence[Recording]) -> str:
-    """Return why there is no picture or table of several recordings, or of one with several sources."""
+    """Return why there is not a table of several recordings, or of one with several sources."""
     if len(recordings) > 1:
         alone = f"taxel convert {quote(str(file))} FOLDER writes each to a separate file"
-        alone = "name its file" if file.is_dir() else alone
-        return f"{file}: holds {len(recordings)} recordings; a picture or a table shows one recording: {alone}"
+        alone = f"taxel info {quote(str(recordings[0].path))} --table FILE.csv" if file.is_dir() else alone
+        return f"{file}: holds {len(recordings)} recordings; a table is of one recording: {alone}"
     names = ", ".join(recordings[0].sources)
     return (
-        f"{file}: holds {len(recordings[0].sources)} sources ({names}); a picture or a table shows one source: taxel "
-        f"convert "
+        f"{file}: holds {len(recordings[0].sources)} sources ({names}); a table is of one source: taxel convert "
         "--source NAME writes a source to a separate file"
     )
 
 
-def _of_several(place: Path, of_each: Sequence[dict[str, Any]], *, as_json: bool, each: bool) -> Iterable[str]:
+def _of_several(
+    place: Path, of_each: Sequence[dict[str, Any]], written: dict[str, str], *, as_json: bool, each: bool
+) -> Iterable[str]:
     """Return the facts of several recordings, or of one with several sources, as JSON or as lines for people."""
     if as_json:
-        return [json.dumps(of_each if len(of_each) > 1 else of_each[0])]
-    if each or len(of_each) == 1:
-        return chain.from_iterable(map(_pages, of_each))
-    return _overview(place, of_each)
+        facts = [facts | written for facts in of_each]
+        return [json.dumps(facts if len(facts) > 1 else facts[0])]
+    pages = chain.from_iterable(map(_pages, of_each)) if each or len(of_each) == 1 else _overview(place, of_each)
+    return chain(pages, (f"{kind} written to {file}" for kind, file in written.items()))
 
 
 def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:

@@ -175,7 +175,7 @@ def _trained(opened: Sequence[Recording], labels: str, options: TrainOptions, *,
 
 
 def _confirmed(error: ProblemError) -> bool:
-    """Return whether a user on a terminal wants to train nonetheless; elsewhere false."""
+    """Return whether a user on a terminal wants to train anyway; elsewhere false."""
     if not _on_terminal():
         return False
     say(f"taxel: {error.args[0]}", err=True)

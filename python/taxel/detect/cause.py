@@ -71,12 +71,14 @@ class Cause:
     - ``durations``, ``plain_rule``: a rule makes at most half the mistakes. ``--rule FILE`` writes it, for
       ``taxel detect --readout FILE``.
     - ``recipe``: another recipe, tried on the same folds, makes at most half the mistakes. ``--recipe NAME``.
-    - ``window`` (*): detections are within twice the window of missed labels. ``--window-ms MS``.
+    - ``window`` (*): detections are within twice the window of missed labels (``--window-ms MS``), or later, as the
+      load rises or falls slowly.
     - ``gaps`` (*): missed labels are where frames are missing, false detections at the first frames after a gap.
     - ``unlabelled_time``: a quarter of the time is before or after the labels. Label all events, or ``taxel cut``.
     - ``label_name``: no input follows a kind's labels, or they are within touches. A name of begin or end; other times.
     - ``other_name`` (*): false detections are at labels of another name.
-    - ``unlabelled_loads`` (*): false detections are in loads as strong as labelled loads. Label these too.
+    - ``unlabelled_loads`` (*): false detections are in loads as strong as labelled loads (label these too), or inside
+      a load, as at a partial release.
     - ``unfelt_labels`` (*): missed labels are more than 50 ms from any load: touches are too weak or too slow.
     - ``unlike_training`` (*): noise, strength or loaded taxels differ from the training. Train with such data too.
     - ``indistinct_kinds``: nothing separates the kinds. Other kinds.

@@ -1,4 +1,4 @@
-"""What training data show of their labels and tares without a training."""
+"""Find what training data show of their labels and tares without a training."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import numpy as np
 from taxel._base.messages import counted
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS, Alignment
-from taxel.detect.cause import Cause, by_option, lie, ordered
+from taxel.detect.cause import Cause, by_option, ordered
 from taxel.detect.examples import Example
 from taxel.detect.fitting import TWO_FOLDS
 from taxel.detect.label_times import FeltLoads, Off, early
 from taxel.detect.levels import LEAST_LEVELS, loaded_levels
-from taxel.detect.mistakes import overlapping, stretch_of
+from taxel.detect.mistakes import are, overlapping, stretch_of
 from taxel.detect.recipe import Recipe
 from taxel.detect.tares import TOUCH, held_by_tare, loaded_at_rest, quiet_s
 from taxel.encode import LevelCrossing, ThresholdIzhikevich
@@ -28,11 +28,11 @@ from taxel.recorded import recorded
 from taxel.recording.analysis.rest import TIMES_NOISE, ZEROS_BEFORE, of_frames
 from taxel.spikes import to_ms, to_us
 
-#: What helps against labels that lie elsewhere.
+#: Advice against labels that are elsewhere.
 FOREIGN = "labels of this recording"
 #: What makes a tare's file of a recording.
 _MAKES_TARE = "taxel cut RECORDING FILE --from S --to S"
-#: Labels are a question before a training if at most this share of them lies near anything that was felt ...
+#: Labels are a question before a training if at most this share of them is near anything that was felt ...
 _NEARLY_NONE = 0.1
 #: ... of so many or more.
 _LEAST_LABELS = 4
@@ -91,7 +91,7 @@ class Evidence:
 
     @cached_property
     def _fall(self) -> tuple[str, str]:
-        """What turns values that fall, and that they do; empty where none do."""
+        """Advice that turns values that fall, and that they do; empty where none do."""
         for example in self.examples:
             source = recorded(example.source, hold=False)
             if isinstance(source, Frames) and (rest := of_frames(source)).falls:
@@ -149,7 +149,7 @@ class Evidence:
 
     @cached_property
     def _early(self) -> str:
-        """That the labels of each recording lie at its very beginning; empty where they do not."""
+        """That the labels of each recording are at its very beginning; empty where they do not."""
         texts = [
             early(example.labels, int(source.t[0]), int(source.t[-1]))
             for example in self.sound
@@ -166,7 +166,7 @@ class Evidence:
 
     @cached_property
     def _of_tare(self) -> tuple[str, str, dict[str, Any]]:
-        """What is wrong with the tare, the option that helps, and its value in Python; empty where nothing is."""
+        """The fault of the tare, the option that helps, and its value in Python; empty where nothing is."""
         held = held_by_tare(self.sound)
         if held >= TOUCH:
             seconds = quiet_s(self.sound)
@@ -178,16 +178,16 @@ class Evidence:
 
     @cached_property
     def _near(self) -> dict[str, tuple[int, int, int]]:
-        """How many labels of each name lie near a load, near its begin or end, and how many there are, if known."""
+        """How many labels of each name are near a load, near its begin or end, and how many there are, if known."""
         near = {label: self.felt.near(label) for label in self._counts}
         return {label: counts for label, counts in near.items() if counts is not None and counts[-1]}
 
     def unfelt(self) -> str:
-        """Return how many labels lie near anything felt, if nearly none does; else, and where it is not known, ""."""
+        """Return how many labels are near anything felt, if nearly none is; else, and where it is not known, ""."""
         count, _, total = np.sum([*self._near.values(), (0, 0, 0)], axis=0).tolist()
         if total < _LEAST_LABELS or count > _NEARLY_NONE * total:
             return ""
-        return f"{count} of {counted(total, 'label')} {lie(count)} within {WINDOW_MS:.0f} ms of anything that was felt"
+        return f"{count} of {counted(total, 'label')} {are(count)} within {WINDOW_MS:.0f} ms of anything that was felt"
 
     def refused(self) -> tuple[Cause, ...]:
         """Return the causes that the data show of a training that was refused: all labels count as missed."""
@@ -207,7 +207,7 @@ class Evidence:
         return [*while_lasting, *(shifts or found)]
 
     def _while_lasting(self, label: str, wrong: int) -> Iterator[Cause]:
-        """Yield that most labels of a name lie within touches, where most labels of another name lie at their edges."""
+        """Yield that most labels of a name are within touches, where most labels of another name are at their edges."""
         near, at_edge, total = self._near.get(label, (0, 0, 0))
         fits = [name for name, (_, edges, count) in self._near.items() if name != label and 2 * edges > count]
         within = near - at_edge
@@ -215,13 +215,13 @@ class Evidence:
         if recipes.knows("touch", label) or not fits or 2 * within <= total or self._loaded >= TOUCH:
             return
         measured = (
-            f"{within} of {counted(total, 'label')} {lie(within)} within touches, which {', '.join(fits)} "
+            f"{within} of {counted(total, 'label')} {are(within)} within touches, which {', '.join(fits)} "
             f"{'fits' if len(fits) == 1 else 'fit'}, and no recipe tells what happens while a touch lasts"
         )
         yield Cause("label_name", (label,), wrong, measured, "labels of where touches begin or end")
 
     def _foreign(self, label: str, wrong: int) -> Iterator[Cause]:
-        """Yield that labels lie at loads as by chance, or at the beginning, as those of another recording or unit."""
+        """Yield that labels are at loads as by chance, or at the beginning, as those of another recording or unit."""
         if self._early:
             yield Cause("foreign_labels", (label,), wrong, f"the labels {self._early}", "labels with times in us")
             return
@@ -237,7 +237,7 @@ class Evidence:
         if 2 * away <= total or 2 * self.felt.count < total or not self.felt.at_edges_by_chance(at_edge, total):
             return
         measured = (
-            f"{at_edge} of {counted(total, 'label')} {lie(at_edge)} within {WINDOW_MS:.0f} ms of where a load begins "
+            f"{at_edge} of {counted(total, 'label')} {are(at_edge)} within {WINDOW_MS:.0f} ms of where a load begins "
             f"or ends, as chance has it, while the sensor felt {counted(self.felt.count, 'load')}"
         )
         yield Cause("foreign_labels", (label,), wrong, measured, FOREIGN)
@@ -279,7 +279,7 @@ class Evidence:
             count, distance = int(alike.members.sum()), f"{abs(alike.ms):.0f} ms"
             labels = "labels" if len(names) == len(self._counts) else f"labels of {', '.join(names)}"
             where = f"{distance} {side} where the sensor felt the others"
-            measured = f"{count} of {counted(len(times), 'label')} {lie(count)} {where}"
+            measured = f"{count} of {counted(len(times), 'label')} {are(count)} {where}"
             for label in wrong if len(names) > 1 else names:
                 yield Cause(
                     "shifted_labels",
@@ -301,7 +301,7 @@ class Evidence:
             loaded = loaded_levels(self.plan.encoder, self.sound, stretches)
             if loaded is not None and loaded.within < min(LEAST_LEVELS, len(self.plan.encoder.levels)):  # type: ignore[attr-defined]
                 measured = (
-                    f"{loaded.within} of the encoder's levels {lie(loaded.within)} within what "
+                    f"{loaded.within} of the encoder's levels {are(loaded.within)} within what "
                     f"loaded taxels read, {loaded.low:.3g} to {loaded.high:.3g}"
                 )
                 changes = {"fit_levels": True}
@@ -314,7 +314,7 @@ class Evidence:
         yield from self._begun_loaded(label, wrong)
 
     def _begun_loaded(self, label: str, wrong: int) -> Iterator[Cause]:
-        """Yield how many labels lie where a recording begins loaded, of which encoders of levels see no begin."""
+        """Yield how many labels are where a recording begins loaded, of which encoders of levels see no begin."""
         encoder = self.plan.encoder
         if not isinstance(encoder, LevelCrossing | ThresholdIzhikevich):
             return
@@ -325,7 +325,7 @@ class Evidence:
                 count += int(np.count_nonzero(example.labels.get(label, np.empty(0)) <= source.t[1]))
         if count:
             measured = (
-                f"{count} of {counted(self._counts[label], 'label')} {lie(count)} in the first two frames of "
+                f"{count} of {counted(self._counts[label], 'label')} {are(count)} in the first two frames of "
                 "recordings that begin loaded, where no load begins"
             )
             yield Cause("begun_loaded", (label,), min(count, wrong), measured, ZEROS_BEFORE)
@@ -376,7 +376,7 @@ def of_weak_bursts(examples: Sequence[Example], label: str, alignment: Alignment
     times, most = max(_LONGER, key=lambda k: np.median([burst.by[k] for burst in weak])), weak[0].window_ms
     present, longer = (np.median([burst.by[k] for burst in weak]) for k in (1, times))
     measured = (
-        f"{counted(len(weak), 'burst')} {'is' if len(weak) == 1 else 'are'} weaker than the level that {label} is "
+        f"{counted(len(weak), 'burst')} {are(len(weak))} weaker than the level that {label} is "
         f"learnt from, at the median {events:.0f} events in {most:g} ms where the rest has {rest:.0f}: {present:.3g} "
         "times its noise"
     )

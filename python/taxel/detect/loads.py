@@ -25,7 +25,7 @@ Stretch: TypeAlias = tuple[int, float, float]
 
 
 class FoundTimes(NamedTuple):
-    """What a rule found: times and when they were known (us, on one clock, ascending), and the quantity then."""
+    """Detections of a rule: times and when they were known (us, on one clock, ascending), and the quantity then."""
 
     t: NDArray[np.int64]
     known: NDArray[np.int64]
@@ -50,7 +50,7 @@ def clock_of(example: object, frame_us: float | None = None) -> Clock:
 class Loads:
     """Hold the quantities of (checked) examples, and what rules found by them.
 
-    The examples lie one after the other on one clock, so far apart that nothing of one pairs with another.
+    The examples are one after the other on one clock, so far apart that nothing of one pairs with another.
     """
 
     def __init__(
@@ -99,8 +99,8 @@ class Loads:
         """Return ages at which something else is read than at those before.
 
         A frame holds until the next one, so of frames those are 0 for the first of a touch, and for each later one
-        the middle of the time for which it holds, as stamps are not regular. Of several examples the longest frame
-        counts.
+        the middle of the time for which it holds, as stamps are not regular. The longest frame
+        of several examples counts.
         """
         if not self._frame_ms:
             return list(ages_ms)
@@ -118,7 +118,7 @@ class Loads:
         return self._together([curve.at_end() for curve in self._curves["area"]])
 
     def changes(self, quantity: str, k: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return when a quantity changes in example k, us by its clock, and what it is from then on."""
+        """Return when a quantity changes in example k, us by its clock, and what it is after that."""
         if quantity not in self._changes:
             self._changes[quantity] = [curve.changes() for curve in self._curves[quantity]]
         return self._changes[quantity][k]

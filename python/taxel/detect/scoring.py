@@ -17,8 +17,10 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped, plain, three_digits
 from taxel._core import ProblemError
 from taxel.detections import Detections
-from taxel.spikes import to_us
+from taxel.spikes import to_ms, to_us
 
+#: Missed events have detections at one distance if those of this share of them differ by so much from the median, ms.
+_MOST, _SAME_MS = 0.8, 50.0
 #: Distance between recordings that are scored together, us: no detection pairs with an event of another recording.
 APART_US = 10**12
 
@@ -54,7 +56,7 @@ class Spread(NamedTuple):
 
         Raises
         ------
-        ProblemError : something that is no sequence of numbers
+        ProblemError : something other than a sequence of numbers
 
         Examples
         --------
@@ -89,13 +91,15 @@ class Score:
     missed_events, false_detections : int64, shape (n,), indices
         Places of the reference events without a detection, and of the detections without an event.
     false_near : int, 0 or more
-        How many of the false ones lie within the window of a reference event: the thesis' false positives (6.5.2).
+        How many of the false ones are within the window of a reference event: the thesis' false positives (6.5.2).
     errors_ms, delays_ms : float64, shape (found,), ms
         `t` minus reference (negative is early) and `known` minus reference.
     by_label : dict of str to Score
         Empty in the score of one label.
     false_beside : int, 0 or more
-        How many of the false ones lie within twice the window of a reference event.
+        How many of the false ones are within twice the window of a reference event.
+    missed_ms : float64, shape (missed,), ms
+        `t` of the nearest false detection of its label minus reference, for each missed event; NaN without any.
     """
 
     label: str
@@ -107,6 +111,7 @@ class Score:
     delays_ms: NDArray[np.float64]
     by_label: Mapping[str, Score] = field(default_factory=dict)
     false_beside: int = 0
+    missed_ms: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
     @property
     def events(self) -> int:
@@ -125,14 +130,14 @@ class Score:
 
     @property
     def false(self) -> int:
-        """How many detections belong to no reference event, however near they lie."""
+        """How many detections belong to no reference event, however near they are."""
         return len(self.false_detections)
 
     @property
     def rank(self) -> tuple[int, float]:
         """Missed and false together, then the root mean square of `errors_ms` (ms): the less, the better.
 
-        `taxel.detect.choose` goes by it. The error is infinite where nothing was found.
+        `taxel.detect.choose` compares it. The error is infinite where nothing was found.
         """
         return self.missed + self.false, float(np.sqrt(np.mean(self.errors_ms**2))) if self.found else np.inf
 
@@ -146,6 +151,19 @@ class Score:
         """Spread of `known` minus reference, ms."""
         return Spread.from_values(self.delays_ms)
 
+    @property
+    def missed_text(self) -> str:
+        """Where the nearest detections are, if most events are missed and most of these have one at one distance."""
+        known = self.missed_ms[np.isfinite(self.missed_ms)]
+        if 2 * self.missed <= self.events or len(self.by_label) > 1 or not len(known):
+            return ""
+        ms = float(np.median(known))
+        count = int(np.count_nonzero(np.abs(known - ms) <= _SAME_MS))
+        if count < _MOST * self.missed:
+            return ""
+        where = f"{three_digits(abs(ms))} ms {'after' if ms > 0 else 'before'} the label"
+        return f"the nearest detection comes {where}, for {count} of {counted(self.events, 'label')}"
+
     def __getitem__(self, label: str) -> Score:
         """Return the score of one label."""
         if label not in self.by_label:
@@ -157,7 +175,8 @@ class Score:
         plain: dict[str, Any] = {
             name: getattr(self, name) for name in ("events", "found", "missed", "false", "false_near", "false_beside")
         }
-        for name, spread in (("error_ms", self.error), ("known_delay_ms", self.delay)):
+        missed = Spread.from_values(self.missed_ms[np.isfinite(self.missed_ms)])
+        for name, spread in (("error_ms", self.error), ("known_delay_ms", self.delay), ("missed_ms", missed)):
             plain[name] = {part: None if np.isnan(value) else value for part, value in spread._asdict().items()}
         if self.by_label:
             plain["by_label"] = {label: part.to_dict() for label, part in self.by_label.items()}
@@ -180,6 +199,7 @@ class Score:
                 title,
                 *(f"{escaped(score.label).ljust(widths[0])}  {getattr(score, spread)!r}" for score in scores),
             ]
+        lines += [f"{escaped(score.label)}: {text}" for score in scores if (text := score.missed_text)]
         return "\n".join(lines)
 
 
@@ -218,7 +238,7 @@ def score(
     truth : mapping of str to int, us; or int, shape (events,), us; or Detections
         Times of the reference events by label. Times alone are of the one label that `found` has.
     window_ms : float, ms; or shape (events,), one a reference event; or a mapping of str to either
-        How far a detection may lie from its event, either way, 0 to 3 600 000; a mapping goes by label. 50 as in 6.5.
+        How far a detection may be from its event, either way, 0 to 3 600 000; a mapping is by label. 50 as in 6.5.
 
     Returns
     -------
@@ -231,7 +251,7 @@ def score(
     Notes
     -----
     Thesis 6.5.2. Reading: the thesis counts "additional/missing spikes within 50 ms of a gait event"; spikes farther
-    away count as false here as well, and its own count stands beside it as `false_near`. Time and memory: O(events +
+    away count as false here as well, and `false_near` is the count of the thesis. Time and memory: O(events +
     pairs within windows).
 
     Examples
@@ -251,19 +271,30 @@ def score(
     for tally in tallies:
         pairs, lost = np.column_stack([tally.detected, tally.events]), (tally.missed_events, tally.false_detections)
         of_label = np.array([label == tally.label for label in labels], np.bool_)
-        beside = _within(found.t[tally.false_detections], times[of_label], 2 * windows[of_label])
+        false, missed = found.t[tally.false_detections], times[tally.missed_events]
+        beside = _within(false, times[of_label], 2 * windows[of_label])
         apart_ms = tally.errors_ms, tally.delays_ms
-        scores[tally.label] = Score(tally.label, pairs, *lost, tally.false_near, *apart_ms, false_beside=beside)
+        nearest = {"false_beside": beside, "missed_ms": _nearest_ms(np.sort(false), missed)}
+        scores[tally.label] = Score(tally.label, pairs, *lost, tally.false_near, *apart_ms, **nearest)
     no_times, ms = np.empty(0, np.int64), np.empty(0)
     parts = [Score("all", np.empty((0, 2), np.int64), no_times, no_times, 0, ms, ms), *scores.values()]
-    names = ("pairs", "missed_events", "false_detections", "errors_ms", "delays_ms")
+    names = ("pairs", "missed_events", "false_detections", "errors_ms", "delays_ms", "missed_ms")
     together: dict[str, Any] = {name: np.concatenate([getattr(score, name) for score in parts]) for name in names}
     together |= {name: sum(getattr(score, name) for score in parts) for name in ("false_near", "false_beside")}
     return Score(parts[-1].label if len(scores) == 1 else "all", by_label=scores, **together)
 
 
+def _nearest_ms(t: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the nearest of some times (ascending) minus each event, ms; NaN without any."""
+    if not len(t):
+        return np.full(len(events), np.nan)
+    after = np.searchsorted(t, events).clip(max=len(t) - 1)
+    apart = np.array([t[after], t[np.maximum(after - 1, 0)]]) - events
+    return to_ms(np.where(np.abs(apart[0]) <= np.abs(apart[1]), *apart))
+
+
 def _within(t: NDArray[np.int64], events: NDArray[np.int64], windows: NDArray[np.int64]) -> int:
-    """Return how many times lie within the window of an event, each of which has its own, us."""
+    """Return how many times are within the window of an event, each of which has its own, us."""
     begun = np.searchsorted(np.sort(events - windows), t, side="right")
     ended = np.searchsorted(np.sort(events + windows), t, side="left")
     return int(np.count_nonzero(begun > ended))

@@ -1,10 +1,10 @@
-"""What the data of a training were like, and in what a recording differs from them: no label is needed."""
+"""Summarise the data of a training, and find in what a recording differs from them: no label is needed."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from taxel.events import Events
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded
+from taxel.recording.analysis.rest import TIMES_NOISE
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: A touch has a detection at most so far before its begin or after its end, ms.
@@ -38,6 +39,9 @@ _TOUCH = 0.1
 _NOISIER, _WEAKER, _STRONGER = 1.5, 0.6, 1.7
 #: From so many times the noise on the loads are not compared.
 _MUCH_NOISE = 2.0
+#: Noise is that of the sum at so many moments from so long before a load until as long after it, us; the median
+#: difference of two normal values, standard deviations.
+_SAMPLES, _AROUND_US, _NORMAL_APART = 64, 1_000_000, 0.954
 #: So many touches tell something; this share fewer of them with a detection, or of the loaded taxels, is a difference.
 _LEAST, _FEWER = 5, 0.2
 #: The last such part of a recording is compared with the first; a taxel has moved by so many times the noise.
@@ -46,19 +50,30 @@ _PARTS, _MOVED = 8, 5.0
 _CLOSE, _MANY = 0.5, 0.05
 
 
+#: When a quantity changes, us, and what it is then.
+_Values: TypeAlias = NDArray[np.float64]
+_Changes: TypeAlias = tuple[NDArray[np.int64], _Values]
+
+
 @dataclass(frozen=True, eq=False)
 class _Measured:
     """Hold what was measured in an example."""
 
     noise: float
     peaks: NDArray[np.float64]
-    """The largest sum of all taxels above rest in each load, of which those that are strong enough are touches."""
+    """The largest sum of all taxels above rest in each load, ..."""
+    rises: NDArray[np.float64]
+    """... and how much more its taxels read then than before it, if more than noise: strong ones are touches."""
     begins: NDArray[np.int64]
     ends: NDArray[np.int64]
     loaded: NDArray[np.bool_]
     """Which taxels touches load often, shape (rows, columns), and ..."""
     reached: NDArray[np.bool_]
     """... which they load at all."""
+
+    def are_touches(self, strength: float) -> NDArray[np.bool_]:
+        """Return which loads are touches, if those of the training are so strong."""
+        return self.rises >= _TOUCH * strength
 
     def detected(self, t: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return which loads have a detection."""
@@ -85,8 +100,8 @@ def training_data(examples: Sequence[Example], found: Sequence[Detections]) -> d
     touched = np.any([_within(each.loaded, shape) for each in known], axis=0)
     peaks = np.concatenate([each.peaks for each in known])
     has = np.concatenate([each.detected(detections.t) for each, detections in zip(known, found, strict=True)])
-    strength = _usual(peaks, _TOUCH * _usual(peaks[has]))
-    are_touches = peaks >= _TOUCH * strength
+    strength = _usual(peaks[peaks >= _TOUCH * _usual(peaks[has])])
+    are_touches = np.concatenate([each.are_touches(strength) for each in known])
     return {
         "shape": list(shape),
         "touched": "".join("1" if loaded else "0" for loaded in touched.flat),
@@ -97,10 +112,9 @@ def training_data(examples: Sequence[Example], found: Sequence[Detections]) -> d
     }
 
 
-def _usual(peaks: NDArray[np.float64], least: float = 0.0) -> float:
-    """Return the median of the peaks of loads, from a least one on; 0 without a load."""
-    touches = peaks[peaks >= least]
-    return float(np.median(touches)) if len(touches) else 0.0
+def _usual(peaks: NDArray[np.float64]) -> float:
+    """Return the median of the peaks of loads; 0 without a load."""
+    return float(np.median(peaks)) if len(peaks) else 0.0
 
 
 def _apart_ms(examples: Sequence[Example]) -> dict[str, float]:
@@ -170,7 +184,8 @@ def _of_noise(noisier: float, *, is_counts: bool) -> Iterator[str]:
 def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *, is_counts: bool) -> Iterator[str]:
     """Yield in what touches and taxels differ."""
     shape, strength = tuple(data["shape"]), data["strength"]
-    touches = int(np.count_nonzero(measured.peaks >= _TOUCH * strength))
+    are_touches = measured.are_touches(strength)
+    touches = int(np.count_nonzero(are_touches))
     larger = any(size > most for size, most in zip(measured.loaded.shape, shape, strict=True))
     if larger:
         yield "{} x {} taxels, where the training had {} x {}".format(*measured.loaded.shape, *shape)
@@ -180,10 +195,10 @@ def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *,
     if noisier >= _MUCH_NOISE or not strength:
         return
     if touches >= _LEAST:
-        ratio = _usual(measured.peaks, _TOUCH * strength) / strength
+        ratio = _usual(measured.peaks[are_touches]) / strength
         if not _WEAKER <= ratio <= _STRONGER:
             yield f"touches are {ratio:.2g} times as strong"
-    elif touches and len(measured.peaks) >= _LEAST:
+    elif touches and np.count_nonzero(measured.rises) >= _LEAST:
         yield f"most loads are less than {_TOUCH:g} times as strong as its touches"
     # Hot pixels are the most loaded ones of counts.
     if touches >= _LEAST and not is_counts and not larger:
@@ -195,7 +210,7 @@ def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *,
 
 def _undetected(data: Mapping[str, Any], measured: _Measured, found: Detections) -> Iterator[str]:
     """Yield how many touches have no detection, if that is a larger share than in the training."""
-    are_touches = measured.peaks >= _TOUCH * data["strength"]
+    are_touches = measured.are_touches(data["strength"])
     touches = int(np.count_nonzero(are_touches))
     missing = touches - int(np.count_nonzero(measured.detected(found.t) & are_touches))
     if touches >= _LEAST and missing / touches >= 1.0 - data["detected"] + _FEWER:
@@ -213,7 +228,7 @@ def _of_detections(apart_ms: Mapping[str, float], labels: Sequence[str], found: 
         close = int(np.count_nonzero(to_ms(np.diff(t)) < _CLOSE * shortest))
         if close > max(2.0, _MANY * len(t)):
             parts.append(
-                f"{close} of {len(t)} detections of {label} follow another one within "
+                f"{close} of {len(t)} detections of {label} follow another within "
                 f"{three_digits(_CLOSE * shortest)} ms, half "
                 "the shortest time between its labels"
             )
@@ -244,10 +259,36 @@ def _measured(given: Example) -> _Measured | None:
     loads = Loads([example], [clock_of(given)], floor, reporting(None), sorted({quantity, strength}))
     begins, ends = (loads.off(edge, 0).t for edge in loads.edges(quantity, threshold, 1.0, 1))
     begin, end = _touches(begins, ends, int(source.t[-1]))
-    above = tare.off(_touched(source, begin, end)).values >= _core.touched_above(floor)
-    share = above.mean(axis=0) if len(above) else np.zeros(source.array.shape)
-    peaks = largest(*loads.changes(strength, 0), begin, end)
-    return _Measured(_noise(source), peaks, begin, end, share >= _LOADED, share > 0.0)
+    above = _core.touched_above(floor)
+    are_loaded = tare.off(_touched(source, begin, end)).values >= above
+    share = are_loaded.mean(axis=0) if len(are_loaded) else np.zeros(source.array.shape)
+    sums = loads.changes(strength, 0)
+    peaks = largest(*sums, begin, end)
+    return _Measured(
+        _noise(source), peaks, _rises(source, above, sums, begin, end), begin, end, share >= _LOADED, share > 0.0
+    )
+
+
+def _rises(
+    source: Events | Frames, above: float, sums: _Changes, begin: NDArray[np.int64], end: NDArray[np.int64]
+) -> _Values:
+    """Return how much more the taxels of each load read at its peak than just before it; 0 of one within the noise.
+
+    So neither the noise of a load that stays nor that of a taxel beside it makes touches.
+    """
+    t, values = sums
+    held, rises = np.append(0.0, values), largest(t, values, begin, end)
+    moments = np.linspace(begin - _AROUND_US, end + _AROUND_US, _SAMPLES)
+    apart = np.abs(np.diff(held[np.searchsorted(t, moments, side="right")], axis=0))
+    noise = np.median(apart, axis=0) / _NORMAL_APART
+    if isinstance(source, Frames):
+        # A sum leaves out a loaded taxel that is alone: one that stays adds to it only with the noise of another.
+        edges = np.searchsorted(source.t, [begin, end])
+        for k, (first, last) in enumerate(edges.T.tolist()):
+            some = slice(first, max(last, first + 1), 1 + (last - first) // _SAMPLES)
+            more = source.values[some] - source.values[max(first - 1, 0)]
+            rises[k] = min(rises[k], np.nansum(np.where(more >= above, more, 0.0), axis=(1, 2)).max())
+    return np.where(rises > TIMES_NOISE * noise, rises, 0.0)
 
 
 def _touches(
@@ -273,8 +314,9 @@ def _moved(source: Events | Frames | SpikeTrains, noise: float) -> int:
     if not isinstance(source, Frames) or len(source) < 2 * _FRAMES or noise <= 0.0:
         return 0
     part = len(source) // _PARTS
+    step = 1 + part * _PARTS // _LOOKS
     # Touches that come and go leave the lowest readings as they are.
-    ends = np.stack([source.values[:part], source.values[-part:]]).astype(np.float64)
+    ends = np.stack([source.values[:part:step], source.values[-part::step]]).astype(np.float64)
     read = ~np.isnan(ends).any(axis=(0, 1))
     first, last = np.quantile(ends[:, :, read], 0.1, axis=1)
     count = int(np.count_nonzero(np.abs(last - first) >= _MOVED * noise))

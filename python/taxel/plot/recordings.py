@@ -95,7 +95,7 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
     for note in recording.notes:
         if note.t is not None:
             over.axvline((note.t - begin_us) / 1e6, color="grey", linestyle=":", linewidth=0.8)
-    over.set(xlabel=_time(begin_us), title=escaped(recording.path.name))
+    over.set(xlabel=_time(begin_us), title=escaped(recording.title.removeprefix(f"{recording.path.parent}/")))
     return figure
 
 

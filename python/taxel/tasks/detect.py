@@ -40,6 +40,8 @@ from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare,
 _LOOKS = 2000
 #: Causes of a bad score that are of labels or of the recording, not of the readout.
 _OF_LABELS = ("shifted_labels", "window", "gaps", "unlabelled_loads", "overlapping_loads")
+#: The noise is compared with that of the training from so many times that.
+_NOISIER = 1.5
 #: No event.
 _NONE = np.empty(0, np.int64)
 
@@ -251,6 +253,10 @@ def detect(
             try:
                 found.append(_detected(readout, recording, labelled, without, options))
             except UnknownRestError as error:
+                of_training = (readout._parts.get("training") or {}).get("noise", 0.0)
+                if of_training and error.noise >= _NOISIER * of_training:
+                    noisier = f"{error.noise / of_training:.2g} times that of the training"
+                    error.args = (f"{error.args[0]}, {noisier}", *error.args[1:])
                 unknown_rests[recording.title] = error
         if not found and unknown_rests:
             raise next(iter(unknown_rests.values()))
@@ -325,7 +331,7 @@ def _of_other_arrays(readout: Readout | PlainRule, recordings: Sequence[Recordin
 
 
 class _Found(NamedTuple):
-    """What was detected in a recording, the same with a rest for what was felt, and in what the sensor differs."""
+    """The detections in a recording, the same with a rest for what was felt, and in what the sensor differs."""
 
     detected: Detected
     felt: Outcome

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import checked_path, instance, number
 from taxel._base.errors import helped, refused
-from taxel._base.messages import collected, warn
+from taxel._base.messages import collected, counted, warn
 from taxel._base.number_text import float_of
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
@@ -28,7 +28,7 @@ from taxel.recorded import recorded
 from taxel.recording import Recording, open_one
 from taxel.recording.analysis.preload import free_of_preload, without_preload
 from taxel.recording.analysis.pressure import quiet_rest
-from taxel.recording.analysis.rest import ZEROS_BEFORE, by_unit, of_quiet
+from taxel.recording.analysis.rest import ZEROS_BEFORE, by_unit, of_quiet, quantile
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
@@ -48,6 +48,8 @@ _TIMES, _MANY, _LOWEST, _FRAMES = 3.0, 0.25, 0.05, 2000
 #: A recording begins loaded if the sum of its first so many frames is so many times its least sums, and not less than
 #: its largest ones by more.
 _FIRST_FRAMES, _LOADED_TIMES = 5, 10.0
+#: At most so many half seconds are looked at. Only noise moves in one if no three taxels spread so many times as much.
+_STRETCHES, _THIRD, _BY_NOISE = 64, 3, 2.0
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
 
@@ -55,8 +57,15 @@ _MOST_UNKNOWN = 0.1
 class UnknownRestError(ProblemError):
     """Say that the rest of a recording's taxels is not known, as nothing in it is quiet: a tare must be given.
 
-    Of several recordings the others can still be detected.
+    The others of several recordings can still be detected.
+
+    Attributes
+    ----------
+    noise : float, in the sensor's unit
+        The noise of its taxels, if only that is why; else 0.
     """
+
+    noise: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +88,7 @@ class TakenRest:
 
     @property
     def detect_from_us(self) -> int | None:
-        """When detection begins: at the end of a beginning that was said to be at rest; None: with the recording."""
+        """When detection begins: at the end of a beginning that was given as at rest; None: with the recording."""
         return self.tare.stop_us if self.source == "beginning" else None
 
     def __str__(self) -> str:
@@ -101,7 +110,7 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     """Return the rest of a recording's taxels as each detection takes it: the page's, the shell's and Python's.
 
     It is the given one; else 0 of frames in a unit of force or pressure; else that of the first quiet stretch of half
-    a second in which nothing lies on the array, for a board's events on their held values. Labels and notes never
+    a second in which nothing is on the array, for a board's events on their held values. Labels and notes never
     count.
 
     Parameters
@@ -142,10 +151,13 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     if warning:
         warn(warning, stacklevel=2)
     if span is None:
+        loaded = _begun_loaded(source)
+        noise, because = (0.0, "") if loaded else _noisy(source)
+        because = because or f" with nothing on it{_slow(source) or loaded}"
         error = UnknownRestError(
-            f"{recording.path}: the rest of its taxels is not known, as no half second is quiet with nothing on it"
-            + (_slow(source) or _begun_loaded(source))
+            f"{recording.path}: the rest of its taxels is not known, as no half second is quiet{because}"
         )
+        error.noise = noise
         raise helped(error, "tare", "give")
     return TakenRest("quiet", _measured(recording, recorded(recording), span[1], span[0]), begin_us)
 
@@ -264,8 +276,8 @@ def zero_by_unit(recording: Recording) -> Tare | None:
     found = of_quiet(source)
     if found.quiet_us is None or found.preload_at:
         return zero
-    middle = np.nan_to_num(np.nanmedian(source.between(*found.quiet_us).values, axis=0))
-    lowest = np.nan_to_num(np.nanquantile(source.values[:: 1 + len(source) // _FRAMES], _LOWEST, axis=0))
+    middle = np.nan_to_num(quantile(source.between(*found.quiet_us).values, 0.5))
+    lowest = np.nan_to_num(quantile(source.values[:: 1 + len(source) // _FRAMES], _LOWEST))
     above = _TIMES * zero.noise
     off = (middle < -above) | ((middle > above) & (lowest > above))
     count = np.count_nonzero(off)
@@ -357,6 +369,32 @@ def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Ta
     return _measured(recording, source, min(ends))
 
 
+def _noisy(source: Events | Frames) -> tuple[float, str]:
+    """Return the noise if only that is why no half second is quiet, and that it is; else 0 and ""."""
+    if not isinstance(source, Frames) or len(source) < 2:
+        return 0.0, ""
+    lasts, values = int(np.ceil(_QUIET_US / np.median(np.diff(source.t)))), source.values.reshape(len(source), -1)
+    begins = np.arange(0, len(source) - lasts, lasts)[:: 1 + len(source) // (lasts * _STRETCHES)]
+    if lasts < _LEAST_FRAMES or not len(begins):
+        return 0.0, ""
+    spread, noise = np.array([_spread(values[begin : begin + lasts]) for begin in begins.tolist()]).transpose(1, 0, 2)
+    moves = np.nan_to_num(spread / np.maximum(noise, np.finfo(np.float32).tiny))
+    still = np.sort(moves, axis=1)[:, -min(_THIRD, moves.shape[1])] < _BY_NOISE
+    strong = float(np.median(noise[still])) if still.any() else 0.0
+    if not strong:
+        return 0.0, ""
+    return strong, (
+        f": only noise moves in {np.count_nonzero(still)} of {counted(len(still), 'half second')}, but its standard "
+        f"deviation is {strong:.3g} {source.unit}, {strong / np.nanmax(np.ptp(values, axis=0)):.1%} of the range"
+    )
+
+
+def _spread(values: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return each taxel's standard deviation, and that of its noise: two frames differ by twice its variance."""
+    apart = np.diff(values, axis=0).astype(np.float64)
+    return values.std(axis=0, dtype=np.float64), np.sqrt((apart**2).mean(axis=0) / 2)
+
+
 def _slow(source: Events | Frames) -> str:
     """Return that frames come so slowly that half a second holds none or one; else ""."""
     apart_us = float(np.median(np.diff(source.t))) if isinstance(source, Frames) and len(source) > 1 else 0.0
@@ -406,7 +444,7 @@ def _measured(recording: Recording, source: Events | Frames, stop_us: int, start
         if unknown > _MOST_UNKNOWN * np.count_nonzero(present):
             warn(
                 f"{recording.path}: the rest of {unknown} of {np.count_nonzero(present)} taxels is not known, as none "
-                f"of their changes lies in its first {to_ms(stop_us - int(source.t[0])):g} ms: their events are left "
+                f"of their changes is in its first {to_ms(stop_us - int(source.t[0])):g} ms: their events are left "
                 "out; start the recording before the board, which then sends all values, or give a tare's file",
                 stacklevel=2,
             )

@@ -6,7 +6,9 @@ import json
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import wraps
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +58,21 @@ _BLOCK = 1 << 16
 
 #: Frames in order: their times, us, and their values by taxel, NaN where a taxel has none.
 FrameBlock = tuple[NDArray[np.int64], NDArray[np.float32]]
+
+T = TypeVar("T")
+
+
+def _once(find: Callable[[Frames], T]) -> Callable[[Frames], T]:
+    """Return a costly function of frames that computes each result once."""
+
+    @wraps(find)
+    def found(frames: Frames) -> T:
+        known: dict[str, T] = frames._found
+        if find.__name__ not in known:
+            known[find.__name__] = find(frames)
+        return known[find.__name__]
+
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +153,7 @@ class Rest:
         return {"source": self.source, "quiet_us": self.quiet_us, "zeroed": self.zeroed, "falls": self.falls}
 
 
+@_once
 def by_unit(frames: Frames) -> Tare | None:
     """Return the tare of frames in a unit of force or pressure: 0, with the noise of a quiet stretch; None of others.
 
@@ -145,9 +163,9 @@ def by_unit(frames: Frames) -> Tare | None:
     """
     if frames.unit not in FORCE_UNITS or not len(frames):
         return None
-    quiet = _of_rising(frames, ticks_by_unit(frames)).quiet_us
+    quiet = _of_rising(frames).quiet_us
     still = np.zeros((1, *frames.array.shape)) if quiet is None else frames.between(*quiet).values
-    middle, above = np.nanquantile(np.where(np.isnan(still).all(axis=0), 0.0, still), (0.5, 0.75), axis=0)
+    middle, above = quantile(np.where(np.isnan(still).all(axis=0), 0.0, still), (0.5, 0.75))
     noise = 1.4826 * np.asarray(above - middle, np.float64)
     nothing = Frames(np.zeros((2, *frames.array.shape)), [0, 1], unit=frames.unit, array=frames.array)
     document = json.loads(Tare.take(nothing, note=BY_UNIT).to_json())
@@ -180,6 +198,7 @@ def rest_scale(frames: Frames) -> float:
     return float(_core.touched_above(NOISE_FLOOR)) / (_BY_CHANCE + TIMES_NOISE * float(np.sqrt(mean)))
 
 
+@_once
 def ticks_by_unit(frames: Frames) -> float:
     """Return the ticks by the unit of frames: the range of their values counts as that of a board's ramp.
 
@@ -275,13 +294,14 @@ def find_rest(
         first += len(t)
         load = begins - values if falls else values - begins
         far = load < -LOADED_TICKS / scale
-        released += (far * weights).sum(axis=0)
-        less -= (np.where(far, load, 0.0) * weights).sum(axis=0)
-        is_known = ~np.isnan(load)
-        known += (is_known * weights).sum(axis=0)
+        if far.any():
+            released += (far * weights).sum(axis=0)
+            less -= (np.where(far, load, 0.0) * weights).sum(axis=0)
+        missing = np.isnan(load)
+        known += weights.sum() - ((missing * weights).sum(axis=0) if missing.any() else 0)
         within = slice(*np.searchsorted(t, rest.quiet))
-        quiet += (np.where(is_known, load, 0.0) * weights)[within].sum(axis=0)
-        in_quiet += (is_known * weights)[within].sum(axis=0)
+        quiet += (np.where(missing[within], 0.0, load[within]) * weights[within]).sum(axis=0)
+        in_quiet += (~missing[within] * weights[within]).sum(axis=0)
     loaded = released > LOADED_SHARE * known
     begins[loaded] = np.nan
     if np.isnan(begins).all():
@@ -298,21 +318,32 @@ def of_frames(frames: Frames) -> Rest:
     return of_quiet(frames)
 
 
+def quantile(values: NDArray[np.float32], shares: float | tuple[float, ...]) -> NDArray[np.float64]:
+    """Return quantiles over frames, without missing values; NumPy takes far longer to look for these."""
+    find = np.nanquantile if np.isnan(values.min(initial=0.0)) else np.quantile
+    return np.asarray(find(values, shares, axis=0))
+
+
+@_once
 def of_quiet(frames: Frames) -> Rest:
     """Return the rest of frames that a quiet stretch of them shows, or none."""
-    scale = rest_scale(frames)
-    rest = _of_rising(frames, scale)
-    if rest.quiet_us is None or not _fall(frames, rest.quiet_us, scale):
+    rest = _of_rising(frames)
+    if rest.quiet_us is None or not _fall(frames, rest.quiet_us, rest_scale(frames)):
         return rest
-    fallen = _of_rising(frames, scale, falls=True)
+    fallen = _found_in(frames, falls=True)
     # Without a rest of their own the values are tracked from their first ones on. What they rise by is no load.
     return replace(rest, values=fallen.values, falls=True, preload=None, preload_at="")
 
 
-def _of_rising(frames: Frames, scale: float, *, falls: bool = False) -> Rest:
-    """Return the rest that a quiet stretch of frames shows if their values rise with pressure, or if they fall."""
+@_once
+def _of_rising(frames: Frames) -> Rest:
+    """Return the rest that a quiet stretch of frames shows if their values rise with pressure."""
+    return _found_in(frames, falls=False)
+
+
+def _found_in(frames: Frames, *, falls: bool) -> Rest:
     blocks, columns = _blocks(frames), frames.array.columns
-    return find_rest(lambda: blocks, frames.array.rows * columns, columns, scale, falls=falls)
+    return find_rest(lambda: blocks, frames.array.rows * columns, columns, rest_scale(frames), falls=falls)
 
 
 def _blocks(frames: Frames) -> list[FrameBlock]:
@@ -334,11 +365,14 @@ def _fall(frames: Frames, quiet_us: tuple[int, int], scale: float) -> bool:
     rest = np.minimum(rest, values[first:end].mean(axis=0, dtype=np.float64))
     lowest = values.min(axis=0)
     down, up = rest - lowest, values.max(axis=0) - rest
-    back = np.array([values[k:, taxel].max() for taxel, k in enumerate(values.argmin(axis=0))])
-    down[back < rest - down / _FALLS] = 0
     rank = _THIRD if down.size >= _SMALL else 1
-    deepest, most = (np.partition(moves, -rank)[-rank] for moves in (down, up))
-    return bool(deepest > max(_FALLS * most, 2 * LOADED_TICKS / scale))
+    far = max(_FALLS * np.partition(up, -rank)[-rank], 2 * LOADED_TICKS / scale)
+    fallen = np.flatnonzero(down > far)
+    if len(fallen) < rank:
+        return False
+    series = values[:, fallen].T
+    back = np.array([each[k:].max() for each, k in zip(series, series.argmin(axis=1), strict=True)])
+    return np.count_nonzero(back >= (rest - down / _FALLS)[fallen]) >= rank
 
 
 def frames_above(rest: Rest, blocks: Iterable[FrameBlock], columns: int, scale: float = 1.0) -> Iterable[FrameBlock]:
