@@ -13,6 +13,14 @@ from numpy.typing import NDArray
 from shell import call
 
 import taxel
+from taxel.detect import Example, Recipe
+from taxel.detect.cause import by_option
+from taxel.detect.causes import Mistakes, question, without_explained
+from taxel.detect.evidence import Evidence
+from taxel.detect.examples import check_examples
+from taxel.detect.fitting import UNLEARNT
+from taxel.detect.floors import measured_floor
+from taxel.detect.folds import Judged
 from taxel.tasks import TrainOptions
 
 Labels = dict[str, NDArray[np.int64]]
@@ -89,6 +97,72 @@ def test_nothing_is_said_of_a_right_recording(trained: Trained, tmp_path: Path, 
         frames, labels = drawn(trained.shape, trained.rate, seed)
         assert trained.told(capsys, tmp_path, frames, labels) == []
         assert trained.told(capsys, tmp_path, frames, None) == []
+
+
+def asked(frames: taxel.Frames, labels: Labels) -> str:
+    """Return the question that a training asks of labels before it begins."""
+    example = Example(frames, labels, taxel.Tare.take(frames, stop_us=2_000_000))
+    recipe = Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example]))
+    return question(Evidence([example], check_examples([example]), recipe))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("size", SIZES)
+def test_a_training_asks_first_about_labels_that_are_all_off_and_about_no_others(size: str, seed: int) -> None:
+    for late_us in (300_000, -200_000):
+        frames, labels = drawn(*SIZES[size], seed)
+        text = asked(frames, {label: t + late_us for label, t in labels.items()})
+        assert text.startswith("what may help is --shift-ms "), text
+        assert int(text.split()[5].rstrip(":")) == pytest.approx(-late_us / 1000, abs=30)
+        since = labels["contact"][12]
+        assert asked(frames, {label: t + late_us * (t >= since) for label, t in labels.items()}) == ""
+    for more in ({}, {"gain": 0.05}, {"gain": 0.02}, {"noise": 40.0}):
+        assert asked(*drawn(*SIZES[size], seed, **more)) == ""
+
+
+def test_a_training_names_the_part_of_each_recording_whose_labels_are_off(tmp_path: Path, capsys: Any) -> None:
+    folder, rows, begins = tmp_path / "days", ["recording,label,t_us\n"], []
+    folder.mkdir()
+    for seed in (11, 12):
+        frames, labels = drawn(*SIZES["taxel"], seed)
+        taxel.convert(frames, folder / f"{seed}.npz")
+        since = labels["contact"][12]
+        begins.append(np.floor((since + 250_000) / 1e5) / 10)
+        rows += [f"{seed}.npz,{label},{t + 250_000 * (t >= since)}\n" for label, t_all in labels.items() for t in t_all]
+    (tmp_path / "days.csv").write_text("".join(rows))
+    words = ("train", folder, "--labels", tmp_path / "days.csv", "-o", tmp_path / "r.json")
+    code, out, error = call(capsys, *words)
+    assert code == 0
+    assert UNLEARNT not in error
+    lines = out.splitlines()
+    [cause] = [line for line in lines if line.startswith("contact, lift: what may help is labels of ")]
+    for seed, begin_s in zip((11, 12), begins, strict=True):
+        assert f"of {folder / f'{seed}.npz'} from {begin_s:.1f} s on 2" in cause
+    assert not any("the plain rule is better" in line for line in lines), "it learnt wrong labels"
+    [last] = [line for line in lines if line.startswith("written to ")]
+    assert "; next: train again with labels of " in last
+    assert "taxel detect" not in last
+
+
+def test_a_window_is_advised_only_with_what_a_trial_of_it_left() -> None:
+    times = np.arange(1, 26) * 1_000_000
+    late = taxel.Detections(["contact"] * 25, times + 80_000, times + 80_000)
+    scores = {ms: taxel.detect.score(late, {"contact": times, "lift": []}, ms) for ms in (50.0, 60.0, 100.0)}
+    fact = "25 of 25 missed have a false detection 80 to 80 ms later"
+    cause = by_option("window", "contact", 50, fact, "--window-ms 80", window_ms=80.0)
+    for trial_ms, advice in ((None, ""), (60.0, ""), (100.0, "--window-ms 80")):
+        tried = None if trial_ms is None else lambda _, ms=trial_ms: Judged((), scores[ms], "")
+        mistakes = Mistakes(None, scores[50.0], scores[50.0], tried=tried)  # type: ignore[arg-type]
+        [found] = mistakes._tried_windows([cause])
+        assert (found.advice, found.option) == (advice, advice)
+        trial = "; tried on the same folds: 0 missed, 0 false, where this training has 25 missed, 25 false"
+        assert found.measured == fact + trial * bool(advice)
+
+
+def test_few_spikes_are_no_news_where_a_cause_explains_them() -> None:
+    lines = [f"{label}: 25 of 25 events {UNLEARNT} (1 ms)" for label in ("contact", "lift")]
+    cause = by_option("shifted_labels", "contact", 25, "25 of 25 are late", "--shift-ms -300")
+    assert without_explained([*lines, "contact: else"], [cause]) == (lines[1], "contact: else")
 
 
 @pytest.mark.parametrize("late_ms", [242, -90])

@@ -106,7 +106,8 @@ def train(
         bool,
         typer.Option(
             "--labels-as-given",
-            help="Train, without a question, even if almost no label is near anything that the sensor felt.",
+            help="Train, without a question, even if almost no label is near anything that the sensor felt, or almost all "
+            "are off by the same time.",
         ),
     ] = False,
     report: ReportOption = None,
@@ -143,7 +144,7 @@ def train(
         written |= {} if report is None else {"report": str(report / "report.html")}
         say(json.dumps({"readout": str(out), **training.to_dict(), **written}))
     else:
-        say(*training.lines(), "", f"written to {out}; next: {_next(training, out, tare)}")
+        say(*training.lines(), "", f"written to {out}{_next(training, out, tare)}")
         say(*(f"plain rule of {' and '.join(each)}: written to {path}" for path, each in rules.items()))
         say(*(f"warning: {warning}" for warning in training.unreliable()))
     if report is not None:  # last, so that nothing is lost where it fails
@@ -219,10 +220,16 @@ def _of_label(path: Path, label: str) -> Path:
 
 
 def _next(training: Training, out: Path, tare: str | None) -> str:
-    """Return the command that detects by a readout, with the --tare, if any, of the training."""
+    """Return the command that detects by a readout, with the --tare, if any, of the training.
+
+    If the readout cannot be relied on, return the first advice instead, or nothing.
+    """
+    if any(training.unreliable()):
+        advice = next((cause.advice for cause in training.causes if cause.advice), "")
+        return f"; next: train again with {advice}" * bool(advice)
     again = tare or ("" if _are_quiet(training.recordings) else training.beginning())
     option = f" --tare {quote(again)}" if again and training.readout._needs_tare else ""
-    return f"taxel detect RECORDING --readout {quote(str(out))}{option}"
+    return f"; next: taxel detect RECORDING --readout {quote(str(out))}{option}"
 
 
 def _are_quiet(recordings: Sequence[Recording]) -> bool:

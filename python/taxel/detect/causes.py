@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import comb
 
 import numpy as np
 
-from taxel._base.messages import counted
+from taxel._base.messages import counted, escaped
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.cause import Cause, by_option, ordered
 from taxel.detect.evidence import FIVE_FOLDS, Evidence, of_weak_bursts
 from taxel.detect.examples import Example
-from taxel.detect.fitting import Trained
+from taxel.detect.fitting import UNLEARNT, Trained
+from taxel.detect.folds import Judged
 from taxel.detect.label_times import unlabelled_us
 from taxel.detect.mistakes import Measured, many_wrong
 from taxel.detect.plain_score import PlainScore
@@ -25,6 +27,15 @@ from taxel.encode import Moments
 _UNLABELLED = 0.25
 #: Kinds of touch are told apart where chance would tell as many with at most this probability.
 _CHANCE = 0.05
+#: Labels are a question before a training if at least this share of them has one distance from what was felt.
+_NEARLY_ALL = 0.9
+#: Part of a recording is off if so many labels are, which are missed; so many recordings are named.
+_LEAST_OFF, _NAMED = 5, 5
+#: Causes that do not say why labels have too few input spikes.
+_NO_REASON = (
+    "few_labels", "unlabelled_time", "unlabelled_loads", "durations", "plain_rule", "indistinct_kinds", "overfitting",
+    "many_false", "unknown",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -45,6 +56,8 @@ class Mistakes:
     mistakes : sequence of Mistake
         What `scored` calls missed and false, with a window of ...
     window_ms : float, ms
+    tried : function of float (ms), optional
+        Scores the same training in another window, on the same folds.
     """
 
     trained: Trained
@@ -55,10 +68,12 @@ class Mistakes:
     plain: PlainScore | None = None
     mistakes: Sequence[Mistake] = ()
     window_ms: float = WINDOW_MS
+    tried: Callable[[float], Judged] | None = None
 
     def causes(self, evidence: Evidence) -> tuple[Cause, ...]:
         """Return the causes for the labels of which more than 5 % are missed or false, those of most mistakes first."""
         wrong = {label: n for label, n in many_wrong(self.scored).items() if label in self.trained.readout.labels}
+        each = self.each
         sources: dict[int, list[Cause]] = {}
         for label in wrong if not evidence.falls else ():
             for place, cause in self._of_sources(evidence.sound, label):
@@ -68,7 +83,7 @@ class Mistakes:
         beside = Measured(evidence.sound, mistakes, self.scored, self.window_ms, evidence.felt) if mistakes else None
         if sources:
             # All else is measured on the others.
-            evidence = evidence.without(sources)
+            evidence, each = evidence.without(sources), [each[k] for k in range(len(each)) if k not in sources]
             for label in wrong:
                 scores = (self.each[place].by_label.get(label) for place in sources)
                 wrong[label] -= sum(score.rank[0] for score in scores if score is not None)
@@ -76,8 +91,12 @@ class Mistakes:
         where = [] if beside is None or evidence.falls else beside.causes(wrong)
         late = [cause for label, count in wrong.items() for cause in self._felt_late(evidence, label, count)]
         where = late + [c for c in where if c.kind != "window" or all(c.labels != cause.labels for cause in late)]
+        shown = [cause for cause in evidence.causes(wrong) if not self._contradicts(cause)]
+        if not any(cause.kind in ("falling_values", "shifted_labels") for cause in shown):
+            shown += _off_in_parts(evidence, each, wrong)
+        where = self._tried_windows(where)
         wide = {c.labels for c in where if c.kind == "window" and 2 * c.mistakes >= wrong[c.labels[0]]}
-        for cause in evidence.causes(wrong):
+        for cause in shown:
             # What a window mends needs no other tare. Whether labels are off or felt late is not known of those of one
             # name alone: a wider window keeps their times.
             mended = ("tare", "shifted_labels") if evidence.is_of_one_name else ("tare",)
@@ -158,12 +177,45 @@ class Mistakes:
             return
         apart, (reach_ms, left) = evidence.felt_apart[label], evidence.felt_window(label)
         if self.window_ms < reach_ms and 2 * left <= wrong:
-            option = f"--window-ms {reach_ms:g} --rule FILE"
-            within = f"within {reach_ms:g} ms a plain rule leaves {left} missed and false, the neuron {wrong}"
-            advice = f"a wider window and the plain rule ({option})"
-            yield Cause("window", (label,), wrong - left, f"{apart}; {within}", advice, option, {"window_ms": reach_ms})
+            option = f"--window-ms {reach_ms:g}"
+            yield by_option("window", label, wrong - left, str(apart), option, window_ms=reach_ms)
         elif apart.changes_from_label:
             yield Cause("window", (label,), wrong, str(apart), "")
+
+    def _tried_windows(self, where: Sequence[Cause]) -> list[Cause]:
+        """Return causes with a wider window as advice only where a trial of it leaves at most half of the mistakes."""
+        window_ms = max(
+            (cause.arguments["window_ms"] for cause in where if cause.kind == "window" and cause.option), default=0.0
+        )
+        tried = None if self.tried is None or not window_ms else self.tried(window_ms)
+        return [self._with_trial(cause, window_ms, tried) if cause.kind == "window" else cause for cause in where]
+
+    def _with_trial(self, cause: Cause, window_ms: float, tried: Judged | None) -> Cause:
+        """Return that mistakes are beyond the window, with what neuron or rule left of them within a wider one."""
+        (label,), option = cause.labels, f"--window-ms {window_ms:g}"
+        fact = replace(cause, advice="", option="", arguments={})
+        if tried is None or not cause.option:
+            return fact
+        arguments = {"window_ms": window_ms}
+        if left := _left(label, self.scored, tried.together):
+            return replace(
+                cause, measured=f"{cause.measured}; {left}", advice=option, option=option, arguments=arguments
+            )
+        rules = None if tried.plain is None else tried.plain.together
+        if rules is not None and (left := _left(label, self.scored, rules, "the plain rule leaves ")):
+            option = f"{option} --rule FILE"
+            advice = f"a wider window and the plain rule ({option})"
+            return replace(
+                cause, measured=f"{cause.measured}; {left}", advice=advice, option=option, arguments=arguments
+            )
+        return fact
+
+    def _contradicts(self, cause: Cause) -> bool:
+        """Whether most labels that are as of another recording by what was felt were found held out."""
+        scores = [self.scored, *([] if self.plain is None or self.plain.together is None else [self.plain.together])]
+        return cause.kind == "foreign_labels" and any(
+            2 * score[label].found > score[label].events for score in scores for label in cause.labels
+        )
 
     def _unpaired(self, examples: Sequence[Example], label: str) -> Iterator[Cause]:
         """Yield how many labels lie far from what the neuron learnt them by, or are weaker than that."""
@@ -245,19 +297,71 @@ class Mistakes:
         return self.trained.recipe.about == str(recipes.read("touch")["about"])
 
 
+def question(evidence: Evidence) -> str:
+    """Return why labels are asked about before a training; "" where they are not.
+
+    Nearly none is near anything felt, or nearly all of all names are off by one distance. Weak loads are no reason.
+    """
+    if not evidence.falls and not evidence.felt.are_clear:
+        return ""
+    if unfelt := evidence.unfelt():
+        return "; ".join([unfelt, *map(str, evidence.refused()[:1])])
+    counts = Counter(label for example in evidence.sound for label, times in example.labels.items() for _ in times)
+    off = [distance for distance in evidence.felt.distances(counts).values() if not distance.changes_from_label]
+    if sum(distance.beyond for distance in off) < _NEARLY_ALL * counts.total():
+        return ""
+    first = evidence.refused()[0]
+    return str(first) if first.kind == "shifted_labels" and set(first.labels) == set(counts) else ""
+
+
 def by_recipe(name: str, scored: Score, tried: Score, causes: Sequence[Cause]) -> tuple[Cause, ...]:
     """Return causes with that another recipe, which was tried on the same folds, makes at most half the mistakes."""
-    found = []
-    for label, wrong in many_wrong(scored).items():
-        parts = [score.by_label[label] for score in (tried, scored)]
-        left, left_now = (f"{part.missed} missed, {part.false} false" for part in parts)
-        if 2 * parts[0].rank[0] <= wrong:
-            option, measured = (
-                f"--recipe {name}",
-                f"tried on the same folds: {left}, where this training has {left_now}",
-            )
-            found.append(by_option("recipe", label, wrong - parts[0].rank[0], measured, option, recipe=name))
+    found = [
+        by_option("recipe", label, wrong - tried[label].rank[0], measured, f"--recipe {name}", recipe=name)
+        for label, wrong in many_wrong(scored).items()
+        if (measured := _left(label, scored, tried))
+    ]
     return ordered([*causes, *found])
+
+
+def _left(label: str, scored: Score, tried: Score, by: str = "") -> str:
+    """Return what a trial on the same folds left of a label's mistakes, if it is at most half of them; else ""."""
+    left, left_now = (f"{score[label].missed} missed, {score[label].false} false" for score in (tried, scored))
+    halved = 2 * tried[label].rank[0] <= scored[label].rank[0]
+    return f"tried on the same folds: {by}{left}, where this training has {left_now}" if halved else ""
+
+
+def without_explained(warnings: Sequence[str], causes: Sequence[Cause]) -> tuple[str, ...]:
+    """Return warnings without those of too few input spikes where a cause of the same label explains them."""
+    known = tuple(f"{escaped(label)}: " for c in causes if c.kind not in _NO_REASON for label in c.labels)
+    return tuple(text for text in warnings if not (UNLEARNT in text and text.startswith(known)))
+
+
+def _off_in_parts(evidence: Evidence, each: Sequence[Score], wrong: Mapping[str, int]) -> Iterator[Cause]:
+    """Yield in which parts of several recordings labels are off, if these have most mistakes."""
+    if len(each) != len(evidence.sound) or len(each) == 1:
+        return
+    found: dict[str, list[tuple[str, Cause]]] = {label: [] for label in wrong}
+    for k, (example, score) in enumerate(zip(evidence.sound, each, strict=True)):
+        many = {label: s.rank[0] for label in wrong if (s := score.by_label.get(label)) and s.missed >= _LEAST_OFF}
+        alone = evidence.without([other for other in range(len(each)) if other != k]) if many else None
+        for cause in alone.causes(many) if alone is not None else ():
+            if cause.kind == "shifted_labels":
+                found[cause.labels[0]].append((example.name, cause))
+    for label, parts in found.items():
+        mistakes = sum(cause.mistakes for _, cause in parts)
+        if 2 * mistakes > wrong[label]:
+            more = f" and of {counted(len(parts) - _NAMED, 'other recording')} alike" if len(parts) > _NAMED else ""
+            advice = ", ".join(f"of {name} {_moved(cause)}" for name, cause in parts[:_NAMED])
+            measured = "; ".join(f"{name}: {cause.measured.partition(', all ')[0]}" for name, cause in parts[:_NAMED])
+            yield Cause("shifted_labels", (label,), mistakes, measured, f"labels {advice}{more}")
+
+
+def _moved(cause: Cause) -> str:
+    """Return how the labels of a recording are to be moved."""
+    ms = cause.arguments.get("shift_ms", 0.0)
+    whole = f"{abs(ms):.0f} ms {'earlier' if ms < 0 else 'later'}"
+    return whole if cause.option else cause.advice.removeprefix("labels ").removeprefix("of ")
 
 
 def _chance(label: str, scored: Score, plain: PlainScore | None) -> str:

@@ -273,7 +273,7 @@ class Evidence:
         for names in dict.fromkeys([tuple(self._counts), *((label,) for label in wrong)]):
             off = self.felt.part_off(names)
             stretch = "" if off is None else stretch_of(off[0], off[1].members, self.sound)
-            if off is None or not stretch:
+            if off is None or not stretch or not wrong:
                 continue
             (times, alike), side, back = off, *(("after", "earlier") if off[1].ms > 0 else ("before", "later"))
             count, distance = int(alike.members.sum()), f"{abs(alike.ms):.0f} ms"

@@ -62,6 +62,8 @@ TWO_FOLDS = 4
 _MOST_WAIT_MS = 100.0
 #: Where a neuron waits for its first inputs, those of this share of the labels have come.
 _MOST_LABELS = 0.9
+#: Why events cannot be learnt that have too few inputs.
+UNLEARNT = "cannot be learnt, as too few input spikes come before them"
 #: With so many of the quantities that follow the labels best a point is tried.
 _FOLLOWED = 2
 
@@ -666,7 +668,7 @@ def _remarks(
         at = [(targets[p][k] - shift_ms - begins_ms[p], f" of {names[p]}" * (len(targets) > 1)) for p, k in missed]
         times_and_names = [f"{ms:.10g} ms{name}" for ms, name in at]
         listed = ", ".join(times_and_names[:3]) + f" and {len(times_and_names) - 3} more" * (len(times_and_names) > 3)
-        why = f"cannot be learnt, as too few input spikes come before them ({listed})"
+        why = f"{UNLEARNT} ({listed})"
         if found > count - len(missed):
             yield (
                 f"the inputs of {len(missed)} of {counted(count, 'label')} come too late to fire by them ({listed}); "

@@ -24,6 +24,8 @@ from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: The peak that noise does not reach.
 PEAK = 6.0
+#: Loads are clear that have this peak.
+_CLEAR = 20.0
 #: Distances between labels and touches are looked at up to this, ms, and are the same that differ by this.
 _FARTHEST_MS, _SAME_MS = 1000.0, 50.0
 #: Labels are off where this share of them has the same distance, and so many; of fewer chance may do so. They are not
@@ -188,6 +190,14 @@ class FeltLoads:
     def count(self) -> int:
         """How many loads there are."""
         return len(self._spans(self._quantity)[0])
+
+    @property
+    def are_clear(self) -> bool:
+        """Whether the loads are far above the noise of the tare, at the median: no noise, and no tare of loads."""
+        if self._loads is None:
+            return False
+        peaks = self._loads.largest("peak", *self._spans(self._quantity))
+        return len(peaks) > 0 and float(np.median(peaks)) >= _CLEAR
 
     def rank(self, label: str, reach_ms: float) -> int:
         """Return how many labels of a name, and begins of loads, have no pair that near; or ends, if that is fewer."""

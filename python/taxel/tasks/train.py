@@ -19,7 +19,7 @@ from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
 from taxel.detect.cause import OF_DATA, Cause
-from taxel.detect.causes import Mistakes, by_recipe
+from taxel.detect.causes import Mistakes, by_recipe, question, without_explained
 from taxel.detect.evidence import Evidence
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fitting import Trained, fit_aligned
@@ -100,7 +100,7 @@ def train(
     update = reporting(progress)
     with collected() as warnings:
         training = _train(sensors_of(recordings), labels, options, update)
-    return replace(training, warned=tuple(warnings))
+    return replace(training, warned=without_explained(warnings, training.causes))
 
 
 def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainOptions, update: Progress) -> Training:
@@ -207,13 +207,13 @@ class _Work:
     def training(self, plan: Recipe) -> Training:
         """Return the readout with its scores, held out where that can be, and its outcomes on the training data.
 
-        Labels of which nearly none lies near anything felt are refused first. An error says what may help, where the
+        Labels of which nearly none is near anything felt, or nearly all are off, are refused first. An error says what may help, where the
         data show it.
         """
         self.update("looking for what was felt at the labels", 0, 0)
         evidence = Evidence(self.examples, check_examples(self.examples), plan)
-        if not self.options.labels_as_given and (unfelt := evidence.unfelt()):
-            raise helped(ProblemError(f"labels: {unfelt}; {evidence.refused()[0]}"), "labels_as_given", "go_on")
+        if not self.options.labels_as_given and (doubt := question(evidence)):
+            raise helped(ProblemError(f"labels: {doubt}"), "labels_as_given", "go_on")
         try:
             return self._training(plan, evidence)
         except ProblemError as error:
@@ -226,17 +226,26 @@ class _Work:
     def _training(self, plan: Recipe, evidence: Evidence) -> Training:
         folds, search, window_ms = self.options.folds, self.options.search, self.options.window_ms
         count, why = count_of_folds(self.examples) if folds is None else (folds, "" if folds else "folds is 0")
-        begun = perf_counter()
+        begun, given = perf_counter(), plan
         with collected() if search else nullcontext():  # after a search it is trained again
             trained = fit_aligned(self.examples, plan, self.update)
         self._say_how_long(plan, perf_counter() - begun, count)
+        registers = self.opened[0].registers
+        frame_us = None if registers is None else registers.frame_us
+
+        def judged(window_ms: float) -> Judged:
+            how: dict[str, Any] = {"search": search, "window_ms": window_ms, "frame_us": frame_us}
+            return judge(self.examples, given, count, **how, progress=self.update)
+
+        def tried(window_ms: float) -> Judged:
+            self.update(f"many are missed or false beyond the window, so that {window_ms:g} ms is tried too", 0, 0)
+            with collected():
+                return judged(window_ms)
+
         scored = None
         if count:
-            registers = self.opened[0].registers
-            frame_us = None if registers is None else registers.frame_us
-            how: dict[str, Any] = {"search": search, "window_ms": window_ms, "frame_us": frame_us}
             try:
-                scored = judge(self.examples, plan, count, **how, progress=self.update)
+                scored = judged(window_ms)
             except ProblemError as error:
                 # These folds are the default, not a request, and all of the data may still be learnt from.
                 if folds is not None:
@@ -258,7 +267,8 @@ class _Work:
             rules = {label: rule and rule._with(training=data) for label, rule in scored.plain.rules.items()}
             scored = replace(scored, plain=replace(scored.plain, rules=rules))
         scores = scored.together, trained_on.together, scored.scores
-        causes = Mistakes(trained, *scores, search, scored.plain, scored.mistakes, window_ms).causes(evidence)
+        of_window = scored.mistakes, window_ms, tried if count else None
+        causes = Mistakes(trained, *scores, search, scored.plain, *of_window).causes(evidence)
         if evidence.falls and not causes:
             warn(evidence.falls)
         if count:

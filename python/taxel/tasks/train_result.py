@@ -13,7 +13,7 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted, three_digits
 from taxel._base.times import beginning_us
 from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained, recipes
-from taxel.detect.cause import Cause
+from taxel.detect.cause import OF_DATA, Cause
 from taxel.detect.levels import LEAST_LEVELS
 from taxel.detect.mistakes import unreliable
 from taxel.detect.recipe import change_values, with_floor
@@ -56,7 +56,8 @@ class TrainOptions:
     shift_ms : float, ms
         By how much labels are moved before all else, as those of another clock; later is positive.
     labels_as_given : bool
-        Whether it trains also where nearly no label lies near anything that the sensor felt, which is refused else.
+        Whether it trains also where nearly no label is near anything that the sensor felt, or nearly all are off by the
+        same time, which is refused else.
 
     Raises
     ------
@@ -220,7 +221,7 @@ class Training:
             lines.append(f"{label}: neither trained nor scored on {', '.join(sources)}, which no row of labels names")
         for label in self.readout.labels:
             lines += self._scores(label)
-        lines += [*self._better(), *self._advised(), *self._aligned()]
+        lines += [*self._advised(), *self._better(), *self._aligned()]
         if self.options.shift_ms:
             lines.append(f"labels moved by {self.options.shift_ms:+g} ms before, as asked")
         lines += [f"{label}: {chosen}" for label, chosen in self.made.chosen.items()]
@@ -308,7 +309,18 @@ class Training:
         plain = self.scored.plain
         if plain is None or plain.together is None:
             return
-        for label in plain.better(self.scored.together):
+        # Rules that learnt wrong labels, or that are advised already, are no news.
+        known = {
+            label
+            for cause in self._first_causes()
+            if cause.kind in OF_DATA or "--rule" in cause.option
+            for label in cause.labels
+        }
+        better, sooner = (
+            [label for label in of_rule(self.scored.together) if label not in known]
+            for of_rule in (plain.better, plain.sooner)
+        )
+        for label in better:
             rule_score, score = (scores[label] for scores in (plain.together, self.scored.together))
             rule, neuron = (f"{each.rank[0]} missed and false" for each in (rule_score, score))
             when = ""
@@ -318,7 +330,7 @@ class Training:
                 rule += f", known {three_digits(rule_score.delay.median, '+')} ms after the label (median)"
                 neuron += f", {three_digits(score.delay.median, '+')} ms"
             yield f"{label}: the plain rule is better{when}: {rule}; the neuron: {neuron}; {_RULE_FILE}"
-        for label in plain.sooner(self.scored.together):
+        for label in sooner:
             rule_score, score = (scores[label] for scores in (plain.together, self.scored.together))
             yield (
                 f"{label}: the plain rule is as good and knows sooner: {rule_score.rank[0]} missed and false, as the "
