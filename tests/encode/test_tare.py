@@ -96,7 +96,7 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
             "Frames.held fills the missing ones",
         ),
         (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), "start must be before stop|nothing came"),
-        (Tare, "is measured"),
+        (Tare, "measure one by Tare.take"),
         (lambda: Tare.from_json(5), "must be JSON text"),
         (lambda: Tare.from_json("[1"), "tare: "),
         (lambda: Tare.from_json('{"rest": []}'), "tare: array is missing"),

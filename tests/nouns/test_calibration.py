@@ -251,7 +251,7 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (Calibration, "not built"),
+        (Calibration, "make one by Calibration.law"),
         (lambda: Calibration.fit([]), "loads is empty"),
         (lambda: Calibration.fit([Load(frames(0.0), 1.0)]), "load 1: no taxel reads more than 0 counts above its rest"),
         (lambda: Calibration.fit([Load(frames(1.0), -1.0)]), "load 1 is -1: must be above 0"),
