@@ -130,7 +130,7 @@ def test_where_nothing_can_be_learnt_the_error_says_by_how_much_labels_are_off(t
     (tmp_path / "a.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
     in_touch = (truth["contact"][0] + 180_000) / 1e6
     arguments = ("train", tmp_path / "a.npz", "--labels", tmp_path / "a.csv", "--recipe", "touch", "--folds", 2)
-    arguments = (*arguments, "--tare", f"{in_touch:.3f}")
+    arguments = (*arguments, "--labels-as-given", "--tare", f"{in_touch:.3f}")
     code, _, error = call(capsys, *arguments, "-o", tmp_path / "r.json")
     assert (code, error.count("\n")) == (2, 1)
     assert re.search(

@@ -106,8 +106,8 @@ def train(
         bool,
         typer.Option(
             "--labels-as-given",
-            help="Train, without a question, even if almost no label is near anything that the sensor felt, or almost all "
-            "are off by the same time.",
+            help="Train, without a question, even if almost no label is near anything that the sensor felt, or "
+            "almost all are off by the same time.",
         ),
     ] = False,
     report: ReportOption = None,

@@ -207,8 +207,8 @@ class _Work:
     def training(self, plan: Recipe) -> Training:
         """Return the readout with its scores, held out where that can be, and its outcomes on the training data.
 
-        Labels of which nearly none is near anything felt, or nearly all are off, are refused first. An error says what may help, where the
-        data show it.
+        Labels of which nearly none is near anything felt, or nearly all are off, are refused first. An error says what
+        may help, where the data show it.
         """
         self.update("looking for what was felt at the labels", 0, 0)
         evidence = Evidence(self.examples, check_examples(self.examples), plan)
