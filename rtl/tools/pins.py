@@ -31,7 +31,7 @@ WIRES = {
     "eth_tx_clk": ("out", "RGMII to the PHY"),
     "eth_tx_ctl": ("out", "RGMII to the PHY"),
     "eth_tx_data": ("out", "RGMII to the PHY, bit by bit"),
-    "comparators": ("in", "sense lines; pulled down"),
+    "comparators": ("in", "pulled down"),
 }
 
 
