@@ -76,13 +76,13 @@ def labelled(*counts: dict[str, int], gap_us: int = 200_000) -> list[Example]:
         (labelled({"contact": 25, "lift": 7}), 3, ""),
         (labelled({"contact": 60, "lift": 7}), 0, "every lift is in one stretch of the recording"),
         (labelled({"contact": 4}), 2, ""),
-        (labelled({"contact": 3}), 0, "of contact there are 3, and two folds need 4"),
-        (labelled({"contact": 20, "ball": 1}), 0, "of ball there is 1, and two folds need 4"),
+        (labelled({"contact": 3}), 0, "3 labels of contact, and two folds need 4"),
+        (labelled({"contact": 20, "ball": 1}), 0, "1 label of ball, and two folds need 4"),
         (labelled(*[{"contact": 3, "lift": 3}] * 9), 5, ""),
         (labelled(*[{"contact": 9}] * 3), 3, ""),
         (labelled({"contact": 2}, {"contact": 2}, {}), 2, ""),
         (labelled({"contact": 9, "lift": 9}, {"contact": 9}), 0, "every lift is in one recording"),
-        (labelled({"contact": 1}, {"contact": 2}), 0, "of contact there are 3, and two folds need 4"),
+        (labelled({"contact": 1}, {"contact": 2}), 0, "3 labels of contact, and two folds need 4"),
     ],
 )
 def test_folds_are_as_many_as_recordings_and_the_rarest_label_allow(
@@ -154,7 +154,7 @@ def test_events_that_cannot_be_learnt_are_named_from_the_beginning_of_a_recordin
     plan = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "ub": 1e-6, "delay_ms": 1.0})
     with pytest.warns(UserWarning, match=r"cannot be learnt.* \(10 ms\)"):
         fit([Example(frames, {"contact": [begin_us + 10_000]})], plan)
-    with pytest.raises(taxel.ProblemError, match=r"contact at 5000.000 ms lies outside it, 0.000 to 30.000 ms"):
+    with pytest.raises(taxel.ProblemError, match=r"contact at 5000.000 ms is outside it, 0.000 to 30.000 ms"):
         fit([Example(frames, {"contact": [begin_us + 5_000_000]})], plan)
 
 
@@ -224,10 +224,10 @@ def test_only_what_a_fold_tests_is_scored() -> None:
     [
         ([], "folds is empty"),
         ([Fold([Part(0)], [])], "fold 0 is .* must be a Fold with parts to train on and parts to test"),
-        ([Fold([Part(0)], [Part(2)])], "no Part of 2 examples"),
+        ([Fold([Part(0)], [Part(2)])], "not a Part of 2 examples"),
         ([Fold([Part(0)], [Part(1, 5.0, 5.0)])], "must start before it stops"),
         ([Fold([Part(0)], [Part(1)]), Fold([Part(0)], [Part(1, 0.0, 9.0)])], "fold 1: .* is tested twice"),
-        ([Fold([Part(0)], [Part(1)], [Fold([Part(7)], [Part(1)])])], "no Part of 2 examples"),
+        ([Fold([Part(0)], [Part(1)], [Fold([Part(7)], [Part(1)])])], "not a Part of 2 examples"),
         ([((0,), (1,))], "must be a Fold"),
     ],
 )

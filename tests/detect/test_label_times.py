@@ -114,8 +114,8 @@ def test_training_says_first_by_how_much_labels_are_off(tmp_path: Path, capsys, 
     assert code == 2
     side = "after" if shift_ms > 0 else "before"
     found = re.search(
-        rf"^taxel: labels: what may help is --shift-ms (-?\d+): 1\d of 12 lie \d+ ms {side} what the sensor felt.*"
-        "; to continue nonetheless, give --labels-as-given$",
+        rf"^taxel: labels: what may help is --shift-ms (-?\d+): 1\d of 12 are \d+ ms {side} what the sensor felt.*"
+        "; to continue anyway, give --labels-as-given$",
         error,
         re.MULTILINE,
     )
@@ -134,7 +134,7 @@ def test_where_nothing_can_be_learnt_the_error_says_by_how_much_labels_are_off(t
     code, _, error = call(capsys, *arguments, "-o", tmp_path / "r.json")
     assert (code, error.count("\n")) == (2, 1)
     assert re.search(
-        r"nothing was felt .*; what may help is --shift-ms -\d+: 12 of 12 lie \d+ ms after what the sensor felt", error
+        r"nothing was felt .*; what may help is --shift-ms -\d+: 12 of 12 are \d+ ms after what the sensor felt", error
     ), error
 
 

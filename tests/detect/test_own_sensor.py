@@ -250,7 +250,7 @@ def test_where_only_the_first_touches_have_labels_those_of_the_others_may_help()
         causes = Mistakes(made, some, some, searched=True).causes(Evidence([example], check_examples([example]), plan))
         return f"{causes[0].advice}: {causes[0].measured}" if causes else ""
 
-    assert helps(5, 12).startswith("labels of all events: 7.2 of 13.0 s lie before the first or behind the last one")
+    assert helps(5, 12).startswith("labels of all events: 7.2 of 13.0 s are before the first or after the last label")
     assert helps(5, 3).startswith(": no cause was found in the data")
     assert helps(12, 9).startswith(": no cause was found in the data")
     assert helps(12, 12) == ""
@@ -509,7 +509,7 @@ def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed
     cause = first_cause(made, [example], none, none)
     assert cause.kind == "foreign_labels"
     assert re.match(
-        r"\d of 12 labels lies? within 50 ms of where a load begins or ends, as chance has it", cause.measured
+        r"\d of 12 labels (is|are) within 50 ms of where a load begins or ends, as chance has it", cause.measured
     )
 
 

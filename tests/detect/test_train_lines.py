@@ -63,14 +63,14 @@ def test_a_label_of_which_nothing_was_felt_is_named_by_recording_and_time(tmp_pa
     arguments = ("train", first, second, "--labels", labels, "--tare", 0.03, "--overwrite", "-o", tmp_path / "r.json")
     code, out, _ = call(capsys, *arguments)
     assert (code, out.splitlines()[0]) == (0, "held out: whole recordings, 2 folds (window 50 ms)")
-    unlearnt = "contact: no input that contact is learnt from lies within 50 ms of 1 label, not learnt"
+    unlearnt = "contact: no input that contact is learnt from is within 50 ms of 1 label, not learnt"
     assert f"{unlearnt}: {second} at {alone / 1e6:.3f} s" in out
     assert "contact, neuron: 12 of 13 found, 1 missed, 0 false" in out, "it counts as missed"
     result = json.loads(call(capsys, *arguments, "--json")[1])
     assert result["alignment"]["contact"]["unpaired"] == [{"recording": str(second), "t_us": alone}]
     assert result["alignment"]["lift"]["unpaired"] == []
     assert (result["held_out"], result["score"]["missed"]) == (True, 1)
-    assert "\ncontact: no input that contact is learnt from lies within 50 ms of 1 label\n" in out
+    assert "\ncontact: no input that contact is learnt from is within 50 ms of 1 label\n" in out
 
 
 @pytest.mark.parametrize(("folds", "which"), [(2, "held-out labels"), (0, "labels that it was trained on")])
@@ -150,8 +150,8 @@ def test_labels_within_the_refractory_time_are_named_and_leave_no_readout(tmp_pa
 @pytest.mark.parametrize(
     ("count", "options", "why"),
     [
-        (1, (), "of contact there is 1, and two folds need 4"),
-        (3, (), "of contact there are 3, and two folds need 4"),
+        (1, (), "1 label of contact, and two folds need 4"),
+        (3, (), "3 labels of contact, and two folds need 4"),
         (6, ("--folds", 0), "folds is 0"),
     ],
 )

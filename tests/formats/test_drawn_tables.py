@@ -126,7 +126,7 @@ def test_drawn_events_open_by_the_layout_that_is_printed_of_them(order, named, p
         (
             "86399.96 2 3\n0.04 4 3\n",
             "time_column = 1",
-            r"time 0\.04 s does not ascend from 86399\.96 s; if these are times of day, they begin anew at",
+            r"time 0\.04 s does not ascend from 86399\.96 s; if these are times of day, they begin again at",
         ),
         ("1714562289.75 2 3\n1714562289.73 4 3\n", "time_column = 1", r"562289\.73 s does not ascend from \d+\.75 s"),
         ("1 2\n3 4\n", "rows = 2\ncolumns = 2\n[table]", "2 columns; .* states 2 x 2 taxels; if 2 lines are"),

@@ -757,7 +757,7 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
         assert (again, again.to_dict()) == (verdict, verdict.to_dict())
         assert type(again) is Verdict
     assert json.loads(json.dumps([verdict])) == ["LOST: 2 messages dropped by the kernel"]
-    with pytest.raises(taxel.ProblemError, match="make one by Verdict.from_dict"):
+    with pytest.raises(taxel.ProblemError, match=r"make one by Verdict\.from_dict"):
         Verdict("nothing lost")
     verdict.lost["dropped_by_kernel"] = 0
     assert verdict.lost == {"dropped_by_kernel": 2}

@@ -405,9 +405,7 @@ def test_a_long_training_says_how_long_before_its_folds(tmp_path: Path, monkeypa
     steps: list[str] = []
     taxel.train(taxel.open(tmp_path / "a.npz"), [labels], progress=lambda step, *_: steps.append(step))
     (said,) = [step for step in steps if isinstance(step, Forecast)]
-    assert re.fullmatch(
-        r"about \d+ min from here on: one training on all data took [\d.]+ s, and the folds .* 4 of them", said
-    )
+    assert re.fullmatch(r"about \d+ min left: one training on all data took [\d.]+ s, and the folds .* 4 of them", said)
     assert steps.index(said) < steps.index("fold 1 of 5")
 
 
@@ -421,7 +419,7 @@ def test_labels_in_another_unit_of_time_are_asked_for_their_unit(
     words = saved(tmp_path, frames, {label: t // us_by_unit for label, t in labels.items()})
     code, _, error = call(capsys, "train", *words, "-o", tmp_path / "r.json")
     assert code == 2
-    assert "what may help is labels with times in us: the labels lie in the first 0.0" in error
+    assert "what may help is labels with times in us: the labels are in the first 0.0" in error
     assert "--shift-ms" not in error
     table(tmp_path / "right.csv", labels)
     assert call(capsys, "train", words[0], "--labels", tmp_path / "right.csv", "-o", tmp_path / "r.json")[0] == 0

@@ -31,7 +31,7 @@ def asked(name: str, request: Any) -> tuple[dict[str, Any], list[tuple[str, int,
 @pytest.mark.parametrize(
     ("name", "more", "said"),
     [
-        ("trane", {}, "'trane' is no task; there are train, detect, information"),
+        ("trane", {}, "'trane' is not a task; there are train, detect, information"),
         ("train", {"fold": 5}, "fold is no key of train; there are recordings, open, labels, options, out, overwrite"),
         ("train", {"options": {"fold": 5}}, "fold is no field of options; there are recipe, changes, tare, folds,"),
         ("train", {"open": {"pitch": 5}}, "pitch is no field of open; there are array, layout, topic"),
@@ -87,7 +87,7 @@ def test_folds_are_counted_and_the_last_line_is_the_result(tmp_path: Path) -> No
 
 def test_errors_are_a_line_and_an_exit_code(tmp_path: Path) -> None:
     for request, code, kind, said in (
-        ("{", 2, "ProblemError", "the request is no JSON"),
+        ("{", 2, "ProblemError", "the request is not JSON"),
         (json.dumps({"recordings": ["none.npz"], "out": "r"}), 2, "FileNotFoundError", "none.npz: no such file"),
     ):
         done = subprocess.run(

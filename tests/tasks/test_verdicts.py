@@ -120,6 +120,13 @@ def test_a_training_asks_first_about_labels_that_are_all_off_and_about_no_others
         assert asked(*drawn(*SIZES[size], seed, **more)) == ""
 
 
+def test_nothing_is_asked_where_no_label_is_left() -> None:
+    frames, labels = drawn(*SIZES["grid"], 1)
+    fallen = taxel.Frames(510 - 4 * (frames.values - 510), frames.t, unit=frames.unit, array=frames.array)
+    for values in (frames, fallen):
+        assert asked(values, {label: t[:0] for label, t in labels.items()}) == ""
+
+
 def test_a_training_names_the_part_of_each_recording_whose_labels_are_off(tmp_path: Path, capsys: Any) -> None:
     folder, rows, begins = tmp_path / "days", ["recording,label,t_us\n"], []
     folder.mkdir()

@@ -75,6 +75,11 @@ def counted(count: int, noun: str, plural: str | None = None) -> str:
     return f"{count} {noun if count == 1 else plural or f'{noun}s'}"
 
 
+def are(count: int) -> str:
+    """Return the verb of so many: "is" or "are"."""
+    return "is" if count == 1 else "are"
+
+
 def three_digits(value: float, sign: str = "") -> str:
     """Return a number with three digits, from 1000 to a million as a whole one; `sign`: "+" shows that of all.
 

@@ -16,7 +16,7 @@ import typer
 
 import taxel
 from taxel._base.files import check_writable, write_whole
-from taxel._base.messages import counted, plain
+from taxel._base.messages import are, counted, plain
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -355,11 +355,9 @@ def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if facts["missing"]["values"]:
         yield "missing values", f"{facts['missing']['values']} of {facts['missing']['of']}"
     if (full := facts["full_scale"]) is not None:
-        are = "is" if full["readings"] == 1 else "are"
-        readings = (
-            f"{counted(full['readings'], 'reading')} of {counted(full['taxels'], 'taxel')} {are} at {full['value']:g}"
-        )
-        yield "full scale", f"{readings}, the greatest value: larger loads may be cut off"
+        readings = f"{counted(full['readings'], 'reading')} of {counted(full['taxels'], 'taxel')}"
+        greatest = f"{are(full['readings'])} at {full['value']:g}, the greatest value"
+        yield "full scale", f"{readings} {greatest}: larger loads may be cut off"
     if (gaps := facts["gaps"]) is not None and "gaps" not in facts["verdict"].noted:
         yield "gaps", gaps["text"]
 

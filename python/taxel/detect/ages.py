@@ -24,7 +24,7 @@ ACTS_AFTER_MS = to_ms(1.0)
 #: Times that are nearer are the same, ms: stamps are whole us, and since 1970 resolved to a quarter of one.
 _SAME_MS = 5e-4
 #: A neuron that has fired is silent for that share of a frame at least: of stamps that are not regular two frames
-#: may lie in the time of one.
+#: may be in the time of one.
 _SILENT_SHARE = 0.9
 #: A kernel shorter than a frame, which stamps beside the grid would change, and which is silent between frames only
 #: where its grid has points, becomes an exponential one as long as this share, ...

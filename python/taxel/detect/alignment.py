@@ -18,7 +18,7 @@ from taxel.detect.scoring import Score, score
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
-#: How far from its label an input spike may lie, either way, ms.
+#: How far from its label an input spike may be, either way, ms.
 WINDOW_MS = 50.0
 #: Trains with more spikes a label than that are not compared with the labels: they fire throughout.
 _MOST_A_LABEL = 4

@@ -17,7 +17,7 @@ KINDS = (
     "indistinct_kinds", "overfitting", "many_false", "unknown",
 )  # fmt: skip
 
-#: Those that lie in the data: no other recipe helps.
+#: Causes in the data: no other recipe helps.
 OF_DATA = (
     "falling_values", "shifted_labels", "few_labels", "unlabelled_source", "overlapping_loads", "foreign_labels",
     "tare", "begun_loaded", "gaps", "unlabelled_time", "unlabelled_loads",
@@ -88,9 +88,9 @@ class Cause:
 
     Examples
     --------
-    >>> cause = Cause("shifted_labels", ("contact",), 12, "12 of 12 lie 203 ms late", "--shift-ms -203")
+    >>> cause = Cause("shifted_labels", ("contact",), 12, "12 of 12 are 203 ms late", "--shift-ms -203")
     >>> str(cause)
-    'what may help is --shift-ms -203: 12 of 12 lie 203 ms late'
+    'what may help is --shift-ms -203: 12 of 12 are 203 ms late'
     """
 
     kind: str
@@ -145,8 +145,3 @@ def ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
             measured="; ".join(dict.fromkeys((*before.measured.split("; "), *cause.measured.split("; ")))),
         )
     return tuple(sorted(merged.values(), key=lambda cause: (-cause.mistakes, KINDS.index(cause.kind))))
-
-
-def lie(count: int) -> str:
-    """Return the verb of so many that lie somewhere."""
-    return "lies" if count == 1 else "lie"

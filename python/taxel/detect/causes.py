@@ -25,7 +25,7 @@ from taxel.encode import Moments
 
 #: From this share of the time before the first label and behind the last one on, some labels may be missing there.
 _UNLABELLED = 0.25
-#: Kinds of touch are told apart where chance would tell as many with at most this probability.
+#: Kinds of touch are distinguished where chance would distinguish as many with at most this probability.
 _CHANCE = 0.05
 #: Labels are a question before a training if at least this share of them has one distance from what was felt.
 _NEARLY_ALL = 0.9
@@ -111,11 +111,11 @@ class Mistakes:
     def _of_label(
         self, evidence: Evidence, label: str, wrong: int, found: Sequence[Cause], where: Sequence[Cause]
     ) -> list[Cause]:
-        """Return what else concerns a label, beside what was found, and where its mistakes lie."""
+        """Return what else concerns a label, beside what was found, and where its mistakes are."""
         where = [cause for cause in where if label in cause.labels]
         causes = [*self._unlabelled_time(evidence.sound, label), *self._name(label, wrong), *where]
         known = [cause for cause in found if label in cause.labels]
-        # A tare that does not fit lets labels lie far from what is felt, too, and so does what is felt late.
+        # Labels are far from what is felt where a tare does not fit, and where a load is felt late, too.
         unpaired = ("foreign_labels", "unfelt_labels", "tare")
         if not any(cause.kind in unpaired for cause in known) and label not in evidence.felt_apart:
             causes += self._unpaired(evidence.sound, label)
@@ -157,7 +157,7 @@ class Mistakes:
                 yield k, Cause("unlabelled_source", (label,), score.rank[0], measured, advice)
 
     def _unlabelled_time(self, examples: Sequence[Example], label: str) -> Iterator[Cause]:
-        """Yield that events may lack labels before the first and behind the last, where much time lies there."""
+        """Yield that events may lack labels before the first and behind the last, where that is much time."""
         (outside, total), scored = unlabelled_us(examples, label), self.scored[label]
         found = scored.false <= scored.missed and 2 * scored.found >= scored.events
         if not found and outside >= _UNLABELLED * total:
@@ -165,8 +165,8 @@ class Mistakes:
                 "unlabelled_time",
                 (label,),
                 scored.rank[0],
-                f"{outside / 1e6:.1f} of {total / 1e6:.1f} s lie before the first or behind the last one, and an event "
-                "without its label counts as false: label those too, or cut the recording (taxel cut) to what is "
+                f"{outside / 1e6:.1f} of {total / 1e6:.1f} s are before the first or after the last label, and an "
+                "event without its label counts as false: label those too, or cut the recording (taxel cut) to what is "
                 "labelled",
                 "labels of all events",
             )
@@ -218,7 +218,7 @@ class Mistakes:
         )
 
     def _unpaired(self, examples: Sequence[Example], label: str) -> Iterator[Cause]:
-        """Yield how many labels lie far from what the neuron learnt them by, or are weaker than that."""
+        """Yield how many labels are far from what the neuron learnt them by, or are weaker than that."""
         alignment = self.trained.alignments.get(label)
         if alignment is None or not (unpaired := int(alignment.unpaired.sum())):
             return
@@ -226,9 +226,7 @@ class Mistakes:
         if (weaker := of_weak_bursts(examples, label, alignment, mistakes)) is not None:
             yield weaker
             return
-        measured = (
-            f"no input that {label} is learnt from lies within {WINDOW_MS:.0f} ms of {counted(unpaired, 'label')}"
-        )
+        measured = f"no input that {label} is learnt from is within {WINDOW_MS:.0f} ms of {counted(unpaired, 'label')}"
         yield Cause("unfelt_labels", (label,), mistakes, measured, "")
 
     def _name(self, label: str, wrong: int) -> Iterator[Cause]:
@@ -238,8 +236,8 @@ class Mistakes:
         if not kinds or self.scored[label].found or alignment is None or alignment.train is not None:
             return
         measured = (
-            "by this one it is learnt as a kind of touch, told as one begins; names of the end of a touch are "
-            f"{recipes.names_of('touch', 'lift')}"
+            "the recipe touch learns it as a kind of touch, which it detects when a touch begins; names of the end of "
+            f"a touch are {recipes.names_of('touch', 'lift')}"
         )
         yield Cause("label_name", (label,), wrong, measured, "another name of the label")
 
@@ -273,7 +271,7 @@ class Mistakes:
             yield Cause("indistinct_kinds", (label,), wrong, measured, "other kinds")
 
     def _by_chance(self, label: str) -> str:
-        """Return how many of a kind of touch are told, where that is as by chance and there are enough; else ""."""
+        """Return how many of a kind are detected, where chance would detect as many and they are enough; else ""."""
         return _chance(label, self.scored, self.plain) if self.scored[label].events >= FIVE_FOLDS else ""
 
     def _rule(self, label: str, wrong: int) -> Iterator[Cause]:
@@ -300,7 +298,7 @@ class Mistakes:
 def question(evidence: Evidence) -> str:
     """Return why labels are asked about before a training; "" where they are not.
 
-    Nearly none is near anything felt, or nearly all of all names are off by one distance. Weak loads are no reason.
+    Nearly none is near anything felt, or nearly all of all names are off by one distance. Loads must be clear.
     """
     if not evidence.falls and not evidence.felt.are_clear:
         return ""
@@ -310,8 +308,9 @@ def question(evidence: Evidence) -> str:
     off = [distance for distance in evidence.felt.distances(counts).values() if not distance.changes_from_label]
     if sum(distance.beyond for distance in off) < _NEARLY_ALL * counts.total():
         return ""
-    first = evidence.refused()[0]
-    return str(first) if first.kind == "shifted_labels" and set(first.labels) == set(counts) else ""
+    first = next(iter(evidence.refused()), None)
+    shifts_all = first is not None and first.kind == "shifted_labels" and set(first.labels) == set(counts)
+    return str(first) if shifts_all else ""
 
 
 def by_recipe(name: str, scored: Score, tried: Score, causes: Sequence[Cause]) -> tuple[Cause, ...]:
@@ -365,16 +364,16 @@ def _moved(cause: Cause) -> str:
 
 
 def _chance(label: str, scored: Score, plain: PlainScore | None) -> str:
-    """Return how many of a kind of touch are told, where neuron and rule tell no more than chance would; else ""."""
+    """Return how many of a kind of touch are detected, where neuron and rule detect no more than chance; else ""."""
     by = {"the neuron": scored} | ({} if plain is None or plain.together is None else {"the rule": plain.together})
     shares = [_by_chance(label, who, score) for who, score in by.items()]
     return ", ".join(shares) + ", as by chance" if all(shares) else ""
 
 
 def _by_chance(label: str, who: str, together: Score) -> str:
-    """Return how many of a kind are told, and of the others taken for it, where chance may do so (Fisher, one-sided).
+    """Return how many touches of a kind are detected, and how many others as it, where chance may do so.
 
-    Every false detection counts as one at a touch of another kind.
+    Fisher's exact test, one-sided. Every false detection counts as one at a touch of another kind.
     """
     kinds = [score for score in together.by_label.values() if not recipes.knows("touch", score.label)]
     kind = together[label]

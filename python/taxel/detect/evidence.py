@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taxel._base.messages import counted
+from taxel._base.messages import are, counted
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS, Alignment
 from taxel.detect.cause import Cause, by_option, ordered
@@ -17,7 +17,7 @@ from taxel.detect.examples import Example
 from taxel.detect.fitting import TWO_FOLDS
 from taxel.detect.label_times import FeltLoads, Off, early
 from taxel.detect.levels import LEAST_LEVELS, loaded_levels
-from taxel.detect.mistakes import are, overlapping, stretch_of
+from taxel.detect.mistakes import overlapping, stretch_of
 from taxel.detect.recipe import Recipe
 from taxel.detect.tares import TOUCH, held_by_tare, loaded_at_rest, quiet_s
 from taxel.encode import LevelCrossing, ThresholdIzhikevich
@@ -149,7 +149,7 @@ class Evidence:
 
     @cached_property
     def _early(self) -> str:
-        """That the labels of each recording are at its very beginning; empty where they do not."""
+        """That the labels of each recording are at its very beginning; empty where they are not."""
         texts = [
             early(example.labels, int(source.t[0]), int(source.t[-1]))
             for example in self.sound
@@ -293,7 +293,7 @@ class Evidence:
 
     def _of_label(self, label: str, wrong: int) -> Iterator[Cause]:
         if (count := self._counts.get(label, 0)) < TWO_FOLDS:
-            there = f"there {'is' if count == 1 else 'are'} {count}"
+            there = f"there {are(count)} {count}"
             folds = f"{TWO_FOLDS} are the least to score it held out, {FIVE_FOLDS} for five folds"
             yield Cause("few_labels", (label,), wrong, f"{there}; {folds}", "more labels")
         if not self.plan.fit_levels:

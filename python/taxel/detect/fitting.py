@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.arguments import instance, parameters, shown
 from taxel._base.errors import helped
-from taxel._base.messages import collected, counted, warn
+from taxel._base.messages import are, collected, counted, warn
 from taxel._base.progress import Progress, reporting
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
@@ -73,7 +73,7 @@ Known: TypeAlias = dict[tuple[str, ...], list[Followed]]
 
 
 class Trained(NamedTuple):
-    """What one training made.
+    """Hold what one training made.
 
     Attributes
     ----------
@@ -383,7 +383,7 @@ class Fitting:
 
     Raises
     ------
-    ProblemError : no example has such an event, or one lies outside its example (names it); too few quantities
+    ProblemError : no example has such an event, or one is outside its example (names it); too few quantities
     """
 
     def __init__(
@@ -622,9 +622,7 @@ def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     outside = times[(times < source.start) | (times > source.stop + SILENCE_MS)]
     if len(outside):
         at, start, stop = (ms - _begin_ms(source) for ms in (outside[0], source.start, source.stop))
-        raise ProblemError(
-            f"{name_of(k, example)}: {label} at {at:.3f} ms lies outside it, {start:.3f} to {stop:.3f} ms"
-        )
+        raise ProblemError(f"{name_of(k, example)}: {label} at {at:.3f} ms is outside it, {start:.3f} to {stop:.3f} ms")
     return events
 
 
@@ -675,7 +673,7 @@ def _remarks(
                 f"the neuron fires later, and finds {found} of {count}"
             )
         elif count < TWO_FOLDS:
-            there = f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from"
+            there = f"there {are(count)} {counted(count, 'event')} to learn from"
             yield f"{there}; {len(missed)} {why}"
         else:
             yield f"{len(missed)} of {count} events {why}" + "; the others were" * (len(missed) < count)

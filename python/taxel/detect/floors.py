@@ -1,4 +1,4 @@
-"""The noise floor of a sensor that is no board: from the noise of its taxels at rest, in its own unit."""
+"""The noise floor of a sensor that is not a board: from the noise of its taxels at rest, in its own unit."""
 
 from __future__ import annotations
 

@@ -54,10 +54,10 @@ class Part(NamedTuple):
 
     Attributes
     ----------
-    example : int, from 0 on
+    example : int, 0 or more
         Its place among the examples.
     start, stop : float, us
-        What lies in ``start <= t < stop`` belongs to the part; all of it where they are left out.
+        The part has what happens in ``start <= t < stop``; all of it where they are left out.
 
     Raises
     ------
@@ -327,7 +327,7 @@ def _marks(
 ) -> list[tuple[int, float]]:
     """Return the `Score.rank` over all folds of each of several recipes for one label.
 
-    One that cannot be learnt from a fold's training data, but for the first, ranks behind all others.
+    Except the first, a recipe that cannot be learnt from a fold's training data ranks behind all others.
     """
     array = array_of(examples)
     detections: list[dict[int, list[Detections]]] = [{} for _ in plans]
@@ -346,7 +346,7 @@ def _marks(
             if rows is None or not rows.fits(plan):
                 try:
                     rows = Fitting(training, plan, label, array, reporting(None), known=known)
-                except ProblemError:  # as where two labels lie within a longer refractory time
+                except ProblemError:  # as where two labels are within a longer refractory time
                     if m == 0:
                         raise
                     refused.add(m)
@@ -366,7 +366,7 @@ def _marks(
 
 
 def _read(examples: Sequence[Example], patterns: Sequence[Example], readout: Readout, part: Part) -> Sequence[Example]:
-    """Return the examples as spike trains where a readout detects the same at the same times in them, but for `known`.
+    """Return the examples as spike trains where a readout detects the same in them, except `known`.
 
     It does if it receives all of them, and the grid of its neurons, which begins at a whole number of steps, is theirs.
     """
@@ -446,7 +446,7 @@ def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
     recordings = len(_group(examples, parts))
     most = min(_MOST, counts[rarest] // 2, *([recordings] if recordings > 1 else []))
     if most < 2:
-        return 0, f"of {rarest} there {'is' if counts[rarest] == 1 else 'are'} {counts[rarest]}, and two folds need 4"
+        return 0, f"{counted(counts[rarest], 'label')} of {rarest}, and two folds need 4"
     for count in range(most, 1, -1):
         lacking = [_lacks(examples, fold.train, counts) for fold in _split(examples, parts, count)]
         if not any(lacking):
@@ -508,7 +508,7 @@ def _check_folds(folds: Sequence[Fold], examples: int) -> list[Fold]:
 
 def _check_part(where: str, part: object, examples: int) -> Part:
     if not isinstance(part, Part) or not 0 <= (example := integer(f"{where}: example", part.example)) < examples:
-        raise ProblemError(f"{where}: {shown(part)} is no Part of {examples} examples")
+        raise ProblemError(f"{where}: {shown(part)} is not a Part of {examples} examples")
     start, stop = window("us", part.start, part.stop)
     if not start < stop:
         raise ProblemError(f"{where}: {shown(part)} must start before it stops")
@@ -532,7 +532,7 @@ def _split(examples: Sequence[Example], parts: Sequence[Part], count: int) -> li
 
 
 def _within(part: Part, start: float, stop: float) -> Part:
-    """Return what of a part lies between two times; of none a part that does not start before it stops."""
+    """Return the part between two times; it does not start before it stops where nothing is between them."""
     return Part(part.example, max(part.start, start), min(part.stop, stop))
 
 

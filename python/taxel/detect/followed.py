@@ -13,7 +13,7 @@ from taxel.detect.scoring import APART_US, Score, score
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_us
 
-#: How far from its label an onset may lie, either way, ms.
+#: How far from its label an onset may be, either way, ms.
 FOLLOWED_MS = 50.0
 #: Thresholds of a quantity: numbers of taxels, or units of noise.
 _THRESHOLDS = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)

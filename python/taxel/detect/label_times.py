@@ -31,27 +31,27 @@ _FARTHEST_MS, _SAME_MS = 1000.0, 50.0
 #: Labels are off where this share of them has the same distance, and so many; of fewer chance may do so. They are not
 #: where as many are near.
 _SHARE, _LEAST = 0.8, 5
-#: Marks that a hand sets live have a common distance of at most that, ms, and the same share of them lies in a stretch
+#: Marks that a hand sets live have a common distance of at most that, ms, and the same share of them is in a stretch
 #: of at most that, ms; all but a few in so many standard deviations around it, in steps of that, ms.
 _HAND_MS, _HAND_SPREAD_MS, _DEVIATIONS, _STEP_MS = 500.0, 170.0, 3.0, 10.0
-#: A load changes from its label on where it has on the middle part of the way to where it is felt, looked at so often,
-#: of so many labels; what falls has fallen to that share.
+#: A load changes after its label where it has changed in the middle part of the time until it is felt, looked at so
+#: often, of so many labels; what falls has fallen to that share.
 _MIDDLE, _LOOKS, _MOST, _FALLEN = (0.25, 0.75), 8, 0.85, 0.75
 #: The standard deviation of normal values that have the median deviation of 1.
 _NORMAL = 1.4826
-#: Chance brings as many labels to one distance with at most this probability.
+#: Chance gives as many labels one distance with at most this probability.
 _CHANCE = 0.01
 #: Touches that are so many times as many as the labels are at some distance of them by chance.
 _MOST_A_LABEL = 4
-#: So many labels that all lie in the first such share of a recording may be in another unit of time.
+#: So many labels that are all in the first such share of a recording may be in another unit of time.
 _SEVERAL, _FIRST = 4, 0.01
 
 
 class Off(NamedTuple):
-    """By how much labels of one name lie after what was felt, ms; how many lie there, how many of them too far, of all.
+    """By how much labels of one name are after what was felt, ms; how many are there, how many of them too far, of all.
 
     `within_ms` is how far marks that a hand set live spread around that distance; 0 of other labels. `spread_ms` is the
-    distance between the first and the last of those that lie there.
+    distance between the first and the last of those that are there.
     """
 
     ms: float
@@ -61,28 +61,28 @@ class Off(NamedTuple):
     spread_ms: float
     within_ms: float = 0.0
     changes_from_label: bool = False
-    """Whether the load changes from the labels on: it is felt late, as what rises or falls slowly."""
+    """Whether the load changes after the labels: it is felt late, as what rises or falls slowly."""
 
     @property
     def is_far(self) -> bool:
-        """Whether more than a few of the labels lie too far from what was felt to be aligned."""
+        """Whether more than a few of the labels are too far from what was felt to be aligned."""
         return self.beyond > (1 - _SHARE) * self.alike
 
     def __str__(self) -> str:
         side = "after" if self.ms > 0 else "before"
         if self.changes_from_label:
             return (
-                f"the load changes from the labels on, and is felt {abs(self.ms):.0f} ms behind {self.alike} of "
+                f"the load changes after the labels, and is felt {abs(self.ms):.0f} ms behind {self.alike} of "
                 f"{self.labels} (median): slowly, the labels are not off"
             )
         hand = f" and within {self.within_ms:.0f} ms of that, as keys pressed live" if self.within_ms else ""
-        return f"{self.alike} of {self.labels} lie {abs(self.ms):.0f} ms {side} what the sensor felt (median){hand}"
+        return f"{self.alike} of {self.labels} are {abs(self.ms):.0f} ms {side} what the sensor felt (median){hand}"
 
 
 class FeltLoads:
     """Hold when (checked) examples were loaded, to compare labels with: by area, of channels by the peak.
 
-    Loads are measured from the beginning of a tare that is of its own recording, as late labels let it end in a touch.
+    Loads are measured from the beginning of a tare of the same recording, as late labels let it end in a touch.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class FeltLoads:
             self._loads = Loads(early, clocks, floor_of(early), reporting(None), list(self._felt))
 
     def near(self, label: str) -> tuple[int, int, int] | None:
-        """Return how many labels of a name lie within 50 ms of a load, of its begin or end, and how many there are.
+        """Return how many labels of a name are within 50 ms of a load, of its begin or end, and how many there are.
 
         None where it is not known.
         """
@@ -124,7 +124,7 @@ class FeltLoads:
         return self._loads.truth(label, self._loads.whole_examples)
 
     def felt_at(self, times: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return which times lie within 50 ms of a load, and which within 50 ms of its begin or end."""
+        """Return which times are within 50 ms of a load, and which within 50 ms of its begin or end."""
         reach = round(to_us(WINDOW_MS))
         near, at_edge = np.zeros(len(times), np.bool_), np.zeros(len(times), np.bool_)
         for quantity in self._felt:
@@ -136,12 +136,12 @@ class FeltLoads:
         return near, at_edge
 
     def at_edges_by_chance(self, count: int, among: int) -> bool:
-        """Whether chance brings so many of some times within 50 ms of the begins and ends of loads."""
+        """Whether chance places so many of some times within 50 ms of the begins and ends of loads."""
         covered = sum(4 * round(to_us(WINDOW_MS)) * len(self._spans(quantity)[0]) for quantity in self._felt)
         return chance_of(count, among, min(1.0, covered / max(1, self._lasts_us))) > _CHANCE
 
     def overlapped(self, label: str) -> NDArray[np.bool_]:
-        """Return which labels of a name lie while a load lasts that holds two of them or more, far from its ends."""
+        """Return which labels of a name are in a load that holds two of them or more, far from its ends."""
         reach, times = round(to_us(WINDOW_MS)), self.times(label)
         if not len(times):
             return np.zeros(0, np.bool_)
@@ -167,7 +167,7 @@ class FeltLoads:
         return begins, np.minimum(np.minimum(after, np.append(begins[1:], last[-1:])), last)
 
     def strong(self, label: str, names: Iterable[str], times: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which times lie in or beside loads that are about as strong as those with a label, but have none.
+        """Return which times are in or beside loads that are about as strong as those with a label, but have none.
 
         Ends of loads have labels of names of an end anywhere in them, as they may be felt late, begins those of other
         names beside them. A load is as strong that has half the peak that loads with a label have at the median.
@@ -208,7 +208,7 @@ class FeltLoads:
         return min(found.rank[0] for found in scores)
 
     def distances(self, labels: Iterable[str]) -> dict[str, Off]:
-        """Return by how much labels lie after what was felt, of each name of which most lie at one distance.
+        """Return by how much labels are after what was felt, of each name of which most are at one distance.
 
         What was felt are the begins of loads, or the ends of names that say so, of other names whichever more labels
         follow. Where no distance is the same, it is that of marks that a hand set live.
@@ -238,9 +238,9 @@ class FeltLoads:
         return bool(max(share.mean() for name, share in changes.items() if neuron in (None, name)) >= _MOST)
 
     def part_off(self, labels: Sequence[str]) -> tuple[NDArray[np.int64], Alike] | None:
-        """Return labels of some names, and which of them lie at one distance from what was felt, far from all of it.
+        """Return labels of some names, and which of them are at one distance from what was felt, far from all of it.
 
-        The distance is counted from where the other labels of their name lie, as ends may be felt later than begins.
+        The distance is counted from where the other labels of their name are, as ends may be felt later than begins.
         """
         if self._loads is None:
             return None
@@ -267,7 +267,7 @@ class FeltLoads:
 
 
 def _distance(times: NDArray[np.int64], felt: Sequence[NDArray[np.int64]]) -> Off | None:
-    """Return by how much labels lie after begins or ends of loads; None where it is not the same of most."""
+    """Return by how much labels are after begins or ends of loads; None where it is not the same of most."""
     steady = [off for edge in felt for off in _steady(times, edge)]
     near = [off for off in steady if abs(off.ms) <= WINDOW_MS]
     found = near or steady or [off for edge in felt for off in _by_hand(times, edge)]
@@ -275,16 +275,16 @@ def _distance(times: NDArray[np.int64], felt: Sequence[NDArray[np.int64]]) -> Of
 
 
 class Alike(NamedTuple):
-    """Times that lie at one distance after others, ms, and which of the times they are."""
+    """Times that are at one distance after others, ms, and which of the times they are."""
 
     ms: float
     members: NDArray[np.bool_]
 
 
 def same_distance(times: NDArray[np.int64], others: NDArray[np.int64], beyond_ms: float) -> Alike | None:
-    """Return which times lie at one distance from others, of those that have none of these nearer than `beyond_ms`.
+    """Return which times are at one distance from others, of those that have none of these nearer than `beyond_ms`.
 
-    None where they are fewer than five, or as many as chance may bring to one distance.
+    None where they are fewer than five, or as many as may have one distance by chance.
     """
     return _alike([_apart(times, np.sort(others))], [len(times)], beyond_ms)
 
@@ -292,7 +292,7 @@ def same_distance(times: NDArray[np.int64], others: NDArray[np.int64], beyond_ms
 def _alike(
     pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]], counts: Sequence[int], beyond_ms: float
 ) -> Alike | None:
-    """Return which of so many times of several kinds lie at one distance from others, by the pairs of each kind."""
+    """Return which of so many times of several kinds are at one distance from others, by the pairs of each kind."""
     first = np.cumsum([0, *counts])
     apart = np.concatenate([pair[0] for pair in pairs])
     index = np.concatenate([pair[1] + begin for pair, begin in zip(pairs, first[:-1], strict=True)])
@@ -325,14 +325,14 @@ def _apart(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[NDArray[n
 
 
 def _near(apart: NDArray[np.float64], index: NDArray[np.int64]) -> int:
-    """Return how many times lie near enough to be aligned, by their distances."""
+    """Return how many times are near enough to be aligned, by their distances."""
     return len(np.unique(index[np.abs(apart) <= WINDOW_MS]))
 
 
 def _reached(times: NDArray[np.int64], felt: NDArray[np.int64]) -> int:
-    """Return how many of these times lie up to the farthest from a label, at most as many as there are labels.
+    """Return how many of these times are up to the farthest from a label, at most as many as there are labels.
 
-    Labels in another unit of time, which lie close together, all have the same distance from one of them.
+    Labels in another unit of time, which are close together, all have the same distance from one of them.
     """
     far, ordered = round(to_us(_FARTHEST_MS)), np.sort(times)
     first, last = np.searchsorted(ordered, [felt - far, felt + far])
@@ -340,7 +340,7 @@ def _reached(times: NDArray[np.int64], felt: NDArray[np.int64]) -> int:
 
 
 def _by_hand(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[Off]:
-    """Yield the distance around which most labels lie from these times as a hand sets them."""
+    """Yield the distance around which most labels are from these times as a hand sets them."""
     least = int(np.ceil(max(_LEAST, _SHARE * len(times))))
     if _reached(times, felt) < least or len(felt) > _MOST_A_LABEL * len(times):
         return
@@ -373,14 +373,14 @@ def _off(
     labels: int,
     within_ms: float = 0.0,
 ) -> Off:
-    """Return the distance of labels whose pairs lie here."""
+    """Return the distance of labels whose pairs are here."""
     near = np.unique(label_index[here][np.abs(apart[here]) <= WINDOW_MS])
     alike = np.unique(label_index[here])
     return Off(ms, len(alike), len(alike) - len(near), labels, spread_ms, within_ms)
 
 
 def chance_of(least: int, total: int, share: float) -> float:
-    """Return how probable it is that so many of all times, at least, lie in a share of all time."""
+    """Return how probable it is that so many of all times, at least, are in a share of all time."""
     if share >= 1.0 or not least:
         return 1.0
     # Numbers of combinations may be too large for a float.
@@ -410,25 +410,25 @@ def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[Off]:
 
 
 def early(labels: Mapping[str, NDArray[np.int64]], first_us: int, last_us: int) -> str:
-    """Return that all labels of a recording lie in its first hundredth, as times in another unit do; else "".
+    """Return that all labels of a recording are in its first hundredth, as times in another unit are; else "".
 
     Examples
     --------
     >>> early({"contact": np.array([1200, 2400, 3100, 4000])}, 0, 5_000_000)
-    'lie in the first 0.004 s of 5 s: are their times in us?'
+    'are in the first 0.004 s of 5 s: are their times in us?'
     """
     times = np.concatenate([*labels.values(), np.empty(0, np.int64)])
     lasts = last_us - first_us
     latest = int(times.max(initial=first_us)) - first_us
     if len(times) < _SEVERAL or not 0 < latest < _FIRST * lasts:
         return ""
-    return f"lie in the first {latest / 1e6:.3g} s of {lasts / 1e6:.3g} s: are their times in us?"
+    return f"are in the first {latest / 1e6:.3g} s of {lasts / 1e6:.3g} s: are their times in us?"
 
 
 def unlabelled_us(examples: Sequence[Example], label: str) -> tuple[int, int]:
-    """Return how long recordings last further before their first label and behind their last than labels lie apart, us.
+    """Return how long recordings last before their first label and after their last, beyond the distance of labels, us.
 
-    And how long they last. Of an example without the label nothing counts.
+    And how long they last. An example without the label does not count.
 
     Parameters
     ----------

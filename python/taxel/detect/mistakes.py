@@ -8,7 +8,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.messages import counted, of_names
+from taxel._base.messages import are, counted, of_names
 from taxel._base.times import beginning_us
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
@@ -364,8 +364,7 @@ class Measured:
             if self._differs(_Times(missed, false)) or wrong > len(labels):
                 return None
             names_fit = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
-            verb = "is" if len(names) == 1 else "are"
-            return cause(f"{measured}, while {names_fit}: {', '.join(names)} {verb} felt {side} there", "")
+            return cause(f"{measured}, while {names_fit}: {', '.join(names)} {are(len(names))} felt {side} there", "")
         if count < _STRETCH * len(labels):
             where = [self._stretch_in(k, names, missed) for k in np.unique(_example_of(missed)).tolist()]
             measured += f", the other {len(labels) - count} of {len(labels)} labels do not"
@@ -508,11 +507,6 @@ def _of_clock(cause: Callable[..., Cause], ms: float, measured: str, fits: str) 
     measured += f": either these labels are {is_late} or those of the training were {was}"
     advice = f"a look at where a load begins (taxel view); --shift-ms {shift_ms} moves these labels"
     return cause(measured, advice, f"--shift-ms {shift_ms}")
-
-
-def are(count: int) -> str:
-    """Return the verb of so many."""
-    return "is" if count == 1 else "are"
 
 
 def overlapping(label: str, count: int, labels: int, mistakes: int) -> Cause:

@@ -243,7 +243,7 @@ def _between(areas: NDArray[np.float64], second: NDArray[np.bool_]) -> tuple[flo
     """
     order = np.argsort(areas, kind="stable")
     logs, ones = np.log(np.maximum(areas[order], 0.5)), second[order]
-    # By how many values lie below: how many of the first kind are wrong above, and of the second below.
+    # By how many values are below: how many of the first kind are wrong above, and of the second below.
     below_first, below_second = (np.concatenate([[0], np.cumsum(mask)]) for mask in (~ones, ones))
     wrong = below_second + below_first[-1] - below_first
     flipped = len(ones) - wrong

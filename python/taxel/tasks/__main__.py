@@ -1,4 +1,4 @@
-"""Runs one task in a process of its own: ``python -m taxel.tasks NAME``.
+"""Runs one task in a separate process: ``python -m taxel.tasks NAME``.
 
 It reads one JSON object from standard input, to its end, and writes one JSON object a line to standard output::
 
@@ -29,7 +29,7 @@ is either the result, as of its `to_dict()`, with `lines` for people where a res
 
     {"type": "error", "kind": "ProblemError", "text": "walk.mcap: ...", "question": null}
 
-`question` is the same without a remedy where the task goes on if someone confirms it, as `labels_as_given` does.
+`question` is the same without a remedy where the task continues if someone confirms it, as `labels_as_given` does.
 
 Exit codes are those of the command line: 0 done, 2 the request or its recordings are wrong, 3 the system (a disk that
 is full), 130 stopped by Ctrl-C, SIGTERM or SIGHUP. A task that is stopped writes no last line and leaves no file.
@@ -141,7 +141,7 @@ def run(name: str, request: Mapping[str, Any], progress: Progress) -> dict[str, 
     ProblemError : no such task, an unknown key or option (named), or what the task raises
     """
     if name not in _TASKS:
-        raise ProblemError(f"{shown(name)} is no task; there are {', '.join(_TASKS)}")
+        raise ProblemError(f"{shown(name)} is not a task; there are {', '.join(_TASKS)}")
     work, known = _TASKS[name]
     left = mapping("the request", request)
     _refuse_unknown(left, ("recordings", "open", *known, *(["overwrite"] if "out" in known else [])), f"key of {name}")
@@ -207,7 +207,7 @@ def _main() -> NoReturn:
         try:
             request = json.load(sys.stdin)
         except ValueError as error:
-            raise ProblemError(f"the request is no JSON: {error}") from None
+            raise ProblemError(f"the request is not JSON: {error}") from None
         _say(run(name, request, _show))
     except KeyboardInterrupt:
         leave(130)

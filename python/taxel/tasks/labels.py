@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import column, finite, mapping, several, shown
 from taxel._base.errors import refused
-from taxel._base.messages import counted, warn
+from taxel._base.messages import are, counted, warn
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.detect.label_times import early
@@ -28,7 +28,7 @@ GivenLabels: TypeAlias = str | os.PathLike[str] | Sequence[Mapping[str, Any]]
 
 _SIDES = {"left", "right"}
 #: How long after the last event of a board a label may be, us, as people mark late; and from which distance on, the
-#: window of a score, a warning names the label, as no detection can lie near it.
+#: window of a score, a warning names the label, as no detection can be near it.
 _LATE_US, _NEAR_US = 1_000_000, 50_000
 
 
@@ -94,10 +94,8 @@ def moved(
     inside = {label: times[(times >= first) & (times <= last)] for label, times in moved.items()}
     outside = sum(map(len, events.values())) - sum(map(len, inside.values()))
     if outside:
-        are = "is" if outside == 1 else "are"
-        warn(
-            f"{counted(outside, 'label')} of {recording.title} {are} outside it when moved by {shift_ms:g} ms: left out"
-        )
+        are_outside = f"{counted(outside, 'label')} of {recording.title} {are(outside)} outside it"
+        warn(f"{are_outside} when moved by {shift_ms:g} ms: left out")
     return inside
 
 
@@ -154,7 +152,7 @@ def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
         count = counted(sum(row.recording in strange for row in table.rows), "event")
         there = few(dict.fromkeys(recording.title for recording in recordings))
         warn(
-            f"{table.path}: left out {count} of {few(strange)}, which {'is' if len(strange) == 1 else 'are'} "
+            f"{table.path}: left out {count} of {few(strange)}, which {are(len(strange))} "
             f"not among the recordings: {there}",
             stacklevel=3,
         )

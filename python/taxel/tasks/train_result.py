@@ -257,7 +257,7 @@ class Training:
         recipe = self.options.recipe
         if recipe is not None and (kinds := recipes.kinds(recipe, self.readout.labels)):
             yield (
-                f"{', '.join(kinds)}: learnt as a kind of touch, told at an age of the touch; its begin is called "
+                f"{', '.join(kinds)}: learnt as a kind of touch, detected at an age of the touch; its begin is called "
                 f"{recipes.names_of(recipe, 'contact')}; its end {recipes.names_of(recipe, 'lift')}"
             )
 
@@ -267,7 +267,7 @@ class Training:
             levels = ", ".join(f"{level:g}" for level in self.fitted_levels)
             yield (
                 f"levels: {levels} {self.readout.unit}, of the training data, as fewer than {LEAST_LEVELS} of the "
-                "recipe's lie within what loaded taxels read; --set encoder.levels=[...] gives others"
+                "recipe's are within what loaded taxels read; --set encoder.levels=[...] gives others"
             )
 
     def _tares(self) -> Iterator[str]:
@@ -384,7 +384,7 @@ class Training:
                 named = ", ".join(events[:_NAMED]) + more
                 weaker = next((f"; {c.measured}" for c in self.causes if c.kind == "levels" and label in c.labels), "")
                 yield (
-                    f"{label}: no input that {label} is learnt from lies within 50 ms of {labels}, not learnt: {named}"
+                    f"{label}: no input that {label} is learnt from is within 50 ms of {labels}, not learnt: {named}"
                     f"{weaker}"
                 )
 
