@@ -172,12 +172,12 @@ def lines(answer: Answer) -> list[str]:
         "trials the truth is outside it more often than that",
     ]
     text += [f"warning: {warning}" for warning in answer.warnings]
-    text += ["", _row("period", "bits", "events", "mb/event", "kb/s", "silent", "95 % of the full?")]
+    text += ["", _row("period", "bits", "events", "millibits/event", "kb/s", "silent", "95 % of the full?")]
     text += [_point(f"{p.period_ms:g} ms", p, answer) for p in answer.by_period]
     if answer.taxels:
         text += [
             "",
-            _row(f"taxels at {answer.taxels[0].period_ms:g} ms", "bits", "events", "mb/event", "kb/s", "silent", ""),
+            _row(f"taxels at {answer.taxels[0].period_ms:g} ms", "bits", "events", "millibits/event", "kb/s", "silent", ""),
         ]
         text += [_point(f"{p.taxels} {p.kind}", p, answer) for p in answer.taxels]
     text += [""]
@@ -218,7 +218,7 @@ def _point(name: str, point: Point, answer: Answer) -> str:
 
 def _row(*cells: str) -> str:
     name, bits, events, each, rate, silent, verdict = cells
-    return f"{name:<18} {bits:>6} {events:>8} {each:>9} {rate:>8} {silent:>7}  {verdict}".rstrip()
+    return f"{name:<18} {bits:>6} {events:>8} {each:>16} {rate:>8} {silent:>7}  {verdict}".rstrip()
 
 
 def _bits(estimate: Estimate | None) -> str:
