@@ -482,7 +482,7 @@ def test_a_recording_that_is_converted_beside_its_layout_is_turned_once(
 def test_turned_readings_are_not_written_where_a_layout_would_turn_them_again(tmp_path: Path) -> None:
     recording = table(tmp_path, lines(VALUES), "falls = true\nrate_hz = 100")
     with pytest.raises(
-        taxel.ProblemError, match=r"turned already, which a \.csv cannot state, and .*step\.layout\.toml"
+        taxel.ProblemError, match=r"inverted already, which a \.csv cannot state, and .*step\.layout\.toml"
     ):
         taxel.convert(recording, tmp_path / "step.csv")
     assert "that its readings were inverted (falls = 0)" in taxel.convert(recording, tmp_path / "other.csv")
