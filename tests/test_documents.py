@@ -98,7 +98,7 @@ def test_what_is_too_long_is_refused_by_what_it_is(tmp_path: Path) -> None:
     (path := tmp_path / "a.json").write_text('{"a": "' + "x" * BY_HAND + '"}')
     with refused("more than 1048576 bytes", FormatError):
         recipes.read(path)
-    with refused("not JSON|does not say|tare", FormatError) as caught:
+    with refused("not JSON|is missing|tare", FormatError) as caught:
         taxel.Tare.load(path)
     assert "bytes" not in str(caught.value)
     with path.open("wb") as file:

@@ -456,7 +456,9 @@ class Array:
         """Return the distances between rows and between columns, mm, for `purpose` that needs them."""
         pitch = self.pitch_mm
         if pitch is None:
-            raise ProblemError(f"{purpose} needs mm, and the pitch of {self.name} is not known: give its pitch_mm")
+            raise ProblemError(
+                f"{purpose} needs distances in mm, but the pitch of {self.name} is not known: give its pitch_mm"
+            )
         return pitch if isinstance(pitch, tuple) else (pitch, pitch)
 
     def _apart(self) -> str:

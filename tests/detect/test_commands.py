@@ -157,10 +157,12 @@ def test_how_labels_name_trials_of_a_file_is_said_in_short_lines(tmp_path: Path,
     assert (code, "must have the column recording, with names as subj900/00" in error) == (2, True), error
     code, _, error = call(capsys, "info", file, "--table", tmp_path / "p.csv")
     assert code == 2
-    assert f"a table is of one recording: taxel convert {file} FOLDER writes each to a separate file" in error
+    assert (
+        f"a table can contain only one recording: taxel convert {file} FOLDER writes each to a separate file" in error
+    )
     assert call(capsys, "convert", file, tmp_path / "each")[0] == 0
     code, _, error = call(capsys, "info", tmp_path / "each", "--table", tmp_path / "p.csv")
-    assert (code, "a table is of one recording: taxel info " in error) == (2, True), error
+    assert (code, "a table can contain only one recording: taxel info " in error) == (2, True), error
     for several in (file, tmp_path / "each"):
         picture = tmp_path / f"{several.name}.svg"
         code, said, _ = call(capsys, "info", several, "--picture", picture)

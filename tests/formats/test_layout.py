@@ -470,7 +470,8 @@ def test_a_recording_that_is_converted_beside_its_layout_is_turned_once(
         given.write_text(f"falls = {other}\n")
         was = falls.replace("true", "0")
         with pytest.raises(
-            FormatError, match=f"states falls = {other}; the readings of .* were turned by falls = {was}"
+            FormatError,
+            match=f"states falls = {other}, but the readings of .* were already inverted with falls = {was}",
         ):
             taxel.open(recording.path, layout=given)
     given.write_text('heel = "bottom"\n')
@@ -481,10 +482,10 @@ def test_a_recording_that_is_converted_beside_its_layout_is_turned_once(
 def test_turned_readings_are_not_written_where_a_layout_would_turn_them_again(tmp_path: Path) -> None:
     recording = table(tmp_path, lines(VALUES), "falls = true\nrate_hz = 100")
     with pytest.raises(
-        taxel.ProblemError, match=r"turned already, which a \.csv cannot state, and .*step\.layout\.toml"
+        taxel.ProblemError, match=r"inverted already, which a \.csv cannot state, and .*step\.layout\.toml"
     ):
         taxel.convert(recording, tmp_path / "step.csv")
-    assert "that its readings were turned (falls = 0)" in taxel.convert(recording, tmp_path / "other.csv")
+    assert "that its readings were inverted (falls = 0)" in taxel.convert(recording, tmp_path / "other.csv")
 
 
 def test_a_layout_for_tables_says_nothing_of_a_board_s_recording_in_the_same_folder(tmp_path: Path) -> None:

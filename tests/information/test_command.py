@@ -202,7 +202,7 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
             "line 2: '9' is in a column without a name",
         ),
         ("\n\n", [], "labels.csv: holds nothing; must be recording,t_us,label"),
-        (GOOD, ["--periods", "fast"], "must be numbers, as 1,2,5"),
+        (GOOD, ["--periods", "fast"], "must be numbers, for example 1,2,5"),
         (GOOD, ["--periods", "0"], "--periods is [0.0]: must be whole us"),
         (GOOD, ["--windows", "1000"], "--windows is [1000.0]: must be in"),
         (GOOD, ["--pools", "40"], "--pools is [40]: the array is"),

@@ -306,7 +306,7 @@ def test_on_a_grid_a_margin_decides_and_a_target_is_a_point():
     assert held == {False, True}
     between = [t + 0.5 for t in targets]
     cone.fit(patterns, between)
-    assert "is between grid points" in check_solution(cone, patterns, between).wrong
+    assert "is between two time steps" in check_solution(cone, patterns, between).wrong
 
 
 def test_a_cone_r_holds_where_it_meets_every_target():

@@ -136,8 +136,11 @@ def test_without_a_pitch_a_grid_counts_in_columns_and_rows_and_channels_refuse()
 @pytest.mark.parametrize(
     ("work", "match"),
     [
-        (lambda: taxel.encode.Skin(seed=1).afferents(Array(8, 8, name="mat")), "skin needs mm, and the pitch of mat"),
-        (lambda: taxel.encode.Skin(seed=1).afferents(FOOT), "skin needs one pitch, and foot has a place"),
+        (
+            lambda: taxel.encode.Skin(seed=1).afferents(Array(8, 8, name="mat")),
+            "skin needs distances in mm, but the pitch of mat",
+        ),
+        (lambda: taxel.encode.Skin(seed=1).afferents(FOOT), "skin needs one pitch, but foot has a place"),
         (lambda: _moments(Array(4, 4, name="mat"), displacement_mm=(1.0, 9.0)), "displacement_mm needs mm"),
         (lambda: _moments(Array(1, 4, name="foot"), area=(1.0, 9.0)), "moments needs neighbours on a grid; foot"),
         (lambda: _encode(taxel.encode.ContactArea, Array(1, 4, name="foot")), "contact area needs neighbours"),
@@ -145,7 +148,7 @@ def test_without_a_pitch_a_grid_counts_in_columns_and_rows_and_channels_refuse()
         (lambda: taxel.simulate.Layer(array=Array(8, 8, name="mat")), "the pitch of mat is not known"),
         (lambda: taxel.simulate.Layer(array=Array(8, 8, (2.0, 3.0), name="mat")), "same pitch between rows"),
         (lambda: taxel.metrics.van_rossum_spatial(_trains(), _trains(), array=Array(2, 2, name="mat")), "pitch of mat"),
-        (lambda: Array(2, 2, name="mat").row_mm, "row_mm needs mm, and the pitch of mat"),
+        (lambda: Array(2, 2, name="mat").row_mm, "row_mm needs distances in mm, but the pitch of mat"),
     ],
 )
 def test_what_needs_mm_or_neighbours_refuses_by_name(work: Callable[[], object], match: str) -> None:

@@ -36,7 +36,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "losses.truncated": ("that its end is missing",),
     "losses.rebuilt": ("the remarks on reading it",),
     "frame_table.untimed": ("that its frames have no times",),
-    "frame_table.turned": ("that its readings were turned",),
+    "frame_table.turned": ("that its readings were inverted",),
     "frame_table.frame_us": ("the length of a frame that a readout assumed",),
     "stream.columns": ("the names of the columns",),
     "stream.samples": ("the lines of the stream as they came",),

@@ -126,7 +126,7 @@ def test_info_of_a_folder_says_all_of_them(tmp_path: Path) -> None:
     assert head == f"{tmp_path}: 2 recordings"
     assert [row.split()[0] for row in rows] == ["walk0.npz", "walk1.npz"]
     assert last.split()[2:4] == ["80", "events"]
-    assert end == "--each prints all facts about each"
+    assert end == "--each prints all facts about each recording"
     each = run("info", tmp_path, "--each").stdout
     assert [f"walk{k}.npz: .npz" in each for k in range(2)] == [True, True]
 

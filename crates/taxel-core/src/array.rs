@@ -257,10 +257,9 @@ impl Array {
     pub fn pitch(&self, subject: &str) -> Result<Pitch> {
         let name = &self.name;
         self.pitch_mm.ok_or_else(|| match self.places {
-            None => {
-                problem!("{subject} needs mm, and the pitch of {name} is not known").with_hint("array", Hint::Pitch)
-            }
-            Some(_) => problem!("{subject} needs one pitch, and {name} has a place for each taxel"),
+            None => problem!("{subject} needs distances in mm, but the pitch of {name} is not known")
+                .with_hint("array", Hint::Pitch),
+            Some(_) => problem!("{subject} needs one pitch, but {name} has a place for each taxel"),
         })
     }
 
@@ -369,7 +368,13 @@ mod tests {
     #[test]
     fn what_needs_mm_or_neighbours_refuses_by_name() {
         let channels = Array::unmeasured(1, 8, "foot");
-        assert!(channels.pitch("skin").unwrap_err().to_string().contains("skin needs mm, and the pitch of foot"));
+        assert!(
+            channels
+                .pitch("skin")
+                .unwrap_err()
+                .to_string()
+                .contains("skin needs distances in mm, but the pitch of foot")
+        );
         assert!(channels.check_neighbours("area").unwrap_err().to_string().contains("area needs neighbours"));
         Array::new(1, 8, 5.0, "line").unwrap().check_neighbours("area").unwrap();
         Array::unmeasured(2, 8, "grid").check_neighbours("area").unwrap();

@@ -240,11 +240,11 @@ def _described(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     read = {1: (np.lib.format.read_array_header_1_0, 2), 2: (np.lib.format.read_array_header_2_0, 4)}
     version = np.lib.format.read_magic(file)
     if version[0] not in read:
-        raise ValueError(f"version {version[0]} of the description; there are 1 and 2")
+        raise ValueError(f"the header has version {version[0]}; versions 1 and 2 are read")
     parse, width = read[version[0]]
     field = file.read(width)
     if (length := int.from_bytes(field, "little")) > _HEADER:
-        raise ValueError(f"a description of {length} bytes; at most {_HEADER} are read")
+        raise ValueError(f"the header has {length} bytes; at most {_HEADER} are read")
     shape, fortran, dtype = parse(io.BytesIO(field + file.read(length)))
     if any(isinstance(n, bool) or n < 0 for n in shape):
         raise ValueError(f"shape {shape}")

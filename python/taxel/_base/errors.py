@@ -111,7 +111,7 @@ _ABOUT = {
         ...     taxel.simulate.Scene.draw(0, array=taxel.Array(8, 8))
         ... except taxel.SceneError as error:
         ...     print(error)
-        a scene needs mm, and the pitch of array is not known; give array with the pitch in mm...
+        a scene needs distances in mm, but the pitch of array is not known; give array with the pitch in mm...
         """,
     ),
 }

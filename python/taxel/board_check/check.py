@@ -183,7 +183,9 @@ class _Check:
         """Tell what the comparators do."""
         driven = found.silent[:, : found.registers.lines]
         quiet = lines_of(driven)
-        where = f"; {quiet}: their comparators, if no current flows there" if quiet else ""
+        where = (
+            f"; look at the comparators and the current of {quiet}, where all taxels stay at 0 or 1" if quiet else ""
+        )
         words = f"comparators had not returned when their ramp began, {counted(found.faults, 'time')}{where}"
         self.tell(
             "comparators", found.faults == 0, words if found.faults else "all had returned when their ramps began"
@@ -289,7 +291,7 @@ def check_board(
     if not 0.1 <= number("seconds", seconds) <= 3600:
         raise refused("seconds", f" is {seconds:g}: must be from 0.1 to 3600")
     if preset is not None and text("preset", preset) not in PRESETS:
-        raise ProblemError(f"preset {preset!r}: there are {', '.join(map(repr, PRESETS))}")
+        raise ProblemError(f"preset {preset!r} is not known; presets: {', '.join(map(repr, PRESETS))}")
     if preset is not None and place is not None:
         raise refused("preset", ": the board on the serial line states its registers: leave it out")
     check = _Check(None if say is None else callback("say", say))

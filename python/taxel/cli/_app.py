@@ -31,7 +31,7 @@ SecondsOption = Annotated[
 
 #: What a command prints, and whether it may replace what it writes.
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
-OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace files that are written, if they exist.")]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace output files that exist already.")]
 
 
 #: What can be done instead of giving an option twice.

@@ -106,7 +106,7 @@ def apply(
     Example: taxel device apply /dev/ttyACM0 "2 kHz"
     """
     if preset not in PRESETS:
-        raise ProblemError(f"preset {preset!r}: there are {', '.join(map(repr, PRESETS))}")
+        raise ProblemError(f"preset {preset!r} is not known; presets: {', '.join(map(repr, PRESETS))}")
     with Device(place, baud=baud) as device:
         _print(device, device.apply(preset), as_json)
 

@@ -180,11 +180,11 @@ def _several(file: Path, recordings: Sequence[Recording]) -> str:
     if len(recordings) > 1:
         alone = f"taxel convert {quote(str(file))} FOLDER writes each to a separate file"
         alone = f"taxel info {quote(str(recordings[0].path))} --table FILE.csv" if file.is_dir() else alone
-        return f"{file}: holds {len(recordings)} recordings; a table is of one recording: {alone}"
+        return f"{file}: holds {len(recordings)} recordings; a table can contain only one recording: {alone}"
     names = ", ".join(recordings[0].sources)
     return (
-        f"{file}: holds {len(recordings[0].sources)} sources ({names}); a table is of one source: taxel convert "
-        "--source NAME writes a source to a separate file"
+        f"{file}: holds {len(recordings[0].sources)} sources ({names}); a table can contain only one source: "
+        "taxel convert --source NAME writes a source to a separate file"
     )
 
 
@@ -234,7 +234,7 @@ def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:
         *("  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows),
         *([f"notes: {of_notes}"] if notes else []),
         *(f"{counted(count, 'recording')}: {verdict}" for verdict, count in faults.items()),
-        "--each prints all facts about each",
+        "--each prints all facts about each recording",
     ]
 
 
@@ -331,7 +331,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         reference = facts["against"]
         yield (
             f"clock of {reference['source']}",
-            f"{reference['offset_us']:+d} us at the beginning, {reference['drift_ppm']:+.1f} ppm faster",
+            f"ahead by {reference['offset_us']:+d} us at the beginning, faster by {reference['drift_ppm']:+.1f} ppm",
         )
         # A source of events states its own drift, and its doubt, below.
         if "events" not in facts and (wrong := doubt(reference["drift_ppm"], 0.0)):

@@ -86,10 +86,10 @@ def information(
         encoder,
         assignments(values or []),
         window_ms,
-        _parse_numbers("--windows", windows_ms, float_of, "numbers, as 1,2,5"),
-        _parse_numbers("--periods", periods_ms, float_of, "numbers, as 1,2,5"),
-        _parse_numbers("--taxels", taxels, int_of, "whole numbers, as 10,30"),
-        _parse_numbers("--pools", pools, int_of, "whole numbers, as 10,30"),
+        _parse_numbers("--windows", windows_ms, float_of, "numbers, for example 1,2,5"),
+        _parse_numbers("--periods", periods_ms, float_of, "numbers, for example 1,2,5"),
+        _parse_numbers("--taxels", taxels, int_of, "whole numbers, for example 10,30"),
+        _parse_numbers("--pools", pools, int_of, "whole numbers, for example 10,30"),
         draws,
         shuffles,
         folds,
@@ -143,11 +143,12 @@ class _KnownBits:
     def line(self, draws: int) -> str:
         """Return one line of all settings so far."""
         if not self._bits:
-            return "stopped; no setting is done yet"
+            return "stopped before the bits of any setting were known"
         counts = sorted({count for by_window in self._bits.values() for _, count in by_window.values()})
         done = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
         by_period = "; ".join(
-            f"{period:g} ms: " + ", ".join(f"{bits:.2f} to {window:g} ms" for window, (bits, _) in by_window.items())
+            f"period {period:g} ms: "
+            + ", ".join(f"{bits:.2f} within {window:g} ms" for window, (bits, _) in by_window.items())
             for period, by_window in self._bits.items()
         )
         return f"stopped; bits of {done} of {counted(draws, 'draw')}, without intervals: {by_period}"

@@ -54,11 +54,11 @@ def train(
     recipe: Annotated[
         str | None,
         typer.Option(
-            help="The recipe to start from: touch (events of a board; on any grid, all labels except those of steps), "
-            "event_counts (counts of an event camera), gait_plate (counts), gait_insole (N), gait_channel (others); or "
-            "a TOML or JSON file (a path with a dot or a slash): [encoder] or [encoders.NAME], [learner], "
-            "[neurons.LABEL], run_threshold, align. Default, without --encoder: the recipe that fits the recording "
-            "and its labels."
+            help="The recipe to start from. touch: for events of a board, and for frames of a grid if labels are not "
+            "of steps; event_counts: for counts of an event camera; gait_plate, gait_insole, gait_channel: for steps, "
+            "in counts, in N, and in other units. Or the path (with a dot or a slash) of a TOML or JSON file with "
+            "[encoder] or [encoders.NAME], [learner], [neurons.LABEL], run_threshold and align. Default, without "
+            "--encoder: the recipe that fits the recording and its labels."
         ),
     ] = None,
     encoder: Annotated[

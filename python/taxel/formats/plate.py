@@ -34,8 +34,8 @@ FRAME_US = 2000
 ROW_MM, COLUMN_MM = 7.62, 5.08
 
 _SOURCE = (
-    "the full plate itself: contact and foot-off are its first and last loaded frame, heel-off the heel region's "
-    "fall below 5 % of its peak"
+    "the full plate itself: contact and foot-off are its first and last loaded frame; heel-off is the time when the "
+    "load of the heel region falls below 5 % of its peak"
 )
 
 

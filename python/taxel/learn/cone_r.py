@@ -309,7 +309,10 @@ class ConeRProblem:
                     name, f": {len(bound)} bounds for {self._trains} trains, must be one per train, or one for all"
                 )
             if away(bound, 0.0)[silent if bound.ndim else ...].any():
-                raise refused(name, ": holds a train without a spike away from 0; lay the rows out with these bounds")
+                raise refused(
+                    name,
+                    ": forbids the weight 0 of a train without spikes; prepare the rows by a ConeR of these bounds",
+                )
             largest = np.maximum(largest, np.abs(bound[silent] if bound.ndim else bound))
             if bound.ndim:
                 plain[name] = bound[self._counted].tolist()

@@ -142,7 +142,9 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
             elif fires is None:
                 unproven.append(f"pattern {p}: whether it fires at target {k} ({t:g} ms) is not proven")
             if rows.on_grid and not rows.is_point(float(t)):
-                wrong.append(f"pattern {p}: target {k} ({t:g} ms) is between grid points, where no neuron fires")
+                wrong.append(
+                    f"pattern {p}: target {k} ({t:g} ms) is between two time steps; a neuron fires only at a time step"
+                )
             if not rows.on_grid:
                 slope = min(slope, float(-rows.slope(k)[0] @ w + rows.fall(k)))
         exponentials = exact.left

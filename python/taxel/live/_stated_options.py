@@ -69,7 +69,7 @@ class StatedOptions:
     )
     record: str | os.PathLike[str] | None = option(None, "Record in a new file (.mcap or .lsa).")
     record_later: bool = option(
-        False, "Recordings begin and end while it runs (`record`, `end_recording`).", commands=""
+        False, "Let `record` and `end_recording` begin and end recordings while the `Live` runs.", commands=""
     )
     name: str = option("board", "The board's name among the sources of the recording.", commands="record")
     sources: Mapping[str, str] | str | Sequence[str] | None = option(
@@ -86,7 +86,7 @@ class StatedOptions:
         3.0, "How long each source of lines may be silent before its first line, s.", least=0, commands=""
     )
     compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.", commands="record")
-    overwrite: bool = option(False, "Replace files that are written, if they exist.", commands="live record")
+    overwrite: bool = option(False, "Replace output files that exist already.", commands="live record")
     guard_frames: float = option(
         5.0, "How far, in frames, a readout stays behind the host's clock while no events arrive.", least=0
     )

@@ -74,8 +74,8 @@ class Live:
     record : path, optional
         Record in a new file (.mcap or .lsa). `.mcap` holds all data, `.lsa` the raw bytes of the manual.
     record_later : bool
-        Recordings begin and end while it runs (`record`, `end_recording`). Then none begins here, and `sources` are
-        recorded while one runs.
+        Let `record` and `end_recording` begin and end recordings while the `Live` runs. Then none begins when the
+        `Live` begins; `sources` are recorded while a recording runs.
     name : str
         The board's name among the sources of the recording.
     sources : mapping of str to str or str or sequence of str, optional
@@ -96,7 +96,7 @@ class Live:
     compression : str
         Compression of a .mcap: none, lz4 or zstd.
     overwrite : bool
-        Replace files that are written, if they exist.
+        Replace output files that exist already.
     guard_frames : float, 0 or more
         How far, in frames, a readout stays behind the host's clock while no events arrive.
     gap_frames : float, 0 or more

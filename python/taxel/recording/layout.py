@@ -113,7 +113,8 @@ def _apply_layout(source: RecordedSource, layout: Layout, *, given: bool) -> Rec
     if strict and was is not None and layout.falls is not None and layout.turned != was:
         falls = "false" if layout.turned is None else f"{layout.turned:g}"
         raise FormatError(
-            f"{layout.path}: states falls = {falls}; the readings of {name} were turned by falls = {was:g}"
+            f"{layout.path}: states falls = {falls}, but the readings of {name} were already inverted with falls = "
+            f"{was:g}; leave falls out"
         )
     full = layout.turned if was is None else None
     # Read at once, so that a layout that contradicts the file is refused where the file is opened.
@@ -159,7 +160,7 @@ _ALONG = ("gaitpdb",)
 _ALONE = ("table", "arrays", "npz", "h5", "csv")
 
 
-#: Kinds of files that state their sensor, unit, times, and whether readings were turned, as far as these are known.
+#: Kinds of files that state their sensor, unit, times, and whether readings were inverted, as far as these are known.
 _STATING = ("mcap", "npz", "h5")
 
 

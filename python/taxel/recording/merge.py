@@ -259,7 +259,7 @@ class _Merging:
         return sections.FrameTable(
             known(_frames(tables, self.shifts, self.array, self.lefts if self.beside else None)),
             all(table.untimed for table in frames),
-            self.agreed((table.turned for table in frames), None, "whether readings were turned"),
+            self.agreed((table.turned for table in frames), None, "whether readings were inverted"),
             self.agreed((table.frame_us for table in frames), None, "the time from one frame to the next"),
         )
 

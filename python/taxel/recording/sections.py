@@ -239,7 +239,7 @@ class FrameTable:
     def losses(self) -> list[str]:
         """Return what a file without this section does not hold, except the frames."""
         lines = ["that its frames have no times"] * self.untimed
-        lines += [] if self.turned is None else [f"that its readings were turned (falls = {self.turned:g})"]
+        lines += [] if self.turned is None else [f"that its readings were inverted (falls = {self.turned:g})"]
         return lines + (
             [] if self.frame_us is None else [f"the length of a frame that a readout assumed, {self.frame_us:g} us"]
         )

@@ -229,7 +229,9 @@ impl Body {
             Move::Rolled(along) => {
                 along.check(&moves("rolled"))?;
                 if self.shape.turns().0 + self.shape.turns().1 == 0.0 {
-                    return Err(Error::scene(format!("{path}: only a sphere or a cylinder rolls; let it be slid")));
+                    return Err(Error::scene(format!(
+                        "{path}: only a sphere or a cylinder can roll; use the motion slid"
+                    )));
                 }
             }
             Move::Slid(along) => along.check(&moves("slid"))?,

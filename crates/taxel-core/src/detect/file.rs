@@ -22,7 +22,7 @@ pub(super) fn parts(name: &str, text: &str, formats: &[&'static str]) -> Result<
     };
     let stated = object.remove("format");
     let Some(stated) = stated else {
-        return Err(format(format!("has no \"format\": {names}, so it is not such a file")));
+        return Err(format(format!("the key \"format\" is missing, must be {names}")));
     };
     let Some(&name) = formats.iter().find(|&&name| stated == name) else {
         return Err(format(format!("format is {stated}, must be {names}")));

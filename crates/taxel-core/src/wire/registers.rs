@@ -66,7 +66,7 @@ impl Registers {
     pub fn preset(name: &str) -> Result<Self> {
         match PRESETS.iter().find(|preset| preset.name == name) {
             Some(preset) => Ok(preset.registers),
-            None => Err(problem!("preset {name:?}: there are {}", preset_names(&PRESETS))),
+            None => Err(problem!("preset {name:?} is not known; presets: {}", preset_names(&PRESETS))),
         }
     }
 
@@ -82,7 +82,7 @@ impl Registers {
         if !fitting().any(|preset| preset.name == name) {
             let Array { rows, columns, .. } = array;
             return Err(problem!(
-                "preset {name:?} is not made for a board of {rows} x {columns} taxels: there are {}",
+                "preset {name:?} is not for a board of {rows} x {columns} taxels; presets of that size: {}",
                 preset_names(fitting())
             ));
         }

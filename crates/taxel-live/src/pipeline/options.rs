@@ -92,9 +92,9 @@ options! {
         /// `.mcap` holds all data, `.lsa` the raw bytes of the manual.
         #[serde(serialize_with = "shown")]
         record: Option<PathBuf> = None, "python" = "str | os.PathLike[str] | None";
-        /// Recordings begin and end while it runs (`record`, `end_recording`).
+        /// Let `record` and `end_recording` begin and end recordings while the `Live` runs.
         ///
-        /// Then none begins here, and `sources` are recorded while one runs.
+        /// Then none begins when the `Live` begins; `sources` are recorded while a recording runs.
         record_later: bool = false, "commands" = "";
         /// The board's name among the sources of the recording.
         name: String = "board".to_owned(), "commands" = "record";
@@ -120,7 +120,7 @@ options! {
         first_line_s: f64 = 3.0, "commands" = "", "minimum" = 0;
         /// Compression of a .mcap: none, lz4 or zstd.
         compression: String = "none".to_owned(), "commands" = "record";
-        /// Replace files that are written, if they exist.
+        /// Replace output files that exist already.
         overwrite: bool = false, "commands" = "live record";
         /// How far, in frames, a readout stays behind the host's clock while no events arrive.
         guard_frames: f64 = 5.0, "minimum" = 0;

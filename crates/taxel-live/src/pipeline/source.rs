@@ -794,7 +794,7 @@ fn unread(texts: &[&str], leave_out: &[String], fields: Option<usize>) -> String
     if let Some(&cut) = shared.iter().find(|&&k| first[k].trim_matches(['\'', '"']) == "...") {
         let column = cut + 1;
         return format!(
-            "all cut by \"...\" in column {column}: the sender must print whole lines (ros2 topic echo: add --full-length)"
+            "all shortened to \"...\" in column {column}: the sender must print whole lines (ros2 topic echo: add --full-length)"
         );
     }
     if let Some(&dated) = shared.iter().find(|&&k| date(&first[k]).is_some()) {
@@ -980,7 +980,7 @@ mod tests {
                 vec!["1,a,2,'...'", "1,a,3,'...'"],
                 vec!["2"],
                 None,
-                "all cut by \"...\" in column 4: the sender must print",
+                "all shortened to \"...\" in column 4: the sender must print",
             ),
             (
                 vec!["ros2: command not found"],

@@ -277,7 +277,7 @@ impl SourceWriter {
     pub fn datagrams(&self, arrived_ns: &[i64], number: &[u64], offsets: &[i64], bytes: &[u8]) -> Result<()> {
         if number.len() != arrived_ns.len() || offsets.len() != arrived_ns.len() + 1 {
             let n = arrived_ns.len();
-            return Err(problem!("{n} arrivals: need {n} numbers and {} offsets", n + 1).into());
+            return Err(problem!("{n} arrival times need {n} arrival numbers and {} offsets of bytes", n + 1).into());
         }
         for (k, two) in offsets.windows(2).enumerate() {
             let range = usize::try_from(two[0]).ok().zip(usize::try_from(two[1]).ok());

@@ -540,7 +540,7 @@ impl Verdict {
         let largest = self.steps_back.iter().rev().max_by_key(|step| step.by_us).filter(|_| self.parts.is_empty());
         let back = largest.map(|StepBack { after_us, by_us, .. }| {
             let times = counted(self.steps_back.len() as u64, "time");
-            format!("times step back {times}, at most by {by_us} us after {after_us} us")
+            format!("times step back {times} (the largest step: {by_us} us, after the time {after_us} us)")
         });
         parts.chain(back).chain(doubt).collect::<Vec<_>>().join("; ")
     }

@@ -151,8 +151,8 @@ def _csv(source: RecordedSource, path: Path) -> _Kept:
     beside, is_turned = Layout.beside(path), isinstance(source, FrameSource) and source.frame_table.turned is not None
     if is_turned and beside is not None and Layout.read(beside).turned is not None:
         raise ProblemError(
-            f"{path}: the readings were turned already, which a .csv cannot state, and {beside} beside it would turn "
-            "them again; write it to another folder, or as a .npz, .h5 or .mcap"
+            f"{path}: the readings were inverted already, which a .csv cannot state, and {beside} beside it would "
+            "invert them again; write it to another folder, or as a .npz, .h5 or .mcap"
         )
     original, stated = source.table, source.sensor.array
     array = array_in_csv(original)

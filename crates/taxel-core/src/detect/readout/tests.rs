@@ -60,7 +60,7 @@ fn files_that_are_no_readout_are_refused_by_name() {
     let cases = [
         ("", "readout: not JSON"),
         ("[]", "readout: not a JSON object"),
-        ("{}", "readout: does not say \"format\": \"taxel readout\", so it is not such a file"),
+        ("{}", "readout: the key \"format\" is missing, must be \"taxel readout\""),
         (&good.replace("taxel readout", "other"), "readout: format is \"other\", must be \"taxel readout\""),
         (&good.replace("\"version\": 1,", ""), "readout: states no version, must be 1"),
         (&good.replace("\"version\": 1,", "\"version\": 2,"), "readout: version 2, this taxel reads version 1 only"),
