@@ -244,7 +244,7 @@ PROOFS = (
             (SORTER, "weighed <= ready && !pop;", "weighed <= ready;"),
             (SORTER, "!gathered && !handing && !valid;", "!gathered && !valid;"),
         ),
-        skip=22,
+        skip=25,
         induction=4,
     ),
     Proof(
