@@ -239,7 +239,6 @@ PROOFS = (
             (SORTER, "else if (!chosen && !landed) begin", "else if (!chosen) begin"),
             (SORTER, "fetched && !landed;", "fetched;"),
             (SORTER, "fetched && !landed;", "chosen && !landed;"),
-            (SORTER, "fetched   <= chosen && !lands;", "fetched   <= chosen;"),
             (SORTER, "(!chosen || lands)", "1'b1"),
             (SORTER, "weighed <= ready && !pop;", "weighed <= ready;"),
             (SORTER, "!gathered && !handing && !valid;", "!gathered && !valid;"),
