@@ -41,10 +41,10 @@ module taxel_line_sorter #(
   // The line that is handed on: a group's rows, of them the first one, what is held of it.
   logic [$clog2(GROUPS+1)-1:0] group;
   logic [GROUP-1:0] rows;
-  logic [6:0] base, y, y_fetched;
+  logic [6:0] base, y, y_landed;
   logic [2:0] row;
-  logic chosen, fetched, chooses, fetches;
-  held_t held_of;
+  logic chosen, fetched, landed, chooses, lands;
+  held_t held_read, held_of;  // from the memory, and in the register that its block has behind it
 
   assign idle    = !gathered && !handing && !valid;
   // What an entry is, and whether it is of the line, is found a clock before that is used.
@@ -53,8 +53,9 @@ module taxel_line_sorter #(
   assign free    = !valid;
   assign passes  = !sorts && !gathered && !handing && free;
   assign pop     = ready && weighed && (belongs || passes);
-  assign fetches = chosen && (!fetched || free);
-  assign chooses = rows != '0 && (!chosen || fetches);
+  // The memory reads in every clock: a row is chosen until what is held of it has landed.
+  assign lands   = fetched && !landed;
+  assign chooses = rows != '0 && (!chosen || lands);
 
   // The first row of a group's.
   always_comb begin
@@ -88,14 +89,14 @@ module taxel_line_sorter #(
       line     <= gathering;
       group    <= '0;
     end
-    // Row by row: it is chosen, what is held of it is fetched, and it is handed on.
+    // Row by row: it is chosen, what is held of it is fetched and lands, and it is handed on.
     if (handing && rows == '0) begin
       if (32'(group) != GROUPS) begin
         rows                  <= changed[!bank][group];
         changed[!bank][group] <= '0;
         base                  <= {4'(group), 3'd0};
         group                 <= group + 1'b1;
-      end else if (!chosen && !fetched) begin
+      end else if (!chosen && !landed) begin
         handing <= 1'b0;
       end
     end
@@ -104,23 +105,25 @@ module taxel_line_sorter #(
       rows <= rows & (rows - GROUP'(1));
     end
     if (chooses) chosen <= 1'b1;
-    else if (fetches) chosen <= 1'b0;
-    if (fetches) begin
-      held_of   <= held[{!bank, y}];
-      y_fetched <= y;
+    else if (lands) chosen <= 1'b0;
+    held_read <= held[{!bank, y}];
+    fetched   <= chosen && !lands;
+    if (lands) begin
+      held_of  <= held_read;
+      y_landed <= y;
     end
-    if (fetches) fetched <= 1'b1;
-    else if (free) fetched <= 1'b0;
-    if (fetched && free) begin
+    if (lands) landed <= 1'b1;
+    else if (free) landed <= 1'b0;
+    if (landed && free) begin
       valid       <= 1'b1;
       entry       <= line;
-      entry.y     <= y_fetched;
+      entry.y     <= y_landed;
       entry.more  <= held_of.more;
       entry.value <= held_of.value;
       line.lost   <= 1'b0;
     end
     if (reset) begin
-      {valid, gathered, handing, bank, weighed, chosen, fetched} <= '0;
+      {valid, gathered, handing, bank, weighed, chosen, fetched, landed} <= '0;
       rows    <= '0;
       changed <= '0;
     end

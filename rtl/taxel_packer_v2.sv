@@ -67,6 +67,7 @@ module taxel_packer_v2 #(
   state_t state, after;
   event_t now;
   format_t format;
+  logic room, flushes;  // for an entry: what stands at the input is copied, whether it is one or not
   logic gathered, flag, lost, any, again, late, newer, differs;
   logic moved, behind, far, far_ahead;  // an event's time and place against those of the one before
   logic since_long, quiet_long, silent, restless, ripe;
@@ -97,8 +98,9 @@ module taxel_packer_v2 #(
   assign position = 16'(now.x) << STRIDE | 16'(now.y);
   assign entry_position = 16'(entry.x) << STRIDE | 16'(entry.y);
   assign ahead = entry_position - reached - 16'sd1;
-  // The next entry is taken while the last unit of the one before is written.
-  assign taken = valid && (state == IDLE || (state == WRITE && left == 3'd1 && after == IDLE));
+  assign taken = valid && room;
+  // What is gathered goes when an entry of version 1 is next.
+  assign flushes = room && !valid && leaving && gathered;
   assign idle  = state == IDLE && !gathered && !valid && !send && !sending;
   assign row_repeated = row[6:0];
 
@@ -194,7 +196,7 @@ module taxel_packer_v2 #(
   // What is done next.
   always_ff @(posedge clk) begin
     case (state)
-      IDLE: if (leaving && gathered && !valid) state <= OVER;
+      IDLE: ;
       WEIGH: state <= PLACE;
       PLACE: begin
         state <= !fits_in ? CLOSE : count_of == 3'd1 ? IDLE : WRITE;
@@ -235,19 +237,24 @@ module taxel_packer_v2 #(
       default: if (goes) state <= NEXT;  // TOTALS
     endcase
     if (taken) state <= entry.kind == ENTRY_EVENT ? WEIGH : OVER;
-    if (reset) state <= IDLE;
+    if (flushes) state <= OVER;
+    // The next entry is taken while the last unit of the one before is written.
+    room <= (state == IDLE && !taken && !flushes) || (fits_in && count_of <= 3'd2)
+        || (state == WRITE && left == 3'd2 && after == IDLE);
+    if (reset) begin
+      state <= IDLE;
+      room  <= 1'b0;
+    end
   end
 
   // The entry, and what it still asks for.
   always_ff @(posedge clk) begin
-    if (taken) begin
+    if (room) begin
       now        <= entry;
-      states     <= entry.states;
-      totals_due <= entry.totals;
-    end else if (state == IDLE && leaving && gathered && !valid) begin
-      now.kind             <= ENTRY_FLUSH;
-      now.at               <= at;
-      {states, totals_due} <= '0;
+      states     <= entry.states && !flushes;
+      totals_due <= entry.totals && !flushes;
+      if (flushes) now.kind <= ENTRY_FLUSH;
+      if (flushes) now.at <= at;
     end else if (state == NEXT && now.kind == ENTRY_MARKER) begin
       now.kind <= ENTRY_FLUSH;
     end else if (goes && state == REPEAT) begin
@@ -259,12 +266,10 @@ module taxel_packer_v2 #(
 
   // Where an event lies, seen from the one before, or from the start of a body or of a time.
   always_ff @(posedge clk) begin
-    if (taken) begin
-      moved     <= entry.at != at;
-      behind    <= entry_position <= reached;
-      gap_ahead <= 15'(ahead);
-      far_ahead <= 15'(ahead) >= 15'(NEAR);
-    end
+    moved     <= entry.at != at;
+    behind    <= entry_position <= reached;
+    gap_ahead <= 15'(ahead);
+    far_ahead <= 15'(ahead) >= 15'(NEAR);
     if (state == WEIGH) begin
       again <= gathered && (moved || behind);
       if (!gathered) begin
@@ -296,7 +301,7 @@ module taxel_packer_v2 #(
       reached <= position;
     end
     if (goes && state == CLOSE) gathered <= 1'b0;
-    if (!gathered && (taken || state == WEIGH)) format <= taken ? entry.format : now.format;
+    if (!gathered && (room || state == WEIGH)) format <= room ? entry.format : now.format;
     if (reset) {gathered, any} <= '0;
   end
 

@@ -48,6 +48,7 @@ module taxel_status_sender #(
   logic waits;           // an answer does, since a clock
   logic [2:0] part;      // a name and a count
   logic [2:0] look;      // which faults are still to be looked at
+  answer_t waiting;      // it, or what stood there
   answer_t line;
   logic [5:0] at;        // character of the line
   count_t bits;
@@ -147,7 +148,9 @@ module taxel_status_sender #(
   assign pop   = state == IDLE && greeted && waits;
 
   always_ff @(posedge clk) begin
-    waits <= ready;  // it is not popped before many clocks later
+    // It is not popped before many clocks later.
+    waits   <= ready;
+    waiting <= oldest;
     if (look_again) look <= 3'b111;
     for (int k = 0; k < 3; k++) differs[k] <= counts[k] != given[k];
     further <= part >= 3'd3 && part != 3'd7;
@@ -165,9 +168,9 @@ module taxel_status_sender #(
           line.kind <= ANSWER_GREETING;
           state     <= LOOK;
         end else if (waits) begin
-          line  <= oldest;
+          line  <= waiting;
           state <= LOOK;
-          if (oldest.kind == ANSWER_STATUS) begin
+          if (waiting.kind == ANSWER_STATUS) begin
             counting     <= 1'b1;
             part         <= 3'd3;
             {bits, rest} <= totals;

@@ -66,6 +66,7 @@ module packer_v2_proof
       assert (packer.units == (send ? 10'd0 : written + 10'(write)));
       assert (bank == (send ? !datagram.bank : any ? !was_bank : 1'b0));
       assert (packer.units <= 10'(MOST));
+      assert (!packer.room || state == IDLE || (state == WRITE && after == IDLE && packer.left == 3'd1));
       case (state)
         IDLE, WEIGH, PLACE, OVER, AGE: assert (packer.gathered || packer.units == 0);
         BEAT: assert (after == NEXT && (packer.gathered || packer.units == 0));

@@ -142,8 +142,8 @@ module sorter_proof
   end
 
   // Where each of them is meanwhile, without which the induction does not close: it is gathered, or waits with its
-  // line, or is of the rows that are chosen from, chosen, fetched, at the output.
-  logic [1:0] gathers, lies, rests, chosen, fetched, hands;
+  // line, or is of the rows that are chosen from, chosen, landed, at the output.
+  logic [1:0] gathers, lies, rests, chosen, landed, hands;
   logic [1:0][2:0] rank;  // how far: the lower row of a line is never behind
   always_comb begin
     for (int k = 0; k < 2; k++) begin
@@ -152,14 +152,15 @@ module sorter_proof
       lies[k]    = sorter.changed[!sorter.bank][events[k].y[3]][events[k].y[2:0]];
       rests[k]   = sorter.rows[events[k].y[2:0]] && sorter.base == {events[k].y[6:3], 3'd0};
       chosen[k]  = sorter.chosen && sorter.y == events[k].y;
-      fetched[k] = sorter.fetched && sorter.y_fetched == events[k].y;
-      if (!sorter.handing || !together(sorter.line, events[k])) {lies[k], rests[k], chosen[k], fetched[k]} = '0;
-      hands[k] = lies[k] || rests[k] || chosen[k] || fetched[k];
-      rank[k]  = gone[k] ? 3'd6 : out[k] ? 3'd5 : fetched[k] ? 3'd4 : chosen[k] ? 3'd3 : rests[k] ? 3'd2 : 3'd1;
+      landed[k]  = sorter.landed && sorter.y_landed == events[k].y;
+      if (!sorter.handing || !together(sorter.line, events[k])) {lies[k], rests[k], chosen[k], landed[k]} = '0;
+      hands[k] = lies[k] || rests[k] || chosen[k] || landed[k];
+      rank[k]  = gone[k] ? 3'd6 : out[k] ? 3'd5 : landed[k] ? 3'd4 : chosen[k] ? 3'd3 : rests[k] ? 3'd2 : 3'd1;
     end
     if (LEMMAS && begun) begin
       assert (sorter.handing || (sorter.changed[!sorter.bank] == '0 && sorter.rows == '0 && !sorter.chosen
-                                 && !sorter.fetched));
+                                 && !sorter.landed));
+      assert (!sorter.fetched || sorter.chosen);
       assert (sorter.gathered || sorter.changed[sorter.bank] == '0);
       assert (!sorter.gathered || sorter.changed[sorter.bank] != '0);
       assert (!sorter.handing || sorter.group <= 2'd2);
@@ -182,13 +183,14 @@ module sorter_proof
       if (seen[0] && !seen[1] && !between && !gathers[0] && !gone[0])
         assert (leaving || (ready && !(sorts && together(oldest, events[0]))));
       for (int k = 0; k < 2; k++) begin
-        assert (3'(gathers[k]) + 3'(lies[k]) + 3'(rests[k]) + 3'(chosen[k]) + 3'(fetched[k]) + 3'(out[k])
+        assert (3'(gathers[k]) + 3'(lies[k]) + 3'(rests[k]) + 3'(chosen[k]) + 3'(landed[k]) + 3'(out[k])
                 == 3'(seen[k] && !gone[k]));
         assert (seen[k] || !gone[k]);
         if (gathers[k]) assert (sorter.held[{sorter.bank, events[k].y}] == {events[k].more, events[k].value});
         if (lies[k] || rests[k] || chosen[k])
           assert (sorter.held[{!sorter.bank, events[k].y}] == {events[k].more, events[k].value});
-        if (fetched[k]) assert (sorter.held_of == {events[k].more, events[k].value});
+        if (chosen[k] && sorter.fetched) assert (sorter.held_read == {events[k].more, events[k].value});
+        if (landed[k]) assert (sorter.held_of == {events[k].more, events[k].value});
         if (sorter.gathered && seen[k] && together(sorter.gathering, events[k]) && gathers[k])
           assert (sorter.gathering.format == events[k].format && sorter.gathering.frame == events[k].frame
                   && (!events[k].lost || sorter.gathering.lost));

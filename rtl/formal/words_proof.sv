@@ -197,6 +197,7 @@ module words_proof
   always_comb begin
     if (LEMMAS && begun) begin
       assert (state != WRITE || (packer.left != 0 && packer.left <= 3'd6));
+      assert (!packer.room || state == IDLE || (state == WRITE && after == IDLE && packer.left == 3'd1));
       assert (promised <= newest && 4'(state) <= 4'(AGE));
       if (comes) assert (coming.at == newest && packer.now == coming && (state == WEIGH || state == OVER));
       else assert (!event_waits || expected.at == newest);

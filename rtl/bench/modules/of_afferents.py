@@ -1,5 +1,6 @@
 """Afferents: the spikes of FA-1 as docs/registers.md has them, with changes of mode and comparators not returned."""
 
+import itertools
 import random
 from collections import defaultdict
 
@@ -39,17 +40,19 @@ async def spikes_are_those_of_the_page(dut):
             spikes, quiet = spikes + (expected is not None), quiet + (expected is None)
         await FallingEdge(dut.clk)
 
+    # Thresholds, and how far a value moves: each two of them come twice or more, as many give few spikes or none.
+    thresholds = [(33, 983, 51), (400, 100, 255), (0, 9, 9), (65535, 65535, 1), (3, 65535, 255)]
+    settings = list(itertools.product(thresholds, [2, 30, 2000])) * 2
+    settings += random.sample(settings, 10)
+    random.shuffle(settings)
     mode = False
-    for frame in range(200):
+    for frame in range(400):
         if frame % 40 in (0, 37):
             mode = frame % 40 == 0
             taxels.clear()
         if frame % 10 == 0:
-            rest, jump, decay = random.choice(
-                [(33, 983, 51), (400, 100, 255), (0, 9, 9), (65535, 65535, 1), (3, 65535, 255)]
-            )
+            (rest, jump, decay), far = settings[frame // 10]
             dut.threshold.value = pack("threshold_t", rest=rest, jump=jump, decay=decay)
-            far = random.choice([2, 30, 2000])
             for _ in range(6):
                 await clock()
         # Lines come in any order, their steps one after the other.
