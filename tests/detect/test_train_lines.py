@@ -20,6 +20,7 @@ from taxel.detect.examples import check_examples
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.tares import loaded_at_rest
 from taxel.encode import ContactArea, LevelCrossing
+from taxel.tasks.__main__ import run as run_task
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -87,6 +88,11 @@ def test_the_last_lines_warn_of_labels_that_are_not_found_and_the_readout_is_wri
     assert taxel.Readout.load(tmp_path / "r.json").labels == ("contact", "lift")
     result = json.loads(call(capsys, *arguments, "--window-ms", 1, "--json")[1])
     assert [f"warning: {one}" for one in result["warnings"]] == out.splitlines()[-2:]
+    assert "; next: train again with " in out
+    request = {"recordings": [str(recording)], "labels": str(labels), "out": str(tmp_path / "p.json")}
+    for window_ms, command in ((1, ""), (10, f"taxel detect RECORDING --readout {tmp_path / 'p.json'}")):
+        options = {"options": {"folds": folds, "window_ms": window_ms}, "overwrite": True}
+        assert run_task("train", request | options, lambda *_: None)["command"].partition(" --tare")[0] == command
     code, out, _ = call(capsys, *arguments, "--window-ms", 10)
     assert (code, "warning" in out) == (0, False), "all are found"
 

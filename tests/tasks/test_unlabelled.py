@@ -99,6 +99,19 @@ def test_detections_of_it_are_not_scored(feet: Path, tmp_path: Path, capsys: pyt
     assert len(found.each[1].outcome.found) == 8
 
 
+def test_a_name_without_any_label_is_not_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place, labels, rule = mat(tmp_path, 3), tmp_path / "l.csv", tmp_path / "rule.json"
+    labels.write_text("label,t_us\n" + "".join(f"contact,{10_000 * k}\n" for k in BEGINS))
+    taxel.detect.PlainRule("area", 2, labels=("contact", "lift"), noise_floor=6.0, unit="counts").save(rule)
+    code, out, _ = call(capsys, "detect", place, "--readout", rule, "--truth", labels)
+    assert (code, "do not rely on" in out) == (0, False), out
+    assert f"not scored, because no row of {labels} names it: lift\n" in out
+    found = taxel.tasks.detect(taxel.detect.load(rule), taxel.open(place), labels)
+    assert (found.score.found, found.score.false, found.to_dict()["unlabelled"]) == (8, 0, {"lift": []})
+    found = taxel.tasks.detect(taxel.detect.load(rule), taxel.open(place), [{"contact": [], "lift": []}])
+    assert (found.score.false, found.unlabelled) == (16, {}), "nothing happened"
+
+
 def test_an_example_is_left_out_of_what_is_not_known_of_it(tmp_path: Path) -> None:
     frames = taxel.open(mat(tmp_path)).frames()
     tare, truth = Tare.take(frames, stop_us=900_000), {"contact": [10_000 * k for k in BEGINS]}

@@ -15,12 +15,13 @@ from shell import call
 import taxel
 from taxel.detect import Example, Recipe
 from taxel.detect.cause import by_option
-from taxel.detect.causes import Mistakes, question, without_explained
+from taxel.detect.causes import Mistakes, without_explained
 from taxel.detect.evidence import Evidence
-from taxel.detect.examples import check_examples
+from taxel.detect.examples import Outcome, check_examples
 from taxel.detect.fitting import UNLEARNT
 from taxel.detect.floors import measured_floor
 from taxel.detect.folds import Judged
+from taxel.detect.mistakes import causes_of
 from taxel.tasks import TrainOptions
 
 Labels = dict[str, NDArray[np.int64]]
@@ -103,7 +104,7 @@ def asked(frames: taxel.Frames, labels: Labels) -> str:
     """Return the question that a training asks of labels before it begins."""
     example = Example(frames, labels, taxel.Tare.take(frames, stop_us=2_000_000))
     recipe = Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example]))
-    return question(Evidence([example], check_examples([example]), recipe))
+    return Evidence([example], check_examples([example]), recipe).question()
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -301,17 +302,17 @@ def test_touches_that_rise_slowly_are_felt_later_and_no_window_is_advised(
     assert not any("what may help is" in line for line in lines)
 
 
-def test_a_partial_release_is_inside_a_load(trained: Trained, tmp_path: Path, capsys: Any) -> None:
-    frames, labels = drawn(trained.shape, trained.rate, 15)
-    values = frames.values.copy()
-    for begin, end in zip(*labels.values(), strict=True):
-        middle = (begin + end) // 2
-        here = (frames.t >= middle - 40_000) & (frames.t < middle + 40_000)
-        values[here] -= np.rint(0.6 * np.maximum(values[here] - 510, 0))
-    partial = taxel.Frames(values, frames.t, unit="counts", array=frames.array)
-    lines = trained.told(capsys, tmp_path, partial, labels)
-    false = [line for line in lines if " false " in line]
-    assert all("inside a load, more than 50 ms from where it begins or ends" in line for line in false), lines
+@pytest.mark.parametrize("size", SIZES)
+def test_false_detections_inside_loads_are_named(size: str) -> None:
+    frames, labels = drawn(*SIZES[size], 15)
+    contacts, middles = labels["contact"], (labels["contact"] + labels["lift"]) // 2
+    t = np.sort(np.concatenate([contacts, middles]))
+    found, truth = taxel.Detections(["contact"] * len(t), t, t), {"contact": contacts}
+    example = Example(frames, truth, taxel.Tare.take(frames, stop_us=2_000_000))
+    [cause] = causes_of([Outcome("a", example, found, taxel.detect.score(found, truth), None)], 50.0)
+    assert (cause.kind, cause.mistakes) == ("unlabelled_loads", 25)
+    where = "inside a load, more than 50 ms from where it begins or ends, as at "
+    assert cause.measured.startswith(f"25 of 25 false are {where}{middles[0] / 1e6:.3f} s, ")
 
 
 @pytest.mark.parametrize("seed", [16, 17])

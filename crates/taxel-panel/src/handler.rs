@@ -82,7 +82,8 @@ pub struct Mistake {
 pub enum TrainingReply {
     /// Its result.
     Trained(TrainingResult),
-    /// It has not begun: nearly no label lies near anything felt, and a person must confirm that these are the labels.
+    /// It has not begun: nearly no label is near anything felt, or nearly all are off by the same time, and a person must
+    /// confirm that these are the labels.
     Question(String),
 }
 
@@ -97,7 +98,7 @@ pub struct TrainingResult {
     pub scores: Vec<LabelScore>,
     /// What the neurons missed or detected falsely, with times as in the file.
     pub mistakes: Vec<Mistake>,
-    /// The command that detects by it in a shell.
+    /// The command that detects by it in a shell; empty if it cannot be relied on.
     pub next: String,
     /// Options of the command that trains that may help.
     pub options: Vec<String>,

@@ -530,7 +530,7 @@ export interface Trained {
   scores: LabelScore[];
   /** The labels that neurons missed, and their false detections, among the labels that `scores` count. */
   mistakes: Mistake[];
-  /** The command that detects by it in a shell. */
+  /** The command that detects by it in a shell; empty if it cannot be relied on. */
   next: string;
   /** Options of `taxel train` that may help. */
   options: string[];
@@ -900,7 +900,7 @@ export interface HealthRequest {
   id?: number;
 }
 
-/** Train a readout on the labels of the recording shown, as `taxel train --labels notes` does; of a file with several trials, on the trials that have labels. The readout replaces `NAME.readout.json` beside the recording. Answered when the training has ended; `trained` comes before. One training runs at a time. If nearly no label is near anything felt, the request is refused with the field `labels_as_given`, unless that is true. */
+/** Train a readout on the labels of the recording shown, as `taxel train --labels notes` does; of a file with several trials, on the trials that have labels. The readout replaces `NAME.readout.json` beside the recording. Answered when the training has ended; `trained` comes before. One training runs at a time. If nearly no label is near anything felt, or nearly all labels are off by the same time, the request is refused with the field `labels_as_given`, unless that is true. */
 export interface TrainRequest {
   type: "train";
   id?: number;

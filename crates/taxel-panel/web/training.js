@@ -30,7 +30,7 @@ export class Training {
     this.source = null;
     this.button = part("train", HTMLButtonElement);
     this.button.onclick = () => (this.since === null ? this.begin() : this.end());
-    /** Trains although nearly no label lies near anything felt. */
+    /** Trains although nearly no label is near anything felt, or nearly all are off by the same time. */
     this.nonetheless = part("train-nonetheless", HTMLButtonElement);
     this.nonetheless.onclick = () => this.begin(true);
     /** The readout that reads what is shown; "" without one. */

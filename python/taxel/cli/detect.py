@@ -190,7 +190,7 @@ def _score_lines(found: Detecting, labels: Sequence[str], truth: str | None, *, 
     yield f"against {truth} (window {found.window_ms:g} ms{shift}){read}:"
     yield from repr(found.score).split("\n")
     for label, sources in found.unlabelled.items():
-        yield f"not scored, because no row of {truth} names it: {label} of {', '.join(sources)}"
+        yield f"not scored, because no row of {truth} names it: {label}{' of ' * bool(sources)}{', '.join(sources)}"
     if found.not_scored:
         yield f"not scored, as the readout has {', '.join(labels)}: {', '.join(found.not_scored)}"
     if several:

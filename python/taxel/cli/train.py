@@ -8,7 +8,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -144,7 +143,7 @@ def train(
         written |= {} if report is None else {"report": str(report / "report.html")}
         say(json.dumps({"readout": str(out), **training.to_dict(), **written}))
     else:
-        say(*training.lines(), "", f"written to {out}{_next(training, out, tare)}")
+        say(*training.lines(), "", f"written to {out}{_next(training, out)}")
         say(*(f"plain rule of {' and '.join(each)}: written to {path}" for path, each in rules.items()))
         say(*(f"warning: {warning}" for warning in training.unreliable()))
     if report is not None:  # last, so that nothing is lost where it fails
@@ -219,23 +218,8 @@ def _of_label(path: Path, label: str) -> Path:
     return path.parent / f"{path.stem}.{name}{path.suffix}"
 
 
-def _next(training: Training, out: Path, tare: str | None) -> str:
-    """Return the command that detects by a readout, with the --tare, if any, of the training.
-
-    If the readout cannot be relied on, return the first advice instead, or nothing.
-    """
-    if any(training.unreliable()):
-        advice = next((cause.advice for cause in training.causes if cause.advice), "")
-        return f"; next: train again with {advice}" * bool(advice)
-    again = tare or ("" if _are_quiet(training.recordings) else training.beginning())
-    option = f" --tare {quote(again)}" if again and training.readout._needs_tare else ""
-    return f"; next: taxel detect RECORDING --readout {quote(str(out))}{option}"
-
-
-def _are_quiet(recordings: Sequence[Recording]) -> bool:
-    """Return whether a detection finds the rest of each recording by itself."""
-    try:
-        with collected():
-            return all(taxel.tasks.rest(recording) for recording in recordings)
-    except ProblemError:
-        return False
+def _next(training: Training, out: Path) -> str:
+    """Return what to do with a readout: detect by it, or train again as the first advice says; else ""."""
+    advice = next((f"train again with {cause.advice}" for cause in training.causes if cause.advice), "")
+    following = training.command(str(out)) or advice
+    return f"; next: {following}" if following else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import comb
@@ -27,8 +26,6 @@ from taxel.encode import Moments
 _UNLABELLED = 0.25
 #: Kinds of touch are distinguished where chance would distinguish as many with at most this probability.
 _CHANCE = 0.05
-#: Labels are a question before a training if at least this share of them has one distance from what was felt.
-_NEARLY_ALL = 0.9
 #: Part of a recording is off if so many labels are, which are missed; so many recordings are named.
 _LEAST_OFF, _NAMED = 5, 5
 #: Causes that do not say why labels have too few input spikes.
@@ -192,30 +189,26 @@ class Mistakes:
 
     def _with_trial(self, cause: Cause, window_ms: float, tried: Judged | None) -> Cause:
         """Return that mistakes are beyond the window, with what neuron or rule left of them within a wider one."""
-        (label,), option = cause.labels, f"--window-ms {window_ms:g}"
-        fact = replace(cause, advice="", option="", arguments={})
-        if tried is None or not cause.option:
-            return fact
-        arguments = {"window_ms": window_ms}
-        if left := _left(label, self.scored, tried.together):
-            return replace(
-                cause, measured=f"{cause.measured}; {left}", advice=option, option=option, arguments=arguments
-            )
-        rules = None if tried.plain is None else tried.plain.together
-        if rules is not None and (left := _left(label, self.scored, rules, "the plain rule leaves ")):
-            option = f"{option} --rule FILE"
-            advice = f"a wider window and the plain rule ({option})"
-            return replace(
-                cause, measured=f"{cause.measured}; {left}", advice=advice, option=option, arguments=arguments
-            )
-        return fact
+        (label,), rules = cause.labels, None if tried is None or tried.plain is None else tried.plain.together
+        for by, score in (("", None if tried is None else tried.together), ("the plain rule leaves ", rules)):
+            if cause.option and score is not None and (left := _left(label, self.scored, score, by)):
+                option = f"--window-ms {window_ms:g}{' --rule FILE' * bool(by)}"
+                advice = f"a wider window and the plain rule ({option})" if by else option
+                measured, arguments = f"{cause.measured}; {left}", {"window_ms": window_ms}
+                return replace(cause, measured=measured, advice=advice, option=option, arguments=arguments)
+        return replace(cause, advice="", option="", arguments={})
 
     def _contradicts(self, cause: Cause) -> bool:
         """Whether most labels that are as of another recording by what was felt were found held out."""
-        scores = [self.scored, *([] if self.plain is None or self.plain.together is None else [self.plain.together])]
         return cause.kind == "foreign_labels" and any(
-            2 * score[label].found > score[label].events for score in scores for label in cause.labels
+            2 * score[label].found > score[label].events for score in self._by.values() for label in cause.labels
         )
+
+    @property
+    def _by(self) -> dict[str, Score]:
+        """The scores of the neuron and, if there is one, of the plain rule."""
+        rule = None if self.plain is None else self.plain.together
+        return {"the neuron": self.scored} | ({} if rule is None else {"the rule": rule})
 
     def _unpaired(self, examples: Sequence[Example], label: str) -> Iterator[Cause]:
         """Yield how many labels are far from what the neuron learnt them by, or are weaker than that."""
@@ -272,7 +265,9 @@ class Mistakes:
 
     def _by_chance(self, label: str) -> str:
         """Return how many of a kind are detected, where chance would detect as many and they are enough; else ""."""
-        return _chance(label, self.scored, self.plain) if self.scored[label].events >= FIVE_FOLDS else ""
+        shares = [_by_chance(label, who, score) for who, score in self._by.items()]
+        enough = self.scored[label].events >= FIVE_FOLDS
+        return ", ".join(shares) + ", as by chance" if enough and all(shares) else ""
 
     def _rule(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the plain rule if it halves the mistakes."""
@@ -293,24 +288,6 @@ class Mistakes:
     def _by_touch(self) -> bool:
         """Whether it was trained by the recipe `touch`."""
         return self.trained.recipe.about == str(recipes.read("touch")["about"])
-
-
-def question(evidence: Evidence) -> str:
-    """Return why labels are asked about before a training; "" where they are not.
-
-    Nearly none is near anything felt, or nearly all of all names are off by one distance. Loads must be clear.
-    """
-    if not evidence.falls and not evidence.felt.are_clear:
-        return ""
-    if unfelt := evidence.unfelt():
-        return "; ".join([unfelt, *map(str, evidence.refused()[:1])])
-    counts = Counter(label for example in evidence.sound for label, times in example.labels.items() for _ in times)
-    off = [distance for distance in evidence.felt.distances(counts).values() if not distance.changes_from_label]
-    if sum(distance.beyond for distance in off) < _NEARLY_ALL * counts.total():
-        return ""
-    first = next(iter(evidence.refused()), None)
-    shifts_all = first is not None and first.kind == "shifted_labels" and set(first.labels) == set(counts)
-    return str(first) if shifts_all else ""
 
 
 def by_recipe(name: str, scored: Score, tried: Score, causes: Sequence[Cause]) -> tuple[Cause, ...]:
@@ -361,13 +338,6 @@ def _moved(cause: Cause) -> str:
     ms = cause.arguments.get("shift_ms", 0.0)
     whole = f"{abs(ms):.0f} ms {'earlier' if ms < 0 else 'later'}"
     return whole if cause.option else cause.advice.removeprefix("labels ").removeprefix("of ")
-
-
-def _chance(label: str, scored: Score, plain: PlainScore | None) -> str:
-    """Return how many of a kind of touch are detected, where neuron and rule detect no more than chance; else ""."""
-    by = {"the neuron": scored} | ({} if plain is None or plain.together is None else {"the rule": plain.together})
-    shares = [_by_chance(label, who, score) for who, score in by.items()]
-    return ", ".join(shares) + ", as by chance" if all(shares) else ""
 
 
 def _by_chance(label: str, who: str, together: Score) -> str:

@@ -34,8 +34,8 @@ FOREIGN = "labels of this recording"
 _MAKES_TARE = "taxel cut RECORDING FILE --from S --to S"
 #: Labels are a question before a training if at most this share of them is near anything that was felt ...
 _NEARLY_NONE = 0.1
-#: ... of so many or more.
-_LEAST_LABELS = 4
+#: ... of so many or more, or if at least this share of them has one distance from it.
+_LEAST_LABELS, _NEARLY_ALL = 4, 0.9
 #: Labels of several names are moved together whose distances from what was felt differ by so many windows at most.
 _TOGETHER = 1.5
 #: Five folds need this many labels.
@@ -182,7 +182,23 @@ class Evidence:
         near = {label: self.felt.near(label) for label in self._counts}
         return {label: counts for label, counts in near.items() if counts is not None and counts[-1]}
 
-    def unfelt(self) -> str:
+    def question(self) -> str:
+        """Return why labels are asked about before a training; "" where they are not.
+
+        Nearly none is near anything felt, or nearly all of all names are off by one distance. Loads must be clear.
+        """
+        if not self.falls and not self.felt.are_clear:
+            return ""
+        if unfelt := self._unfelt():
+            return "; ".join([unfelt, *map(str, self.refused()[:1])])
+        beyond = sum(off.beyond for off in self._distances.values() if not off.changes_from_label)
+        labels = {label for label, count in self._counts.items() if count}
+        if beyond < _NEARLY_ALL * sum(self._counts.values()):
+            return ""
+        shifts = (c for c in self.refused()[:1] if c.kind == "shifted_labels" and set(c.labels) == labels)
+        return next(map(str, shifts), "")
+
+    def _unfelt(self) -> str:
         """Return how many labels are near anything felt, if nearly none is; else, and where it is not known, ""."""
         count, _, total = np.sum([*self._near.values(), (0, 0, 0)], axis=0).tolist()
         if total < _LEAST_LABELS or count > _NEARLY_NONE * total:
@@ -273,14 +289,14 @@ class Evidence:
         for names in dict.fromkeys([tuple(self._counts), *((label,) for label in wrong)]):
             off = self.felt.part_off(names)
             stretch = "" if off is None else stretch_of(off[0], off[1].members, self.sound)
-            if off is None or not stretch or not wrong:
+            if off is None or not stretch:
                 continue
             (times, alike), side, back = off, *(("after", "earlier") if off[1].ms > 0 else ("before", "later"))
             count, distance = int(alike.members.sum()), f"{abs(alike.ms):.0f} ms"
             labels = "labels" if len(names) == len(self._counts) else f"labels of {', '.join(names)}"
             where = f"{distance} {side} where the sensor felt the others"
             measured = f"{count} of {counted(len(times), 'label')} {are(count)} {where}"
-            for label in wrong if len(names) > 1 else names:
+            for label in filter(names.__contains__, wrong):
                 yield Cause(
                     "shifted_labels",
                     (label,),

@@ -25,7 +25,8 @@ arguments in `taxel.tasks`; an unknown one is refused by its name. `out` is need
 not exist unless `overwrite` is true. `encode`, `calibrate`, `info` and `rest` take one recording.
 
 Progress is reported before each step: `done` of `of` parts are done, `of` is 0 where that is not known. The last line
-is either the result, as of its `to_dict()`, with `lines` for people where a result has them; or an error::
+is either the result, as of its `to_dict()`, with `lines` for people where a result has them, and of a training with
+the `command` that detects by its readout (empty if the readout cannot be relied on); or an error::
 
     {"type": "error", "kind": "ProblemError", "text": "walk.mcap: ...", "question": null}
 
@@ -60,7 +61,7 @@ from taxel.tasks.info import info
 from taxel.tasks.information import InformationOptions, information
 from taxel.tasks.rest import rest
 from taxel.tasks.train import train
-from taxel.tasks.train_result import TrainOptions
+from taxel.tasks.train_result import Training, TrainOptions
 
 __all__ = ["run"]
 
@@ -148,7 +149,8 @@ def run(name: str, request: Mapping[str, Any], progress: Progress) -> dict[str, 
     overwrite = left.pop("overwrite", False) is True
     save: _Save = lambda _: None  # noqa: E731
     if "out" in known:
-        out = Path(_needed(left, "out"))
+        given = _needed(left, "out")
+        out = Path(given)
         check_writable(out, overwrite=overwrite)
         save = lambda finished: finished.save(out, overwrite=overwrite)  # noqa: E731
     opener = _fields(TextOptions, left, "open")
@@ -160,6 +162,8 @@ def run(name: str, request: Mapping[str, Any], progress: Progress) -> dict[str, 
     found = result.to_dict()
     found["warnings"] = [*dict.fromkeys([*warnings, *found.get("warnings", [])])]
     lines = {"lines": result.lines()} if hasattr(result, "lines") else {}
+    if isinstance(result, Training):
+        lines |= {"command": result.command(given)}
     return {"type": "result", "result": found, **lines}
 
 

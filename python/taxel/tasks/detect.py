@@ -141,7 +141,8 @@ class Detecting:
     not_scored : tuple of str
         The labels of the truth that the readout does not have.
     unlabelled : mapping of str to tuple of str
-        The sources that no row of the truth names, by label, where rows name sources: they are not scored for it.
+        The sources that no row of the truth names, by label, where rows name sources: they are not scored for it. No
+        sources: the truth has no label of that name, so nothing is scored for it.
     window_ms, shift_ms : float, ms
     unreliable : tuple of str
         The labels whose score is too bad to rely on, in all recordings or in some.
@@ -238,6 +239,9 @@ def detect(
         if truth is not None and not any(events):
             raise refused("truth", f" is {truth}: names no event in {titles_of(opened)}")
         unlabelled = {} if truth is None else sources_without(truth, opened, events)
+        named = {label for of_recording in events for label in of_recording}
+        if named.intersection(readout.labels):
+            unlabelled |= {label: () for label in readout.labels if label not in named}
         each_labelled = [
             None if truth is None else moved(events[k], recording, options.shift_ms)
             for k, recording in enumerate(opened)
@@ -249,7 +253,7 @@ def detect(
             if left_out and not readout._accepts(recording.array):
                 continue
             update(f"detecting in {recording.title}", 0, 0)
-            without = {label for label, sources in unlabelled.items() if recording.label in sources}
+            without = {label for label, sources in unlabelled.items() if not sources or recording.label in sources}
             try:
                 found.append(_detected(readout, recording, labelled, without, options))
             except UnknownRestError as error:

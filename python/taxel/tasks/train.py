@@ -19,7 +19,7 @@ from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
 from taxel.detect.cause import OF_DATA, Cause
-from taxel.detect.causes import Mistakes, by_recipe, question, without_explained
+from taxel.detect.causes import Mistakes, by_recipe, without_explained
 from taxel.detect.evidence import Evidence
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fitting import Trained, fit_aligned
@@ -212,7 +212,7 @@ class _Work:
         """
         self.update("looking for what was felt at the labels", 0, 0)
         evidence = Evidence(self.examples, check_examples(self.examples), plan)
-        if not self.options.labels_as_given and (doubt := question(evidence)):
+        if not self.options.labels_as_given and (doubt := evidence.question()):
             raise helped(ProblemError(f"labels: {doubt}"), "labels_as_given", "go_on")
         try:
             return self._training(plan, evidence)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from shlex import quote
 from typing import Any
 
 import numpy as np
 
 from taxel._base.arguments import finite, flag, integer, mapping
 from taxel._base.errors import refused
-from taxel._base.messages import counted, three_digits
+from taxel._base.messages import collected, counted, three_digits
 from taxel._base.times import beginning_us
+from taxel._core import ProblemError
 from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained, recipes
 from taxel.detect.cause import OF_DATA, Cause
 from taxel.detect.levels import LEAST_LEVELS
@@ -21,8 +23,9 @@ from taxel.detect.scoring import score_rows
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.spikes import to_ms
+from taxel.tare import Tare
 from taxel.tasks.labels import check_shift
-from taxel.tasks.rest import GivenTare, check_tare
+from taxel.tasks.rest import GivenTare, check_tare, rest
 
 #: Largest number of unpaired labels that a warning names.
 _NAMED = 5
@@ -240,7 +243,20 @@ class Training:
             lines += ["", *score_rows(zip(titles, self.scored.scores, strict=True))]
         return lines
 
-    def beginning(self) -> str:
+    def command(self, readout: str) -> str:
+        """Return the command that detects by the readout in a file, with the tare, if any, of the training.
+
+        "" if the readout cannot be relied on.
+        """
+        if any(self.unreliable()):
+            return ""
+        tare = "FILE" if isinstance(self.options.tare, Tare) else self.options.tare
+        if tare is None:
+            tare = "" if _are_quiet(self.recordings) else self._beginning()
+        option = f" --tare {quote(str(tare))}" if tare and self.readout._needs_tare else ""
+        return f"taxel detect RECORDING --readout {quote(readout)}{option}"
+
+    def _beginning(self) -> str:
         """Return the seconds at rest at the beginning of each recording, for ``--tare``; "" where none is needed."""
         if not self.tares_us or any(begin > 0 for begin, *_ in self.tares_us):
             return "SECONDS" if self.tares_us else ""
@@ -387,6 +403,15 @@ class Training:
                     f"{label}: no input that {label} is learnt from is within 50 ms of {labels}, not learnt: {named}"
                     f"{weaker}"
                 )
+
+
+def _are_quiet(recordings: Sequence[Recording]) -> bool:
+    """Return whether a detection finds the rest of each recording by itself."""
+    try:
+        with collected():
+            return all(rest(recording) for recording in recordings)
+    except ProblemError:
+        return False
 
 
 def _line(label: str, by: str, score: Score) -> str:

@@ -229,7 +229,7 @@ pub(crate) enum Message {
         scores: Vec<LabelScore>,
         /// The labels that neurons missed, and their false detections, among the labels that `scores` count.
         mistakes: Vec<Mistake>,
-        /// The command that detects by it in a shell.
+        /// The command that detects by it in a shell; empty if it cannot be relied on.
         next: String,
         /// Options of `taxel train` that may help.
         options: Vec<String>,

@@ -43,7 +43,7 @@ class TrainedReadout:
     mistakes : list of (str, int, bool, str, str)
         Label, time (us), whether a label was missed, the sensor where there are several, and the trial.
     next : str
-        The command that detects by the readout.
+        The command that detects by the readout; empty if it cannot be relied on.
     options : list of str
         Which options of ``taxel train`` may help.
     """
@@ -108,7 +108,7 @@ class TrainingRequests:
             # A separate process, so that it does not delay receiving.
             self._training = ChildProcess("taxel.tasks", ["train"], stdin=PIPE, stdout=PIPE, text=True)
         try:
-            answer = self._answer(self._training, request | {"out": str(out), "overwrite": True})
+            answer = self._answer(self._training, request | {"out": typed(out), "overwrite": True})
             code = self._training.returncode
         finally:
             self._training = None
@@ -119,7 +119,6 @@ class TrainingRequests:
         if answer["type"] != "result":
             stopped = code < 0 or code == _INTERRUPTED
             raise ProblemError(_STOPPED if stopped else f"the training ended with code {code}")
-        following = shlex.join(["taxel", "detect", "RECORDING", "--readout", typed(out)])
         lines = [*answer["lines"], *(f"warning: {text}" for text in answer["result"]["warnings"])]
         result = answer["result"]
         return TrainedReadout(
@@ -127,7 +126,7 @@ class TrainingRequests:
             answer["lines"][0],
             list(_scores(result)),
             [(m["label"], m["t_us"], m["missed"], m["source"], m["recording"]) for m in result["mistakes"]],
-            following,
+            answer["command"],
             result["options"],
         )
 
