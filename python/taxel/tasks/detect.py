@@ -18,6 +18,7 @@ from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, recipes, score
 from taxel.detect.cause import Cause
 from taxel.detect.detector import detector
+from taxel.detect.exchanged import Scored, exchanged
 from taxel.detect.mistakes import behind_gaps, causes_of, score_of, unreliable
 from taxel.detect.readout import run_counting
 from taxel.detect.tares import count_drifted
@@ -33,13 +34,25 @@ from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
-from taxel.tasks.labels import GivenLabels, check_shift, few, moved, references, sources_without, titles_of
+from taxel.tasks.labels import (
+    GivenLabels,
+    check_shift,
+    few,
+    moved,
+    of_other_sources,
+    references,
+    source_name,
+    sources_without,
+    titles_of,
+)
 from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, rest, zero_by_unit
 
 #: At most so many frames are looked at for dead and stuck taxels.
 _LOOKS = 2000
 #: Causes of a bad score that are of labels or of the recording, not of the readout.
-_OF_LABELS = ("shifted_labels", "window", "gaps", "unlabelled_loads", "overlapping_loads")
+_OF_LABELS = ("exchanged_sources", "shifted_labels", "window", "gaps", "unlabelled_loads", "overlapping_loads")
+#: Those of them that need no advice.
+_WITHOUT_ADVICE = ("exchanged_sources", "gaps")
 #: The noise is compared with that of the training from so many times that.
 _NOISIER = 1.5
 #: No event.
@@ -262,7 +275,8 @@ def detect(
             raise next(iter(unknown_rests.values()))
         for unknown_rest in unknown_rests.values():
             warn(f"left out: {unknown_rest}", stacklevel=2)
-        each = tuple(_with_causes(found, options.window_ms))
+        others = {} if truth is None else of_other_sources(truth, opened, each_labelled, options.shift_ms)
+        each = tuple(_with_causes(found, others, options.window_ms))
     scored = [outcome for detected in each if (outcome := detected.outcome).score is not None]
     together = score_of(scored, options.window_ms) if scored else None
     unknown = sorted({label for labels_of in events for label in labels_of} - set(readout.labels))
@@ -277,16 +291,30 @@ def detect(
     return Detecting(each, together, tuple(unknown), unlabelled, *how, bad, tuple(warnings), names)
 
 
-def _with_causes(each: Sequence[_Found], window_ms: float) -> Iterator[Detected]:
-    """Yield what was detected with the causes of what is missed and false: sources of a recording have the same."""
+def _with_causes(
+    each: Sequence[_Found], others: Mapping[str, Mapping[str, Any]], window_ms: float
+) -> Iterator[Detected]:
+    """Yield what was detected with the causes of what is missed and false: sources of a recording have the same.
+
+    `others`: the labels of the other sources of each recording, by its title.
+    """
     known: dict[str, tuple[Cause, ...]] = {}
     for detected, felt, _ in each:
         group = felt.example.group
         if group not in known:
             sources = [source for source in each if source.felt.example.group == group]
             scored = [source for source in sources if source.felt.score is not None]
-            outcomes, differences = [source.felt for source in scored], [source.differences for source in scored]
-            known[group] = causes_of(outcomes, window_ms, differences) if scored else ()
+            of_sources = [
+                Scored(source.felt, source_name(source.detected.recording), others.get(source.felt.name, {}))
+                for source in scored
+            ]
+            pairs = list(exchanged(of_sources, window_ms))
+            mixed_up = {place for _, places in pairs for place in places}
+            # All else is measured on the others.
+            rest = [source for k, source in enumerate(scored) if k not in mixed_up]
+            outcomes, differences = [source.felt for source in rest], [source.differences for source in rest]
+            found = causes_of(outcomes, window_ms, differences) if rest else ()
+            known[group] = (*(cause for cause, _ in pairs), *found)
         yield replace(detected, outcome=detected.outcome._replace(causes=known[group]))
 
 
@@ -312,7 +340,9 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
 def _at_fault(label: str, scored: Score, causes: Sequence[Cause]) -> str:
     """Return whether a bad score is one of the readout, or by labels and recording, as its causes say, of the score."""
     of_labels = (cause for cause in causes if label in cause.labels and cause.kind in _OF_LABELS)
-    count = sum(cause.mistakes / len(cause.labels) for cause in of_labels if cause.advice or cause.kind == "gaps")
+    count = sum(
+        cause.mistakes / len(cause.labels) for cause in of_labels if cause.advice or cause.kind in _WITHOUT_ADVICE
+    )
     return "score" if 2 * count >= scored.rank[0] else "readout"
 
 
