@@ -8,7 +8,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.messages import counted, of_names
+from taxel._base.messages import counted, of_names, ranged
 from taxel._base.times import beginning_us
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
@@ -40,6 +40,8 @@ _FOUND = 0.8
 _FAR_MORE = 2
 #: Fewer events missed and false are few.
 _FEW = 3
+#: A single label tells no cause of how far detections are.
+_SEVERAL = 2
 #: So many times of labels are named.
 _NAMED = 3
 #: A load changes slowly that takes so long, ms, from the first to the second part of its change, and no longer from its
@@ -289,14 +291,14 @@ class Measured:
         most = change.max(axis=0, initial=PEAK)
         begun_ms, made_ms = (after_ms[(change >= part * most).argmax(axis=0)] for part in (_BEGUN, _MADE))
         is_slow = (made_ms - begun_ms >= np.maximum(begun_ms, _MADE_MS)) & (later_ms <= made_ms)
-        if 2 * int(is_slow.sum()) <= len(left.missed):
+        if 2 * int(is_slow.sum()) <= len(left.missed) or is_slow.sum() < _SEVERAL:
             return None
         here = later_ms <= later_ms[is_slow].max()
         count = int(here.sum())
         measured = (
-            f"{count} of {len(left.missed)} missed have a false detection {later_ms[here].min():.0f} to "
-            f"{later_ms[here].max():.0f} ms later, as the load {'falls' if falls else 'rises'} slowly: {label} is felt "
-            "later there"
+            f"{count} of {len(left.missed)} missed have a false detection "
+            f"{ranged(later_ms[here].min(), later_ms[here].max())} ms later, as the load "
+            f"{'falls' if falls else 'rises'} slowly: {label} is felt later there"
         )
         is_missed, is_false = _at(events[here], left.missed), _at(detected[here], left.false)
         return Cause("window", (label,), 2 * count, measured, ""), left.without(is_missed, is_false)
@@ -306,16 +308,16 @@ class Measured:
         reach_ms = 2 * self._window_ms
         pairs = score(Detections([label] * len(left.false), left.false, left.false), {label: left.missed}, reach_ms)
         mistakes = 2 * pairs.found
-        if 2 * pairs.found <= len(left.missed) or 2 * mistakes < len(left.missed) + len(left.false):
+        is_most = 2 * pairs.found > len(left.missed) and 2 * mistakes >= left.total
+        if not is_most or pairs.found < _SEVERAL:
             return None
         least_ms, most_ms = (float(edge) for edge in (np.floor(pairs.errors_ms.min()), np.ceil(pairs.errors_ms.max())))
         window_ms = max(abs(least_ms), abs(most_ms))
         where = f"at most {window_ms:g} ms away"
         if least_ms * most_ms > 0:
-            low, high = sorted((abs(least_ms), abs(most_ms)))
-            where = f"{low:g} to {high:g} ms {'later' if least_ms > 0 else 'earlier'}"
-        have = "has" if pairs.found == 1 else "have"
-        measured = f"{pairs.found} of {len(left.missed)} missed {have} a false detection {where}"
+            low, high = sorted(np.abs([pairs.errors_ms.min(), pairs.errors_ms.max()]))
+            where = f"{ranged(low, high)} ms {'later' if least_ms > 0 else 'earlier'}"
+        measured = f"{pairs.found} of {len(left.missed)} missed have a false detection {where}"
         cause = by_option("window", label, mistakes, measured, f"--window-ms {window_ms:g}", window_ms=window_ms)
         detected, events = pairs.pairs.T
         return cause, left.without(_at(events, left.missed), _at(detected, left.false))
