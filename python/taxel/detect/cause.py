@@ -12,15 +12,15 @@ from taxel._base.errors import refused
 #: The kinds of causes. Where two concern equally many mistakes the earlier comes first: the later may follow from it.
 KINDS = (
     "falling_values", "exchanged_sources", "shifted_labels", "shifted_training", "few_labels", "unlabelled_source",
-    "levels", "overlapping_loads", "foreign_labels", "tare", "begun_loaded", "durations", "recipe", "window", "gaps",
-    "unlabelled_time", "label_name", "other_name", "unlabelled_loads", "unfelt_labels", "unlike_training", "plain_rule",
-    "indistinct_kinds", "overfitting", "many_false", "unknown",
+    "levels", "overlapping_loads", "standing_load", "foreign_labels", "tare", "begun_loaded", "durations", "recipe",
+    "window", "gaps", "unlabelled_time", "label_name", "other_name", "unlabelled_loads", "unfelt_labels",
+    "unlike_training", "plain_rule", "indistinct_kinds", "overfitting", "many_false", "unknown",
 )  # fmt: skip
 
 #: Those that lie in the data: no other recipe helps.
 OF_DATA = (
     "falling_values", "exchanged_sources", "shifted_labels", "few_labels", "unlabelled_source", "overlapping_loads",
-    "foreign_labels", "tare", "begun_loaded", "gaps", "unlabelled_time", "unlabelled_loads",
+    "standing_load", "foreign_labels", "tare", "begun_loaded", "gaps", "unlabelled_time", "unlabelled_loads",
 )  # fmt: skip
 
 
@@ -65,6 +65,7 @@ class Cause:
     - ``unlabelled_source``: one source (a foot) has half the share found of another. A column ``source`` in the labels.
     - ``levels``: loads reach fewer than two levels, as in another unit. ``--set fit_levels=true``.
     - ``overlapping_loads`` (*): one load holds several labels of a name. A source or region for each load.
+    - ``standing_load`` (*): while these labels happen, something lies on the array, or a taxel is stuck. ``--tare``.
     - ``foreign_labels``: labels are more than 50 ms from any load, or all at the beginning. Labels of this recording;
       times in us.
     - ``tare``: the tare holds a touch, or untouched taxels read above rest. ``--tare``.

@@ -83,7 +83,10 @@ def score_of(outcomes: Sequence[Outcome], window_ms: float) -> Score:
 
 
 def causes_of(
-    outcomes: Sequence[Outcome], window_ms: float, differences: Sequence[Sequence[str]] = ()
+    outcomes: Sequence[Outcome],
+    window_ms: float,
+    differences: Sequence[Sequence[str]] = (),
+    standing: Standing | None = None,
 ) -> tuple[Cause, ...]:
     """Return what concerns most of what a readout missed, and what is false; none of few mistakes.
 
@@ -95,6 +98,8 @@ def causes_of(
         The window of the scores.
     differences : sequence of sequence of str
         In what each differs from the training, as `taxel.detect.training_data.unlike` says.
+    standing : Standing, optional
+        A load of theirs that stays.
     """
     scored = score_of(outcomes, window_ms)
     wrong = many_wrong(scored)
@@ -104,9 +109,18 @@ def causes_of(
     found = [example._known(outcome.found) for example, outcome in zip(examples, outcomes, strict=True)]
     scores = [cast("Score", outcome.score) for outcome in outcomes]
     mistakes = mistakes_of(found, [example.labels for example in examples], scores)
-    measured = Measured(examples, mistakes, scored, window_ms, differences=differences)
+    measured = Measured(examples, mistakes, scored, window_ms, differences=differences, standing=standing)
     # That far too many are false is what `unreliable` says.
     return ordered([cause for cause in measured.causes(wrong) if cause.kind != "many_false"])
+
+
+class Standing(NamedTuple):
+    """A load that stays, as of an object or a stuck taxel: what it is, and what helps, as of `Cause`."""
+
+    text: str
+    advice: str = ""
+    option: str = ""
+    arguments: Mapping[str, float] = {}
 
 
 class _Times(NamedTuple):
@@ -155,6 +169,8 @@ class Measured:
         When the examples were loaded.
     differences : sequence of sequence of str
         In what each of them differs from the training of the readout.
+    standing : Standing, optional
+        A load of one of them that stays.
     """
 
     def __init__(
@@ -165,6 +181,7 @@ class Measured:
         window_ms: float,
         felt: FeltLoads | None = None,
         differences: Sequence[Sequence[str]] = (),
+        standing: Standing | None = None,
     ) -> None:
         self._examples, self._window_ms = examples, window_ms
         self._scores = scored.by_label or {scored.label: scored}
@@ -173,7 +190,7 @@ class Measured:
         self._lasts_us = sum(last - first for first, last in spans)
         #: What the clock of each example is moved by, so that all are on one.
         self._shifts = [k * APART_US - first for k, (first, _) in enumerate(spans)]
-        self._mistakes = mistakes
+        self._mistakes, self._standing = mistakes, standing
         self._differences = {k: texts for k, texts in enumerate(differences) if texts}
 
     def causes(self, wrong: Mapping[str, int]) -> list[Cause]:
@@ -402,6 +419,11 @@ class Measured:
         inside = np.isin(left.missed, self._felt.times(label)[overlapped])
         if 2 * (count := int(inside.sum())) <= len(left.missed):
             return None
+        if self._standing is not None:
+            text, advice, option, arguments = self._standing
+            measured = f"{text}; {count} of {len(inside)} missed of {label} {are(count)} while it stays"
+            cause = Cause("standing_load", (label,), count, measured, advice, option, arguments)
+            return cause, left.without(inside, np.zeros(len(left.false), np.bool_))
         # Loads that overlap have labels of their other edges too; without such labels a load holds a label too many.
         names = {name for example in self._examples for name in example.labels} - {label}
         if names and not any(2 * int(self._felt.overlapped(name).sum()) >= count for name in names):

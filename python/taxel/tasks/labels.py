@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -160,11 +161,12 @@ def of_other_sources(
         beside_it = [k for k, each in enumerate(recordings) if (each.path, trial_name(each)) == file]
         theirs = {source_name(recordings[k]): events[k] or {} for k in beside_it if recordings[k] is not recording}
         names = {name for k in beside_it for name in (recordings[k].label, recordings[k].side)} | {""}
+        clock_of = partial(getattr, recording, "clock")
         for table in _tables(source, recording.path):
             rows = [row for row in table.rows if row.recording in {table.named(*file), ""}]
             for name in sorted({row.source for row in rows} - names):
                 with collected():  # what these warn of concerns the labels of this source too
-                    times = table._times(recording.path, lambda clock=recording.clock: clock, name, file[1], name)
+                    times = table._times(recording.path, clock_of, name, file[1], name)
                     (counted_anew,) = _from_beginnings([times], [recording], str(table.path))
                     theirs[name] = moved(counted_anew, recording, shift_ms)
         found[recording.title] = theirs
