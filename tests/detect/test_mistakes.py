@@ -132,7 +132,7 @@ SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
         "40 of 40 missed have a false detection 60 ms later",
         "--shift-ms 60",
     ),
-    "rising slowly": (rising_slowly, "window", "20 of 20 missed have a false detection 60 to 60 ms", "--window-ms 60"),
+    "rising slowly": (rising_slowly, "window", "20 of 20 missed have a false detection 60 ms", "--window-ms 60"),
     "felt late": (felt_late, "shifted_labels", "170 ms later, while lift fits: contact is felt later there", ""),
     "alike": (alike, "other_name", "20 of 20 false detections of lift are within 100 ms of labels of contact", ""),
     "misplaced": (misplaced, "unlabelled_loads", "6 of 6 false are in loads without a label", "labels of these"),
@@ -405,3 +405,15 @@ def test_names_of_grasps_and_of_steps_are_ends_of_touches() -> None:
     assert known.kinds("touch", ["grasp", "Griff", "release", "slip"]) == ("slip",)
     assert known.kinds("touch", ["IC", "FO"]) == ()
     assert known.kinds("event_counts", ["slip"]) == ()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_single_label_tells_no_cause_of_how_far_detections_are(seed: int) -> None:
+    frames, truth = touched(seed, 20)
+    several = np.random.default_rng(seed).choice(20, 2, replace=False)
+    for count, kinds in ((1, []), (2, ["window"])):
+        found = truth["contact"].copy()
+        found[several[:count]] += 70_000
+        extra = {"contact": found, "lift": np.concatenate([truth["lift"], truth["lift"][:3] + 400_000])}
+        causes = causes_of([outcome(frames, truth, extra)], 50.0)
+        assert [cause.kind for cause in causes if "contact" in cause.labels] == kinds

@@ -91,8 +91,20 @@ def three_digits(value: float, sign: str = "") -> str:
     return f"{value:{sign}.0f}" if 999.5 <= abs(value) < 1e6 else f"{value:{sign}.3g}"
 
 
-#: Numbers in a text, and times among them.
-_NUMBER, _SECONDS = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)"), re.compile(r"\d s\b")
+#: Numbers in a text, ranges of them, and times among them.
+_NUMBER = r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)"
+_RANGE, _SECONDS = re.compile(f"{_NUMBER}(?: to {_NUMBER})?"), re.compile(r"\d s\b")
+
+
+def ranged(least: float, most: float) -> str:
+    """Return whole numbers from the least to the largest as text, or their only one.
+
+    Examples
+    --------
+    >>> ranged(51.2, 52.9), ranged(51.8, 52.3)
+    ('51 to 53', '52')
+    """
+    return " to ".join(dict.fromkeys((f"{least:.0f}", f"{most:.0f}")))
 
 
 def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
@@ -112,10 +124,12 @@ def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
     --------
     >>> of_names([("a", "2 of 4 are far"), ("b", "3 of 4 are far"), ("b", "noisy")], 2)
     ['all 2: 2 to 3 of 4 are far', 'b: noisy']
+    >>> of_names([("a", "51 to 52 ms later"), ("b", "52 to 53 ms later"), ("c", "54 ms later")], 3)
+    ['all 3: 51 to 54 ms later']
     """
     alike: dict[str, dict[str, list[str]]] = {}
     for name, text in named:
-        key = text if _SECONDS.search(text) else _NUMBER.sub("\0", text)
+        key = text if _SECONDS.search(text) else _RANGE.sub("\0", text)
         alike.setdefault(key, {}).setdefault(text, []).append(name)
     texts = []
     for by_text in alike.values():
@@ -127,9 +141,10 @@ def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
 
 def _with_ranges(texts: Sequence[str]) -> str:
     """Return texts that differ in numbers alone as one, with the least and the largest of each."""
-    each = zip(*(_NUMBER.findall(text) for text in texts), strict=True)
-    ranges = iter([" to ".join(dict.fromkeys((min(n, key=float), max(n, key=float)))) for n in each])
-    return _NUMBER.sub(lambda _: next(ranges), texts[0])
+    each = zip(*(_RANGE.findall(text) for text in texts), strict=True)
+    edges = ([edge for found in same for edge in found.split(" to ")] for same in each)
+    ranges = iter([" to ".join(dict.fromkeys((min(n, key=float), max(n, key=float)))) for n in edges])
+    return _RANGE.sub(lambda _: next(ranges), texts[0])
 
 
 def first_line(error: BaseException) -> str:

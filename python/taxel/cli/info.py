@@ -371,9 +371,12 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
     for name, taxels in facts["taxels"].items():
         yield f"{name} taxels", f"{len(taxels)}{at(taxels, len(taxels))}"
+        if name == "stuck":
+            yield from (("", held["text"]) for held in facts["taxels_held"])
     # Each touch is seen by few pixels of a camera.
     if "on_share" in facts:
         return
+    yield from (("rows and columns", line) for line in facts["taxels_lines"])
     unchanging = facts["taxels_unchanging"]
     if unchanging:
         where = at(facts["taxels_unchanging_at"], unchanging)

@@ -11,16 +11,16 @@ from taxel._base.errors import refused
 
 #: The kinds of causes. Where two concern equally many mistakes the earlier comes first: the later may follow from it.
 KINDS = (
-    "falling_values", "shifted_labels", "shifted_training", "few_labels", "unlabelled_source", "levels",
-    "overlapping_loads", "foreign_labels", "tare", "begun_loaded", "durations", "recipe", "window", "gaps",
-    "unlabelled_time", "label_name", "other_name", "unlabelled_loads", "unfelt_labels", "unlike_training", "plain_rule",
-    "indistinct_kinds", "overfitting", "many_false", "unknown",
+    "falling_values", "exchanged_sources", "shifted_labels", "shifted_training", "few_labels", "unlabelled_source",
+    "levels", "overlapping_loads", "standing_load", "foreign_labels", "tare", "begun_loaded", "durations", "recipe",
+    "window", "gaps", "unlabelled_time", "label_name", "other_name", "unlabelled_loads", "unfelt_labels",
+    "unlike_training", "plain_rule", "indistinct_kinds", "overfitting", "many_false", "unknown",
 )  # fmt: skip
 
 #: Causes in the data: no other recipe helps.
 OF_DATA = (
-    "falling_values", "shifted_labels", "few_labels", "unlabelled_source", "overlapping_loads", "foreign_labels",
-    "tare", "begun_loaded", "gaps", "unlabelled_time", "unlabelled_loads",
+    "falling_values", "exchanged_sources", "shifted_labels", "few_labels", "unlabelled_source", "overlapping_loads",
+    "standing_load", "foreign_labels", "tare", "begun_loaded", "gaps", "unlabelled_time", "unlabelled_loads",
 )  # fmt: skip
 
 
@@ -56,6 +56,7 @@ class Cause:
     What was measured, by kind, and what helps. ``taxel detect --truth`` finds those with an asterisk.
 
     - ``falling_values``: values fall when touched. ``falls = true`` in a layout file, or remove it.
+    - ``exchanged_sources`` (*): the labels of two sources, as left and right, fit the detections of the other.
     - ``shifted_labels`` (*): most labels, or those of a part of the recording, are shifted by the same time, more than
       50 ms (another clock, a video, a key press). ``--shift-ms MS``, and ``--window-ms MS`` for labels by hand.
     - ``shifted_training`` (*): labels agree with the felt loads, but all detections are late or early.
@@ -64,6 +65,7 @@ class Cause:
     - ``unlabelled_source``: one source (a foot) has half the share found of another. A column ``source`` in the labels.
     - ``levels``: loads reach fewer than two levels, as in another unit. ``--set fit_levels=true``.
     - ``overlapping_loads`` (*): one load holds several labels of a name. A source or region for each load.
+    - ``standing_load`` (*): while these labels happen, something lies on the array, or a taxel is stuck. ``--tare``.
     - ``foreign_labels``: labels are more than 50 ms from any load, or all at the beginning. Labels of this recording;
       times in us.
     - ``tare``: the tare holds a touch, or untouched taxels read above rest. ``--tare``.

@@ -8,7 +8,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.messages import are, counted, of_names
+from taxel._base.messages import are, counted, of_names, ranged
 from taxel._base.times import beginning_us
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
@@ -40,6 +40,8 @@ _FOUND = 0.8
 _FAR_MORE = 2
 #: Fewer events missed and false are few.
 _FEW = 3
+#: A single label tells no cause of how far detections are.
+_SEVERAL = 2
 #: So many times of labels are named.
 _NAMED = 3
 #: A load changes slowly that takes so long, ms, from the first to the second part of its change, and no longer from its
@@ -81,7 +83,10 @@ def score_of(outcomes: Sequence[Outcome], window_ms: float) -> Score:
 
 
 def causes_of(
-    outcomes: Sequence[Outcome], window_ms: float, differences: Sequence[Sequence[str]] = ()
+    outcomes: Sequence[Outcome],
+    window_ms: float,
+    differences: Sequence[Sequence[str]] = (),
+    standing: Standing | None = None,
 ) -> tuple[Cause, ...]:
     """Return what concerns most of what a readout missed, and what is false; none of few mistakes.
 
@@ -93,6 +98,8 @@ def causes_of(
         The window of the scores.
     differences : sequence of sequence of str
         In what each differs from the training, as `taxel.detect.training_data.unlike` says.
+    standing : Standing, optional
+        A load of theirs that stays.
     """
     scored = score_of(outcomes, window_ms)
     wrong = many_wrong(scored)
@@ -102,9 +109,18 @@ def causes_of(
     found = [example._known(outcome.found) for example, outcome in zip(examples, outcomes, strict=True)]
     scores = [cast("Score", outcome.score) for outcome in outcomes]
     mistakes = mistakes_of(found, [example.labels for example in examples], scores)
-    measured = Measured(examples, mistakes, scored, window_ms, differences=differences)
+    measured = Measured(examples, mistakes, scored, window_ms, differences=differences, standing=standing)
     # That far too many are false is what `unreliable` says.
     return ordered([cause for cause in measured.causes(wrong) if cause.kind != "many_false"])
+
+
+class Standing(NamedTuple):
+    """A load that stays, as of an object or a stuck taxel: what it is, and what helps, as of `Cause`."""
+
+    text: str
+    advice: str = ""
+    option: str = ""
+    arguments: Mapping[str, float] = {}
 
 
 class _Times(NamedTuple):
@@ -153,6 +169,8 @@ class Measured:
         When the examples were loaded.
     differences : sequence of sequence of str
         In what each of them differs from the training of the readout.
+    standing : Standing, optional
+        A load of one of them that stays.
     """
 
     def __init__(
@@ -163,6 +181,7 @@ class Measured:
         window_ms: float,
         felt: FeltLoads | None = None,
         differences: Sequence[Sequence[str]] = (),
+        standing: Standing | None = None,
     ) -> None:
         self._examples, self._window_ms = examples, window_ms
         self._scores = scored.by_label or {scored.label: scored}
@@ -171,7 +190,7 @@ class Measured:
         self._lasts_us = sum(last - first for first, last in spans)
         #: What the clock of each example is moved by, so that all are on one.
         self._shifts = [k * APART_US - first for k, (first, _) in enumerate(spans)]
-        self._mistakes = mistakes
+        self._mistakes, self._standing = mistakes, standing
         self._differences = {k: texts for k, texts in enumerate(differences) if texts}
 
     def causes(self, wrong: Mapping[str, int]) -> list[Cause]:
@@ -289,14 +308,14 @@ class Measured:
         most = change.max(axis=0, initial=PEAK)
         begun_ms, made_ms = (after_ms[(change >= part * most).argmax(axis=0)] for part in (_BEGUN, _MADE))
         is_slow = (made_ms - begun_ms >= np.maximum(begun_ms, _MADE_MS)) & (later_ms <= made_ms)
-        if 2 * int(is_slow.sum()) <= len(left.missed):
+        if 2 * int(is_slow.sum()) <= len(left.missed) or is_slow.sum() < _SEVERAL:
             return None
         here = later_ms <= later_ms[is_slow].max()
         count = int(here.sum())
         measured = (
-            f"{count} of {len(left.missed)} missed have a false detection {later_ms[here].min():.0f} to "
-            f"{later_ms[here].max():.0f} ms later, as the load {'falls' if falls else 'rises'} slowly: {label} is felt "
-            "later there"
+            f"{count} of {len(left.missed)} missed have a false detection "
+            f"{ranged(later_ms[here].min(), later_ms[here].max())} ms later, as the load "
+            f"{'falls' if falls else 'rises'} slowly: {label} is felt later there"
         )
         is_missed, is_false = _at(events[here], left.missed), _at(detected[here], left.false)
         return Cause("window", (label,), 2 * count, measured, ""), left.without(is_missed, is_false)
@@ -306,16 +325,16 @@ class Measured:
         reach_ms = 2 * self._window_ms
         pairs = score(Detections([label] * len(left.false), left.false, left.false), {label: left.missed}, reach_ms)
         mistakes = 2 * pairs.found
-        if 2 * pairs.found <= len(left.missed) or 2 * mistakes < len(left.missed) + len(left.false):
+        is_most = 2 * pairs.found > len(left.missed) and 2 * mistakes >= left.total
+        if not is_most or pairs.found < _SEVERAL:
             return None
         least_ms, most_ms = (float(edge) for edge in (np.floor(pairs.errors_ms.min()), np.ceil(pairs.errors_ms.max())))
         window_ms = max(abs(least_ms), abs(most_ms))
         where = f"at most {window_ms:g} ms away"
         if least_ms * most_ms > 0:
-            low, high = sorted((abs(least_ms), abs(most_ms)))
-            where = f"{low:g} to {high:g} ms {'later' if least_ms > 0 else 'earlier'}"
-        have = "has" if pairs.found == 1 else "have"
-        measured = f"{pairs.found} of {len(left.missed)} missed {have} a false detection {where}"
+            low, high = sorted(np.abs([pairs.errors_ms.min(), pairs.errors_ms.max()]))
+            where = f"{ranged(low, high)} ms {'later' if least_ms > 0 else 'earlier'}"
+        measured = f"{pairs.found} of {len(left.missed)} missed have a false detection {where}"
         cause = by_option("window", label, mistakes, measured, f"--window-ms {window_ms:g}", window_ms=window_ms)
         detected, events = pairs.pairs.T
         return cause, left.without(_at(events, left.missed), _at(detected, left.false))
@@ -399,6 +418,11 @@ class Measured:
         inside = np.isin(left.missed, self._felt.times(label)[overlapped])
         if 2 * (count := int(inside.sum())) <= len(left.missed):
             return None
+        if self._standing is not None:
+            text, advice, option, arguments = self._standing
+            measured = f"{text}; {count} of {len(inside)} missed of {label} {are(count)} while it stays"
+            cause = Cause("standing_load", (label,), count, measured, advice, option, arguments)
+            return cause, left.without(inside, np.zeros(len(left.false), np.bool_))
         # Loads that overlap have labels of their other edges too; without such labels a load holds a label too many.
         names = {name for example in self._examples for name in example.labels} - {label}
         if names and not any(2 * int(self._felt.overlapped(name).sum()) >= count for name in names):

@@ -18,7 +18,8 @@ from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, recipes, score
 from taxel.detect.cause import Cause
 from taxel.detect.detector import detector
-from taxel.detect.mistakes import behind_gaps, causes_of, score_of, unreliable
+from taxel.detect.exchanged import Scored, exchanged
+from taxel.detect.mistakes import Standing, behind_gaps, causes_of, score_of, unreliable
 from taxel.detect.readout import run_counting
 from taxel.detect.tares import count_drifted
 from taxel.detect.training_data import Unlike, unlike
@@ -28,18 +29,39 @@ from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
-from taxel.recording.analysis.health import health, unchanging_taxels
-from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
+from taxel.recording.analysis.health import health, unchanging_taxels, whole_lines
+from taxel.recording.analysis.preload import standing
+from taxel.recording.analysis.rest import FORCE_UNITS, of_frames, of_quiet
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
-from taxel.tasks.labels import GivenLabels, check_shift, few, moved, references, sources_without, titles_of
-from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, rest, zero_by_unit
+from taxel.tasks.labels import (
+    GivenLabels,
+    check_shift,
+    few,
+    moved,
+    of_other_sources,
+    references,
+    source_name,
+    sources_without,
+    titles_of,
+)
+from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, given_tare, rest, zero_by_unit
 
 #: At most so many frames are looked at for dead and stuck taxels.
 _LOOKS = 2000
 #: Causes of a bad score that are of labels or of the recording, not of the readout.
-_OF_LABELS = ("shifted_labels", "window", "gaps", "unlabelled_loads", "overlapping_loads")
+_OF_LABELS = (
+    "exchanged_sources",
+    "shifted_labels",
+    "window",
+    "gaps",
+    "unlabelled_loads",
+    "overlapping_loads",
+    "standing_load",
+)
+#: Those of them that need no advice.
+_WITHOUT_ADVICE = ("exchanged_sources", "gaps", "standing_load")
 #: The noise is compared with that of the training from so many times that.
 _NOISIER = 1.5
 #: No event.
@@ -266,7 +288,8 @@ def detect(
             raise next(iter(unknown_rests.values()))
         for unknown_rest in unknown_rests.values():
             warn(f"left out: {unknown_rest}", stacklevel=2)
-        each = tuple(_with_causes(found, options.window_ms))
+        others = {} if truth is None else of_other_sources(truth, opened, each_labelled, options.shift_ms)
+        each = tuple(_with_causes(found, others, options.window_ms))
     scored = [outcome for detected in each if (outcome := detected.outcome).score is not None]
     together = score_of(scored, options.window_ms) if scored else None
     unknown = sorted({label for labels_of in events for label in labels_of} - set(readout.labels))
@@ -281,16 +304,31 @@ def detect(
     return Detecting(each, together, tuple(unknown), unlabelled, *how, bad, tuple(warnings), names)
 
 
-def _with_causes(each: Sequence[_Found], window_ms: float) -> Iterator[Detected]:
-    """Yield what was detected with the causes of what is missed and false: sources of a recording have the same."""
+def _with_causes(
+    each: Sequence[_Found], others: Mapping[str, Mapping[str, Any]], window_ms: float
+) -> Iterator[Detected]:
+    """Yield what was detected with the causes of what is missed and false: sources of a recording have the same.
+
+    `others`: the labels of the other sources of each recording, by its title.
+    """
     known: dict[str, tuple[Cause, ...]] = {}
-    for detected, felt, _ in each:
+    for detected, felt, *_ in each:
         group = felt.example.group
         if group not in known:
             sources = [source for source in each if source.felt.example.group == group]
             scored = [source for source in sources if source.felt.score is not None]
-            outcomes, differences = [source.felt for source in scored], [source.differences for source in scored]
-            known[group] = causes_of(outcomes, window_ms, differences) if scored else ()
+            of_sources = [
+                Scored(source.felt, source_name(source.detected.recording), others.get(source.felt.name, {}))
+                for source in scored
+            ]
+            pairs = list(exchanged(of_sources, window_ms))
+            mixed_up = {place for _, places in pairs for place in places}
+            # All else is measured on the others.
+            rest = [source for k, source in enumerate(scored) if k not in mixed_up]
+            outcomes, differences = [source.felt for source in rest], [source.differences for source in rest]
+            stays = next((source.standing for source in rest if source.standing is not None), None)
+            found = causes_of(outcomes, window_ms, differences, stays) if rest else ()
+            known[group] = (*(cause for cause, _ in pairs), *found)
         yield replace(detected, outcome=detected.outcome._replace(causes=known[group]))
 
 
@@ -316,7 +354,9 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
 def _at_fault(label: str, scored: Score, causes: Sequence[Cause]) -> str:
     """Return whether a bad score is one of the readout, or by labels and recording, as its causes say, of the score."""
     of_labels = (cause for cause in causes if label in cause.labels and cause.kind in _OF_LABELS)
-    count = sum(cause.mistakes / len(cause.labels) for cause in of_labels if cause.advice or cause.kind == "gaps")
+    count = sum(
+        cause.mistakes / len(cause.labels) for cause in of_labels if cause.advice or cause.kind in _WITHOUT_ADVICE
+    )
     return "score" if 2 * count >= scored.rank[0] else "readout"
 
 
@@ -335,11 +375,12 @@ def _of_other_arrays(readout: Readout | PlainRule, recordings: Sequence[Recordin
 
 
 class _Found(NamedTuple):
-    """The detections in a recording, the same with a rest for what was felt, and in what the sensor differs."""
+    """The detections in a recording, the same with a rest for what was felt, in what the sensor differs, what stays."""
 
     detected: Detected
     felt: Outcome
     differences: Sequence[str]
+    standing: Standing | None
 
 
 def _detected(
@@ -368,7 +409,35 @@ def _detected(
     outcome = Outcome(title, example, found, scored, outside)
     felt = outcome if tare is not None else outcome._replace(example=example._replace(tare=_quiet(recording)))
     remarks, differs = _remarks(recording, felt, readout)
-    return _Found(Detected(recording, outcome, taken, tuple(remarks)), felt, differs.sensor)
+    stays = None if scored is None or not scored.rank[0] else _standing(readout, recording, felt, options)
+    return _Found(Detected(recording, outcome, taken, tuple(remarks)), felt, differs.sensor, stays)
+
+
+def _standing(
+    readout: Readout | PlainRule, recording: Recording, outcome: Outcome, options: DetectOptions
+) -> Standing | None:
+    """Return a load of frames that stays, of a stuck taxel or an object, with the tare that a trial shows to help."""
+    source, now = recorded(recording, hold=False), outcome.score
+    assert now is not None
+    if not isinstance(source, Frames) or are_counts(source.unit):
+        return None
+    if held := health(source[:: 1 + len(source) // _LOOKS]).held:
+        return Standing("; ".join(each.text(source) for each in held))
+    where = "" if options.tare is not None else standing(source)
+    if not where:
+        return None
+    text, quiet = f"something lies on it from beginning to end, at {where}", of_quiet(source).quiet_us
+    if quiet is None or quiet[0] > source.t[0]:
+        return Standing(text, "a region without it")
+    seconds = np.floor((quiet[1] - quiet[0]) / 1e4) / 100
+    tare = given_tare(float(seconds), recording)
+    found, _ = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=tare.stop_us)
+    tried = score(outcome.example._known(found), outcome.example.labels, options.window_ms)
+    if 2 * tried.rank[0] > now.rank[0]:
+        return Standing(text, "a region without it")
+    trial = f"{tried.found} found and {tried.false} false, where {now.found} are found and {now.false} false"
+    text += f"; tried with it: {trial}"
+    return Standing(text, f"--tare {seconds:g}", f"--tare {seconds:g}", {"tare": float(seconds)})
 
 
 def _quiet(recording: Recording) -> Tare | None:
@@ -456,10 +525,15 @@ def _of_taxels(source: Events | Frames | SpikeTrains) -> Iterator[str]:
         source = source[:: 1 + len(source) // _LOOKS]
     of_taxels = health(source)
     masks = {"dead": of_taxels.dead, "stuck": of_taxels.stuck, "unchanging": unchanging_taxels(of_taxels, source)}
+    lines, within = whole_lines(masks, source.array)
+    yield from (f"{line} (taxel info lists them)" for line in lines)
+    for held in of_taxels.held if isinstance(source, Frames) else ():
+        yield f"stuck taxel: {held.text(source)}"
+        within[held.y, held.x] = True
     for word, mask in masks.items():
-        if mask.any():
-            y, x = np.argwhere(mask)[0]
-            yield f"{counted(int(mask.sum()), f'{word} taxel')}, as column {x}, row {y} (taxel info lists them)"
+        if (rest := mask & ~within).any():
+            y, x = np.argwhere(rest)[0]
+            yield f"{counted(int(rest.sum()), f'{word} taxel')}, as column {x}, row {y} (taxel info lists them)"
 
 
 def _of_gaps(recording: Recording, outcome: Outcome) -> Iterator[str]:

@@ -26,7 +26,7 @@ from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording, open_one
-from taxel.recording.analysis.preload import free_of_preload, without_preload
+from taxel.recording.analysis.preload import free_of_preload, standing, without_preload
 from taxel.recording.analysis.pressure import quiet_rest
 from taxel.recording.analysis.rest import ZEROS_BEFORE, by_unit, of_quiet, quantile
 from taxel.spikes import to_ms
@@ -281,7 +281,9 @@ def zero_by_unit(recording: Recording) -> Tare | None:
     above = _TIMES * zero.noise
     off = (middle < -above) | ((middle > above) & (lowest > above))
     count = np.count_nonzero(off)
-    if count > _MANY * source.array.taxels:
+    is_off = count > _MANY * source.array.taxels
+    where = "" if is_off else standing(source)
+    if is_off or where:
         first, end = found.quiet_us
         stretch_s = [(t - beginning_us(source.t[:1])) / 1e6 for t in (first, end)]
         stretch = "{:.3f} to {:.3f} s".format(*stretch_s)
@@ -289,12 +291,13 @@ def zero_by_unit(recording: Recording) -> Tare | None:
         if first > source.t[0]:
             cut = "taxel cut {} rest.npz --from {:.3f} --to {:.3f}".format(quote(str(recording.path)), *stretch_s)
             option = f"--tare rest.npz takes that off, which {cut} makes"
-        warn(
-            f"{recording.path}: {count} of {source.array.taxels} taxels read {middle[off].min():.3g} to "
-            f"{middle[off].max():.3g} {source.unit} in a quiet stretch, {stretch}, and not 0; if nothing touches them "
-            f"then, {option}",
-            stacklevel=3,
+        reads = (
+            f"{count} of {source.array.taxels} taxels read {middle[off].min():.3g} to {middle[off].max():.3g} "
+            f"{source.unit} in a quiet stretch, {stretch}, and not 0; if nothing touches them then"
         )
+        if where:
+            reads = f"something lies on it from beginning to end, at {where}; if nothing else touches it in {stretch}"
+        warn(f"{recording.path}: {reads}, {option}", stacklevel=3)
     return zero
 
 

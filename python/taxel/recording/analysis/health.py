@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,6 +15,7 @@ from taxel._base.columns import frozen
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
 from taxel._base.messages import counted
+from taxel._base.times import beginning_us
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
@@ -45,6 +47,15 @@ MOVES_FROM = 8
 #: touch continues, noise turns back.
 NOISY_FROM, NOISY_SHARE, NOISY_ON = 10, 0.5, 0.45
 
+#: A taxel of frames is stuck too from some time on if it reads exactly one value for so long, us, and for this share of
+#: the time from then to the end, at least so many ticks above its least value, while its neighbours (median), of
+#: channels the others, are loaded by so many ticks more than their least and released again so many times.
+HOLDS_US, HOLDS_SHARE, HOLDS_FROM = 3_000_000, 0.5, 8
+#: At most so many frames are looked at for that.
+_LOOKS = 2000
+#: A row or column is bad as a whole if this share of its taxels is, of so many or more.
+_LINE, _LINE_FROM = 0.9, 4
+
 #: A pixel of a camera is noisy too, "hot", if it has at least this number of events, so many spreads (as of normal
 #: noise) more than the median of all pixels, and so many times those of all but one of the 24 around it.
 HOT_FROM, HOT_SPREADS, HOT_TIMES = 50, 10, 4
@@ -67,6 +78,32 @@ _OFFSETS = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
 _CHANGES = 0.2
 
 
+class Held(NamedTuple):
+    """A taxel of frames that sticks at one value from some time on, while those around it are touched.
+
+    Attributes
+    ----------
+    x, y : int
+        Its column and row.
+    value : float, in the sensor's unit
+    t, until : int, us
+        Since when, and until when.
+    """
+
+    x: int
+    y: int
+    value: float
+    t: int
+    until: int
+
+    def text(self, frames: Frames) -> str:
+        """Return what it reads, and when, for people."""
+        name = f"{frames.array.names[self.x + self.y * frames.array.columns]}, " if frames.array.names else ""
+        first, end = ((t - beginning_us(frames.t[:1])) / 1e6 for t in (self.t, self.until))
+        when = f"{first:.1f} s on" if self.until == frames.t[-1] else f"{first:.1f} to {end:.1f} s"
+        return f"{name}column {self.x}, row {self.y}, reads {self.value:g} {frames.unit} from {when}"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Health:
     """Hold which taxels are dead, stuck or noisy.
@@ -79,6 +116,8 @@ class Health:
     dead, stuck, noisy : bool, shape (rows, columns)
     untested : bool, shape (rows, columns)
         Taxels that were not touched enough to say whether they work.
+    held : tuple of Held
+        The stuck taxels of frames that worked before.
 
     Examples
     --------
@@ -93,6 +132,7 @@ class Health:
     stuck: NDArray[np.bool_]
     noisy: NDArray[np.bool_]
     untested: NDArray[np.bool_]
+    held: tuple[Held, ...] = ()
 
     def named(self) -> dict[str, list[tuple[int, int]]]:
         """Return column and row (x, y) of the taxels that are dead, stuck and noisy."""
@@ -120,6 +160,24 @@ def unchanging_taxels(of_taxels: Health, source: Events | Frames) -> NDArray[np.
     """Return which untested taxels of frames never change, while noise changes most: it does so in taxels that work."""
     is_noisy = isinstance(source, Frames) and np.median(of_taxels.activity) >= _CHANGES * len(source)
     return np.asarray(of_taxels.untested & (of_taxels.activity == 0) & is_noisy)
+
+
+def whole_lines(masks: Mapping[str, NDArray[np.bool_]], array: Array) -> tuple[list[str], NDArray[np.bool_]]:
+    """Return rows and columns of which nearly all taxels are bad, as texts, and the bad taxels in them.
+
+    `masks`: which taxels are bad, by what they are, as "dead".
+    """
+    exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
+    bad, within, texts = exists & np.any([*masks.values()], axis=0), np.zeros(array.shape, bool), list[str]()
+    for noun, axis in (("row", 1), ("column", 0)):
+        counts, sizes = (np.count_nonzero(grid, axis=axis) for grid in (bad, exists))
+        for k in np.flatnonzero((counts >= _LINE * sizes) & (sizes >= _LINE_FROM)).tolist():
+            line = np.zeros(array.shape, bool)
+            np.moveaxis(line, 0, 1 - axis)[k] = True
+            words = " or ".join(name for name, mask in masks.items() if (mask & line).any())
+            texts.append(f"{noun} {k}: {counts[k]} of its {sizes[k]} taxels are {words}")
+            within |= line & bad
+    return texts, within
 
 
 def health(recorded: Events | Frames | Recorded) -> Health:
@@ -154,14 +212,16 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     many as the silent ones. A taxel of counts of events is dead only without any event. Stuck: like a dead one, but
     known to hold a value other than 0; or 3 events or more, all with one intensity, while its neighbours show more than
     one; or known to hold the greatest value of the recording, and no other, while the values of its neighbours (median)
-    move by 8 ticks or more, touched or not. Noisy: in 10 bins of 50 ms or more, half of all in which it changes, it has
-    3 changes or more, and more than 8 times those of all but one of the 24 taxels around it; and at most 45 % of its
-    changes go on in the direction of the one before. Of frames, too, one that jumps for less than two frames at a time,
-    10 times or more, more than half as far from its median as ever, while all but one of its neighbours move less than
-    an eighth as much; and one whose noise from frame to frame, in the quieter tenth of stretches of 20 frames, is 4.5
-    times the median of all taxels or more, and more than 3 times that of all but one of the 24 around it. A pixel of a
-    camera's events or counts is noisy too if it has 50 events or more, more than the median of all by 10 times their
-    spread, and more than 4 times those of all but one of the 24 around it.
+    move by 8 ticks or more, touched or not; or, in frames, one that reads exactly one value, 8 ticks or more above its
+    least, for 3 s or more and half of the time from then to the end, while its neighbours (median; of channels the
+    others) are loaded by 8 ticks and released three times or more. Noisy: in 10 bins of 50 ms or more, half of all in
+    which it changes, it has 3 changes or more, and more than 8 times those of all but one of the 24 taxels around it;
+    and at most 45 % of its changes go on in the direction of the one before. Of frames, too, one that jumps for less
+    than two frames at a time, 10 times or more, more than half as far from its median as ever, while all but one of its
+    neighbours move less than an eighth as much; and one whose noise from frame to frame, in the quieter tenth of
+    stretches of 20 frames, is 4.5 times the median of all taxels or more, and more than 3 times that of all but one of
+    the 24 around it. A pixel of a camera's events or counts is noisy too if it has 50 events or more, more than the
+    median of all by 10 times their spread, and more than 4 times those of all but one of the 24 around it.
 
     Examples
     --------
@@ -210,7 +270,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     result = replace(result, untested=result.untested & ~at_top)
     result = replace(result, dead=dead, stuck=stuck, noisy=noisy, untested=result.untested & ~noisy)
     if not are_counts(table.unit):
-        return result
+        return _with_held(result, table, scale)
     return _with_hot(result, np.asarray(np.nansum(table.values, axis=0, dtype=np.float64)))
 
 
@@ -291,6 +351,61 @@ def judge(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> He
     works = enough | where(touches.pressed > 0) | (activity >= WORKS_FROM)
     untested = exists & ~dead & ~stuck & ~noisy & ~works
     return Health(array, activity, dead, stuck, noisy, untested)
+
+
+def _with_held(result: Health, frames: Frames, scale: float) -> Health:
+    """Return the same with taxels as stuck that hold one value from some time on; `scale`: ticks by the unit."""
+    some = frames[:: 1 + len(frames) // _LOOKS]
+    t, values = some.t, some.values.reshape(len(some), -1)
+    begins, runs = np.zeros((2, values.shape[1]), np.int64)
+    first = begins.copy()
+    # The longest run of equal values of each taxel.
+    for k in range(1, len(some)):
+        first = np.where(values[k] == values[k - 1], first, k)
+        longer = k - first > runs
+        begins, runs = np.where(longer, first, begins), np.maximum(runs, k - first)
+    lasts_us = t[begins + runs] - t[begins]
+    least = np.fmin.reduce(values, axis=0)
+    held = values[begins, np.arange(values.shape[1])]
+    is_long = (lasts_us >= HOLDS_US) & (lasts_us >= HOLDS_SHARE * (t[-1] - t[begins]))
+    array, found = frames.array, list[Held]()
+    for k in np.flatnonzero(is_long & ((held - least) * scale >= HOLDS_FROM)).tolist():
+        y, x = divmod(k, array.columns)
+        if result.noisy[y, x] or not _are_touched(
+            values[begins[k] : begins[k] + runs[k] + 1], array.shape, k, least, scale
+        ):
+            continue
+        # Of all frames, those before the first that was looked at.
+        series = frames.values[:, y, x]
+        at = int(np.searchsorted(frames.t, t[begins[k]]))
+        others = np.flatnonzero(series[:at] != held[k])
+        begin = int(others[-1]) + 1 if len(others) else 0
+        end = int(np.searchsorted(frames.t, t[begins[k] + runs[k]]))
+        if (series[begin : end + 1] == held[k]).all():
+            found.append(Held(x, y, float(held[k]), int(frames.t[begin]), int(frames.t[end])))
+    stuck = result.stuck.copy()
+    for each in found:
+        stuck[each.y, each.x] = True
+    return replace(result, stuck=stuck, dead=result.dead & ~stuck, untested=result.untested & ~stuck, held=tuple(found))
+
+
+def _are_touched(
+    values: NDArray[np.float32], shape: tuple[int, int], k: int, least: NDArray[np.float32], scale: float
+) -> bool:
+    """Return whether those around taxel k are loaded, and released, three times or more in some frames."""
+    y, x = divmod(k, shape[1])
+    around = np.zeros(shape, bool)
+    reach = slice(None) if min(shape) == 1 else slice(max(0, x - 1), x + 2)
+    around[max(0, y - 1) : y + 2, reach] = True
+    around[y, x] = False
+    others = around.reshape(-1)
+    if not others.any():
+        return False
+    above = np.nan_to_num(np.median((values[:, others] - least[others]) * scale, axis=1))
+    # Between both bounds a load goes on.
+    states = np.where(above >= HOLDS_FROM, 1, np.where(above < HOLDS_FROM / 2, 0, -1))
+    states = states[states >= 0]
+    return bool(np.count_nonzero(np.diff(states) < 0) >= TOUCHED_FROM)
 
 
 def _unquiet(frames: Frames) -> NDArray[np.bool_]:

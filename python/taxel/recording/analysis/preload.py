@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording.analysis.pressure import readings
-from taxel.recording.analysis.rest import Rest, of_quiet
+from taxel.recording.analysis.rest import FORCE_UNITS, LOADED_TICKS, Rest, of_quiet, quantile, ticks_by_unit
 from taxel.recording.recording import Recording
 from taxel.tare import Tare
 
 #: A tare lasts so long at least, us, and so many frames.
 _LEAST_US, _LEAST_FRAMES = 10_000, 20
+#: What lies on an array all the time is in all but this share of the frames, of so many.
+_LOWEST, _FRAMES = 0.05, 2000
 
 
 def without_preload(recording: Recording, first_us: int) -> tuple[Tare | None, str]:
@@ -42,6 +45,19 @@ def free_of_preload(recording: Recording, rest: Rest) -> tuple[tuple[int, int] |
     free = _free(read[0], rest)
     span = _later(read[0], free) if len(free) else None
     return rest.quiet_us if span is None else span, _line(recording, rest, found=span is not None)
+
+
+def standing(frames: Frames) -> str:
+    """Return on which taxels of a grid, in a unit of force, something lies from beginning to end; "" if nothing does.
+
+    They read more than 0 in nearly all frames, by more than the rest of any recording may be off.
+    """
+    if frames.unit not in FORCE_UNITS or min(frames.array.shape) == 1 or not len(frames):
+        return ""
+    lowest = quantile(frames.values[:: 1 + len(frames) // _FRAMES], _LOWEST).reshape(-1)
+    above = LOADED_TICKS / ticks_by_unit(frames)
+    _, where = _core.preload(lowest.astype(np.float64), frames.array.columns, above, (0, 0))
+    return where.replace(" above rest", f" {frames.unit} in every frame")
 
 
 def _line(recording: Recording, rest: Rest, *, found: bool) -> str:
