@@ -178,7 +178,15 @@ def lines(answer: Answer) -> list[str]:
     if answer.taxels:
         text += [
             "",
-            _row(f"taxels at {answer.taxels[0].period_ms:g} ms", "bits", "events", "millibits/event", "kb/s", "silent", ""),
+            _row(
+                f"taxels at {answer.taxels[0].period_ms:g} ms",
+                "bits",
+                "events",
+                "millibits/event",
+                "kb/s",
+                "silent",
+                "",
+            ),
         ]
         text += [_point(f"{p.taxels} {p.kind}", p, answer) for p in answer.taxels]
     text += [""]
