@@ -173,21 +173,11 @@ def lines(answer: Answer) -> list[str]:
         "trials the truth is outside it more often than that",
     ]
     text += [f"warning: {warning}" for warning in answer.warnings]
-    text += ["", _row("period", "bits", "events", "millibits/event", "kb/s", "silent", "95 % of the full?")]
+    columns = ("bits", "events", "millibits/event", "kb/s", "silent")
+    text += ["", _row("period", *columns, "95 % of the full?")]
     text += [_point(f"{p.period_ms:g} ms", p, answer) for p in answer.by_period]
     if answer.taxels:
-        text += [
-            "",
-            _row(
-                f"taxels at {answer.taxels[0].period_ms:g} ms",
-                "bits",
-                "events",
-                "millibits/event",
-                "kb/s",
-                "silent",
-                "",
-            ),
-        ]
+        text += ["", _row(f"taxels at {answer.taxels[0].period_ms:g} ms", *columns, "")]
         text += [_point(f"{p.taxels} {p.kind}", p, answer) for p in answer.taxels]
     text += [""]
     for window in sorted({p.window_ms for p in answer.points} - {full.window_ms}):

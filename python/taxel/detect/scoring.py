@@ -274,7 +274,7 @@ def score(
         false, missed = found.t[tally.false_detections], times[tally.missed_events]
         beside = _within(false, times[of_label], 2 * windows[of_label])
         apart_ms = tally.errors_ms, tally.delays_ms
-        nearest = {"false_beside": beside, "missed_ms": _nearest_ms(np.sort(false), missed)}
+        nearest: dict[str, Any] = {"false_beside": beside, "missed_ms": _nearest_ms(np.sort(false), missed)}
         scores[tally.label] = Score(tally.label, pairs, *lost, tally.false_near, *apart_ms, **nearest)
     no_times, ms = np.empty(0, np.int64), np.empty(0)
     parts = [Score("all", np.empty((0, 2), np.int64), no_times, no_times, 0, ms, ms), *scores.values()]
@@ -289,8 +289,9 @@ def _nearest_ms(t: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.f
     if not len(t):
         return np.full(len(events), np.nan)
     after = np.searchsorted(t, events).clip(max=len(t) - 1)
-    apart = np.array([t[after], t[np.maximum(after - 1, 0)]]) - events
-    return to_ms(np.where(np.abs(apart[0]) <= np.abs(apart[1]), *apart))
+    later, earlier = t[after] - events, t[np.maximum(after - 1, 0)] - events
+    nearest: NDArray[np.float64] = to_ms(np.where(np.abs(later) <= np.abs(earlier), later, earlier))
+    return nearest
 
 
 def _within(t: NDArray[np.int64], events: NDArray[np.int64], windows: NDArray[np.int64]) -> int:

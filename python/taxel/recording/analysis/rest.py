@@ -372,7 +372,7 @@ def _fall(frames: Frames, quiet_us: tuple[int, int], scale: float) -> bool:
         return False
     series = values[:, fallen].T
     back = np.array([each[k:].max() for each, k in zip(series, series.argmin(axis=1), strict=True)])
-    return np.count_nonzero(back >= (rest - down / _FALLS)[fallen]) >= rank
+    return int(np.count_nonzero(back >= (rest - down / _FALLS)[fallen])) >= rank
 
 
 def frames_above(rest: Rest, blocks: Iterable[FrameBlock], columns: int, scale: float = 1.0) -> Iterable[FrameBlock]:

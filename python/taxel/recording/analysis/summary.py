@@ -116,8 +116,9 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
 
 def _held(table: Events | Frames, of_taxels: Health) -> list[dict[str, Any]]:
     """Return the taxels of frames that stick at one value from some time on."""
-    held = of_taxels.held if isinstance(table, Frames) else ()
-    return [{**each._asdict(), "text": each.text(table)} for each in held]
+    return (
+        [{**each._asdict(), "text": each.text(table)} for each in of_taxels.held] if isinstance(table, Frames) else []
+    )
 
 
 def _places(taxels: NDArray[np.bool_]) -> list[tuple[int, int]]:
