@@ -120,6 +120,15 @@ def test_a_training_asks_first_about_labels_that_are_all_off_and_about_no_others
         assert asked(*drawn(*SIZES[size], seed, **more)) == ""
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_training_asks_first_about_labels_within_touches(seed: int) -> None:
+    frames, labels = drawn(*next(iter(SIZES.values())), seed)
+    labels["slip"] = (labels["contact"] + labels["lift"]) // 2
+    text = asked(frames, labels)
+    assert text.startswith("slip: ")
+    assert "no recipe tells what happens while a touch lasts" in text
+
+
 def test_a_training_names_the_part_of_each_recording_whose_labels_are_off(tmp_path: Path, capsys: Any) -> None:
     folder, rows, begins = tmp_path / "days", ["recording,label,t_us\n"], []
     folder.mkdir()

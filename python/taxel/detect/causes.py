@@ -300,8 +300,11 @@ class Mistakes:
 def question(evidence: Evidence) -> str:
     """Return why labels are asked about before a training; "" where they are not.
 
-    Nearly none is near anything felt, or nearly all of all names are off by one distance. Weak loads are no reason.
+    Some are within touches, nearly none is near anything felt, or nearly all of all names are off by one distance. Weak
+    loads are no reason.
     """
+    if evidence.plan.about == str(recipes.read("touch")["about"]) and (inside := evidence.within_touches()):
+        return f"{inside}; leave them out of the labels"
     if not evidence.falls and not evidence.felt.are_clear:
         return ""
     if unfelt := evidence.unfelt():

@@ -220,6 +220,15 @@ class Evidence:
         )
         yield Cause("label_name", (label,), wrong, measured, "labels of where touches begin or end")
 
+    def within_touches(self) -> str:
+        """Return which labels are within touches, where no recipe tells anything; "" where none are."""
+        if self.falls:
+            return ""
+        inside = [
+            f"{label}: {c.measured}" for label, count in self._counts.items() for c in self._while_lasting(label, count)
+        ]
+        return "; ".join(inside)
+
     def _foreign(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield that labels are at loads as by chance, or at the beginning, as those of another recording or unit."""
         if self._early:
