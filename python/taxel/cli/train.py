@@ -222,11 +222,10 @@ def _of_label(path: Path, label: str) -> Path:
 def _next(training: Training, out: Path, tare: str | None) -> str:
     """Return the command that detects by a readout, with the --tare, if any, of the training.
 
-    If the readout cannot be relied on, return the first advice instead, or nothing.
+    If the readout cannot be relied on, return the first advice for all such labels instead, or nothing.
     """
     if any(training.unreliable()):
-        advice = next((cause.advice for cause in training.causes if cause.advice), "")
-        return f"; next: train again with {advice}" * bool(advice)
+        return f"; next: train again with {training.again()}" * bool(training.again())
     again = tare or ("" if _are_quiet(training.recordings) else training.beginning())
     option = f" --tare {quote(again)}" if again and training.readout._needs_tare else ""
     return f"; next: taxel detect RECORDING --readout {quote(str(out))}{option}"

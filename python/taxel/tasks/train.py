@@ -315,7 +315,8 @@ class _Work:
             return
         parts = "the search and the folds take" if self.options.search else "the folds take"
         ground = f"one training on all data took {once_s:.1f} s, and {parts} about as long as {trainings} of them"
-        self.update(Forecast(f"about {once_s * trainings / 60:.0f} min from here on: {ground}"), 0, 0)
+        sooner = "fewer recordings, or no folds (--folds 0), are a quick trial"
+        self.update(Forecast(f"about {once_s * trainings / 60:.0f} min from here on: {ground}; {sooner}"), 0, 0)
 
     def _outcomes(self, trained: Trained) -> list[Outcome]:
         """Return the outcomes of the readout on the recordings that it was trained on."""
