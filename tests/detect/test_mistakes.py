@@ -364,6 +364,23 @@ def test_labels_of_footfalls_that_overlap_are_not_called_wrong(seed: int) -> Non
     assert "9 of 12 labels of heel strike are while another load lasts" in cause.measured
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_touches_in_turn_do_not_overlap_where_the_sensor_recovers_slowly(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    begins = 3 + np.cumsum(random.uniform(1.5, 2.0, 12)) + 4.0 * (np.arange(12) // 4)
+    ends = begins + random.uniform(0.9, 1.1, 12)
+    t = np.arange(0, round(1e6 * (ends[-1] + 2)), 5000)
+    values = random.normal(0, 0.002, (len(t), *ARRAY.shape))
+    for k in range(12):
+        values[(t >= 1e6 * begins[k]) & (t < 1e6 * ends[k])] += 1.0
+        if (k + 1) % 4:
+            values[(t >= 1e6 * ends[k]) & (t < 1e6 * begins[k + 1])] += 0.1
+    labels = {"contact": np.rint(1e6 * begins).astype(np.int64), "release": np.rint(1e6 * ends).astype(np.int64)}
+    found = evidence(Frames(values, t, unit="V", array=ARRAY), labels)
+    assert not found.felt.overlapped("contact").any()
+    assert not found.felt.overlapped("release").any()
+
+
 @pytest.mark.parametrize(("found", "is_cause"), [(0, False), (8, False), (18, True)])
 def test_a_source_is_a_cause_only_where_most_is_found_beside_it(found: int, is_cause: bool) -> None:
     frames, truth = touched(1, 20)

@@ -161,6 +161,21 @@ def test_labels_and_neighbours_choose_the_recipe(
     assert recipes.fitting(Frames(np.zeros((1, *shape)), [0], unit=unit, array=Array(*shape)), labels) == recipe
 
 
+@pytest.mark.parametrize(
+    ("labels", "asks"), [(("press", "tap"), True), (("press", "release"), False), (("tap",), False)]
+)
+def test_kinds_of_touch_on_channels_are_a_question_that_names_the_row(
+    tmp_path: Path, labels: tuple[str, ...], asks: bool
+) -> None:
+    values = np.random.default_rng(1).normal(size=(300, 1, 6))
+    channels = Frames(values, 10_000 * np.arange(300), unit="kPa", array=Array(1, 6))
+    assert ("--array 1x6x5 " in recipes.lacking_places(channels, labels)) == asks
+    taxel.convert(channels, tmp_path / "skin.npz")
+    if asks:
+        with pytest.raises(taxel.ProblemError, match=r"--array 1x6x5 .*; to continue anyway, give labels_as_given"):
+            taxel.train(taxel.open(tmp_path / "skin.npz"), [{label: [1_000_000] for label in labels}])
+
+
 def test_a_row_of_taxels_at_a_known_distance_is_no_channels() -> None:
     row = Array(1, 4, pitch_mm=5.0)
     assert recipes.fitting(Frames(np.zeros((1, 1, 4)), [0], unit="V", array=row), LABELS) == "touch"

@@ -128,6 +128,15 @@ def test_nothing_is_asked_where_no_label_is_left() -> None:
         assert asked(values, {label: t[:0] for label, t in labels.items()}) == ""
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_training_asks_first_about_labels_within_touches(seed: int) -> None:
+    frames, labels = drawn(*next(iter(SIZES.values())), seed)
+    labels["slip"] = (labels["contact"] + labels["lift"]) // 2
+    text = asked(frames, labels)
+    assert text.startswith("slip: ")
+    assert "no recipe tells what happens while a touch lasts" in text
+
+
 def test_a_training_names_the_part_of_each_recording_whose_labels_are_off(tmp_path: Path, capsys: Any) -> None:
     folder, rows, begins = tmp_path / "days", ["recording,label,t_us\n"], []
     folder.mkdir()

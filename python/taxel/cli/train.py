@@ -219,7 +219,7 @@ def _of_label(path: Path, label: str) -> Path:
 
 
 def _next(training: Training, out: Path) -> str:
-    """Return what to do with a readout: detect by it, or train again as the first advice says; else ""."""
-    advice = next((f"train again with {cause.advice}" for cause in training.causes if cause.advice), "")
-    following = training.command(str(out)) or advice
+    """Return what to do with a readout: detect by it, or train again as the advice for all its labels says; else ""."""
+    advice = training.again()
+    following = training.command(str(out)) or (f"train again with {advice}" if advice else "")
     return f"; next: {following}" if following else ""

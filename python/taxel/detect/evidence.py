@@ -185,8 +185,11 @@ class Evidence:
     def question(self) -> str:
         """Return why labels are asked about before a training; "" where they are not.
 
-        Nearly none is near anything felt, or nearly all of all names are off by one distance. Loads must be clear.
+        Some are within touches; or, where loads are clear, nearly none is near anything felt, or nearly all of all
+        names are off by one distance.
         """
+        if self.plan.about == str(recipes.read("touch")["about"]) and (inside := self.within_touches()):
+            return f"{inside}; leave them out of the labels"
         if not self.falls and not self.felt.are_clear:
             return ""
         if unfelt := self._unfelt():
@@ -235,6 +238,15 @@ class Evidence:
             f"{'fits' if len(fits) == 1 else 'fit'}, and no recipe tells what happens while a touch lasts"
         )
         yield Cause("label_name", (label,), wrong, measured, "labels of where touches begin or end")
+
+    def within_touches(self) -> str:
+        """Return which labels are within touches, where no recipe tells anything; "" where none are."""
+        if self.falls:
+            return ""
+        inside = [
+            f"{label}: {c.measured}" for label, count in self._counts.items() for c in self._while_lasting(label, count)
+        ]
+        return "; ".join(inside)
 
     def _foreign(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield that labels are at loads as by chance, or at the beginning, as those of another recording or unit."""

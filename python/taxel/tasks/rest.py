@@ -287,7 +287,8 @@ def zero_by_unit(recording: Recording) -> Tare | None:
         first, end = found.quiet_us
         stretch_s = [(t - beginning_us(source.t[:1])) / 1e6 for t in (first, end)]
         stretch = "{:.3f} to {:.3f} s".format(*stretch_s)
-        option = f"--tare {(end - first) / 1e6:g} takes that off"
+        # Of several recordings one number is right for all: the shortest that is quiet.
+        option = f"--tare {_QUIET_US / 1e6:g} takes that off"
         if first > source.t[0]:
             cut = "taxel cut {} rest.npz --from {:.3f} --to {:.3f}".format(quote(str(recording.path)), *stretch_s)
             option = f"--tare rest.npz takes that off, which {cut} makes"

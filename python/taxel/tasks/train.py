@@ -126,6 +126,8 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     opened, labelled, without = [opened[k] for k in some], [labelled[k] for k in some], [without[k] for k in some]
     if options.recipe is None and "encoder.name" not in options.changes:
         source, rests = recorded(opened[0]), True
+        if not options.labels_as_given and (doubt := recipes.lacking_places(source, names)):
+            raise helped(ProblemError(f"labels: {doubt}"), "labels_as_given", "go_on")
         if isinstance(source, Frames) and not source.array._has_neighbours and options.tare is None:
             rests = all(map(has_rest, labelled, opened))
         recipe, why = recipes.chosen(source, names, rests=rests)
@@ -313,7 +315,8 @@ class _Work:
             return
         parts = "the search and the folds take" if self.options.search else "the folds take"
         ground = f"one training on all data took {once_s:.1f} s, and {parts} about as long as {trainings} of them"
-        self.update(Forecast(f"about {once_s * trainings / 60:.0f} min left: {ground}"), 0, 0)
+        sooner = "fewer recordings, or no folds (--folds 0), are a quick trial"
+        self.update(Forecast(f"about {once_s * trainings / 60:.0f} min left: {ground}; {sooner}"), 0, 0)
 
     def _outcomes(self, trained: Trained) -> list[Outcome]:
         """Return the outcomes of the readout on the recordings that it was trained on."""

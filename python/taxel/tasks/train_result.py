@@ -373,11 +373,19 @@ class Training:
 
     def unreliable(self) -> Iterator[str]:
         """Yield the labels of which the readout misses most, or detects no more than one of nothing; what may help."""
-        for label in self.readout.labels:
-            labels = "labels that it was trained on" if self.why else "held-out labels"
-            if text := unreliable(label, self.scored.together[label], labels):
-                first = next((cause for cause in self.causes if label in cause.labels), None)
-                yield text + (f"; what may help is {first.advice}" if first is not None and first.advice else "")
+        for label, text in self._unreliable().items():
+            first = next((cause for cause in self.causes if label in cause.labels), None)
+            yield text + (f"; what may help is {first.advice}" if first is not None and first.advice else "")
+
+    def _unreliable(self) -> dict[str, str]:
+        labels = "labels that it was trained on" if self.why else "held-out labels"
+        texts = {label: unreliable(label, self.scored.together[label], labels) for label in self.readout.labels}
+        return {label: text for label, text in texts.items() if text}
+
+    def again(self) -> str:
+        """Return the first advice that concerns all labels of which the readout cannot be relied on, or ""."""
+        labels = set(self._unreliable())
+        return next((cause.advice for cause in self.causes if cause.advice and labels.issubset(cause.labels)), "")
 
     def _aligned(self) -> Iterator[str]:
         """Yield by how much labels were moved to what the sensor felt, and which found no pair."""

@@ -24,7 +24,19 @@ from taxel._core import FormatError, ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["chosen", "fitting", "for_labels", "kinds", "knows", "names", "names_of", "neuron_of", "read", "spelling"]
+__all__ = [
+    "chosen",
+    "fitting",
+    "for_labels",
+    "kinds",
+    "knows",
+    "lacking_places",
+    "names",
+    "names_of",
+    "neuron_of",
+    "read",
+    "spelling",
+]
 
 #: The recipe of recordings that no other fits: its levels are shares of the running range, of any unit.
 _ANY = "gait_channel"
@@ -133,6 +145,34 @@ def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool =
         # The levels of `_ANY`, 22 trains a taxel, take minutes.
         steps = grids, sensor
     return steps or (_ANY, f"{sensor} in {source.unit}")
+
+
+def lacking_places(source: Events | Frames, labels: Sequence[str]) -> str:
+    """Return why kinds of touch cannot be told apart on channels, and which option lays these out in a row; else "".
+
+    Steps have recipes of channels, and so have contact and lift alone.
+
+    Examples
+    --------
+    >>> channels = Frames([[[0.0] * 6]], [0], unit="kPa")
+    >>> lacking_places(channels, ["press", "tap"])
+    'no recipe tells press and tap apart on 6 channels without places; if these lie in a row, give --array 1x6x5 ...'
+    >>> lacking_places(channels, ["contact", "lift"]), lacking_places(channels, ["heel_off", "foot_off"])
+    ('', '')
+    """
+    if not isinstance(source, Frames) or source.array._has_neighbours or len(labels) < 2:
+        return ""
+    recipes = {name: read(name) for name in names()}
+    others = [label for label in labels if _own(recipes["touch"], label) is None]
+    if not others or any(
+        _is_of_step(label) or _listed(values, label) for label in others for values in recipes.values()
+    ):
+        return ""
+    rows, columns = source.array.shape
+    return (
+        f"no recipe tells {' and '.join(labels)} apart on {counted(source.array.taxels, 'channel')} without places; if "
+        f"these lie in a row, give --array {rows}x{columns}x5 with the distance from one to the next in mm (here 5)"
+    )
 
 
 def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
