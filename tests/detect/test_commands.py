@@ -504,13 +504,21 @@ def test_a_name_that_no_recording_has_is_listed(folder: Path, capsys, tmp_path: 
     assert f"names no event in {folder / '2.npz'}; it names 1.npz, 9.npz, two.npz" in error
 
 
-def test_a_label_without_a_neuron_is_an_error(folder: Path, capsys, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("label", "section"), [("slip", "[neurons.slip]"), ("toe off", '[neurons."toe off"]')])
+def test_a_label_without_a_neuron_is_an_error(folder: Path, capsys, tmp_path: Path, label: str, section: str) -> None:
     labels = tmp_path / "labels.csv"
-    labels.write_text((folder / "labels.csv").read_text() + "1.npz,slip,500000\n")
+    labels.write_text((folder / "labels.csv").read_text() + f"1.npz,{label},500000\n")
     arguments = ("train", folder / "1.npz", folder / "2.npz", "--labels", labels, "--tare", folder / "tare.json")
     code, _, error = call(capsys, *arguments, "--recipe", folder / "recipe.toml", "-o", "no.json")
     assert (code, error.count("\n")) == (2, 1)
-    assert "label 'slip' has no neuron: the recipe has 'contact', 'lift'" in error
+    assert f"label '{label}' has no neuron: the recipe has 'contact', 'lift'; give it a section, {section} in" in error
+    # The option that it shows is taken.
+    option = re.search(r"--set (\"?)(.*?)\1, or leave it out", error)
+    assert option is not None
+    code, _, error = call(
+        capsys, *arguments, "--recipe", folder / "recipe.toml", "--set", option[2], "-o", tmp_path / "r.json"
+    )
+    assert (code, "has no neuron" in error) == (0, False)
 
 
 def test_a_line_of_labels_that_makes_no_sense_is_named(tmp_path: Path) -> None:

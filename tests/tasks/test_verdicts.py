@@ -15,7 +15,7 @@ from shell import call
 import taxel
 from taxel.detect import Example, Recipe
 from taxel.detect.cause import by_option
-from taxel.detect.causes import Mistakes, without_explained
+from taxel.detect.causes import Mistakes, with_settings, without_explained
 from taxel.detect.evidence import Evidence
 from taxel.detect.examples import Outcome, check_examples
 from taxel.detect.fitting import UNLEARNT
@@ -180,6 +180,10 @@ def test_few_spikes_are_no_news_where_a_cause_explains_them() -> None:
     lines = [f"{label}: 25 of 25 events {UNLEARNT} (1 ms)" for label in ("contact", "lift")]
     cause = by_option("shifted_labels", "contact", 25, "25 of 25 are late", "--shift-ms -300")
     assert without_explained([*lines, "contact: else"], [cause]) == (lines[1], "contact: else")
+    given = {"encoder.name": "contact_area", "learner.refractory": 15.0}
+    told = f"{lines[0]}; settings that were given: encoder.name=contact_area, learner.refractory=15.0"
+    assert with_settings([lines[0], "contact: else"], given) == (told, "contact: else")
+    assert with_settings(lines, {}) == tuple(lines)
 
 
 @pytest.mark.parametrize("late_ms", [242, -90])

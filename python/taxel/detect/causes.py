@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import comb
+from typing import Any
 
 import numpy as np
 
@@ -311,6 +312,13 @@ def without_explained(warnings: Sequence[str], causes: Sequence[Cause]) -> tuple
     """Return warnings without those of too few input spikes where a cause of the same label explains them."""
     known = tuple(f"{escaped(label)}: " for c in causes if c.kind not in _NO_REASON for label in c.labels)
     return tuple(text for text in warnings if not (UNLEARNT in text and text.startswith(known)))
+
+
+def with_settings(warnings: Sequence[str], given: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return warnings with the settings that were given, where events have too few input spikes."""
+    settings = ", ".join(f"{key}={value}" for key, value in given.items())
+    ending = f"; settings that were given: {settings}" * bool(settings)
+    return tuple(f"{text}{ending}" if UNLEARNT in text else text for text in warnings)
 
 
 def _off_in_parts(evidence: Evidence, each: Sequence[Score], wrong: Mapping[str, int]) -> Iterator[Cause]:

@@ -35,31 +35,35 @@ def exchanged(scored: Sequence[Scored], window_ms: float) -> Iterator[tuple[Caus
     """
     done: set[int] = set()
     for k, (_, source, others) in enumerate(scored):
-        for other in others:
-            places = [k, *(j for j, each in enumerate(scored) if j != k and each.source == other)]
-            if not done.intersection(places) and (cause := _exchanged(scored, places, source, other, window_ms)):
+        for partner in others:
+            places = [k, *(j for j, each in enumerate(scored) if j != k and each.source == partner)]
+            if not done.intersection(places) and (cause := _exchanged(scored, places, source, partner, window_ms)):
                 done.update(places)
                 yield cause, places
 
 
 def _exchanged(
-    scored: Sequence[Scored], places: Sequence[int], source: str, other: str, window_ms: float
+    scored: Sequence[Scored], places: Sequence[int], source: str, partner: str, window_ms: float
 ) -> Cause | None:
     """Return that the labels of two sources are exchanged, of which the outcomes at some places are; None if not."""
     events = found = left = own_events = own_found = own_left = 0
     labels: dict[str, None] = {}
     for place in places:
         outcome, name, others = scored[place]
-        theirs = others.get(other if name == source else source, {})
-        example, own = outcome.example, outcome.score
-        assert own is not None
-        swapped = {label: theirs.get(label, np.empty(0, np.int64)) for label in example.labels}
+        swapped_labels = others.get(partner if name == source else source, {})
+        example, before = outcome.example, outcome.score
+        assert before is not None
+        swapped = {label: swapped_labels.get(label, np.empty(0, np.int64)) for label in example.labels}
         fits = score(example._known(outcome.found), swapped, window_ms)
         events, found, left = events + fits.events, found + fits.found, left + fits.rank[0]
-        own_events, own_found, own_left = own_events + own.events, own_found + own.found, own_left + own.rank[0]
+        own_events, own_found, own_left = (
+            own_events + before.events,
+            own_found + before.found,
+            own_left + before.rank[0],
+        )
         labels |= dict.fromkeys(label for label, times in example.labels.items() if len(times))
     if events < _LEAST or found < _FITS * events or own_found > _OWN * own_events or left > _FEWER * own_left:
         return None
-    names = " and ".join(sorted((source, other)))
+    names = " and ".join(sorted((source, partner)))
     measured = f"the labels of {names} are exchanged: with them exchanged {found} of {events} are found"
     return Cause("exchanged_sources", tuple(labels), own_left, measured, "")

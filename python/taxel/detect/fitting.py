@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
@@ -369,9 +370,15 @@ def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, 
     for label in {label for example in examples for label in example.labels} - set(labels):
         raise ProblemError(
             f"label {shown(label)} has no neuron: the recipe has {', '.join(map(repr, labels))}; "
-            f"give it [neurons.{label}], or leave it out of the labels"
+            f"give it a section, {_setting(label)}, or leave it out of the labels"
         )
     return labels
+
+
+def _setting(label: str) -> str:
+    """Return how a parameter of a label's neuron is written in a recipe, and as an option."""
+    quote = "" if re.fullmatch(r"[\w-]+", label, re.ASCII) else '"'
+    return f"[neurons.{quote}{label}{quote}] in a recipe or --set {quote}neurons.{label}.tau=0.5{quote}"
 
 
 class Fitting:

@@ -527,10 +527,9 @@ def _of_taxels(source: Events | Frames | SpikeTrains) -> Iterator[str]:
     masks = {"dead": of_taxels.dead, "stuck": of_taxels.stuck, "unchanging": unchanging_taxels(of_taxels, source)}
     lines, within = whole_lines(masks, source.array)
     yield from (f"{line} (taxel info lists them)" for line in lines)
-    if isinstance(source, Frames):
-        for held in of_taxels.held:
-            yield f"stuck taxel: {held.text(source)}"
-            within[held.y, held.x] = True
+    for held in of_taxels.held:
+        yield f"stuck taxel: {held.text(source)}"
+        within[held.y, held.x] = True
     for word, mask in masks.items():
         if (rest := mask & ~within).any():
             y, x = np.argwhere(rest)[0]

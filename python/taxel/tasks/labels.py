@@ -157,7 +157,7 @@ def of_other_sources(
     for recording in recordings:
         file = recording.path, trial_name(recording)
         beside_it = [k for k, each in enumerate(recordings) if (each.path, trial_name(each)) == file]
-        theirs = {source_name(recordings[k]): events[k] or {} for k in beside_it if recordings[k] is not recording}
+        labels = {source_name(recordings[k]): events[k] or {} for k in beside_it if recordings[k] is not recording}
         names = {name for k in beside_it for name in (recordings[k].label, recordings[k].side)} | {""}
         clock_of = partial(getattr, recording, "clock")
         for table in _tables(source, recording.path):
@@ -166,8 +166,8 @@ def of_other_sources(
                 with collected():  # what these warn of concerns the labels of this source too
                     times = table._times(recording.path, clock_of, name, file[1], name)
                     (counted_anew,) = _from_beginnings([times], [recording], str(table.path))
-                    theirs[name] = moved(counted_anew, recording, shift_ms)
-        found[recording.title] = theirs
+                    labels[name] = moved(counted_anew, recording, shift_ms)
+        found[recording.title] = labels
     return found
 
 

@@ -19,7 +19,7 @@ from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
 from taxel.detect.cause import OF_DATA, Cause
-from taxel.detect.causes import Mistakes, by_recipe, without_explained
+from taxel.detect.causes import Mistakes, by_recipe, with_settings, without_explained
 from taxel.detect.evidence import Evidence
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fitting import Trained, fit_aligned
@@ -100,7 +100,8 @@ def train(
     update = reporting(progress)
     with collected() as warnings:
         training = _train(sensors_of(recordings), labels, options, update)
-    return replace(training, warned=without_explained(warnings, training.causes))
+    warned = with_settings(without_explained(warnings, training.causes), options.changes)
+    return replace(training, warned=warned)
 
 
 def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainOptions, update: Progress) -> Training:

@@ -96,8 +96,9 @@ class Held(NamedTuple):
     t: int
     until: int
 
-    def text(self, frames: Frames) -> str:
-        """Return what it reads, and when, for people."""
+    def text(self, frames: Events | Frames) -> str:
+        """Return what it reads, and when, for people; `frames`: those that hold it."""
+        assert isinstance(frames, Frames)
         name = f"{frames.array.names[self.x + self.y * frames.array.columns]}, " if frames.array.names else ""
         first, end = ((t - beginning_us(frames.t[:1])) / 1e6 for t in (self.t, self.until))
         when = f"{first:.1f} s on" if self.until == frames.t[-1] else f"{first:.1f} to {end:.1f} s"

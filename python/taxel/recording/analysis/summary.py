@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from taxel.clock import doubt
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.analysis.health import Health, health, unchanging_taxels, whole_lines
+from taxel.recording.analysis.health import health, unchanging_taxels, whole_lines
 from taxel.recording.analysis.pressure import Series
 from taxel.recording.gaps import of_camera
 from taxel.recording.recording import Recording
@@ -98,7 +98,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
         "registers": None if recording.registers is None else recording.registers._held,
         "taxels": of_taxels.named(),
-        "taxels_held": _held(table, of_taxels),
+        "taxels_held": [{**each._asdict(), "text": each.text(table)} for each in of_taxels.held],
         "taxels_lines": lines,
         "taxels_untested": int(np.count_nonzero(of_taxels.untested)),
         "taxels_untested_at": _places(of_taxels.untested),
@@ -112,13 +112,6 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "verdict_details": recording.verdict.to_dict(),
         "remarks": list(recording.remarks),
     }
-
-
-def _held(table: Events | Frames, of_taxels: Health) -> list[dict[str, Any]]:
-    """Return the taxels of frames that stick at one value from some time on."""
-    return (
-        [{**each._asdict(), "text": each.text(table)} for each in of_taxels.held] if isinstance(table, Frames) else []
-    )
 
 
 def _places(taxels: NDArray[np.bool_]) -> list[tuple[int, int]]:
