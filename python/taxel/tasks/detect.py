@@ -272,7 +272,8 @@ def detect(
                 f"truth has {shown(label)}, the readout {shown(alike[0])}: must be spelt alike to be scored"
             )
     names = (*(recording.title for recording in left_out), *unknown_rests)
-    bad = () if together is None else tuple(_unreliable(scored, together, options.window_ms))
+    labelled = [outcome for outcome in scored if outcome.score is not None and outcome.score.events]
+    bad = tuple(_unreliable(labelled, score_of(labelled, options.window_ms), options.window_ms)) if labelled else ()
     how = options.window_ms, options.shift_ms
     return Detecting(each, together, tuple(unknown), unlabelled, *how, bad, tuple(warnings), names)
 
@@ -284,14 +285,14 @@ def _with_causes(each: Sequence[_Found], window_ms: float) -> Iterator[Detected]
         group = felt.example.group
         if group not in known:
             sources = [source for source in each if source.felt.example.group == group]
-            scored = [source for source in sources if source.felt.score is not None]
+            scored = [source for source in sources if source.felt.score is not None and source.felt.score.events]
             outcomes, differences = [source.felt for source in scored], [source.differences for source in scored]
             known[group] = causes_of(outcomes, window_ms, differences) if scored else ()
         yield replace(detected, outcome=detected.outcome._replace(causes=known[group]))
 
 
 def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) -> Iterator[str]:
-    """Yield the labels whose score is too bad to rely on, in all recordings or else in some."""
+    """Yield the labels whose score is too bad to rely on, in all recordings or else in some; each has labels."""
     groups: dict[str, list[Outcome]] = {}
     for outcome in outcomes:
         groups.setdefault(outcome.example.group, []).append(outcome)
@@ -306,7 +307,8 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
             if of_group is not None:
                 fault = _at_fault(label, of_group, members[0].causes)
                 text = unreliable(label, of_group, "labels", f"this {fault} in {group.strip()}")
-                yield from [text] if text else []
+                # By how much the labels of a recording are off, the score of all does not say.
+                yield from ["; ".join(filter(None, (text, of_group.missed_text)))] if text else []
 
 
 def _at_fault(label: str, scored: Score, causes: Sequence[Cause]) -> str:
@@ -364,6 +366,8 @@ def _detected(
     outcome = Outcome(title, example, found, scored, outside)
     felt = outcome if tare is not None else outcome._replace(example=example._replace(tare=_quiet(recording)))
     remarks, differs = _remarks(recording, felt, readout)
+    if scored is not None and not scored.events:
+        remarks.insert(0, f"0 labels: {counted(scored.false, 'detection')} count as false, which says nothing of them")
     return _Found(Detected(recording, outcome, taken, tuple(remarks)), felt, differs.sensor)
 
 
