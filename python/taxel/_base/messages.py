@@ -86,6 +86,8 @@ def three_digits(value: float, sign: str = "") -> str:
     return f"{value:{sign}.0f}" if 999.5 <= abs(value) < 1e6 else f"{value:{sign}.3g}"
 
 
+#: So many numbers that are so many times apart are all told.
+_MOST_LISTED, _FAR_APART = 6, 1.5
 #: Numbers in a text, and times among them.
 _NUMBER, _SECONDS = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)"), re.compile(r"\d s\b")
 
@@ -93,8 +95,9 @@ _NUMBER, _SECONDS = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)"), re.com
 def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
     """Return texts with their names before them; a text that several names share is returned once.
 
-    Texts that differ only in numbers become one text with the ranges of the numbers, unless these are times. A text of
-    all names begins with how many these are; if there is a single name, it is left out.
+    Texts that differ only in numbers become one text with the ranges of the numbers, unless these are times. Where a
+    single number differs, of few names, and by far, it has that of each name in their order. A text of all names begins
+    with how many these are; if there is a single name, it is left out.
 
     Parameters
     ----------
@@ -107,24 +110,36 @@ def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
     --------
     >>> of_names([("a", "2 of 4 are far"), ("b", "3 of 4 are far"), ("b", "noisy")], 2)
     ['all 2: 2 to 3 of 4 are far', 'b: noisy']
+    >>> of_names([(name, f"{ratio} times as strong") for name, ratio in (("a", 0.3), ("b", 0.9), ("c", 0.4))], 4)
+    ['a, b, c: 0.3, 0.9 and 0.4 times as strong']
     """
-    alike: dict[str, dict[str, list[str]]] = {}
+    alike: dict[str, list[tuple[str, str]]] = {}
     for name, text in named:
         key = text if _SECONDS.search(text) else _NUMBER.sub("\0", text)
-        alike.setdefault(key, {}).setdefault(text, []).append(name)
+        alike.setdefault(key, []).append((name, text))
     texts = []
-    for by_text in alike.values():
-        names = list(dict.fromkeys(name for each in by_text.values() for name in each))
+    for pairs in alike.values():
+        names = list(dict.fromkeys(name for name, _ in pairs))
         who = f"all {total}" if len(names) == total else ", ".join(names)
-        texts.append(f"{who}: " * (total > 1) + _with_ranges(list(by_text)))
+        texts.append(
+            f"{who}: " * (total > 1) + _with_ranges([text for _, text in pairs], is_of_each=len(names) == len(pairs))
+        )
     return texts
 
 
-def _with_ranges(texts: Sequence[str]) -> str:
-    """Return texts that differ in numbers alone as one, with the least and the largest of each."""
-    each = zip(*(_NUMBER.findall(text) for text in texts), strict=True)
-    ranges = iter([" to ".join(dict.fromkeys((min(n, key=float), max(n, key=float)))) for n in each])
+def _with_ranges(texts: Sequence[str], *, is_of_each: bool) -> str:
+    """Return texts that differ in numbers alone as one, with the least and the largest of each, or all of them."""
+    each = [list(n) for n in zip(*(_NUMBER.findall(text) for text in texts), strict=True)]
+    is_listed = is_of_each and len(texts) <= _MOST_LISTED and sum(len(set(n)) > 1 for n in each) == 1
+    ranges = iter([_range(n, is_listed=is_listed) for n in each])
     return _NUMBER.sub(lambda _: next(ranges), texts[0])
+
+
+def _range(numbers: Sequence[str], *, is_listed: bool) -> str:
+    least, most = min(numbers, key=float), max(numbers, key=float)
+    if is_listed and float(most) > _FAR_APART * float(least):
+        return f"{', '.join(numbers[:-1])} and {numbers[-1]}"
+    return " to ".join(dict.fromkeys((least, most)))
 
 
 def first_line(error: BaseException) -> str:

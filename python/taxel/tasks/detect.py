@@ -18,9 +18,10 @@ from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, recipes, score
 from taxel.detect.cause import Cause
 from taxel.detect.detector import detector
+from taxel.detect.floors import measured_floor
 from taxel.detect.mistakes import behind_gaps, causes_of, score_of, unreliable
 from taxel.detect.readout import run_counting
-from taxel.detect.tares import count_drifted
+from taxel.detect.tares import count_drifted, count_loaded
 from taxel.detect.training_data import Unlike, unlike
 from taxel.encode import ContactArea, Moments
 from taxel.events import Events
@@ -443,6 +444,16 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
                 "may seem not to end, and others be missed: take a tare between touches nearer to them "
                 "(taxel cut RECORDING FILE --from S --to S, --tare FILE)"
             )
+    if tare is not None and isinstance(source, Frames) and (floor := measured_floor([outcome.example])) is not None:
+        count = count_loaded(source, tare, floor)
+        if count:
+            # Touches are measured above the rest.
+            lines.append(
+                f"rest: the recording begins loaded: {counted(count, 'taxel')} read less later than in the rest that "
+                "was taken, so that touches may be missed: take a tare while nothing touches (taxel cut RECORDING FILE "
+                "--from S --to S, --tare FILE)"
+            )
+            return lines, Unlike()
     differs = unlike(readout, outcome.example, outcome.found)
     return [*lines, *differs.lines()], differs
 
