@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import taxel
 from taxel.detect import Example, PlainRule
 from taxel.detect.examples import check_examples
+from taxel.detect.tares import count_loaded
 from taxel.detect.training_data import training_data, unlike
 
 
@@ -43,3 +46,36 @@ def test_noise_and_a_creep_that_is_small_beside_the_touches_are_no_difference(se
     assert compared(seed, creep=120.0) == (
         "4 taxels end with other readings than they began: a drift, or a load that stays",
     )
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_load_in_the_rest_is_told_from_a_drift(seed: int) -> None:
+    frames = crept(seed).source
+    assert isinstance(frames, taxel.Frames)
+    for values, count in (
+        (frames.values, 0),
+        (frames.values + np.linspace(200.0, 0.0, len(frames))[:, None, None], 0),
+        (frames.values + np.where(frames.t < 2_000_000, 200.0, 0.0)[:, None, None], 16),
+    ):
+        loaded = taxel.Frames(values, frames.t, unit="counts", array=frames.array)
+        assert count_loaded(loaded, taxel.Tare.take(loaded, stop_us=500_000), 20.0) == count
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_recording_without_labels_is_no_fault_and_an_offset_of_one_is_said(seed: int, tmp_path: Path) -> None:
+    rule = PlainRule("area", 2, labels=("contact", "lift"), noise_floor=100.0, unit="counts")
+    labels = []
+    for k, late_ms in enumerate((0, None, 75, 0, 0)):
+        example = crept(seed + k)
+        assert isinstance(example.source, taxel.Frames)
+        taxel.convert(example.source, tmp_path / f"{k}.npz")
+        late = {label: t + 1000 * (late_ms or 0) + 15_000 * (label == "lift") for label, t in example.labels.items()}
+        labels.append({} if late_ms is None else late)
+    opened = [taxel.open(tmp_path / f"{k}.npz") for k in range(5)]
+    found = taxel.tasks.detect(rule, opened, labels)
+    assert found.each[1].remarks[0].startswith("0 labels: 40 detections count as false")
+    assert [line.count("2.npz") for line in found.unreliable] == [1, 1], found.unreliable
+    assert all("ms before the label, for 20 of 20 labels" in line for line in found.unreliable)
+    assert found.each[1].outcome.causes == ()
+    [cause, *_] = found.each[2].outcome.causes
+    assert cause.arguments["shift_ms"] == pytest.approx(-82, abs=15)

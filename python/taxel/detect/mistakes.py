@@ -41,7 +41,7 @@ _FAR_MORE = 2
 #: Fewer events missed and false are few.
 _FEW = 3
 #: Labels of a recording are all off where this share of them has a detection at the same distance.
-_NEARLY_ALL = 0.9
+_NEARLY_ALL = 0.85
 #: So many times of labels are named.
 _NAMED = 3
 #: A load changes slowly that takes so long, ms, from the first to the second part of its change, and no longer from its

@@ -159,7 +159,7 @@ def count_loaded(source: Events | Frames, tare: Tare, noise_floor: float) -> int
     least = np.quantile(values.reshape(_PARTS, looks, *source.array.shape), 0.1, axis=1)
     fallen = tare.rest - least[1:].max(axis=0)
     most = values.max(axis=0) - least[-1]
-    at_once = np.diff(least, axis=0, prepend=tare.rest[None]).min(axis=0) <= -fallen / 2
+    at_once = np.diff(least, axis=0, prepend=tare.rest[None]).min(axis=0) <= (least.min(axis=0) - tare.rest) / 2
     count = np.count_nonzero(at_once & (fallen > noise_floor) & (fallen > _OF_MOST * most))
     return int(count) if count >= min(TOUCH, source.array.taxels) else 0
 

@@ -273,8 +273,12 @@ def detect(
                 f"truth has {shown(label)}, the readout {shown(alike[0])}: must be spelt alike to be scored"
             )
     names = (*(recording.title for recording in left_out), *unknown_rests)
-    labelled = [outcome for outcome in scored if outcome.score is not None and outcome.score.events]
-    bad = tuple(_unreliable(labelled, score_of(labelled, options.window_ms), options.window_ms)) if labelled else ()
+    with_labels = [outcome for outcome in scored if outcome.score is not None and outcome.score.events]
+    bad = (
+        tuple(_unreliable(with_labels, score_of(with_labels, options.window_ms), options.window_ms))
+        if with_labels
+        else ()
+    )
     how = options.window_ms, options.shift_ms
     return Detecting(each, together, tuple(unknown), unlabelled, *how, bad, tuple(warnings), names)
 
