@@ -42,6 +42,8 @@ _FAR_MORE = 2
 _FEW = 3
 #: A single label tells no cause of how far detections are.
 _SEVERAL = 2
+#: Labels of a recording are all off where this share of them has a detection at the same distance.
+_NEARLY_ALL = 0.85
 #: So many times of labels are named.
 _NAMED = 3
 #: A load changes slowly that takes so long, ms, from the first to the second part of its change, and no longer from its
@@ -68,7 +70,11 @@ def unreliable(label: str, scored: Score, labels: str, on: str = "this readout")
     on : str
         What is not to be relied on.
     """
-    if not scored.rank[0] or (scored.rank[0] < scored.events and 2 * scored.missed <= scored.events):
+    if (
+        not scored.events
+        or not scored.rank[0]
+        or (scored.rank[0] < scored.events and 2 * scored.missed <= scored.events)
+    ):
         return ""
     worth = ", no better than to detect nothing" if scored.rank[0] >= scored.events else ""
     return (
@@ -365,7 +371,9 @@ class Measured:
         labels = np.sort(np.concatenate([self._labels(label) for label in names]))
         ms = float(np.median([shift.ms for shift in group]))
         side = "earlier" if ms > 0 else "later"
-        distance, stretch = f"{abs(ms):.0f} ms", stretch_of(labels, np.isin(labels, missed), self._examples)
+        are_all = self._following(names, ms) >= _NEARLY_ALL * len(labels)
+        stretch = "" if are_all else stretch_of(labels, np.isin(labels, missed), self._examples)
+        distance = f"{abs(ms):.0f} ms"
         count = len(missed)
         measured = f"{count} of {sum(shift.total for shift in group)} missed have a false detection {distance} {side}"
 
@@ -384,7 +392,7 @@ class Measured:
                 return None
             names_fit = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
             return cause(f"{measured}, while {names_fit}: {', '.join(names)} {are(len(names))} felt {side} there", "")
-        if count < _STRETCH * len(labels):
+        if not are_all and count < _STRETCH * len(labels):
             where = [self._stretch_in(k, names, missed) for k in np.unique(_example_of(missed)).tolist()]
             measured += f", the other {len(labels) - count} of {len(labels)} labels do not"
             more = f" and in {counted(len(where) - 1, 'other recording')} alike" if len(where) > 1 else ""
@@ -394,6 +402,16 @@ class Measured:
             return cause(measured, shifted if all(where) else "")
         fitting = self._fitting(labels, false)
         return None if is_near and not fitting else _of_clock(cause, ms, measured, fitting)
+
+    def _following(self, names: Sequence[str], ms: float) -> int:
+        """Return how many labels of some names have a detection at this distance before them, found or missed."""
+        count, reach = 0, round(to_us(WINDOW_MS))
+        for name in names:
+            false, expected = self._wrong(name, is_missed=False), self._wrong(name, is_missed=True) - round(to_us(ms))
+            beside = np.diff(np.searchsorted(false, [expected - reach, expected + reach]), axis=0)[0]
+            near = np.abs(self._scores[name].errors_ms + ms) <= WINDOW_MS
+            count += int(np.count_nonzero(beside) + np.count_nonzero(near))
+        return count
 
     def _stretch_in(self, k: int, names: Sequence[str], missed: NDArray[np.int64]) -> str:
         """Return where the missed labels of an example are; "" if these are not a stretch."""

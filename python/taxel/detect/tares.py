@@ -34,6 +34,8 @@ _LABELS = 4
 _PARTS, _LOOKS = 8, 40
 #: Without frames for so long a sensor may have begun anew, us.
 _GAP_US = 1_000_000
+#: A load in a tare is at least that share of the most that its taxel reads.
+_OF_MOST = 0.05
 #: A touched taxel reads so many times its drift.
 _TIMES = 4
 
@@ -132,6 +134,34 @@ def _at(source: Events | Frames, t_us: int) -> Frames:
         return Frames.from_events(source, 1, t_us, t_us + 1)
     index = max(0, int(np.searchsorted(source.t, t_us, side="right")) - 1)
     return source[index : index + 1]
+
+
+def count_loaded(source: Events | Frames, tare: Tare, noise_floor: float) -> int:
+    """Return how many taxels a tare from the beginning of frames holds a load of, which goes at once later.
+
+    A taxel counts that reads less than that later by more than the noise floor, and by a twentieth of the most that it
+    reads above that, in nine of ten frames of the recording; half of it goes between one eighth and the next.
+
+    Parameters
+    ----------
+    source : Events or Frames
+    tare : Tare
+    noise_floor : float, in the sensor's unit
+    """
+    if isinstance(source, Events) or tare.start_us > source.t[0] + _GAP_US:
+        return 0
+    frames = source.between(tare.stop_us, np.inf)
+    frames = frames[:: max(1, len(frames) // (_PARTS * _LOOKS))]
+    looks = len(frames) // _PARTS
+    if looks < _LOOKS // 4:
+        return 0
+    values = frames.values[: _PARTS * looks].astype(np.float64)
+    least = np.quantile(values.reshape(_PARTS, looks, *source.array.shape), 0.1, axis=1)
+    fallen = tare.rest - least[1:].max(axis=0)
+    most = values.max(axis=0) - least[-1]
+    at_once = np.diff(least, axis=0, prepend=tare.rest[None]).min(axis=0) <= (least.min(axis=0) - tare.rest) / 2
+    count = np.count_nonzero(at_once & (fallen > noise_floor) & (fallen > _OF_MOST * most))
+    return int(count) if count >= min(TOUCH, source.array.taxels) else 0
 
 
 def count_drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> int:

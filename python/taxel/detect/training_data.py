@@ -44,8 +44,9 @@ _MUCH_NOISE = 2.0
 _SAMPLES, _AROUND_US, _NORMAL_APART = 64, 1_000_000, 0.954
 #: So many touches tell something; this share fewer of them with a detection, or of the loaded taxels, is a difference.
 _LEAST, _FEWER = 5, 0.2
-#: The last such part of a recording is compared with the first; a taxel has moved by so many times the noise.
-_PARTS, _MOVED = 8, 5.0
+#: The last such part of a recording is compared with the first; a taxel has moved by so many times the noise, and by
+#: that share of what the most loaded taxel reads in a touch.
+_PARTS, _MOVED, _OF_TOUCH = 8, 5.0, 0.05
 #: Two detections are close at this part of the shortest time between labels; this share of close ones is a difference.
 _CLOSE, _MANY = 0.5, 0.05
 
@@ -57,19 +58,21 @@ _Changes: TypeAlias = tuple[NDArray[np.int64], _Values]
 
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """Hold what was measured in an example."""
+    """Hold what was measured in an example: its loads are those that rise above the noise around them."""
 
     noise: float
     peaks: NDArray[np.float64]
     """The largest sum of all taxels above rest in each load, ..."""
     rises: NDArray[np.float64]
-    """... and how much more its taxels read then than before it, if more than noise: strong ones are touches."""
+    """... and how much more its taxels read then than before it: strong ones are touches."""
     begins: NDArray[np.int64]
     ends: NDArray[np.int64]
     loaded: NDArray[np.bool_]
     """Which taxels touches load often, shape (rows, columns), and ..."""
     reached: NDArray[np.bool_]
     """... which they load at all."""
+    reading: float
+    """What the most loaded taxel reads above rest during loads, at the median."""
 
     def are_touches(self, strength: float) -> NDArray[np.bool_]:
         """Return which loads are touches, if those of the training are so strong."""
@@ -80,6 +83,12 @@ class _Measured:
         near, ordered = round(to_us(_NEAR_MS)), np.sort(t)
         first = np.searchsorted(ordered, self.begins - near)
         return np.asarray(np.searchsorted(ordered, self.ends + near, side="right") > first)
+
+    def peaks_at(self, t: NDArray[np.int64]) -> _Values:
+        """Return the peak of the strongest load at each of some times; nothing of those far from any load."""
+        near = round(to_us(_NEAR_MS))
+        first, stop = np.searchsorted(self.ends, t - near), np.searchsorted(self.begins, t + near, side="right")
+        return np.array([self.peaks[i:k].max() for i, k in zip(first.tolist(), stop.tolist(), strict=True) if i < k])
 
 
 def training_data(examples: Sequence[Example], found: Sequence[Detections]) -> dict[str, Any] | None:
@@ -98,9 +107,9 @@ def training_data(examples: Sequence[Example], found: Sequence[Detections]) -> d
         return None
     shape = tuple(int(size) for size in np.max([each.loaded.shape for each in known], axis=0))
     touched = np.any([_within(each.loaded, shape) for each in known], axis=0)
-    peaks = np.concatenate([each.peaks for each in known])
     has = np.concatenate([each.detected(detections.t) for each, detections in zip(known, found, strict=True)])
-    strength = _usual(peaks[peaks >= _TOUCH * _usual(peaks[has])])
+    labels = [np.concatenate([*example.labels.values(), np.empty(0, np.int64)]) for example in sound]
+    strength = _usual(np.concatenate([each.peaks_at(t) for each, t in zip(known, labels, strict=True)]))
     are_touches = np.concatenate([each.are_touches(strength) for each in known])
     return {
         "shape": list(shape),
@@ -112,9 +121,9 @@ def training_data(examples: Sequence[Example], found: Sequence[Detections]) -> d
     }
 
 
-def _usual(peaks: NDArray[np.float64]) -> float:
-    """Return the median of the peaks of loads; 0 without a load."""
-    return float(np.median(peaks)) if len(peaks) else 0.0
+def _usual(values: NDArray[np.float64]) -> float:
+    """Return the median; 0 of no value."""
+    return float(np.median(values)) if len(values) else 0.0
 
 
 def _apart_ms(examples: Sequence[Example]) -> dict[str, float]:
@@ -160,7 +169,7 @@ def unlike(readout: _Detector, example: Example, found: Detections) -> Unlike:
     is_counts = readout.unit is not None and are_counts(readout.unit)
     noisier = noise / data["noise"] if data["noise"] > 0.0 else 1.0
     sensor, detections = list(_of_noise(noisier, is_counts=is_counts)), list[str]()
-    if measured is not None and (count := _moved(source, data["noise"])):
+    if measured is not None and (count := _moved(source, data["noise"], measured.reading)):
         # Touches are measured above the rest.
         sensor.append(
             f"{counted(count, 'taxel')} end with other readings than they began: a drift, or a load that stays"
@@ -198,7 +207,7 @@ def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *,
         ratio = _usual(measured.peaks[are_touches]) / strength
         if not _WEAKER <= ratio <= _STRONGER:
             yield f"touches are {ratio:.2g} times as strong"
-    elif touches and np.count_nonzero(measured.rises) >= _LEAST:
+    elif touches and len(measured.rises) >= _LEAST:
         yield f"most loads are less than {_TOUCH:g} times as strong as its touches"
     # Hot pixels are the most loaded ones of counts.
     if touches >= _LEAST and not is_counts and not larger:
@@ -259,13 +268,14 @@ def _measured(given: Example) -> _Measured | None:
     loads = Loads([example], [clock_of(given)], floor, reporting(None), sorted({quantity, strength}))
     begins, ends = (loads.off(edge, 0).t for edge in loads.edges(quantity, threshold, 1.0, 1))
     begin, end = _touches(begins, ends, int(source.t[-1]))
-    above = _core.touched_above(floor)
-    are_loaded = tare.off(_touched(source, begin, end)).values >= above
-    share = are_loaded.mean(axis=0) if len(are_loaded) else np.zeros(source.array.shape)
-    sums = loads.changes(strength, 0)
-    peaks = largest(*sums, begin, end)
+    above, sums = _core.touched_above(floor), loads.changes(strength, 0)
+    rises = _rises(source, above, sums, begin, end)
+    begin, end, rises = begin[rises > 0.0], end[rises > 0.0], rises[rises > 0.0]
+    values = tare.off(_touched(source, begin, end)).values
+    share = (values >= above).mean(axis=0) if len(values) else np.zeros(source.array.shape)
+    most = np.fmax.reduce(values, axis=(1, 2), initial=0.0)
     return _Measured(
-        _noise(source), peaks, _rises(source, above, sums, begin, end), begin, end, share >= _LOADED, share > 0.0
+        _noise(source), largest(*sums, begin, end), rises, begin, end, share >= _LOADED, share > 0.0, _usual(most)
     )
 
 
@@ -309,8 +319,8 @@ def _touched(source: Events | Frames, begin: NDArray[np.int64], end: NDArray[np.
     return Frames(source.values[chosen], source.t[chosen], unit=source.unit, array=source.array)
 
 
-def _moved(source: Events | Frames | SpikeTrains, noise: float) -> int:
-    """Return how many taxels of frames read more or less at the end, by so many times the noise; 0 if few do."""
+def _moved(source: Events | Frames | SpikeTrains, noise: float, reading: float) -> int:
+    """Return how many taxels of frames read more or less at the end, against noise and touches; 0 if few do."""
     if not isinstance(source, Frames) or len(source) < 2 * _FRAMES or noise <= 0.0:
         return 0
     part = len(source) // _PARTS
@@ -319,7 +329,7 @@ def _moved(source: Events | Frames | SpikeTrains, noise: float) -> int:
     ends = np.stack([source.values[:part:step], source.values[-part::step]]).astype(np.float64)
     read = ~np.isnan(ends).any(axis=(0, 1))
     first, last = np.quantile(ends[:, :, read], 0.1, axis=1)
-    count = int(np.count_nonzero(np.abs(last - first) >= _MOVED * noise))
+    count = int(np.count_nonzero(np.abs(last - first) >= max(_MOVED * noise, _OF_TOUCH * reading)))
     return count if count >= max(1.0, _FEWER * source.array.taxels) else 0
 
 

@@ -19,9 +19,10 @@ from taxel.detect import Example, Outcome, PlainRule, Readout, Score, recipes, s
 from taxel.detect.cause import Cause
 from taxel.detect.detector import detector
 from taxel.detect.exchanged import Scored, exchanged
+from taxel.detect.floors import measured_floor
 from taxel.detect.mistakes import Standing, behind_gaps, causes_of, score_of, unreliable
 from taxel.detect.readout import run_counting
-from taxel.detect.tares import count_drifted
+from taxel.detect.tares import count_drifted, count_loaded
 from taxel.detect.training_data import Unlike, unlike
 from taxel.encode import ContactArea, Moments
 from taxel.events import Events
@@ -299,7 +300,12 @@ def detect(
                 f"truth has {shown(label)}, the readout {shown(alike[0])}: must be spelt alike to be scored"
             )
     names = (*(recording.title for recording in left_out), *unknown_rests)
-    bad = () if together is None else tuple(_unreliable(scored, together, options.window_ms))
+    with_labels = [outcome for outcome in scored if outcome.score is not None and outcome.score.events]
+    bad = (
+        tuple(_unreliable(with_labels, score_of(with_labels, options.window_ms), options.window_ms))
+        if with_labels
+        else ()
+    )
     how = options.window_ms, options.shift_ms
     return Detecting(each, together, tuple(unknown), unlabelled, *how, bad, tuple(warnings), names)
 
@@ -316,7 +322,7 @@ def _with_causes(
         group = felt.example.group
         if group not in known:
             sources = [source for source in each if source.felt.example.group == group]
-            scored = [source for source in sources if source.felt.score is not None]
+            scored = [source for source in sources if source.felt.score is not None and source.felt.score.events]
             of_sources = [
                 Scored(source.felt, source_name(source.detected.recording), others.get(source.felt.name, {}))
                 for source in scored
@@ -333,7 +339,7 @@ def _with_causes(
 
 
 def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) -> Iterator[str]:
-    """Yield the labels whose score is too bad to rely on, in all recordings or else in some."""
+    """Yield the labels whose score is too bad to rely on, in all recordings or else in some; each has labels."""
     groups: dict[str, list[Outcome]] = {}
     for outcome in outcomes:
         groups.setdefault(outcome.example.group, []).append(outcome)
@@ -348,7 +354,8 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
             if of_group is not None:
                 fault = _at_fault(label, of_group, members[0].causes)
                 text = unreliable(label, of_group, "labels", f"this {fault} in {group.strip()}")
-                yield from [text] if text else []
+                # By how much the labels of a recording are off, the score of all does not say.
+                yield from ["; ".join(filter(None, (text, of_group.missed_text)))] if text else []
 
 
 def _at_fault(label: str, scored: Score, causes: Sequence[Cause]) -> str:
@@ -409,6 +416,8 @@ def _detected(
     outcome = Outcome(title, example, found, scored, outside)
     felt = outcome if tare is not None else outcome._replace(example=example._replace(tare=_quiet(recording)))
     remarks, differs = _remarks(recording, felt, readout)
+    if scored is not None and not scored.events:
+        remarks.insert(0, f"0 labels: {counted(scored.false, 'detection')} count as false, which says nothing of them")
     stays = None if scored is None or not scored.rank[0] else _standing(readout, recording, felt, options)
     return _Found(Detected(recording, outcome, taken, tuple(remarks)), felt, differs.sensor, stays)
 
@@ -512,6 +521,16 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
                 "may seem not to end, and others be missed: take a tare between touches nearer to them "
                 "(taxel cut RECORDING FILE --from S --to S, --tare FILE)"
             )
+    if tare is not None and isinstance(source, Frames) and (floor := measured_floor([outcome.example])) is not None:
+        count = count_loaded(source, tare, floor)
+        if count:
+            # Touches are measured above the rest.
+            lines.append(
+                f"rest: the recording begins loaded: {counted(count, 'taxel')} read less later than in the rest that "
+                "was taken, so that touches may be missed: take a tare while nothing touches (taxel cut RECORDING FILE "
+                "--from S --to S, --tare FILE)"
+            )
+            return lines, Unlike()
     differs = unlike(readout, outcome.example, outcome.found)
     return [*lines, *differs.lines()], differs
 
