@@ -65,7 +65,7 @@ class Cause:
     - ``unlabelled_source``: one source (a foot) has half the share found of another. A column ``source`` in the labels.
     - ``levels``: loads reach fewer than two levels, as in another unit. ``--set fit_levels=true``.
     - ``overlapping_loads`` (*): one load holds several labels of a name. A source or region for each load.
-    - ``standing_load`` (*): while these labels happen, something lies on the array, or a taxel is stuck. ``--tare``.
+    - ``standing_load`` (*): while these labels happen, an object is on the array, or a taxel is stuck. ``--tare``.
     - ``foreign_labels``: labels are more than 50 ms from any load, or all at the beginning. Labels of this recording;
       times in us.
     - ``tare``: the tare holds a touch, or untouched taxels read above rest. ``--tare``.

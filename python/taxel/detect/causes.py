@@ -328,7 +328,7 @@ def _off_in_parts(evidence: Evidence, each: Sequence[Score], wrong: Mapping[str,
     found: dict[str, list[tuple[str, Cause]]] = {label: [] for label in wrong}
     for k, (example, score) in enumerate(zip(evidence.sound, each, strict=True)):
         many = {label: s.rank[0] for label in wrong if (s := score.by_label.get(label)) and s.missed >= _LEAST_OFF}
-        alone = evidence.without([other for other in range(len(each)) if other != k]) if many else None
+        alone = evidence.without([place for place in range(len(each)) if place != k]) if many else None
         for cause in alone.causes(many) if alone is not None else ():
             if cause.kind == "shifted_labels":
                 found[cause.labels[0]].append((example.name, cause))
@@ -344,8 +344,8 @@ def _off_in_parts(evidence: Evidence, each: Sequence[Score], wrong: Mapping[str,
 def _moved(cause: Cause) -> str:
     """Return how the labels of a recording are to be moved."""
     ms = cause.arguments.get("shift_ms", 0.0)
-    whole = f"{abs(ms):.0f} ms {'earlier' if ms < 0 else 'later'}"
-    return whole if cause.option else cause.advice.removeprefix("labels ").removeprefix("of ")
+    distance = f"{abs(ms):.0f} ms {'earlier' if ms < 0 else 'later'}"
+    return distance if cause.option else cause.advice.removeprefix("labels ").removeprefix("of ")
 
 
 def _by_chance(label: str, who: str, together: Score) -> str:

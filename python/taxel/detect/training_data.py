@@ -72,7 +72,7 @@ class _Measured:
     reached: NDArray[np.bool_]
     """... which they load at all."""
     reading: float
-    """What the most loaded taxel reads above rest during loads, at the median."""
+    """Reading of the most loaded taxel above rest, median over loads."""
 
     def are_touches(self, strength: float) -> NDArray[np.bool_]:
         """Return which loads are touches, if those of the training are so strong."""

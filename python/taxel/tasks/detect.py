@@ -435,7 +435,7 @@ def _standing(
     where = "" if options.tare is not None else standing(source)
     if not where:
         return None
-    text, quiet = f"something lies on it from beginning to end, at {where}", of_quiet(source).quiet_us
+    text, quiet = f"an object is on it from beginning to end, at {where}", of_quiet(source).quiet_us
     if quiet is None or quiet[0] > source.t[0]:
         return Standing(text, "a region without it")
     seconds = np.floor((quiet[1] - quiet[0]) / 1e4) / 100

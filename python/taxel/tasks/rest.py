@@ -297,7 +297,7 @@ def zero_by_unit(recording: Recording) -> Tare | None:
             f"{source.unit} in a quiet stretch, {stretch}, and not 0; if nothing touches them then"
         )
         if where:
-            reads = f"something lies on it from beginning to end, at {where}; if nothing else touches it in {stretch}"
+            reads = f"an object is on it from beginning to end, at {where}; if nothing else touches it in {stretch}"
         warn(f"{recording.path}: {reads}, {option}", stacklevel=3)
     return zero
 

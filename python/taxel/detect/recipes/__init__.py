@@ -148,7 +148,7 @@ def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool =
 
 
 def lacking_places(source: Events | Frames, labels: Sequence[str]) -> str:
-    """Return why kinds of touch cannot be told apart on channels, and which option lays these out in a row; else "".
+    """Return why no recipe distinguishes kinds of touch on channels, and which option lays these out in a row; else "".
 
     Steps have recipes of channels, and so have contact and lift alone.
 
@@ -156,7 +156,7 @@ def lacking_places(source: Events | Frames, labels: Sequence[str]) -> str:
     --------
     >>> channels = Frames([[[0.0] * 6]], [0], unit="kPa")
     >>> lacking_places(channels, ["press", "tap"])
-    'no recipe tells press and tap apart on 6 channels without places; if these lie in a row, give --array 1x6x5 ...'
+    'no recipe distinguishes press and tap on 6 channels without places; if these are in a row, give --array 1x6x5 ...'
     >>> lacking_places(channels, ["contact", "lift"]), lacking_places(channels, ["heel_off", "foot_off"])
     ('', '')
     """
@@ -170,8 +170,8 @@ def lacking_places(source: Events | Frames, labels: Sequence[str]) -> str:
         return ""
     rows, columns = source.array.shape
     return (
-        f"no recipe tells {' and '.join(labels)} apart on {counted(source.array.taxels, 'channel')} without places; if "
-        f"these lie in a row, give --array {rows}x{columns}x5 with the distance from one to the next in mm (here 5)"
+        f"no recipe distinguishes {' and '.join(labels)} on {counted(source.array.taxels, 'channel')} without "
+        f"places; if these are in a row, give --array {rows}x{columns}x5 with the distance from one to the next in mm (here 5)"
     )
 
 

@@ -79,7 +79,7 @@ _CHANGES = 0.2
 
 
 class Held(NamedTuple):
-    """A taxel of frames that sticks at one value from some time on, while those around it are touched.
+    """A taxel of frames that sticks at one value after some time, while those around it are touched.
 
     Attributes
     ----------
@@ -355,7 +355,7 @@ def judge(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> He
 
 
 def _with_held(result: Health, frames: Frames, scale: float) -> Health:
-    """Return the same with taxels as stuck that hold one value from some time on; `scale`: ticks by the unit."""
+    """Return the same with taxels as stuck that hold one value after some time; `scale`: ticks by the unit."""
     some = frames[:: 1 + len(frames) // _LOOKS]
     t, values = some.t, some.values.reshape(len(some), -1)
     begins, runs = np.zeros((2, values.shape[1]), np.int64)
