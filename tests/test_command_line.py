@@ -323,8 +323,14 @@ def test_labels_of_a_recording_that_is_not_there_are_left_out_and_a_misspelt_one
     command = ("detect", "walk.npz", "--readout", "rule.json", "--tare", "0.1", "--truth", "labels.csv")
     for names, said in (
         (("walk", "walk"), None),
-        (("walk", "wlak", "wlak"), "left out 2 events of wlak, which is not among the recordings: walk.npz"),
-        (("walk", "Walk", "w-alk.npz"), "left out 2 events of Walk, w-alk.npz, which are not among the recordings"),
+        (
+            ("walk", "wlak", "wlak"),
+            "left out 2 events whose recording is named wlak; the recordings are named walk.npz",
+        ),
+        (
+            ("walk", "Walk", "w-alk.npz"),
+            "left out 2 events whose recording is named Walk, w-alk.npz; the recordings are named walk.npz",
+        ),
         (("walk", *(f"walk{k}" for k in range(7))), None),
     ):
         Path("labels.csv").write_text("recording,label,t_us\n" + "".join(f"{name},contact,500000\n" for name in names))

@@ -154,7 +154,7 @@ def test_how_labels_name_trials_of_a_file_is_said_in_short_lines(tmp_path: Path,
     assert (code, f"names no event in {names}; it names a, b, c and 2 more" in error) == (2, True), error
     labels.write_text("label,t_us\ncontact,9000\n")
     code, _, error = call(capsys, *command)
-    assert (code, "must have the column recording, with names as subj900/00" in error) == (2, True), error
+    assert (code, "state it in the column recording, with names like subj900/00" in error) == (2, True), error
     code, _, error = call(capsys, "info", file, "--table", tmp_path / "p.csv")
     assert code == 2
     assert (
@@ -345,7 +345,8 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
         (("detect", "9.npz", "--readout", "labels.csv"), "labels.csv: not JSON"),
         (
             ("detect", "9.npz", "--readout", "touch.json"),
-            "9.npz: the rest of its taxels is not known, as no half second is quiet with nothing on it; give --tare S",
+            "9.npz: the values of its taxels at rest are not known, because no half second is quiet with nothing on "
+            "it; give --tare S",
         ),
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "-1"), "--tare is -1: must be seconds above 0"),
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "none.json"), "none.json: no such file"),

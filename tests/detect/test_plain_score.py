@@ -173,8 +173,8 @@ def test_the_page_of_training_says_that_the_rule_knows_sooner() -> None:
     result = Training(TrainOptions(), (), None, SimpleNamespace(plain=plain, together=neuron), "", {}, (), ())
     (line,) = result._better()
     assert line.startswith(
-        "hit: the plain rule is as good and knows sooner: 0 missed and false, as the neuron, known +0.2 ms after the "
-        "label (median), the neuron +0.5 ms; "
+        "hit: the plain rule is as good and knows sooner: both have 0 missed and false; the rule knows +0.2 ms after "
+        "the label (median), the neuron +0.5 ms; "
     )
 
 

@@ -195,7 +195,7 @@ def test_texts_count_from_the_recordings_beginning_and_json_from_1970(tmp_path: 
         labels.write_text(f"label,t_us\ncontact,{t}\n")
         wrong = call(capsys, "train", bag, "--topic", "/a", "--labels", labels, "-o", tmp_path / "r.json")[2]
         assert f"holds 1 event ({t / 1e6:.3f} s), none within" in wrong
-        assert f"(0.000 to 1.990 s); it begins 2026-11-18 11:06:40.000 UTC, {begin} us since 1970, and labels" in wrong
+        assert f"(0.000 to 1.990 s); it begins 2026-11-18 11:06:40.000 UTC, {begin} us since 1970: all labels" in wrong
 
 
 def test_messages_of_another_length_are_left_out_and_counted(tmp_path: Path) -> None:
@@ -446,7 +446,9 @@ def test_only_a_bag_has_topics_and_a_taxel_mcap_is_no_bag(tmp_path: Path) -> Non
     taxel.convert(events, tmp_path / "own.mcap")
     assert not ros.is_bag(tmp_path / "own.mcap")
     assert taxel.open(tmp_path / "own.mcap").events == events
-    with pytest.raises(ProblemError, match=r"own\.mcap: a \.mcap; topic, field, types and ros are only for ROS bags"):
+    with pytest.raises(
+        ProblemError, match=r"own\.mcap: is a \.mcap file; topic, field, types and ros are only for ROS bags"
+    ):
         taxel.open(tmp_path / "own.mcap", topic="/palm")
 
 
@@ -567,5 +569,7 @@ def test_labels_of_two_topics_are_each_of_their_source(names: dict[str, str], tm
     table.write_text(f"label,t_us\ntouch,{us + 20_000}\n")
     assert [one["touch"].tolist() for one in references(str(table), opened)] == [[us + 20_000]] * 2
     other = bags.write(tmp_path / "other.mcap", several)
-    with pytest.raises(ProblemError, match="there are 2; must have the column recording; it has "):
+    with pytest.raises(
+        ProblemError, match="there are 2 recordings; state it in the column recording; the columns are "
+    ):
         references(str(table), options.open_sensors([bag, other]))

@@ -109,7 +109,7 @@ TRAINS = SpikeTrains.from_lists([[1.0], [2.0]], stop=10.0)
     ("weights", "said"),
     [
         ([1.0, 2.0], "two, neurons and trains"),
-        ([[1.0, 2.0, 3.0]], "3 a neuron for 2 trains"),
+        ([[1.0, 2.0, 3.0]], "3 per neuron for 2 trains"),
         ([[1.0, 2.0]] * 40 + [[1.0, np.nan]], r"weights\[40, 1\] is NaN"),
         (np.array([[1.0, 2.0], [np.inf, 0.0]], np.float32), r"weights\[1, 0\] is inf"),
         ([[1.0], [2.0, 3.0]], "weights"),

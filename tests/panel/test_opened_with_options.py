@@ -183,7 +183,7 @@ def test_labels_of_a_folder_are_of_the_bag_that_they_name(capsys, tmp_path):
         (
             "label,t_us",
             f"contact,{times['a.bag'][0]}",
-            "names no recording, and there are 2; must have the column recording",
+            "there are 2 recordings; state it in the column recording",
         ),
         ("recording,label,t_us", f"c.bag,contact,{times['a.bag'][0]}", "c.bag is not a recording of this folder"),
         ("recording,label,t_us", "a.bag,contact,480000000", "a.bag: has 1 note, none within"),

@@ -117,7 +117,7 @@ def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
         (("--law",), "--law: turns ticks of a board into N;"),
         (("--from", "1"), "--from and --to give the time of --load: give --load too"),
         (("--loads", "loads.csv"), "loads.csv, line 2: unit is 'kg'; must be N or kPa"),
-        (("--set", "exponent=9", "--load", "3"), "sensor holds values of the law; give --law"),
+        (("--set", "exponent=9", "--load", "3"), "sensor states parameters of the law, but law is not set"),
     ],
 )
 def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path: Path, options: tuple[str, ...], said: str) -> None:

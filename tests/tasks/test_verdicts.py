@@ -253,7 +253,7 @@ def test_a_gap_and_what_it_holds_are_named(trained: Trained, tmp_path: Path, cap
     behind = cut.t[cut.t >= end][0]
     assert "1 gap of " in lines[0]
     assert lines[1].startswith(
-        f"may have happened in a gap, as it ends just before: contact at {behind / 1e6:.3f}"[:-2]
+        f"may have happened in a gap that ends just before them: contact at {behind / 1e6:.3f}"[:-2]
     )
     assert "missed are where the recording has no frames, and 1 of 1 false is at the first frames" in lines[-1]
 

@@ -45,7 +45,10 @@ def _nothing(port: int, seconds: float) -> str:
                     f"{begin}{name} has {HOST}, to which the board of rtl/boards sends, but is down: is the cable in?"
                 )
             slow = f" at {speed} Mbit/s, not at 1000" if 0 < speed < 1000 else ""
-            return f"{begin}{name} has {HOST} and is up{slow}: is it the board's cable, and does a firewall let UDP in?"
+            return (
+                f"{begin}The interface {name} has {HOST} and is up{slow}: is the board's cable in this interface, and "
+                "does a firewall let UDP in?"
+            )
     return (
         f"{begin}The board of rtl/boards sends to {HOST}, and no interface of this machine has that address ({there})"
     )

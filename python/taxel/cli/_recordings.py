@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _REPORT_S = (0.5, 9.5, 20.0, 30.0)
 
 #: What every command that works on recordings reads.
-READ_HELP = ".mcap, .lsa, .npz, .csv or .h5, a ROS bag or a file of another maker"
+READ_HELP = ".mcap, .lsa, .npz, .csv or .h5, a ROS bag or a file of a sensor's maker"
 SET_HELP = "Set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
 
 ReportOption = Annotated[

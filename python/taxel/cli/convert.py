@@ -27,7 +27,7 @@ app = App()
 @app.command()
 @with_out("target")
 def convert(
-    source: Annotated[Path, typer.Argument(help="A recording, a file of another maker, or a folder.")],
+    source: Annotated[Path, typer.Argument(help="A recording, a file of a sensor's maker, or a folder.")],
     target: Annotated[
         Path,
         typer.Argument(

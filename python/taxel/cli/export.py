@@ -31,8 +31,8 @@ def nir(
         float | None,
         typer.Option(
             metavar="MS",
-            help="Time step (ms) of the simulator that will read the file, if it adds 1 in the time step of a spike "
-            "(snnTorch: 0.1).",
+            help="Time step (ms) of the simulator that will read the file, if an input spike is a 1 that lasts one "
+            "time step (snnTorch: 0.1).",
         ),
     ] = None,
     overwrite: OverwriteOption = False,

@@ -46,7 +46,7 @@ _TAXELS = ("dead", "stuck", "noisy")
 def info(
     file: Annotated[
         Path,
-        typer.Argument(help="A recording, a file of another maker, or a folder."),
+        typer.Argument(help="A recording, a file of a sensor's maker, or a folder."),
     ],
     files: FileOptions,
     picture: Annotated[

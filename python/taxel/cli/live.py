@@ -389,7 +389,7 @@ def _silence(now: dict[str, Any], place: str) -> str:
         return f"quiet: {since}"
     within_ms = to_ms(arrival["heartbeat_us"])
     sign = "heartbeat" if now["lines"] is None else "frame"
-    return f"silent: {since} from {place}, though it sent a {sign} every {within_ms:g} ms or sooner"
+    return f"silent: {since} from {place}, which before sent a {sign} at least every {within_ms:g} ms"
 
 
 def _state(now: dict[str, Any], place: str) -> Text:

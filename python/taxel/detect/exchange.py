@@ -237,7 +237,7 @@ def _graph(readout: Parts, spike_ms: float | None) -> NIRGraph:
     for label, trained in readout.neurons.items():
         if trained.neuron.rearm is not None:
             raise ProblemError(
-                f"NIR: rearm of {label!r} is {trained.neuron.rearm}: no NIR neuron has that, must be None"
+                f"NIR: rearm of {label!r} is {trained.neuron.rearm}, but NIR neurons have no rearm; set it to None"
             )
     nodes = [_gains(trained.neuron, spike_s) for trained in neurons]
     kinds = sorted({kind for kind, _, _ in nodes})

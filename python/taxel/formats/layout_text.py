@@ -106,7 +106,9 @@ def with_keys(path: Path, text: str, keys: Mapping[str, Any]) -> str:
         made = _set(made, table, f"{key} = {_written(value)}", key)
     Layout.of_text(path, made)
     if tomllib.loads(made) != wanted:
-        raise ProblemError(f"{path}: cannot be changed here as it is written; set {', '.join(keys)} in it by hand")
+        raise ProblemError(
+            f"{path}: taxel cannot change a file written in this way; set {', '.join(keys)} in it by hand"
+        )
     return made
 
 

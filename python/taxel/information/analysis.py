@@ -278,7 +278,7 @@ class _Answering(Question):
         self.notes += sorted(missing)[:3]
         if self.groups is None:
             self.notes.append(
-                "no groups are named: what the trials of one person, session or pose have in common counts as "
+                "no groups are named: if trials of one person, session or pose resemble each other, this counts as "
                 "information about the label"
             )
         runs = 1 + int(np.count_nonzero(self.labels[1:] != self.labels[:-1]))

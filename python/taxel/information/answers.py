@@ -166,8 +166,8 @@ class Answer:
         lines = []
         if estimate.bits <= self.zero.level:
             lines.append(
-                "not distinguishable from 0 bits: labels shuffled before training give as much "
-                f"(95 % below {self.zero.level:.2f})"
+                "not distinguishable from 0 bits: shuffled labels give as much (95 % of the shuffles give less than "
+                f"{self.zero.level:.2f})"
             )
         guessed, least = _guessing(estimate)
         if estimate.right < least:

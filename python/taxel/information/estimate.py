@@ -412,7 +412,9 @@ def _warnings(least: int, relevant: float, interval: tuple[float, float], tenth:
     lines = []
     needed = int(np.ceil(TRIALS_A_RESPONSE * relevant))
     if least < needed:
-        lines.append(f"{least} trials of a label: below {needed} the bits may read high by more than .05")
+        lines.append(
+            f"only {least} trials of a label: with fewer than {needed}, the bits may be too high by more than .05"
+        )
     half = (interval[1] - interval[0]) / 2
     if half > 0.1:
         lines.append(f"uncertain by {half:.2f} bit: a tenth needs some {tenth} trials")

@@ -269,7 +269,7 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
                     contents = Contents.single(_on_given(contents.main, array))
             case recognition.TaxelFile(kind):
                 if options.topics.are_given:
-                    raise ProblemError(f"{path}: a .{kind}; topic, field, types and ros are only for ROS bags")
+                    raise ProblemError(f"{path}: is a .{kind} file; topic, field, types and ros are only for ROS bags")
                 array = None if options.array is None else Array._given(options.array)
                 if kind == "records" and array is None and layout is not None:
                     array = layout.grid()
@@ -431,8 +431,8 @@ def _add_labels(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Record
     count = len({trial_of(str(name), recording.label) for name, recording in pairs})
     if count > 1 and any(not row.recording for row in labels.rows):
         raise FormatError(
-            f"{table}: names no recording, and there are {count}; must have the column recording; it has "
-            f"{', '.join(map(shown, labels._columns))}"
+            f"{table}: does not state the recording of each label, but there are {count} recordings; state it in the "
+            f"column recording; the columns are {', '.join(map(shown, labels._columns))}"
         )
     return [_with_labels(labels, name, recording) for name, recording in pairs]
 

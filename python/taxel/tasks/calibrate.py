@@ -121,7 +121,7 @@ class CalibrateOptions:
         if self.law and self.table is not None:
             raise refused("law", ": must be left out where table is given")
         if self.sensor and not self.law:
-            raise helped(ProblemError("sensor holds values of the law"), "law", "give")
+            raise ProblemError("sensor states parameters of the law, but law is not set")
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +228,9 @@ def _read(recording: Recording, tare: GivenTare | None) -> tuple[Frames, NDArray
         raise ProblemError(f"{recording.path}: holds events without intensities, so there is nothing to calibrate")
     frames, rest, floor = values
     if rest.source == "none" and recording.has_events:
-        error = ProblemError(f"{recording.path}: the rest of its taxels is not known, as no half second is quiet")
+        error = ProblemError(
+            f"{recording.path}: the values of its taxels at rest are not known, because no half second is quiet"
+        )
         raise helped(error, "tare", "give")
     is_measured = rest.source not in ("unit", "none")
     return frames, rest.values.reshape(recording.array.shape) if is_measured else None, floor

@@ -565,4 +565,4 @@ def _of_gaps(recording: Recording, outcome: Outcome) -> Iterator[str]:
                 f"{label} at {(t - outcome.begin_us) / 1e6:.3f} s"
                 for label, t in zip(behind.label, behind.t, strict=True)
             ]
-            yield f"may have happened in a gap, as it ends just before: {few(at)}"
+            yield f"may have happened in a gap that ends just before them: {few(at)}"

@@ -58,11 +58,11 @@ def references(
     # The sources of one file are one recording.
     count = len({(recording.path, trial_name(recording)) for recording in recordings})
     if count > 1 and any(not row.recording for row in table.rows):
-        trials = f", with names as {trial_name(recordings[0])}" if are_trials(recordings) else ""
+        trials = f", with names like {trial_name(recordings[0])}" if are_trials(recordings) else ""
         raise refused(
             argument,
-            f" is {source}: names no recording, and there are {count}; must have the column recording{trials}; it has "
-            f"{', '.join(map(shown, table._columns))}",
+            f" is {source}: does not state the recording of each label, but there are {count} recordings; state it in "
+            f"the column recording{trials}; the columns are {', '.join(map(shown, table._columns))}",
         )
     _check_sources(table, argument, recordings)
     named = {
@@ -203,8 +203,7 @@ def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
         count = counted(sum(row.recording in strange for row in table.rows), "event")
         there = few(dict.fromkeys(recording.title for recording in recordings))
         warn(
-            f"{table.path}: left out {count} of {few(strange)}, which {are(len(strange))} "
-            f"not among the recordings: {there}",
+            f"{table.path}: left out {count} whose recording is named {few(strange)}; the recordings are named {there}",
             stacklevel=3,
         )
 
@@ -366,7 +365,10 @@ def _span(recording: Recording) -> str:
     more = "" if recording.timed else ", whose frames are numbered (rate_hz gives them times)"
     begin = beginning_us(np.array([first]))
     if begin:
-        more = f"; it begins {begun(begin)}, {begin} us since 1970, and labels must count from 1970, or all from there"
+        more = (
+            f"; it begins {begun(begin)}, {begin} us since 1970: all labels must count from 1970, or all from the "
+            "recording's beginning"
+        )
     return f"{recording.title} ({(first - begin) / 1e6:.3f} to {(last - begin) / 1e6:.3f} s){more}"
 
 

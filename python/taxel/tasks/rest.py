@@ -155,7 +155,8 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
         noise, because = (0.0, "") if loaded else _noisy(source)
         because = because or f" with nothing on it{_slow(source) or loaded}"
         error = UnknownRestError(
-            f"{recording.path}: the rest of its taxels is not known, as no half second is quiet{because}"
+            f"{recording.path}: the values of its taxels at rest are not known, because no half second is "
+            f"quiet{because}"
         )
         error.noise = noise
         raise helped(error, "tare", "give")

@@ -349,9 +349,9 @@ class Training:
         for label in sooner:
             rule_score, score = (scores[label] for scores in (plain.together, self.scored.together))
             yield (
-                f"{label}: the plain rule is as good and knows sooner: {rule_score.rank[0]} missed and false, as the "
-                f"neuron, known {three_digits(rule_score.delay.median, '+')} ms after the label (median), the neuron "
-                f"{three_digits(score.delay.median, '+')} ms; {_RULE_FILE}"
+                f"{label}: the plain rule is as good and knows sooner: both have {rule_score.rank[0]} missed and "
+                f"false; the rule knows {three_digits(rule_score.delay.median, '+')} ms after the label (median), the "
+                f"neuron {three_digits(score.delay.median, '+')} ms; {_RULE_FILE}"
             )
         if plain.lacks:
             yield plain.lacks

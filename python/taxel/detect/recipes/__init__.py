@@ -171,7 +171,8 @@ def lacking_places(source: Events | Frames, labels: Sequence[str]) -> str:
     rows, columns = source.array.shape
     return (
         f"no recipe distinguishes {' and '.join(labels)} on {counted(source.array.taxels, 'channel')} without "
-        f"places; if these are in a row, give --array {rows}x{columns}x5 with the distance from one to the next in mm (here 5)"
+        f"places; if these are in a row, give --array {rows}x{columns}x5 with "
+        "the distance from one to the next in mm (here 5)"
     )
 
 
