@@ -96,6 +96,6 @@ def test_what_is_no_count_of_the_training_is_refused_before_its_rest(tmp_path: P
     values = np.random.default_rng(1).integers(0, 500, (100, 4, 5)).astype(float)
     taxel.convert(Frames(values, 20_000 * np.arange(100), unit=UNIT, array=Array(4, 5)), tmp_path / "loud.npz")
     with pytest.raises(
-        ProblemError, match=r"loud.npz: values in events/20 ms, and the plain rule was trained on on events/5 ms"
+        ProblemError, match=r"loud.npz: values are in events/20 ms, but the plain rule was trained on on events/5 ms"
     ):
         detect(rule, taxel.open(tmp_path / "loud.npz"))

@@ -294,7 +294,7 @@ def test_files_that_are_no_readout_are_refused_by_name(readout: Readout, tmp_pat
     good = json.loads(readout.to_json())
     cases = [
         (b"\x80\xff", "not text in UTF-8"),
-        (b"", "not JSON"),
+        (b"", "not a JSON object: empty"),
         (b"{}", 'the key "format" is missing'),
         (json.dumps({**good, "version": 2}).encode(), "version 2, this taxel reads version 1 only"),
         (json.dumps({**good, "wings": 2}).encode(), 'readout: wings is not known: there is "encoder", "array"'),
