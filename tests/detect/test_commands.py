@@ -419,21 +419,7 @@ def test_the_command_that_follows_a_training_is_said_and_runs(
 ) -> None:
     monkeypatch.chdir(folder)
     out = tmp_path / "a readout.json"
-    # The lifts of so short a training are not to be relied on: the advice to train again would follow.
-    rows = (folder / "truth.csv").read_text().splitlines()
-    (tmp_path / "contacts.csv").write_text("\n".join(row for row in rows if "lift" not in row))
-    command = (
-        "train",
-        "9.npz",
-        "--labels",
-        tmp_path / "contacts.csv",
-        "--recipe",
-        "recipe.toml",
-        "--folds",
-        0,
-        "-o",
-        out,
-    )
+    command = ("train", "9.npz", "--labels", "truth.csv", "--folds", 0, "-o", out)
     code, said, _ = call(capsys, *command, *(() if given is None else ("--tare", given)))
     assert code == 0
     [following] = re.findall(r"^written to .*; next: taxel (.*)$", said, re.MULTILINE)
