@@ -140,8 +140,11 @@ class FeltLoads:
         covered = sum(4 * round(to_us(WINDOW_MS)) * len(self._spans(quantity)[0]) for quantity in self._felt)
         return chance_of(count, among, min(1.0, covered / max(1, self._lasts_us))) > _CHANCE
 
-    def overlapped(self, label: str) -> NDArray[np.bool_]:
-        """Return which labels of a name are in a load that holds two of them or more, far from its ends."""
+    def overlapped(self, label: str, *, stays: bool = False) -> NDArray[np.bool_]:
+        """Return which labels of a name are in a load that holds two of them or more, far from its ends.
+
+        `stays`: the load may be of an object that stays, so that labels of begins and ends alternate in it.
+        """
         reach, times = round(to_us(WINDOW_MS)), self.times(label)
         if self._loads is None or not len(times):
             return np.zeros(len(times), np.bool_)
@@ -151,6 +154,8 @@ class FeltLoads:
         lasting = np.append(ends % APART_US == APART_US // 2, False)[load]
         load[(load >= 0) & ((np.append(ends, 0)[load] < times - reach) | lasting)] = -1
         inside = (load >= 0) & (times - np.append(begins, 0)[load] > reach) & (np.append(ends, 0)[load] - times > reach)
+        if stays:
+            return inside & (np.bincount(load + 1)[load + 1] > 1)
         # In a load whose begins and ends alternate, as of a sensor that recovers slowly, none overlaps.
         kind = {"contact": "lift", "lift": "contact"}.get(recipes.neuron_of("touch", label) or "")
         others = [self.times(name) for name in self._loads.names if kind and recipes.neuron_of("touch", name) == kind]

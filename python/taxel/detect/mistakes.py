@@ -432,7 +432,7 @@ class Measured:
         """Return how many missed are while a load lasts that holds several labels of the name."""
         if not self._felt.are_known:
             return None
-        overlapped = self._felt.overlapped(label)
+        overlapped = self._felt.overlapped(label, stays=self._standing is not None)
         inside = np.isin(left.missed, self._felt.times(label)[overlapped])
         if 2 * (count := int(inside.sum())) <= len(left.missed):
             return None
