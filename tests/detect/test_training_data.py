@@ -143,8 +143,9 @@ def test_a_gap_is_named_and_a_recording_without_a_rest_stops_no_other(
     found = taxel.tasks.detect(training.readout, [taxel.open(restless), recording])
     assert [Path(name).name for name in found.left_out] == ["restless.npz"]
     assert [each.recording.path for each in found.each] == [path]
-    assert any("restless.npz" in warning and "rest of its taxels is not known" in warning for warning in found.warnings)
-    with pytest.raises(taxel.ProblemError, match="rest of its taxels is not known"):
+    unknown = "the values of its taxels at rest are not known"
+    assert any("restless.npz" in warning and unknown in warning for warning in found.warnings)
+    with pytest.raises(taxel.ProblemError, match=unknown):
         taxel.tasks.detect(training.readout, taxel.open(restless))
 
 

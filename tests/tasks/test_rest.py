@@ -230,7 +230,7 @@ def test_zeros_before_are_advised_only_where_a_recording_begins_loaded(tmp_path:
         np.abs(np.random.default_rng(4).normal(0, 400, (300, 3, 4))) * ((t // 20) % 2 == (not loaded))[:, None, None]
     )
     taxel.convert(Frames(values, 10_000 * t, unit=unit), tmp_path / "a.npz")
-    with pytest.raises(UnknownRestError, match="the rest of its taxels is not known") as caught:
+    with pytest.raises(UnknownRestError, match="the values of its taxels at rest are not known") as caught:
         rest(taxel.open(tmp_path / "a.npz"))
     assert ("zeros_before_s" in str(caught.value)) == (loaded and unit == "counts")
     assert caught.value.argument == "tare"
