@@ -100,7 +100,7 @@ def assert_told(path: Path, data: bytes, of: dict[str, list[Any]], where: str) -
     assert all(verdict.lost.values()), where
     unfinished = "not finished" in verdict
     torn = unfinished and verdict.damaged.get("torn_bytes", 0) > 0
-    if "not known" in verdict or torn or (unfinished and not verdict.damaged):
+    if "unknown" in verdict or torn or (unfinished and not verdict.damaged):
         assert STATUSES.index(verdict.status) >= STATUSES.index("damaged"), where
         assert all(verdict.lost.get(cause, 0) <= n for cause, n in gone.items()), where
     else:
@@ -223,7 +223,7 @@ def test_of_a_chunk_without_its_index_and_without_the_end_of_the_file_not_all_is
     verdict = assert_told(tmp_path / "b.mcap", data[:begin] + bytes(end - begin) + data[end:], of, "as finished")
     assert verdict is not None
     assert (verdict.status, verdict.lost) == ("lost", {"notes_lost_in_file": gone})
-    assert "not known" not in verdict
+    assert "unknown" not in verdict
 
 
 def test_datagrams_that_no_index_lists_are_lost_by_their_numbers_or_the_final_counts(
