@@ -327,7 +327,7 @@ def test_causes_are_data_and_their_arguments_are_options_of_a_training(tmp_path:
     frames, labels = pressed(1)
     taxel.convert(frames, tmp_path / "a.npz")
     late = [{label: times + 300_000 for label, times in labels.items()}]
-    options = taxel.tasks.TrainOptions()
+    options = taxel.tasks.TrainOptions(labels_as_given=True)
     training = taxel.train(taxel.open(tmp_path / "a.npz"), late, options)
     cause = training.causes[0]
     assert (cause.kind, set(cause.labels), cause.option) == ("shifted_labels", {"contact", "lift"}, "--shift-ms -300")
@@ -405,7 +405,7 @@ def test_a_long_training_says_how_long_before_its_folds(tmp_path: Path, monkeypa
     steps: list[str] = []
     taxel.train(taxel.open(tmp_path / "a.npz"), [labels], progress=lambda step, *_: steps.append(step))
     (said,) = [step for step in steps if isinstance(step, Forecast)]
-    assert re.fullmatch(r"about \d+ min left: one training on all data took [\d.]+ s, and the folds .* 4 of them", said)
+    assert re.match(r"about \d+ min left: one training on all data took [\d.]+ s, and the folds .* 4 of them; ", said)
     assert steps.index(said) < steps.index("fold 1 of 5")
 
 
