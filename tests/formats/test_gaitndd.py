@@ -40,7 +40,7 @@ def test_gaitndd_gives_step_times_and_leaves_out_invalid_samples(tmp_path):
         (".hea", " 0 500 ", " 0 501 ", "first value 500; the header says 501"),
         (".hea", "control99.let", "../control99.let", "is not a plain file name"),
         (".ts", "5.0000\t1.0000", "5,0000\t1.0000", "line 3: time has a decimal comma"),
-        (".ts", "5.0000\t1.0000", "4.0000\t1.0000", "line 3: time, left stride and swing do not follow"),
+        (".ts", "5.0000\t1.0000", "4.0000\t1.0000", "line 3: times must ascend, and 0 < swing < stride"),
     ],
 )
 def test_a_spoilt_gaitndd_file_is_named(tmp_path, file, old, new, said):

@@ -312,7 +312,7 @@ def test_a_label_that_tables_write_for_what_is_missing_is_refused(tmp_path):
     recording, labels = folder(tmp_path, 20)
     labels.write_text(labels.read_text().replace("left first", "NaN"))
     done = run(recording, "--labels", labels, *QUICK, "--report", tmp_path / "page.html")
-    assert "line 3: label is 'NaN', as tables write what is missing" in str(done.exception)
+    assert "line 3: label is 'NaN', which tables use for a missing value" in str(done.exception)
 
 
 def test_a_sensor_that_a_table_of_events_does_not_hold_is_said(tmp_path):

@@ -574,7 +574,7 @@ def test_trains_without_a_spike_have_weight_0_and_count_in_the_normalisers():
     problem = ConeR().prepare(many, targets)
     with pytest.raises(ProblemError, match="lb: 3 bounds for 60 trains"):
         problem.fit(ConeR(lb=[-1.0] * 3))
-    with pytest.raises(ProblemError, match="lb: holds a train without a spike away from 0"):
+    with pytest.raises(ProblemError, match="lb: forbids the weight 0 of a train without spikes"):
         problem.fit(ConeR(lb=0.1, ub=0.2))
     held = np.where(np.arange(60) == np.setdiff1d(np.arange(60), spoken)[0], 0.25, 0.3)
     assert ConeR(lb=list(np.where(held == 0.25, 0.25, -0.3)), ub=list(held)).fit(many, targets).weights_.max() >= 0.25

@@ -111,7 +111,7 @@ def test_what_is_never_quiet_has_no_rest_and_the_page_says_so(tmp_path: Path) ->
     taxel.convert(events, tmp_path / "e.npz")
     refused = run("calibrate", tmp_path / "e.npz", "--load", "2")
     assert refused.returncode == 2
-    assert "the rest of its taxels is not known" in refused.stderr
+    assert "the values of its taxels at rest are not known" in refused.stderr
     assert "--tare" in refused.stderr
 
 
