@@ -155,7 +155,8 @@ class FeltLoads:
         load[(load >= 0) & ((np.append(ends, 0)[load] < times - reach) | lasting)] = -1
         inside = (load >= 0) & (times - np.append(begins, 0)[load] > reach) & (np.append(ends, 0)[load] - times > reach)
         if stays:
-            return inside & (np.bincount(load + 1)[load + 1] > 1)
+            held: NDArray[np.bool_] = inside & (np.bincount(load + 1)[load + 1] > 1)
+            return held
         # In a load whose begins and ends alternate, as of a sensor that recovers slowly, none overlaps.
         kind = {"contact": "lift", "lift": "contact"}.get(recipes.neuron_of("touch", label) or "")
         others = [self.times(name) for name in self._loads.names if kind and recipes.neuron_of("touch", name) == kind]
@@ -251,22 +252,26 @@ class FeltLoads:
         """Return labels of some names, and which of them are at one distance from what was felt, far from all of it.
 
         The distance is counted from where the other labels of their name are, as ends may be felt later than begins.
+        None where most of the others are not near anything felt: no part is off then.
         """
         if self._loads is None:
             return None
         times = [self.times(label) for label in labels]
         edges = [self._edges(label, self._quantity) for label in labels]
-        pairs = []
+        pairs, are_felt = [], []
         for t, felt in zip(times, edges, strict=True):
             # A name without a meaning takes the edge near which more of its labels are.
             apart, index = max((_apart(t, edge) for edge in felt), key=lambda pair: _near(*pair))
             near = np.abs(apart) <= WINDOW_MS
             usual_ms = float(np.median(apart[near])) if _near(apart, index) >= _LEAST else 0.0
             pairs.append((apart - usual_ms, index))
+            are_felt.append(np.isin(np.arange(len(t)), index[near]))
         together = np.concatenate(times)
         alike = _alike(pairs, list(map(len, times)), WINDOW_MS)
+        if alike is None or 2 * np.count_nonzero(np.concatenate(are_felt)) < np.count_nonzero(~alike.members):
+            return None
         order = np.argsort(together, kind="stable")
-        return None if alike is None else (together[order], alike._replace(members=alike.members[order]))
+        return together[order], alike._replace(members=alike.members[order])
 
     def _edges(self, label: str, quantity: str) -> list[NDArray[np.int64]]:
         """Return when loads begin, or end, or both, as a name of labels says which it is of."""
