@@ -247,6 +247,11 @@ class Training:
         """Return the command that detects by the readout in a file, with the tare, if any, of the training.
 
         "" if the readout cannot be relied on.
+
+        Parameters
+        ----------
+        readout : str
+            The file's name, as the command gives it.
         """
         if any(self.unreliable()):
             return ""
