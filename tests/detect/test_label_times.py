@@ -15,7 +15,7 @@ from shell import call
 import taxel
 from taxel import Array, Frames, Tare
 from taxel.detect import Example, score
-from taxel.detect.causes import _chance
+from taxel.detect.causes import _by_chance
 from taxel.detect.examples import check_examples
 from taxel.detect.label_times import FeltLoads, Off
 from taxel.detect.tares import held_by_tare
@@ -154,14 +154,15 @@ def test_kinds_are_told_by_chance_as_fisher_s_test_has_it(found: int, false: int
     stats = pytest.importorskip("scipy.stats")
     table = [[found, 12 - found], [false, 12 - false]]
     assert (stats.fisher_exact(table, alternative="greater").pvalue > 0.05) == by_chance
-    said = _chance("soft", told(found, 12, false, 12), None)
+    said = _by_chance("soft", "the neuron", told(found, 12, false, 12))
     assert bool(said) == by_chance
     if by_chance:
-        assert said == f"the neuron tells {found} of 12 and takes {false} of 12 others for soft, as by chance"
+        assert said == f"the neuron tells {found} of 12 and takes {false} of 12 others for soft"
 
 
 def test_contact_and_lift_are_no_kinds() -> None:
-    assert _chance("contact", score(taxel.Detections([], [], []), {"contact": [1000], "lift": [2000]}), None) == ""
+    nothing = score(taxel.Detections([], [], []), {"contact": [1000], "lift": [2000]})
+    assert _by_chance("contact", "the neuron", nothing) == ""
 
 
 def test_kinds_that_differ_by_place_are_told_and_of_others_the_advice_says_what_the_inputs_are(
