@@ -95,7 +95,7 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
             lambda: Tare.take(Frames(np.full((2, 1, 1), np.nan), [0, 1])),
             "Frames.held fills the missing ones",
         ),
-        (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), "start must be before stop|nothing came"),
+        (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), "start must be before stop|nothing has arrived"),
         (Tare, "measure one by Tare.take"),
         (lambda: Tare.from_json(5), "must be JSON text"),
         (lambda: Tare.from_json("[1"), "tare: "),
