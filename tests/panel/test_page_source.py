@@ -213,6 +213,6 @@ def test_a_rest_that_shifted_in_a_gap_is_a_warning_of_the_source_until_it_is_zer
         Panel(live) as panel,
         opened(chromium, panel.url) as page,
     ):
-        shows(page, "silence-text", "After a gap of .* s 20 of 36 taxels rest elsewhere than by the tare")
+        shows(page, "silence-text", "After a gap of .* s, the rest of 20 of 36 taxels differs from the tare")
         live.zero(*np.indices(SHAPE)[::-1].reshape(2, -1))
         until(lambda: page.locator("#silence").is_hidden(), "it is zeroed")
