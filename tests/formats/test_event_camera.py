@@ -238,7 +238,7 @@ def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(t
     assert any("recipe event_counts" in line for line in training.lines())
     frames = taxel.open(path, bin=4, window_ms=5).frames()
     assert len(taxel.detect.run(training.readout, frames, tare=taxel.Tare.take(frames, stop_us=500_000))) == 12
-    with refused("in events/2 ms, and the readout was trained on events/5 ms"):
+    with refused("in events/2 ms, but the readout was trained on events/5 ms"):
         taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=2).frames())
     on = taxel.open(path, bin=4, window_ms=5, polarity="on").frames()
     for detector in (training.readout, taxel.detect.PlainRule("area", 2, unit="events/5 ms")):
