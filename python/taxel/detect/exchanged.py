@@ -45,7 +45,7 @@ def exchanged(scored: Sequence[Scored], window_ms: float) -> Iterator[tuple[Caus
 def _exchanged(
     scored: Sequence[Scored], places: Sequence[int], source: str, partner: str, window_ms: float
 ) -> Cause | None:
-    """Return that the labels of two sources are exchanged, of which the outcomes at some places are; None if not."""
+    """Return that the labels of two sources, whose outcomes are at these places, are exchanged; None if not."""
     events = found = left = own_events = own_found = own_left = 0
     labels: dict[str, None] = {}
     for place in places:

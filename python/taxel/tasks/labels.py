@@ -112,7 +112,7 @@ def sources_without(
     source : "notes", path or sequence of mapping
     recordings : sequence of Recording
     events : sequence of mapping of str to int64, us
-        Of each recording, as `references` returns them.
+        Labels of each recording, as `references` returns them.
     """
     if not isinstance(source, str | os.PathLike):
         return {}
@@ -149,7 +149,7 @@ def of_other_sources(
     source : "notes", path or sequence of mapping
     recordings : sequence of Recording
     events : sequence of mapping of str to int64, us
-        Of each recording, as `moved` returns them.
+        Labels of each recording, as `moved` returns them.
     shift_ms : float, ms
         By how much they are moved.
     """

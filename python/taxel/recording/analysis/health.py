@@ -376,7 +376,7 @@ def _with_held(result: Health, frames: Frames, scale: float) -> Health:
             values[begins[k] : begins[k] + runs[k] + 1], array.shape, k, least, scale
         ):
             continue
-        # Of all frames, those before the first that was looked at.
+        # Only some frames were looked at; the value may begin before the first of these.
         series = frames.values[:, y, x]
         at = int(np.searchsorted(frames.t, t[begins[k]]))
         others = np.flatnonzero(series[:at] != held[k])

@@ -48,7 +48,7 @@ def free_of_preload(recording: Recording, rest: Rest) -> tuple[tuple[int, int] |
 
 
 def standing(frames: Frames) -> str:
-    """Return on which taxels of a grid, in a unit of force, an object is from beginning to end; "" if nothing does.
+    """Return on which taxels of a grid, in a unit of force, an object is from beginning to end; "" if none is.
 
     They read more than 0 in nearly all frames, by more than the rest of any recording may be off.
     """
