@@ -133,7 +133,7 @@ class _Detector(Saved):
         tare : Tare, optional
             The taxels' rest, where the encoder needs one and has none.
         wire_version : int, from 1 to 2
-            Version of the wire that stamped the events: 1 counts 100 us, so a stamp may be before its frame; 2 counts us.
+            Version of the wire that stamped the events: 1 counts 100 us (a stamp may be before its frame), 2 counts us.
 
         Raises
         ------
@@ -157,7 +157,7 @@ class ReadoutStream:
     tare : Tare, optional
         The taxels' rest, where the encoder needs one and has none.
     wire_version : int, from 1 to 2
-        Version of the wire that stamped the events: 1 counts 100 us, so a stamp may be before its frame; 2 counts us.
+        Version of the wire that stamped the events: 1 counts 100 us (a stamp may be before its frame), 2 counts us.
 
     Raises
     ------

@@ -391,7 +391,7 @@ def run(
     tare : Tare, optional
         The taxels' rest, where the encoder needs one and has none.
     wire_version : int, from 1 to 2, optional
-        Version of the wire that stamped the events: 1 counts 100 us, so a stamp may be before its frame; 2 counts us.
+        Version of the wire that stamped the events: 1 counts 100 us (a stamp may be before its frame), 2 counts us.
         Left out: what the recording's registers hold, else 1.
 
     Returns
