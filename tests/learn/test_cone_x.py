@@ -380,7 +380,10 @@ def test_progress_is_told_round_by_round():
     ("options", "said"),
     [
         ({"tau": 0}, "tau is 0 ms: must be above 0"),
-        ({"kernel": "exponential"}, 'kernel is "exponential" and time "continuous": its potential changes only in jumps'),
+        (
+            {"kernel": "exponential"},
+            'kernel is "exponential" and time "continuous": its potential changes only in jumps',
+        ),
         ({"kernel": "box"}, '^kernel is "box": must be "alpha", '),
         ({"kappa": 0}, "kappa is 0"),
         ({"delta_t_ms": -1}, "delta_t_ms is -1"),

@@ -141,7 +141,10 @@ def test_without_a_pitch_a_grid_counts_in_columns_and_rows_and_channels_refuse()
             "skin needs distances in mm, but the pitch of mat",
         ),
         (lambda: taxel.encode.Skin(seed=1).afferents(FOOT), "skin needs one pitch, but foot has a place"),
-        (lambda: _moments(Array(4, 4, name="mat"), displacement_mm=(1.0, 9.0)), "displacement_mm needs distances in mm"),
+        (
+            lambda: _moments(Array(4, 4, name="mat"), displacement_mm=(1.0, 9.0)),
+            "displacement_mm needs distances in mm",
+        ),
         (lambda: _moments(Array(1, 4, name="foot"), area=(1.0, 9.0)), "moments needs neighbours on a grid; foot"),
         (lambda: _encode(taxel.encode.ContactArea, Array(1, 4, name="foot")), "contact area needs neighbours"),
         (lambda: _encode(taxel.encode.LocalLoad, Array(1, 4, name="foot")), "local load needs neighbours"),

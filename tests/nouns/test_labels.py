@@ -356,7 +356,9 @@ def test_numbers_of_trials_name_no_recording_and_the_columns_are_said(tmp_path: 
     place = tmp_path / "given" / "labels.csv"
     place.parent.mkdir()
     place.write_text("Trial;Ereignis;Zeit [s]\n1;auf;0,3\n")
-    with pytest.raises(taxel.ProblemError, match="the column recording; the columns are 'Trial', 'Ereignis', 'Zeit \\[s\\]'"):
+    with pytest.raises(
+        taxel.ProblemError, match="the column recording; the columns are 'Trial', 'Ereignis', 'Zeit \\[s\\]'"
+    ):
         references(place, made)
 
 

@@ -129,7 +129,11 @@ def test_play_label_train_and_watch_the_new_readout(
         missed = [(t, label) for t, label in wanted if not any(abs(t - s) < 0.05 and label == of for s, of in heard)]
         assert (missed, len(heard) - len(wanted)) in (([], 0), ([], extra))
         command = page.locator("#train-command").inner_text()
-        shows(page, "train-next", "^Its detections in this recording are listed below. Correct the labels and train again, ")
+        shows(
+            page,
+            "train-next",
+            "^Its detections in this recording are listed below. Correct the labels and train again, ",
+        )
         detects = page.locator("#train-detect").inner_text()
         assert "next: " not in page.locator("#train-text").inner_text()
         low = page.locator("#detection-list").bounding_box()

@@ -79,7 +79,9 @@ def test_the_border_is_between_the_worst_oscillators_and_what_cannot_be() -> Non
     assert soon.startswith("a median delay of -0.1 s is impossible for a clock")
     both = doubt(-10_001.0, 1_000_001.0)
     assert both is not None
-    assert both.startswith("a drift of -10001 ppm (clocks differ by less than 10000) and a delay of 1.0 s is impossible for a clock")
+    assert both.startswith(
+        "a drift of -10001 ppm (clocks differ by less than 10000) and a delay of 1.0 s is impossible for a clock"
+    )
 
 
 @pytest.mark.parametrize(("drift_ppm", "wrong"), [(9_999.0, False), (-10_001.0, True), (-318_601.0, True)])
