@@ -242,7 +242,7 @@ def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(t
         taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=2).frames())
     on = taxel.open(path, bin=4, window_ms=5, polarity="on").frames()
     for detector in (training.readout, taxel.detect.PlainRule("area", 2, unit="events/5 ms")):
-        with refused("in on events/5 ms, and the .* was trained on events/5 ms"):
+        with refused("in on events/5 ms, but the .* was trained on events/5 ms"):
             taxel.detect.run(detector, on, tare=taxel.Tare.take(on, stop_us=500_000))
 
 

@@ -146,7 +146,8 @@ score = {{"found": 3, "missed": 1, "false": 0, "known_delay_ms": {{"median": 5.0
 mistake = {{"recording": "walk", "source": "", "label": "contact", "t_us": 7, "missed": True}}
 result = {{"labels": ["contact"], "score": {{"by_label": {{"contact": score}}}}, "plain_rule": None}}
 result |= {{"mistakes": [mistake], "warnings": ["3 are alone"], "options": ["--search"]}}
-print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result": result}}))
+detects = "taxel detect RECORDING --readout a.json"
+print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result": result, "command": detects}}))
 """
     )
     command.chmod(0o755)
