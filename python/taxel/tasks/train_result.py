@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import finite, flag, integer, mapping
+from taxel._base.arguments import finite, flag, integer, mapping, text
 from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, three_digits
 from taxel._base.times import beginning_us
@@ -252,7 +252,12 @@ class Training:
         ----------
         readout : str
             The file's name, as the command gives it.
+
+        Raises
+        ------
+        ProblemError : no text
         """
+        readout = text("readout", readout)
         if any(self.unreliable()):
             return ""
         tare = "FILE" if isinstance(self.options.tare, Tare) else self.options.tare
