@@ -189,7 +189,7 @@ class Labels:
         self, path: Path, clock_of: Callable[[], Clock | None], source: str, trial: str = "", side: str = ""
     ) -> dict[str, NDArray[np.int64]]:
         """Return the events of a source of the recording at this path; its clock is read only if it is needed."""
-        rows = self._rows(path, source, trial, side=side)
+        rows = self._rows(path, source, trial, side)
         clock = clock_of() if any(row.at_ns for row in rows) else None
         by_label: dict[str, list[int]] = {}
         for row in rows:
@@ -198,7 +198,7 @@ class Labels:
         return {label: np.sort(np.array(times, np.int64)) for label, times in by_label.items()}
 
     def _rows(
-        self, path: Path, source: str, trial: str, among: Sequence[Note] | None = None, side: str = ""
+        self, path: Path, source: str, trial: str, side: str, among: Sequence[Note] | None = None
     ) -> list[Note]:
         """Return the labels of a source of a recording, or of its trial: those of all of the file, and its own.
 
@@ -211,9 +211,9 @@ class Labels:
         }
         return [row for row in rows if row.recording in names and row.source in ("", source, side)]
 
-    def _replaced(self, path: Path, source: str, trial: str) -> set[int | None]:
+    def _replaced(self, path: Path, source: str, trial: str, side: str) -> set[int | None]:
         """Return the times of the notes of a source of a recording that its labels replace."""
-        return {row.replaces for row in self._rows(path, source, trial, (*self.rows, *self.removed))} - {None}
+        return {row.replaces for row in self._rows(path, source, trial, side, (*self.rows, *self.removed))} - {None}
 
     def __repr__(self) -> str:
         recordings = ", ".join(self.recordings) or "one recording"

@@ -142,6 +142,20 @@ def test_a_label_replaces_a_note_of_the_recording_and_one_without_a_name_removes
     assert noted(tmp_path, rows) == left
 
 
+def test_labels_beside_a_table_of_one_foot_name_it_by_its_side(tmp_path: Path) -> None:
+    table = tmp_path / "walk.csv"
+    table.write_text("time_s,l1,l2,r1,r2\n" + "".join(f"{k / 100},1,2,3,4\n" for k in range(100)))
+    layout = tmp_path / "walk.layout.toml"
+    (tmp_path / "walk.notes.csv").write_text("t_us,source,label\n100000,left,heel\n200000,right,heel\n300000,,both\n")
+    (tmp_path / "labels.csv").write_text("recording,source,label,t_us\nwalk.csv,left,toe,400000\nwalk.csv,right,toe,5\n")
+    for side, leave_out, t in (("left", [4, 5], [100_000, 300_000, 400_000]), ("right", [2, 3], [5, 200_000, 300_000])):
+        layout.write_text(
+            f'rows = 1\ncolumns = 2\nunit = "N"\nside = "{side}"\n[table]\ntime_column = "time_s"\ntime_unit = "s"\n'
+            f"leave_out = {leave_out}\n"
+        )
+        assert sorted(note.t for note in taxel.open(table).notes if note.t is not None) == t
+
+
 def test_a_replaced_note_is_that_of_its_source_alone(tmp_path: Path) -> None:
     place = tmp_path / "walk.notes.csv"
     place.write_text("label,t_us,source,replaces_us\nheel,5,left,4\ntoe,7,,\n,9,,9\n")
@@ -149,7 +163,7 @@ def test_a_replaced_note_is_that_of_its_source_alone(tmp_path: Path) -> None:
     assert [(row.text, row.t, row.replaces) for row in labels.rows] == [("heel", 5, 4), ("toe", 7, None)]
     assert [row.replaces for row in labels.removed] == [9]
     walk = tmp_path / "walk.mcap"
-    assert (labels._replaced(walk, "left", ""), labels._replaced(walk, "right", "")) == ({4, 9}, {9})
+    assert (labels._replaced(walk, "left", "", ""), labels._replaced(walk, "right", "", "")) == ({4, 9}, {9})
 
 
 @pytest.mark.parametrize(("cells", "said"), [(",5,", "must name a label"), ("a,5,x", "must be whole us")])

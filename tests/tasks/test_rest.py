@@ -104,6 +104,8 @@ def test_forces_that_do_not_rest_near_0_are_said_with_the_tare_that_takes_that_o
     standing = presses.copy()
     standing[:80] += 30.0
     assert warned("standing", standing) == []
+    # So it is in a shoe that presses a little for all of the time.
+    assert warned("shoe", standing + random.uniform(1, 4, (6, 6))) == []
 
 
 def test_the_first_stretch_counts_wherever_it_is_and_nothing_before_it_is_left_out(tmp_path: Path) -> None:

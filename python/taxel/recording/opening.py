@@ -463,10 +463,10 @@ def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
 def _notes(labels: Labels, name: Path, source: RecordedSource) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
     clock = source.timing.usable()
-    times = labels._times(name, lambda: clock, source.origin.label)
-    rows = labels._rows(name, source.origin.label, "")
+    times = labels._times(name, lambda: clock, source.origin.label, side=source.sensor.side)
+    rows = labels._rows(name, source.origin.label, "", source.sensor.side)
     of_source = {row.text: row.source for row in sorted(rows, key=lambda row: bool(row.source))}
-    names, replaced, labelled = labels_of(source.origin), set[int | None](), set[object]()
+    names, replaced, labelled = labels_of(source), set[int | None](), set[object]()
     if beside(source.origin.path).is_file():
         set_here = Labels(beside(source.origin.path))
         replaced, labelled = set_here._replaced(*names), {(row.text, row.t) for row in set_here._rows(*names)}

@@ -12,7 +12,6 @@ from taxel.recording.contents import Contents, FrameSource, RecordedSource, Stre
 from taxel.recording.frames import calibrate
 from taxel.recording.once import Once, known
 from taxel.recording.recording import Recording
-from taxel.recording.sections import Origin
 
 
 def with_sidecars(contents: Contents) -> Contents:
@@ -35,7 +34,7 @@ def _notes(source: RecordedSource) -> tuple[Note, ...]:
     Notes can be used as labels: one that a label replaces is left out, and a label that says the same at the same time
     is that note.
     """
-    labels, names = Labels(beside(source.origin.path)), labels_of(source.origin)
+    labels, names = Labels(beside(source.origin.path)), labels_of(source)
     replaced = labels._replaced(*names)
     notes = tuple(note for note in source.marks.notes() if note.t is None or note.t not in replaced)
     noted = {(note.text, note.t) for note in notes}
@@ -43,9 +42,10 @@ def _notes(source: RecordedSource) -> tuple[Note, ...]:
     return notes + tuple(Note(row.text, row.t, row.at_ns, source=row.source) for row in more)
 
 
-def labels_of(origin: Origin) -> tuple[Path, str, str]:
+def labels_of(source: RecordedSource) -> tuple[Path, str, str, str]:
     """Return what names the labels of a source in a table of labels beside its file."""
-    return origin.path, origin.label, trial_of(origin.name, origin.label)
+    origin = source.origin
+    return origin.path, origin.label, trial_of(origin.name, origin.label), source.sensor.side
 
 
 def calibration_beside(path: Path, source: RecordedSource) -> Once[Calibration | None]:

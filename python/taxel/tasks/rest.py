@@ -43,8 +43,8 @@ _QUIET_US = 500_000
 _LEAST_FRAMES = 20
 #: A taxel in a unit of force or pressure reads more than its noise in a quiet stretch from so many times that on; more
 #: than this share of all are many. It has no load that stays for a while if it reads as much in all but this share of
-#: the frames, of so many.
-_TIMES, _MANY, _LOWEST, _FRAMES = 3.0, 0.25, 0.05, 2000
+#: the frames, of so many, and not less than that share of the stretch's reading.
+_TIMES, _MANY, _LOWEST, _FRAMES, _MOSTLY_LOAD = 3.0, 0.25, 0.05, 2000, 0.5
 #: A recording begins loaded if the sum of its first so many frames is so many times its least sums, and not less than
 #: its largest ones by more.
 _FIRST_FRAMES, _LOADED_TIMES = 5, 10.0
@@ -280,7 +280,8 @@ def zero_by_unit(recording: Recording) -> Tare | None:
     middle = np.nan_to_num(quantile(source.between(*found.quiet_us).values, 0.5))
     lowest = np.nan_to_num(quantile(source.values[:: 1 + len(source) // _FRAMES], _LOWEST))
     above = _TIMES * zero.noise
-    off = (middle < -above) | ((middle > above) & (lowest > above))
+    # What is mostly a load that ends later is no rest.
+    off = (middle < -above) | ((middle > above) & (lowest > np.maximum(above, _MOSTLY_LOAD * middle)))
     count = np.count_nonzero(off)
     is_off = count > _MANY * source.array.taxels
     where = "" if is_off else standing(source)
