@@ -197,9 +197,7 @@ class Labels:
             by_label.setdefault(row.text, []).append((row.t or 0) - ahead)
         return {label: np.sort(np.array(times, np.int64)) for label, times in by_label.items()}
 
-    def _rows(
-        self, path: Path, source: str, trial: str, side: str, among: Sequence[Note] | None = None
-    ) -> list[Note]:
+    def _rows(self, path: Path, source: str, trial: str, side: str, among: Sequence[Note] | None = None) -> list[Note]:
         """Return the labels of a source of a recording, or of its trial: those of all of the file, and its own.
 
         Labels may name a source by the foot or hand that it is of.

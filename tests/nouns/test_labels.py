@@ -147,7 +147,9 @@ def test_labels_beside_a_table_of_one_foot_name_it_by_its_side(tmp_path: Path) -
     table.write_text("time_s,l1,l2,r1,r2\n" + "".join(f"{k / 100},1,2,3,4\n" for k in range(100)))
     layout = tmp_path / "walk.layout.toml"
     (tmp_path / "walk.notes.csv").write_text("t_us,source,label\n100000,left,heel\n200000,right,heel\n300000,,both\n")
-    (tmp_path / "labels.csv").write_text("recording,source,label,t_us\nwalk.csv,left,toe,400000\nwalk.csv,right,toe,5\n")
+    (tmp_path / "labels.csv").write_text(
+        "recording,source,label,t_us\nwalk.csv,left,toe,400000\nwalk.csv,right,toe,5\n"
+    )
     for side, leave_out, t in (("left", [4, 5], [100_000, 300_000, 400_000]), ("right", [2, 3], [5, 200_000, 300_000])):
         layout.write_text(
             f'rows = 1\ncolumns = 2\nunit = "N"\nside = "{side}"\n[table]\ntime_column = "time_s"\ntime_unit = "s"\n'

@@ -146,6 +146,21 @@ def test_a_plain_npz_or_csv_gets_the_thesis_array_or_one_that_fits(tmp_path: Pat
         taxel.open(tmp_path / "b.csv", array=THESIS)
 
 
+def test_tables_without_a_layout_beside_one_that_has_its_own_are_left_out_with_a_warning(tmp_path: Path) -> None:
+    rows = "\n".join(f"{0.01 * k:.2f},{k % 7},{k % 5}" for k in range(100))
+    for name in ("day1", "day2"):
+        (tmp_path / f"{name}.csv").write_text(f"time_s,a,b\n{rows}\n")
+    (tmp_path / "labels.csv").write_text("recording,label,t_us\nday1,contact,5\n")
+    own = tmp_path / "day1.layout.toml"
+    own.write_text('[table]\ntime_column = "time_s"\ntime_unit = "s"\n')
+    with pytest.warns(UserWarning, match=r": day2.csv left out, as no layout file describes them; a file named layout"):
+        assert [one.name for one in taxel.open_all(tmp_path)] == ["day1.csv"]
+    own.rename(tmp_path / "layout.toml")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert [one.name for one in taxel.open_all(tmp_path)] == ["day1.csv", "day2.csv"]
+
+
 def test_a_table_with_a_layout_beside_a_recording_is_left_out_with_a_warning(tmp_path: Path) -> None:
     rows = "\n".join(f"{0.01 * k:.2f},{k % 7},{k % 5}" for k in range(100))
     (tmp_path / "layout.toml").write_text('[table]\ntime_column = "time_s"\ntime_unit = "s"\n')

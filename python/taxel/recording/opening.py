@@ -352,6 +352,8 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
     found = recorded or ([] if names else recognition.described_tables(files, options.layout))
     if not found:
         _refuse_folder(folder, files, names)
+    if found is not recorded and options.layout is None:
+        _warn_of_undescribed(folder, found, files)
     opened = [(file, _count_memory(recording)) for file in found for recording in _open_file(file, options)]
     return _add_labels(folder / LABELS, [(file.relative_to(folder), recording) for file, recording in opened])
 
@@ -413,6 +415,16 @@ def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path
         warn(
             f"{folder}: {names} left out, as tables and arrays are not read in a folder with recordings ({beside}): "
             f"convert them, or move them to a separate folder",
+            stacklevel=6,
+        )
+
+
+def _warn_of_undescribed(folder: Path, described: Sequence[Path], files: Sequence[Path]) -> None:
+    """Warn of tables and arrays that no layout describes, beside others of their kind that have one."""
+    if left := [file.name for file in recognition.undescribed_tables(files, described)]:
+        warn(
+            f"{folder}: {', '.join(left[:5])}{' ...' * (len(left) > 5)} left out, as no layout file describes them; a "
+            "file named layout.toml in the folder describes all of its tables",
             stacklevel=6,
         )
 

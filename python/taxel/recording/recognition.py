@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -243,6 +243,16 @@ def described_tables(files: Iterable[Path], layout: GivenLayout) -> list[Path]:
     """Return the tables and arrays of other programs of which a layout says how to read them."""
     tables = (file for file in files if not file.name.endswith(".notes.csv") and _has_layout(file, layout))
     return [file for file in tables if _is_of_another_program(file, layout)]
+
+
+def undescribed_tables(files: Iterable[Path], described: Sequence[Path]) -> list[Path]:
+    """Return the tables and arrays that no layout describes, of the same kinds of files as those described."""
+    endings = {file.suffix.lower() for file in described}
+    return [
+        file
+        for file in files
+        if file.suffix.lower() in endings and file.is_file() and recognise(file) == ForeignFile(has_layout=False)
+    ]
 
 
 def formats_of(path: Path) -> dict[str, list[Path]]:

@@ -383,9 +383,9 @@ class Training:
 
     def unreliable(self) -> Iterator[str]:
         """Yield the labels of which the readout misses most, or detects no more than one of nothing; what may help."""
-        for label, text in self._unreliable().items():
+        for label, reason in self._unreliable().items():
             first = next((cause for cause in self.causes if label in cause.labels), None)
-            yield text + (f"; what may help is {first.advice}" if first is not None and first.advice else "")
+            yield reason + (f"; what may help is {first.advice}" if first is not None and first.advice else "")
 
     def _unreliable(self) -> dict[str, str]:
         labels = "labels that it was trained on" if self.why else "held-out labels"
