@@ -395,7 +395,9 @@ class Training:
     def again(self) -> str:
         """Return the first printed advice that concerns all labels of which the readout cannot be relied on, or ""."""
         labels = set(self._unreliable())
-        return next((cause.advice for cause in self._first_causes() if cause.advice and labels.issubset(cause.labels)), "")
+        return next(
+            (cause.advice for cause in self._first_causes() if cause.advice and labels.issubset(cause.labels)), ""
+        )
 
     def _aligned(self) -> Iterator[str]:
         """Yield by how much labels were moved to what the sensor felt, and which found no pair."""

@@ -157,9 +157,13 @@ def _data(path: Path, how: Data) -> Readings:
     size = f"frames of {' x '.join(map(str, values.shape[1:]))}"
     if len(wanted) == 1:
         return Readings(values, None, size, lost=lost)
-    times = arrays[wanted[1]].reshape(-1)
+    return Readings(values, _times(path, wanted[1], arrays[wanted[1]].reshape(-1), how), size, lost=lost)
+
+
+def _times(path: Path, name: str, times: NDArray[Any], how: Data) -> NDArray[np.int64]:
+    """Return times in us; their memory may become that of the result."""
     if times.dtype.kind not in "uif":
-        raise FormatError(f"{path}, {wanted[1]}: {times.dtype}; must be times as numbers")
+        raise FormatError(f"{path}, {name}: {times.dtype}; must be times as numbers")
     # Nobody else has the times, which take more memory than the readings of a single taxel.
     t = (
         times.view(np.int64)
@@ -169,7 +173,7 @@ def _data(path: Path, how: Data) -> Readings:
     for begin in range(0, len(times), _TIMES_AT_ONCE):
         block = slice(begin, begin + _TIMES_AT_ONCE)
         t[block] = whole_us(path.name, times[block].astype(np.float64) * UNITS_US[how.time_unit] / 1e6, begin)
-    return Readings(values, t, size, lost=lost)
+    return t
 
 
 def _too_large(values: NDArray[Any]) -> tuple[int, ...] | None:

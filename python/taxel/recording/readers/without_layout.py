@@ -96,7 +96,8 @@ def refuse_without_layout(path: Path) -> None:
             raise FormatError(
                 f"{path}: holds {list_arrays(shapes)}; must be t, x, y, p (events), values, t (frames), or, with a "
                 "layout file, an array of frames x rows x columns or frames x taxels (docs/files.md)"
-                + "; of a struct, save the fields: save('FILE.mat', '-struct', 'NAME')" * (path.suffix.lower() == ".mat")
+                + "; of a struct, save the fields: save('FILE.mat', '-struct', 'NAME')"
+                * path.name.endswith(".mat")
             )
         holds, lines = list_arrays(shapes), _of_arrays(path, name, shapes)
         says = "names the array of frames" if len(shapes) > 1 else "or rate_hz, describes it"
@@ -131,7 +132,9 @@ def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> 
     is_last = last in timed if (first in timed) != (last in timed) else last > max([first, *inner])
     count, shape = (last, [first, *inner]) if is_last else (first, [*inner, last])
     time = next((name for name, times in of_times.items() if times == count), None)
-    times = [] if time is None else [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time].ravel(), count)]
+    times = []
+    if time is not None:
+        times = [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time].ravel(), count)]
     data = [f"array = {_quote(name)}"] * bool(name) + ['frames = "last"'] * is_last + times
     # An array of frames x rows x columns says its size, and others of the folder may have another.
     size = [_NO_UNIT] if len(shape) == 2 else _size(shape[0], ())
