@@ -141,7 +141,7 @@ SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
     "felt late": (felt_late, "shifted_labels", "170 ms later, while lift fits: contact is felt later there", ""),
     "alike": (alike, "other_name", "20 of 20 false detections of lift are within 100 ms of labels of contact", ""),
     "misplaced": (misplaced, "unlabelled_loads", "6 of 6 false are in loads without a label", "to label these"),
-    "gap": (gap, "gaps", "missed are where the recording has no frames, as ", ""),
+    "gap": (gap, "gaps", "missed are where the recording has no frames, for example ", ""),
     "no releases": (
         no_releases,
         "unlabelled_loads",

@@ -250,7 +250,7 @@ def test_a_recording_without_one_of_the_labels_has_a_row_on_the_page(tmp_path: P
     )
     code, out, error = call(capsys, *arguments, "--report", tmp_path / "page")
     assert code == 0, error
-    assert (code, out.splitlines()[0].rpartition(": ")[2]) == (0, "every lift is in one recording")
+    assert (code, out.splitlines()[0].rpartition(": ")[2]) == (0, "all events lift are in the same recording")
     assert '2.npz</td><td class="left">lift</td><td>0</td>' in (tmp_path / "page" / "report.html").read_text()
 
 

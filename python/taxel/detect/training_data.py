@@ -188,7 +188,7 @@ def _of_noise(noisier: float, *, is_counts: bool) -> Iterator[str]:
         # The variance of events by chance is their number.
         yield f"{noisier**2:.2g} times as many events at rest as in the training"
     elif not is_counts and noisier >= _NOISIER:
-        yield f"the noise at rest is {noisier:.2g} times as strong as in the training as in the training"
+        yield f"the noise at rest is {noisier:.2g} times as strong as in the training"
 
 
 def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *, is_counts: bool) -> Iterator[str]:
@@ -207,7 +207,7 @@ def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *,
     if touches >= _LEAST:
         ratio = _usual(measured.peaks[are_touches]) / strength
         if not _WEAKER <= ratio <= _STRONGER:
-            yield f"touches are {ratio:.2g} times as strong as in the training as in the training"
+            yield f"touches are {ratio:.2g} times as strong as in the training"
     elif touches and len(measured.rises) >= _LEAST:
         yield f"most loads do not reach {_TOUCH:g} of the strength of the training's touches"
     # Hot pixels are the most loaded ones of counts.
