@@ -97,7 +97,7 @@ def test_forces_that_do_not_rest_near_0_are_said_with_the_tare_that_takes_that_o
     assert "offset.npz: 36 of 36 taxels read 4." in line
     assert f" {unit} in a quiet stretch, 0.000 to 0.500 s, and not 0; if nothing touches them then, --tare 0.5 " in line
     (line,) = warned("below", presses - random.uniform(4, 8, (6, 6)))
-    assert "--tare 0.5 takes that off" in line
+    assert "--tare 0.5 subtracts this" in line
     assert warned("tared", presses + 5.0, 0.5) == []
     assert warned("noise", presses + random.normal(0, 0.05, presses.shape)) == []
     # A foot that stands at first and is lifted later is a load.

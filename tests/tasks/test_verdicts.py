@@ -152,12 +152,12 @@ def test_a_training_names_the_part_of_each_recording_whose_labels_are_off(tmp_pa
     assert code == 0
     assert UNLEARNT not in error
     lines = out.splitlines()
-    [cause] = [line for line in lines if line.startswith("contact, lift: what may help is labels of ")]
+    [cause] = [line for line in lines if line.startswith("contact, lift: what may help is to move the labels of ")]
     for seed, begin_s in zip((11, 12), begins, strict=True):
         assert f"of {folder / f'{seed}.npz'} from {begin_s:.1f} s to the end 2" in cause
     assert not any("the plain rule is better" in line for line in lines), "it learnt wrong labels"
     [last] = [line for line in lines if line.startswith("written to ")]
-    assert "; next: train again with labels of " in last
+    assert "; next: move the labels of " in last
     assert "taxel detect" not in last
 
 
@@ -203,7 +203,7 @@ def test_labels_of_another_clock_are_moved_by_the_option_that_is_named(
         )
         assert said, line
         assert float(said[1]) == pytest.approx(abs(late_ms), abs=30)
-    assert "contact, lift: what may help is labels" in cause
+    assert "contact, lift: what may help is to move the labels by" in cause
     assert "the detections are where loads begin or end, the labels are not" in cause
     option = cause.partition("(")[2].partition(")")[0].split()
     assert float(option[1]) == pytest.approx(-late_ms, abs=30)
@@ -328,7 +328,7 @@ def test_false_detections_inside_loads_are_named(size: str) -> None:
     example = Example(frames, truth, taxel.Tare.take(frames, stop_us=2_000_000))
     [cause] = causes_of([Outcome("a", example, found, taxel.detect.score(found, truth), None)], 50.0)
     assert (cause.kind, cause.mistakes) == ("unlabelled_loads", 25)
-    where = "inside a load, more than 50 ms from where it begins or ends, as at "
+    where = "inside a load, more than 50 ms from where it begins or ends, for example at "
     assert cause.measured.startswith(f"25 of 25 false are {where}{middles[0] / 1e6:.3f} s, ")
 
 
