@@ -303,7 +303,7 @@ def test_the_options_are_of_events_without_intensities_alone(tmp_path: Path) -> 
     one = {"array": taxel.Array(4, 4), "intensity": [7]}
     taxel.convert(Events([0], [0], [0], [True], **one), tmp_path / "b.npz")
     for place in (tmp_path / "a.npz", tmp_path, tmp_path / "b.npz"):
-        with refused("holds no events without intensities, as files of event cameras do; region, bin, window_ms and"):
+        with refused("holds no events without intensities; region, bin, window_ms and"):
             taxel.open_all(place, bin=2)
 
 
