@@ -86,7 +86,7 @@ class Table:
         if len(text("separator", self.separator)) != 1:
             raise refused("separator", f" is {shown(self.separator)}: must be one character")
         if text("decimal", self.decimal, (".", ",")) == self.separator:
-            raise refused("decimal", f" is {shown(self.decimal)}, and so is separator: must differ")
+            raise refused("decimal", f" is {shown(self.decimal)}, and separator is too: they must differ")
         for column in several("columns", self.columns):
             text("columns", column)
         _check_end(self)

@@ -404,7 +404,7 @@ def _of_table(found: _TextTable, longer: float, begin: str) -> tuple[str, list[s
         [] if name is None else [f"unit = {_quote(name or found.unit_above)}" if name or found.unit_above else _NO_UNIT]
     )
     rate = [_NO_RATE] if time is None else []
-    holds = f"a table of {counted(len(found.numeric), 'column')}" + f", {lines} lines a frame" * (lines > 1)
+    holds = f"a table of {counted(len(found.numeric), 'column')}" + f", {lines} lines per frame" * (lines > 1)
     names = [found.names[k] for k in taxels] if found.names else []
     size = _size(len(taxels), names) if lines == 1 else [f"rows = {lines}", f"columns = {len(taxels)}"]
     return holds, [*size, *unit, *rate, *(["[table]", *table] if table else [])]
