@@ -127,9 +127,10 @@ def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> 
     of_times = {name: max(shape, default=0) for name, shape in shapes.items() if unit_of(name) is not None}
     of_times = {name: count for name, count in of_times.items() if math.prod(shapes[name]) == count}
     first, *inner, last = shapes[name]
-    # MATLAB's frames are often along the last axis.
+    # MATLAB's frames are often along the last axis; NumPy's are along the first.
+    longest_last = path.suffix.lower() == ".mat" and last > max([first, *inner])
     timed = set(of_times.values())
-    is_last = last in timed if (first in timed) != (last in timed) else last > max([first, *inner])
+    is_last = last in timed if (first in timed) != (last in timed) else longest_last
     count, shape = (last, [first, *inner]) if is_last else (first, [*inner, last])
     time = next((name for name, times in of_times.items() if times == count), None)
     times = []
