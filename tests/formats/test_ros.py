@@ -293,7 +293,7 @@ def test_the_most_frequent_length_is_read_whatever_comes_first(
     assert opened.frames().values[:, 0, 0].tolist() == places
     left = len(lengths) - len(places)
     assert opened.counts["messages_of_another_length"] == left
-    assert [f"{left} of {len(lengths)} messages left out, as" in line for line in opened.lost] == [True] * (left > 0)
+    assert [f"{left} of {len(lengths)} messages left out" in line for line in opened.lost] == [True] * (left > 0)
     # The count is told before anything else, and the list of topics names the shape of most.
     head, first, *_ = call(capsys, "info", bag, "--topic", "/raw")[1].splitlines()
     assert (f"{left} of {len(lengths)} messages left out" in first) == (left > 0), head
