@@ -53,7 +53,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("record", "--array", "8", "a.mcap"), "--array is 8: must be rows x columns, as 64x64"),
+        (("record", "--array", "8", "a.mcap"), "--array is 8: must be rows x columns, for example 64x64"),
         (
             ("record", "--port", "70000", "a.mcap"),
             "--port is 70000: must be a whole number from 0 to 65535",
@@ -74,7 +74,10 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("emulate", "--baud", "9600"), "--baud without --line"),
         (("info", "nowhere/a.mcap"), "nowhere: no such folder"),
         (("info", "none.mcap"), "none.mcap: no such file or directory"),
-        (("info", "walk.npz", "--tare", "0,5"), "tare: 0,5: no such file; seconds are a number with a point, as 0.5"),
+        (
+            ("info", "walk.npz", "--tare", "0,5"),
+            "tare: 0,5: no such file; seconds are a number with a point, for example 0.5",
+        ),
         (("record", "--compression", "x", "a.mcap"), '--compression is "x": must be none, lz4 or zstd'),
         (("record", "--host", "no such host", "a.mcap"), '--host is "no such host": must be an address or a name'),
         (("record", "--preset", "9 kHz", "a.mcap"), 'preset "9 kHz" is not known; presets: "5.2 kHz"'),
@@ -85,8 +88,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("cut", "walk.npz", "a.npz", "-o", "b.npz"), "OUT is given twice: a.npz and b.npz"),
         (
             ("live", "--readout", "a.json", "--readout=b.json"),
-            "--readout is given twice: a.json and b.json; a command "
-            "reads out one: train one readout on the labels of both, or record and run taxel detect with each",
+            "--readout is given twice: a.json and b.json; a command uses one readout: train one readout on the "
+            "labels of both, or record and run taxel detect with each",
         ),
         (("record", "a.mcap", "--bogus"), "No such option: --bogus"),
         (("bogus",), "No such command 'bogus'; see taxel --help"),

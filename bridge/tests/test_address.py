@@ -32,7 +32,9 @@ def test_an_address_is_read_as_it_is_written(host, port, name):
      "zenoh:[fe80::1%eth0]:7447"],
 )  # fmt: skip
 def test_what_is_no_address_is_refused_with_one_that_is(said):
-    with pytest.raises(taxel.ProblemError, match=r"must be zenoh:HOST:PORT/NAME, as zenoh:192\.168\.1\.5:7447/left"):
+    with pytest.raises(
+        taxel.ProblemError, match=r"must be zenoh:HOST:PORT/NAME, for example zenoh:192\.168\.1\.5:7447/left"
+    ):
         Address.of(said)
 
 

@@ -55,7 +55,7 @@ class Places:
                 continue
             values = numbers(name, getattr(self, name), np.float64).copy()
             if values.ndim not in (1, 2) or values.shape != np.shape(self.x):
-                raise refused(name, f" has shape {values.shape}: must be one per taxel, as x, {np.shape(self.x)}")
+                raise refused(name, f" has shape {values.shape}: must be one per taxel, like x: {np.shape(self.x)}")
             object.__setattr__(self, name, frozen(values))
         if self.unit is not None:
             text("unit", self.unit, ("mm",))
@@ -193,7 +193,7 @@ class Array:
     def _given(cls, array: object) -> Array:
         """Return a given array; where it is two numbers, as a shape, the error shows how to make an array of them."""
         if isinstance(array, tuple | list) and len(array) == 2 and all(type(side) is int for side in array):
-            wanted = f"must be taxel.Array({array[0]}, {array[1]}), of so many rows and columns"
+            wanted = f"must be taxel.Array({array[0]}, {array[1]}), with as many rows and columns"
             raise refused("array", f" is {shown(array)}: {wanted}")
         return instance("array", array, cls)
 
@@ -302,7 +302,7 @@ class Array:
         limits = []
         for name, chosen, size in (("x", x, self.columns), ("y", y, self.rows)):
             if not isinstance(chosen, slice) or chosen.step not in (None, 1):
-                raise refused(name, f" is {shown(chosen)}: must be a slice without a step, as slice(8, 16)")
+                raise refused(name, f" is {shown(chosen)}: must be a slice without a step, for example slice(8, 16)")
             try:
                 first, last, _ = chosen.indices(size)
             except TypeError:
@@ -388,7 +388,8 @@ class Array:
             return self.places.x, self.places.y
         if self.is_channels:
             raise ProblemError(
-                f"{self.name}: {self.rows} x {self.columns} channels without a pitch or places; they have no position"
+                f"{self.name}: {self.rows} x {self.columns} channels without a pitch or places, so their positions are "
+                "not known"
             )
         down, across = (1.0, 1.0) if self.pitch_mm is None else (self.row_mm, self.column_mm)
         y, x = np.indices(self.shape, dtype=np.float64)
@@ -546,7 +547,7 @@ def _pitch(pitch: object) -> float | tuple[float, float]:
     """Return a pitch as one number, or as a pair if its two numbers differ."""
     pair = isinstance(pitch, tuple | list) or (isinstance(pitch, np.ndarray) and pitch.ndim > 0)
     if pair and len(pitch) != 2:  # type: ignore[arg-type]
-        raise refused("pitch_mm", f" is {shown(pitch)}: must be a number, or two, that of rows and that of columns")
+        raise refused("pitch_mm", f" is {shown(pitch)}: must be a number, or two numbers, for rows and for columns")
     values = list(pitch) if pair else [pitch]  # type: ignore[call-overload]
     each = [number("pitch_mm", value, "mm") for value in values]
     if not all(np.isfinite(distance) and distance > 0 for distance in each):
@@ -563,7 +564,10 @@ def of_size(size: str, *, of_wire: bool = True) -> Array:
     """
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})(?:x(\d{1,4}(?:\.\d{1,6})?))?", size, re.ASCII)
     if match is None:
-        raise refused("array", f" is {size}: must be rows x columns, as 64x64, or with the pitch in mm, as 64x64x2.67")
+        raise refused(
+            "array",
+            f" is {size}: must be rows x columns, for example 64x64, or with the pitch in mm, for example 64x64x2.67",
+        )
     thesis = Array.thesis()
     rows, columns, pitch = int(match[1]), int(match[2]), thesis.pitch_mm if of_wire else None
     pitch = float(match[3]) if match[3] else pitch

@@ -29,7 +29,7 @@ _FRAMES = re.compile(
 )
 #: What is to be done with numbers of frames, which may be those of a video and count from 0 or 1: taxel does not guess.
 _CONVERT = "write t_us = FRAME * 1000000 / RATE (frame 250 at 100 frames/s is at 2500000)"
-_RIGHT = "must be label,t_us ..., or a column of texts and times with their unit, as label,time [s]"
+_RIGHT = "must be label,t_us ..., or a column of texts and times with their unit, for example label,time [s]"
 
 
 def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
@@ -98,7 +98,7 @@ def _time(table: HeaderTable) -> int:
     if times:
         names = " and ".join(shown(table.header[k]) for k in times)
         raise FormatError(
-            f"{table.location}, line 1: {names} are times; name that of the labels t_us, or leave one out"
+            f"{table.location}, line 1: {names} are all times; name the column of the labels t_us, or remove the others"
         )
     missing = "t_us" if any(name.lower() in _LABELS for name in table.header) else "label"
     frames = next((name for name in table.header if _FRAMES.fullmatch(name)), None)
@@ -136,13 +136,13 @@ def _us(location: str, name: str, cell: str, separator: str) -> int:
     elif not unit:
         of_frames = f"; if these are numbers of frames, {_CONVERT}" if number.is_integer() else ""
         raise FormatError(
-            f"{location}: {name} is {shown(cell)}; its unit is not known; name its column as '{name} [s]' or (ms)"
-            + of_frames
+            f"{location}: {name} is {shown(cell)}; its unit is not known; write the unit in the name of the column, "
+            f"for example '{name} [s]' or (ms)" + of_frames
         )
     us = number * _US[unit]
     if not math.isfinite(us):
         raise FormatError(
-            f"{location}: {name} is {shown(cell)}; must be a number, or as 2024-05-01 10:15:02.25 or "
+            f"{location}: {name} is {shown(cell)}; must be a number, or a time like 2024-05-01 10:15:02.25 or "
             "01.05.2024 10:15:02,25"
         )
     return round(us)

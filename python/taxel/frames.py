@@ -262,7 +262,7 @@ class Frames(FrozenColumns):
         areas = self.array.area_mm2
         if areas is None:
             raise ProblemError(
-                f"area needs mm2, and that of a taxel of {self.array!r} is not known; count them: loaded()"
+                f"area needs mm2, but the area of a taxel of {self.array!r} is not known; loaded() counts taxels"
             )
         if self.array.places is None:
             return np.asarray(areas.flat[0] * self.loaded(above))
@@ -324,7 +324,7 @@ class Frames(FrozenColumns):
         array([[1. , 0.5]])
         """
         if finite("above", above) < 0:
-            raise refused("above", f" is {shown(above)}: must be 0 or more, as values are weights")
+            raise refused("above", f" is {shown(above)}: must be 0 or more, because values are weights")
         weights = np.where(self._loaded(above), self.values, 0.0)
         x, y = self.array.positions()
         across, down = weights.sum(axis=1, dtype=np.float64), weights.sum(axis=2, dtype=np.float64)

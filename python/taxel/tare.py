@@ -106,7 +106,7 @@ class Tare(Saved):
             raise refused("tare", f": there is no {noun}{why}")
         if isinstance(x, Events | Frames) and window[1] is not None and x.t.min() >= window[1]:
             raise ProblemError(
-                f"tare to {stop_us} us: no events are before it; they are from {x.t.min()} to {x.t.max()} us"
+                f"tare to {stop_us} us: no events are before this time; they are from {x.t.min()} to {x.t.max()} us"
             )
         if isinstance(x, Events):
             return cls.from_json(_core.tare_of_events(x._parts(), *window, note))

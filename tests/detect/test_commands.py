@@ -99,7 +99,7 @@ def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path
     more.write_text((folder / "truth.csv").read_text() + "step,9000\noff,12000\n")
     code, out, _ = call(capsys, *arguments, "--truth", more, "--window-ms", 10)
     assert code == 0
-    assert "not scored, as the readout has contact, lift: off, step" in out.splitlines()
+    assert "not scored, because the readout has only contact, lift: off, step" in out.splitlines()
     more.unlink()
 
 
@@ -209,7 +209,7 @@ def test_a_tare_that_holds_a_touch_is_said(folder: Path, trained: Path, capsys) 
     code, _, error = call(capsys, *arguments, 0.2)
     assert (code, error.count("\n")) == (0, 1)
     assert re.search(
-        r"warning: tare is 0\.2: the beginning of .*9\.npz is not quiet but holds a touch of \d+ taxels", error
+        r"warning: tare is 0\.2: the beginning of .*9\.npz is not quiet but contains a touch of \d+ taxels", error
     )
     assert call(capsys, *arguments, 0.05)[2] == ""
 

@@ -121,8 +121,8 @@ def test_inputs_are_given_by_label_too() -> None:
     [
         ((Neuron(), [1.0] * 4, 0.0, ("b",)), {}, 'a: inputs: no encoder "b": there are area, change'),
         ((Neuron(), [1.0] * 4, 0.0, ("area", "area")), {}, 'a: inputs: "area" comes twice'),
-        ((Neuron(), [1.0] * 5, 0.0, ("area",)), {}, "a: 5 weights, the encoder makes 4 trains"),
-        ((Neuron(), [1.0] * 4), {}, "a: 4 weights, the encoder makes 36 trains"),
+        ((Neuron(), [1.0] * 5, 0.0, ("area",)), {}, "a: 5 weights, but the encoder makes 4 trains"),
+        ((Neuron(), [1.0] * 4), {}, "a: 4 weights, but the encoder makes 36 trains"),
         ((Neuron(), [1.0] * 4), {"inputs": {"b": ["area"]}}, "inputs: no neuron 'b': there are a"),
         ((Neuron(), [1.0] * 4), {"inputs": ["area"]}, "inputs is "),
         ((Neuron(), [1.0] * 4), {"inputs": {"a": 3}}, "a: inputs is 3"),

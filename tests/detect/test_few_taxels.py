@@ -96,7 +96,9 @@ def test_grids_of_several_sizes_are_padded_at_their_far_edges(tmp_path: Path) ->
         taxel.convert(example.source, places[-1])
     labels = [{name: t.tolist() for name, t in example.labels.items()} for example in examples]
     training = train([taxel.open(place) for place in places], labels)
-    assert any("3 sizes, from 6 x 8 taxels on, are padded at their far edges to 8 x 8" in w for w in training.warnings)
+    assert any(
+        "3 sizes, the smallest 6 x 8 taxels, are padded at their far edges to 8 x 8" in w for w in training.warnings
+    )
     for example, place in zip(examples, places, strict=True):
         [detected] = detect(training.readout, taxel.open(place), options=DetectOptions(tare=1.9)).each
         assert score(detected.outcome.found, example.labels, 50.0).rank[0] == 0

@@ -74,15 +74,15 @@ def labelled(*counts: dict[str, int], gap_us: int = 200_000) -> list[Example]:
         (labelled({"contact": 25, "lift": 25}), 5, ""),
         (labelled({"contact": 25, "lift": 25}, gap_us=3_600_000_000), 5, ""),
         (labelled({"contact": 25, "lift": 7}), 3, ""),
-        (labelled({"contact": 60, "lift": 7}), 0, "every lift is in one stretch of the recording"),
+        (labelled({"contact": 60, "lift": 7}), 0, "all events lift are in the same stretch of the recording"),
         (labelled({"contact": 4}), 2, ""),
-        (labelled({"contact": 3}), 0, "3 labels of contact, and two folds need 4"),
-        (labelled({"contact": 20, "ball": 1}), 0, "1 label of ball, and two folds need 4"),
+        (labelled({"contact": 3}), 0, "3 labels of contact, but two folds need 4"),
+        (labelled({"contact": 20, "ball": 1}), 0, "1 label of ball, but two folds need 4"),
         (labelled(*[{"contact": 3, "lift": 3}] * 9), 5, ""),
         (labelled(*[{"contact": 9}] * 3), 3, ""),
         (labelled({"contact": 2}, {"contact": 2}, {}), 2, ""),
-        (labelled({"contact": 9, "lift": 9}, {"contact": 9}), 0, "every lift is in one recording"),
-        (labelled({"contact": 1}, {"contact": 2}), 0, "3 labels of contact, and two folds need 4"),
+        (labelled({"contact": 9, "lift": 9}, {"contact": 9}), 0, "all events lift are in the same recording"),
+        (labelled({"contact": 1}, {"contact": 2}), 0, "3 labels of contact, but two folds need 4"),
     ],
 )
 def test_folds_are_as_many_as_recordings_and_the_rarest_label_allow(
@@ -140,10 +140,11 @@ def test_no_label_that_the_neuron_finds_is_called_one_that_cannot_be_learnt(unit
     said = [str(warning.message) for warning in caught]
     assert found > 6
     assert said
-    waits = r"\d+ of 12 labels comes? before the first input, for which the neuron waits: it is known [\d.]+ ms later"
-    later = (
-        rf"the inputs of \d+ of 12 labels come too late to fire by them .*; the neuron fires later, and finds {found}"
+    waits = (
+        r"\d+ of 12 labels comes? before the first input: the neuron waits for this input, and contact is known [\d.]+ "
+        r"ms later"
     )
+    later = rf"the inputs of \d+ of 12 labels come too late to fire at the label .*; the neuron fires later, .* {found}"
     for text in said:
         assert re.match(rf"contact: ({waits}|{later} of 12)$", text)
 
@@ -154,7 +155,7 @@ def test_events_that_cannot_be_learnt_are_named_from_the_beginning_of_a_recordin
     plan = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "ub": 1e-6, "delay_ms": 1.0})
     with pytest.warns(UserWarning, match=r"cannot be learnt.* \(10 ms\)"):
         fit([Example(frames, {"contact": [begin_us + 10_000]})], plan)
-    with pytest.raises(taxel.ProblemError, match=r"contact at 5000.000 ms is outside it, 0.000 to 30.000 ms"):
+    with pytest.raises(taxel.ProblemError, match=r"contact at 5000.000 ms is outside the trains, 0.000 to 30.000 ms"):
         fit([Example(frames, {"contact": [begin_us + 5_000_000]})], plan)
 
 
@@ -166,7 +167,8 @@ def test_a_point_that_the_labels_do_not_allow_is_not_chosen() -> None:
     assert best.neurons == {label: dict(own) for label, own in plan.neurons.items()}
     first = {label: {**own, "refractory": 9000.0, "search": [dict(own)]} for label, own in plan.neurons.items()}
     with pytest.raises(
-        taxel.ProblemError, match=r"contact: .* has one at \d+ us, \d+ us after .*; must be more than 9000 ms"
+        taxel.ProblemError,
+        match=r"contact: .* has a label at \d+ us, \d+ us after .*; labels must be more than 9000 ms",
     ):
         choose(examples(1, 2), dataclasses.replace(plan, neurons=first))
 

@@ -157,7 +157,7 @@ def test_kinds_are_told_by_chance_as_fisher_s_test_has_it(found: int, false: int
     said = _by_chance("soft", "the neuron", told(found, 12, false, 12))
     assert bool(said) == by_chance
     if by_chance:
-        assert said == f"the neuron tells {found} of 12 and takes {false} of 12 others for soft"
+        assert said == f"the neuron recognises {found} of 12 and mistakes {false} of 12 others for soft"
 
 
 def test_contact_and_lift_are_no_kinds() -> None:
@@ -190,6 +190,6 @@ def test_kinds_that_differ_by_place_are_told_and_of_others_the_advice_says_what_
         assert any(one.startswith(f"{name}, neuron: 12 of 12 found, 0 missed, 0 false") for one in told), told[:5]
     told = lines(("wet", "dry"), random.permutation(24) < 12, 2)
     (line,) = [one for one in told if "wet" in one.split(": ")[0] and "what may help is other kinds: " in one]
-    assert "from moments of the frame, as area and load, its centre, and how long a touch lasts" in line
-    assert "taxel information says whether they differ otherwise" in line
+    assert "from moments of the frame, for example area, load and centre, and from how long a touch lasts" in line
+    assert "taxel information shows whether the kinds differ otherwise" in line
     assert "no input tells" not in line

@@ -111,20 +111,25 @@ SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
         late,
         "shifted_labels",
         "40 of 40 missed have a false detection 320 ms earlier; the detections are where loads begin or end",
-        "labels 320 ms earlier (--shift-ms -320)",
+        "to move the labels by -320 ms (--shift-ms -320)",
     ),
     "of late labels": (
         of_late_labels,
         "shifted_training",
-        "a false detection 240 ms later; the labels are where loads begin or end: those of the training were late",
-        "a training on labels 240 ms earlier (taxel train --shift-ms -240)",
+        "a false detection 240 ms later; the labels are where loads begin or end: the labels of the training were late",
+        "to train on labels that are 240 ms earlier (taxel train --shift-ms -240)",
     ),
-    "felt nowhere": (felt_nowhere, "shifted_labels", "either these labels are late or those of the training", "a look"),
+    "felt nowhere": (
+        felt_nowhere,
+        "shifted_labels",
+        "either these labels are late or the labels of the training",
+        "to look where a load begins",
+    ),
     "late in part": (
         late_in_part,
         "shifted_labels",
         "have a false detection 210 ms earlier, all from ",
-        " s on 210 ms",
+        " s to the end 210 ms",
     ),
     "nearly late": (
         nearly_late,
@@ -135,13 +140,13 @@ SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
     "rising slowly": (rising_slowly, "window", "20 of 20 missed have a false detection 60 ms", "--window-ms 60"),
     "felt late": (felt_late, "shifted_labels", "170 ms later, while lift fits: contact is felt later there", ""),
     "alike": (alike, "other_name", "20 of 20 false detections of lift are within 100 ms of labels of contact", ""),
-    "misplaced": (misplaced, "unlabelled_loads", "6 of 6 false are in loads without a label", "labels of these"),
-    "gap": (gap, "gaps", "missed are where the recording has no frames, as ", ""),
+    "misplaced": (misplaced, "unlabelled_loads", "6 of 6 false are in loads without a label", "to label these"),
+    "gap": (gap, "gaps", "missed are where the recording has no frames, for example ", ""),
     "no releases": (
         no_releases,
         "unlabelled_loads",
         "4 of 4 false are in loads without a label of release",
-        "labels of these loads too",
+        "to label these loads too",
     ),
 }
 
@@ -158,7 +163,7 @@ def test_what_lies_beside_most_mistakes_is_said_first(name: str, seed: int) -> N
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_what_differs_from_the_training_is_the_cause_where_labels_are_not(seed: int) -> None:
-    noise = ["the noise at rest is 3 times as strong"]
+    noise = ["the noise at rest is 3 times as strong as in the training"]
     for make in (noisy, nearly_found, felt_late, misplaced_and_missed):
         first, *_ = causes_of([make(seed)], 50.0, [noise])
         assert (first.kind, first.measured) == ("unlike_training", noise[0]), make
@@ -206,7 +211,7 @@ def test_sources_of_one_clock_have_one_cause_and_times_count_as_the_file_does() 
     first, *_ = causes_of([in_part], 50.0)
     begin_s = in_part.example.labels["contact"][10] / 1e6
     assert begin_s > 100.0
-    assert f"all from {np.floor(10 * begin_s) / 10:.1f} s on" in first.measured
+    assert f"all from {np.floor(10 * begin_s) / 10:.1f} s to the end" in first.measured
     hand = [finger(1, "thumb", 0), finger(2, "index", 0)]
     (cause,) = causes_of(hand, 50.0)
     assert (cause.labels, cause.option, cause.mistakes) == (("contact", "lift"), "--shift-ms -300", 160)
@@ -267,12 +272,12 @@ def test_training_says_from_when_on_labels_are_off(seed: int) -> None:
     begin_s = np.floor(made.example.labels["contact"][10] / 1e5) / 10
     assert cause.kind == "shifted_labels"
     said = re.fullmatch(
-        rf"10 of 20 labels are (\d+) ms after where the sensor felt the others, all from {begin_s:.1f} s on",
+        rf"10 of 20 labels are (\d+) ms after where the sensor felt the others, all from {begin_s:.1f} s to the end",
         cause.measured,
     )
     assert said, cause.measured
     assert abs(int(said[1]) - 210) <= 5
-    assert cause.advice == f"labels from {begin_s:.1f} s on {said[1]} ms earlier"
+    assert cause.advice == f"to move the labels from {begin_s:.1f} s to the end {said[1]} ms earlier"
 
 
 def channels(frames: Frames) -> Frames:
@@ -291,7 +296,7 @@ def test_a_stretch_is_found_over_all_names_on_grids_and_channels(names: tuple[st
     found = evidence(frames if of_grid else channels(frames), labels).causes(dict.fromkeys(names, 5))
     assert {cause.kind for cause in found} == {"shifted_labels"}
     (advice,) = {cause.advice for cause in found}
-    said = re.fullmatch(r"labels from ([\d.]+) to ([\d.]+) s (\d+) ms later", advice)
+    said = re.fullmatch(r"to move the labels from ([\d.]+) to ([\d.]+) s (\d+) ms later", advice)
     assert said, advice
     assert abs(int(said[3]) - 350) <= 10
     # As printed, labels are within it that are off, and no others.
@@ -361,7 +366,7 @@ def test_labels_of_footfalls_that_overlap_are_not_called_wrong(seed: int) -> Non
     frames = Frames(values, t, unit="kPa", array=ARRAY)
     (cause,) = evidence(frames, labels).causes({"heel strike": 12, "toe off": 12})[:1]
     assert (cause.kind, "of another recording" in cause.measured) == ("overlapping_loads", False)
-    assert "9 of 12 labels of heel strike are while another load lasts" in cause.measured
+    assert "9 of 12 labels of heel strike are at times when another load lasts" in cause.measured
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -56,7 +56,7 @@ def test_detections_of_touches_unlike_those_of_training_are_counted(tmp_path: Pa
     (tmp_path / "old.json").write_text(json.dumps(older))
     taxel.convert(unseen.source, tmp_path / "unseen.npz")
     unseen.tare.save(tmp_path / "tare.json")
-    for name, text in (("r", "2 of 5 (40%)"), ("old", "unknown, as the readout's file does not hold the range")):
+    for name, text in (("r", "2 of 5 (40%)"), ("old", "unknown, because the readout's file does not state the range")):
         asked = (
             "detect",
             tmp_path / "unseen.npz",

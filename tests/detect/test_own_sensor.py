@@ -234,7 +234,7 @@ def test_advice_names_the_rule_that_won() -> None:
     for made in (of_area, of_area._replace(recipe=Recipe(LevelCrossing([40.0])))):
         cause = first_cause(made, [example], scored(6), scored(12), rule)
         assert cause.advice == "the plain rule (--rule FILE)"
-        assert "leaves 0 missed and false on the same labels, the neuron 6" in cause.measured
+        assert "leaves 0 missed and false on the same labels, and the neuron 6" in cause.measured
         assert first_cause(made, [example], scored(6), scored(12)).advice == "more labels"
 
 
@@ -464,7 +464,7 @@ def test_a_noisy_mat_in_force_or_pressure_rests_at_0_for_info_train_and_detect(
     mat = Frames(np.abs(frames.values), frames.t, unit=unit, array=Array(8, 8, pitch_mm=10.0))
     arguments = written(tmp_path, mat, labels)
     code, out, error = call(capsys, "info", tmp_path / "own.npz")
-    assert (code, "rest                0, as the values are force or pressure" in out) == (0, True), error
+    assert (code, "rest                0, because the values are force or pressure" in out) == (0, True), error
     (area,) = re.findall(r"contact area +at most (\d+) mm2", out)
     assert 100 <= int(area) <= 3200, "the noise of the others is no contact"
     code, out, error = call(capsys, *arguments, "--folds", 0)
@@ -524,7 +524,8 @@ def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed
     cause = first_cause(made, [example], none, none)
     assert cause.kind == "foreign_labels"
     assert re.match(
-        r"\d of 12 labels (is|are) within 50 ms of where a load begins or ends, as chance has it", cause.measured
+        r"\d of 12 labels (is|are) within 50 ms of the beginning or end of a load, no more than by chance",
+        cause.measured,
     )
 
 

@@ -269,7 +269,7 @@ def test_neurons_trained_otherwise_are_refused() -> None:
         ({"neurons": None}, "must be trained neurons by label"),
         ({"neurons": {3: (taxel.Neuron(), [1.0] * 6)}}, "label is 3"),
         ({"neurons": {" ": (taxel.Neuron(), [1.0] * 6)}}, "without a name"),
-        ({"neurons": {"a": (taxel.Neuron(), [1.0] * 5)}}, "a: 5 weights, the encoder makes 6 trains"),
+        ({"neurons": {"a": (taxel.Neuron(), [1.0] * 5)}}, "a: 5 weights, but the encoder makes 6 trains"),
         ({"neurons": {"a": (taxel.Neuron(), [math.nan] * 6)}}, "weights"),
         ({"neurons": {"a": (taxel.Neuron(), "heavy")}}, "a: weights"),
         ({"neurons": {"a": (None, [1.0] * 6)}}, "a: neuron is None"),

@@ -155,7 +155,7 @@ def test_what_is_said_for_all_neurons_comes_before_what_one_has_and_what_is_said
         (
             "gaitpdb",
             ProblemError,
-            r"recipe 'gaitpdb': there are event_counts, gait_channel, .*; the path of a file holds a dot",
+            r"recipe 'gaitpdb': must be one of event_counts, gait_channel, .*, or the path of a file, with a dot",
         ),
         ("./gaitpdb", FileNotFoundError, "No such file"),
         (3, ProblemError, "recipe is 3: must be a path"),

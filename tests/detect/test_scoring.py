@@ -118,7 +118,7 @@ def test_the_spread_is_numpys(values: list[float]) -> None:
         ({"a": [1]}, math.inf, "window_ms is inf"),
         ({"a": [1]}, "wide", "window_ms"),
         ({"a": [1]}, None, "window_ms is None"),
-        ({"a": [1]}, [1, 2], "one each of 1 event"),
+        ({"a": [1]}, [1, 2], "one number for each of 1 event"),
         ({"a": [1]}, {"b": 1}, "window_ms: there is none for 'a'"),
     ],
 )

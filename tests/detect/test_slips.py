@@ -41,10 +41,10 @@ def test_noise_and_a_creep_that_is_small_beside_the_touches_are_no_difference(se
     for creep in (14.0, 19.0):
         assert compared(seed, creep=creep) == ()
     (weak,) = compared(seed, 0.35, creep=7.0)
-    ratio = float(weak.removeprefix("touches are ").removesuffix(" times as strong"))
+    ratio = float(weak.removeprefix("touches are ").removesuffix(" times as strong as in the training"))
     assert ratio == pytest.approx(0.35, abs=0.1)
     assert compared(seed, creep=120.0) == (
-        "4 taxels end with other readings than they began: a drift, or a load that stays",
+        "4 taxels have other readings at the end than at the beginning: a drift, or a load that stays",
     )
 
 

@@ -148,7 +148,8 @@ def test_labels_within_the_refractory_time_are_named_and_leave_no_readout(tmp_pa
     code, _, error = call(capsys, "train", recording, "--labels", labels, "--no-align", "--tare", 0.03, "-o", out)
     assert (code, error.count("\n"), out.exists()) == (2, 1, False)
     assert re.search(
-        rf"contact: {recording} has one at 95000 us, 5000 us after the one before; must be more than [\d.]+ ms apart",
+        rf"contact: {recording} has a label at 95000 us, 5000 us after the label before; labels must be more than "
+        rf"[\d.]+",
         error,
     )
 
@@ -156,8 +157,8 @@ def test_labels_within_the_refractory_time_are_named_and_leave_no_readout(tmp_pa
 @pytest.mark.parametrize(
     ("count", "options", "why"),
     [
-        (1, (), "1 label of contact, and two folds need 4"),
-        (3, (), "3 labels of contact, and two folds need 4"),
+        (1, (), "1 label of contact, but two folds need 4"),
+        (3, (), "3 labels of contact, but two folds need 4"),
         (6, ("--folds", 0), "folds is 0"),
     ],
 )
@@ -249,7 +250,7 @@ def test_a_recording_without_one_of_the_labels_has_a_row_on_the_page(tmp_path: P
     )
     code, out, error = call(capsys, *arguments, "--report", tmp_path / "page")
     assert code == 0, error
-    assert (code, out.splitlines()[0].rpartition(": ")[2]) == (0, "every lift is in one recording")
+    assert (code, out.splitlines()[0].rpartition(": ")[2]) == (0, "all events lift are in the same recording")
     assert '2.npz</td><td class="left">lift</td><td>0</td>' in (tmp_path / "page" / "report.html").read_text()
 
 
@@ -306,12 +307,12 @@ def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
     few = causes(readout, [example._replace(labels={"contact": [9000]})], scored(0, 1, 0), scored(0, 1, 0))[0]
     assert (few.advice, few.measured) == (
         "more labels",
-        "there is 1; 4 are the least to score it held out, 10 for five folds",
+        "there is 1; a score on held-out data needs at least 4, and five folds need 10",
     )
     (cause, *_) = causes(readout, [stale], scored(9, 1, 0), scored(9, 1, 0))
-    assert (cause.kind, cause.advice) == ("tare", "another tare, of the time just before (--tare FILE)")
+    assert (cause.kind, cause.advice) == ("tare", "a tare of the time just before (--tare FILE)")
     assert cause.measured == (
-        "of the tare: 64 taxels read above theirs while nothing touches them; taxel cut RECORDING FILE "
+        "64 taxels read above the tare while nothing touches them; taxel cut RECORDING FILE "
         "--from S --to S makes that file, a .npz"
     )
 
@@ -324,7 +325,7 @@ def test_another_recipe_is_advised_where_it_was_tried_and_halves_what_is_wrong(l
     if helps:
         (cause,) = found
         assert (cause.option, cause.arguments, cause.mistakes) == ("--recipe touch", {"recipe": "touch"}, 8)
-        said = "tried on the same folds: 1 missed, 1 false, where this training has 10 missed, 0 false"
+        said = "tried on the same folds: 1 missed, 1 false, while this training has 10 missed, 0 false"
         assert cause.measured == said
 
 

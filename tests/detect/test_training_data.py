@@ -81,7 +81,9 @@ def test_noise_strength_and_taxels_that_differ_are_named(
     assert times("touches are", strength=900.0) == pytest.approx(3.0, abs=0.3)
     heel = np.zeros(SHAPE, np.bool_)
     heel[:3] = True
-    assert "taxels that touches loaded are never loaded" in remarks(training, made(tmp_path, seed, dead=heel)[0])
+    assert "taxels that touches of the training loaded are never loaded" in remarks(
+        training, made(tmp_path, seed, dead=heel)[0]
+    )
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -136,7 +138,7 @@ def test_a_gap_is_named_and_a_recording_without_a_rest_stops_no_other(
     late = np.where(frames.t >= 6_000_000, frames.t + 3_500_000, frames.t)
     gap = tmp_path / "gap.npz"
     taxel.convert(taxel.Frames(frames.values, late, unit="counts", array=frames.array), gap)
-    assert "1 gap of 3.5 s at 6.0 s: nothing is detected in there" in remarks(training, gap)
+    assert "1 gap of 3.5 s at 6.0 s: nothing is detected there" in remarks(training, gap)
     restless = tmp_path / "restless.npz"
     moving = 500.0 + 200.0 * np.sin(np.arange(len(frames)) * 0.05)[:, None, None] + np.zeros(frames.values.shape)
     taxel.convert(taxel.Frames(moving, frames.t, unit="counts", array=frames.array), restless)
@@ -153,4 +155,6 @@ def test_a_gap_is_named_and_a_recording_without_a_rest_stops_no_other(
 def test_touches_far_weaker_than_those_of_the_training_are_none(
     training: taxel.tasks.Training, tmp_path: Path, seed: int
 ) -> None:
-    assert "no load is 0.1 times as strong as its touches" in remarks(training, made(tmp_path, seed, strength=12.0)[0])
+    assert "no load reaches 0.1 of the strength of the training's touches" in remarks(
+        training, made(tmp_path, seed, strength=12.0)[0]
+    )

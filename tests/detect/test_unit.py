@@ -137,5 +137,5 @@ def test_a_training_on_two_units_says_which_recording_is_in_which(tmp_path: Path
         capsys, "train", tmp_path, "--labels", tmp_path / "labels.csv", "-o", tmp_path / "readout.json"
     )
     assert (code, out, error.count("\n")) == (2, "", 1), error
-    assert re.search("kPa.npz is in kPa, .*counts.npz in counts: must be in one unit, as a readout", error), error
+    assert re.search("kPa.npz is in kPa, .*counts.npz in counts: must be in one unit, because a readout", error), error
     assert not (tmp_path / "readout.json").exists()

@@ -80,7 +80,7 @@ def swap(old, new):
         (swap("Matrix: 8x10", "Matrix: 8"), "no 'Matrix: 64x95' before it"),
         (swap("Matrix: 8x10", "Matrix: 0x10"), "a matrix of 0"),
         (swap("Time/picture:10.0", "Time/picture:0.0"), "a period of 0"),
-        (swap("Pict-No.: 2", "Pict-No.: 1"), "line 20: frame 1 after frame 1"),
+        (swap("Pict-No.: 2", "Pict-No.: 1"), "line 20: frame 1 follows frame 1"),
         (lambda rows: [r for r in rows if "Pict-No" not in r], "no page with a frame's number"),
         (lambda rows: rows[:-5], "frame 3 ends without the line Force"),
     ],

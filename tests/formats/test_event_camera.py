@@ -281,7 +281,7 @@ def test_strong_bursts_are_told_from_weaker_ones(tmp_path: Path) -> None:
     ("options", "said"),
     [
         ({"region": "0:65,0:48"}, "region '0:65,0:48': must be within the sensor's 64 columns and 48 rows"),
-        ({"region": "9:9,0:48"}, "region '9:9,0:48': columns 9:9 holds none"),
+        ({"region": "9:9,0:48"}, "region '9:9,0:48': columns 9:9 is empty, because the last is not included"),
         ({"region": "0:9,40:4"}, "region '0:9,40:4': rows 40:4: the first must be below the last"),
         ({"region": "1,2"}, "region is '1,2': must be columns and rows A:B,C:D"),
         ({"region": 3}, "region is 3"),
@@ -303,7 +303,7 @@ def test_the_options_are_of_events_without_intensities_alone(tmp_path: Path) -> 
     one = {"array": taxel.Array(4, 4), "intensity": [7]}
     taxel.convert(Events([0], [0], [0], [True], **one), tmp_path / "b.npz")
     for place in (tmp_path / "a.npz", tmp_path, tmp_path / "b.npz"):
-        with refused("holds no events without intensities, as files of event cameras do; region, bin, window_ms and"):
+        with refused("holds no events without intensities; region, bin, window_ms and"):
             taxel.open_all(place, bin=2)
 
 
@@ -368,9 +368,9 @@ def test_names_of_columns_of_events_are_known(names: str, tmp_path: Path) -> Non
 
 def test_taxels_beyond_the_sensor_are_refused(tmp_path: Path) -> None:
     file = write(tmp_path / "a.raw", some_rows())
-    with refused(r"bin is 65: must be a whole number from 1 to 64, as the sensor has 64 columns and 48 rows"):
+    with refused(r"bin is 65: must be a whole number from 1 to 64, because the sensor has 64 columns and 48 rows"):
         taxel.open(file, bin=65)
-    with refused(r"bin is 9: must be a whole number from 1 to 8, as the region has 8 columns and 4 rows"):
+    with refused(r"bin is 9: must be a whole number from 1 to 8, because the region has 8 columns and 4 rows"):
         taxel.open(file, bin=9, region="0:8,0:4")
     assert taxel.open(file, bin=64).array.shape == (1, 1)
 

@@ -39,7 +39,7 @@ def test_short_stances_do_not_count():
         (lambda r: [*r[:6], "\t" + r[6].split("\t", 1)[1], *r[7:]], "line 7: time is empty"),
         (lambda r: [*r[:6], "x" + r[6], *r[7:]], "line 7: time is 'x0.06', not a number"),
         (lambda r: [*r[:6], "nan" + r[6][4:], *r[7:]], "line 7: time is 'nan', not a finite number"),
-        (lambda r: [*r[:6], r[2], *r[7:]], "line 7: time 0.02 s does not ascend"),
+        (lambda r: [*r[:6], r[2], *r[7:]], "line 7: time 0.02 s is not after"),
         (lambda r: r[:1], "fewer than 2 lines"),
     ],
 )

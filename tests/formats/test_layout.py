@@ -156,7 +156,7 @@ def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls
     table(tmp_path, lines(rows), f"{falls}[table]\ntime_column = 1\n")
     shown = CliRunner().invoke(app, ["info", str(tmp_path / "step.txt")]).stdout
     of_it = (
-        "as step.layout.toml turns them: if that is wrong, remove falls from the file"
+        "after step.layout.toml inverted them: if that is wrong, remove falls from the file"
         if falls
         else "write falls = true in a layout file beside"
     )
@@ -395,7 +395,7 @@ def test_a_layout_that_makes_no_sense_is_refused_in_one_line(tmp_path: Path, lay
 @pytest.mark.parametrize("head", ["", "heel, N\n"])
 def test_a_table_of_another_separator_is_named(tmp_path: Path, stated: str, there: str, head: str) -> None:
     head = head.replace(", ", there)
-    with pytest.raises(FormatError, match=r"line 1: one column by the separator .*write in the layout"):
+    with pytest.raises(FormatError, match=r"line 1: the separator .*write the right separator"):
         table(tmp_path, head + lines(VALUES, there), f'rate_hz = 50\n[table]\nseparator = "{stated}"')
 
 
@@ -431,7 +431,7 @@ def test_a_name_with_a_comma_over_one_column_is_a_name(tmp_path: Path) -> None:
         (
             Frames(VALUES[:, None], [0, 10_000, 20_000]),
             "rate_hz = 50",
-            "states 50 Hz; the times of one.npz make 100 Hz",
+            "states 50 Hz, but the times of one.npz give 100 Hz",
         ),
         (Frames(VALUES[:, None], [0, 1, 2], array=Array(1, 6, 3.0)), "pitch_mm = 4", "the file states 3 mm apart"),
     ],

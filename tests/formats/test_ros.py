@@ -130,7 +130,7 @@ def test_topics_fields_and_parts_of_lists_become_sources(tmp_path: Path) -> None
     }
     forces = taxel.open(bag, topic="/skin", field="patches.forces.z")
     assert np.array_equal(forces.frames().values[:, 0], [[0.5, k, 1.5] for k in range(6)])
-    assert forces.remarks == ("at the bag's times, as its messages have no header",)
+    assert forces.remarks == ("at the bag's times, because its messages have no header",)
     assert np.array_equal(taxel.open(bag, topic="/skin", field="patches.1.taxels").frames().values[0, 0], [3, 4])
 
 
@@ -205,7 +205,7 @@ def test_messages_of_another_length_are_left_out_and_counted(tmp_path: Path) -> 
     for array in (None, taxel.Array(1, 3)):
         opened = taxel.open(bag, topic="/hand", field="thumb", array=array)
         assert (opened.counts["messages"], opened.counts["messages_of_another_length"]) == (4, 2)
-        assert opened.lost == ("2 of 6 messages left out, as they do not hold 1 x 3 values",)
+        assert opened.lost == ("2 of 6 messages left out, because they do not hold 1 x 3 values",)
         assert np.array_equal(opened.frames().t - BEGIN_NS // 1000, [0, 10_000, 30_000, 50_000])
     with pytest.raises(FormatError, match="thumb: its messages hold 3 values; the array has 2 x 2"):
         taxel.open(bag, topic="/hand", field="thumb", array=taxel.Array(2, 2))

@@ -90,7 +90,7 @@ def swap(old, new):
         (swap("0.2 centimeters", "0,2 centimeters"), "line 6: ROW_SPACING has a decimal comma"),
         (swap("UNITS raw\n", ""), "no line UNITS in the header"),
         (swap("ASCII_DATA @@", "ASCII"), "no line ASCII_DATA @@ after the header"),
-        (swap("Frame 2", "Frame 1"), "line 20: frame 1 after frame 1"),
+        (swap("Frame 2", "Frame 1"), "line 20: frame 1 follows frame 1"),
         (swap(", 0.032,", ", 0,"), "line 20: at 0 us, not after 0 us"),
         (swap(", 0.032,", ", 0:32,"), "line 20: time is '0:32', not a number"),
         (swap("\n10,12", "\n10,B"), "line 22: cell 2 is 'B'; in frame 1 it is a number"),

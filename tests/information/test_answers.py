@@ -314,7 +314,7 @@ def test_neurons_name_touches_too():
         ({"periods_ms": [0.5]}, "finer than the recordings"),
         ({"window_ms": None}, "has no end"),
         ({"windows_ms": [80]}, "must be in"),
-        ({"taxels": [7]}, "2 of the array's ever send an event"),
+        ({"taxels": [7]}, "2 taxels of the array send events"),
         ({"taxels_at_ms": 3}, "one of the periods"),
         ({"classifiers": ["forest"]}, "must be one of"),
         ({"encoder": ChangeEvents(noise_floor=1e6)}, "no event in any of them"),

@@ -336,7 +336,9 @@ def test_folders_of_labels_are_named_where_their_folder_is_given(tmp_path):
         (tmp_path / "trials" / label).mkdir(parents=True)
         taxel.convert(events, tmp_path / "trials" / label / "one.npz")
     done = run(tmp_path / "trials", "--window-ms", "60", "--report", tmp_path / "page.html")
-    assert str(done.exception).endswith("trials: holds no recording; its folders left, right do: name them")
+    assert str(done.exception).endswith(
+        "trials: holds no recording; its folders left, right hold recordings: name these folders"
+    )
 
 
 def test_numbered_frames_are_refused_until_a_rate_is_given(tmp_path):

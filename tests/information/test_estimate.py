@@ -204,12 +204,12 @@ def test_the_rule_rarely_takes_a_setting_that_is_too_cheap():
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: estimate(["a", "a"], ["a", "b"]), "must be two at least"),
+        (lambda: estimate(["a", "a"], ["a", "b"]), "must be at least two"),
         (lambda: estimate(["a", "b"], ["a"]), "one per label"),
         (lambda: estimate(["a", "b"], ["a", "b"], groups=["x"]), "one per trial"),
         (lambda: estimate(["a", "b"], [1, 2]), "two kinds"),
         (lambda: estimate(["a", "b"], ["a", "b"], confidence=1.0), "between 0 and 1"),
-        (lambda: folds(["a"] * 5, count=2), "must be two at least"),
+        (lambda: folds(["a"] * 5, count=2), "must be at least two"),
         (lambda: folds(["a", "b"] * 2, count=10), "4 trials for 10 folds"),
         (
             lambda: folds(["a", "a", "b", "b"], count=2, groups=["x", "y", "z", "z"]),

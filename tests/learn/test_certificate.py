@@ -103,7 +103,7 @@ def test_a_target_out_of_reach_is_refuted_by_one_row_and_said_so(time, after_spi
     trains = SpikeTrains.from_lists([[20.0], [25.0], [80.0]], stop=120.0)
     for ub, target, said in (
         (0.3, 10.0, "no input counts before it"),
-        (0.3, 30.0, "full weights come to"),
+        (0.3, 30.0, "the greatest weights give"),
         (5.0, 10.0, "no input counts before it"),
     ):
         cone = ConeX(neuron=Neuron(time=time, after_spike=after_spike), lb=-ub, ub=ub).fit([trains], [[target]])
@@ -114,14 +114,14 @@ def test_a_target_out_of_reach_is_refuted_by_one_row_and_said_so(time, after_spi
         assert proof.at_all
         assert said in proof.text
         assert f"pattern 0 target 0 ({target:.0f} ms)" in str(proof)
-        assert "Impossible at all" in proof.text
+        assert "Impossible also without a margin" in proof.text
     # An input at the target itself adds nothing there.
     cone = ConeX(neuron=Neuron(time=time), lb=-9, ub=9).fit([trains], [[20.0]])
     assert cone.certificate_.rows == [Row("target", 0, 0)]
     # Least weights that are too much are refuted by one row as well.
     many = SpikeTrains.from_lists([[20.0]] * 9, stop=120.0)
     cone = ConeX(neuron=Neuron(time=time), lb=0.5, ub=0.6).fit([many], [[35.0]])
-    assert "the least weights come to" in cone.certificate_.text
+    assert "the least weights give" in cone.certificate_.text
 
 
 def test_the_reading_names_the_patterns_targets_and_silences_that_conflict():
@@ -151,7 +151,7 @@ def test_a_proof_that_needs_its_margin_says_so_and_a_smaller_margin_may_solve_it
             assert check_certificate(cone.problem_, proof, margin=False) == proof.at_all
             if not proof.at_all:
                 assert f"This holds for silence {margin} mV below the threshold" in proof.text
-                assert "Impossible at all" not in proof.text
+                assert "Impossible also without a margin" not in proof.text
     assert found[0.2] == "infeasible"
     assert found[1e-5] == "solved"
 
@@ -159,7 +159,7 @@ def test_a_proof_that_needs_its_margin_says_so_and_a_smaller_margin_may_solve_it
 def test_a_row_that_the_problem_does_not_have_is_one_clear_error():
     problem = refuted().problem_
     for row, said in (
-        (("silence", 99, 5.0), "pattern 99: there are 8"),
+        (("silence", 99, 5.0), "pattern 99: there are only 8"),
         (("target", 0, 7), "pattern 0, target 7: the pattern has 1 targets"),
         (("silence", 0, 1e6), "is outside the time that is trained"),
         (("noise", 0, 1.0), 'row of kind "noise"'),
@@ -194,7 +194,7 @@ def test_the_same_inputs_asked_to_fire_and_to_be_silent_are_refuted_for_any_marg
         assert cone.certificate_.at_all
         said = str(cone.certificate_)
         assert "pattern 1 shall fire" in said
-        assert "Impossible at all" in said
+        assert "Impossible also without a margin" in said
         by_them_alone += "pattern 4, with the same inputs up to there, shall be silent" in said
         # With another input in time the problem is feasible, because the neuron can distinguish the patterns.
         apart = [*patterns[4]]

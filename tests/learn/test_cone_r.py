@@ -330,7 +330,7 @@ def test_one_layout_serves_many_parameters_and_refuses_those_that_need_other_row
         here = rows.fit(made(ConeR, tau=12.0, **options))
         assert here.objective_ == fitted(made(ConeR, tau=12.0, **options), patterns, targets).objective_
     for options in ({"tau": 13.0}, {"margin": 0.1}, {"delta_t_ms": 3.0}, {"after_spike": "reset"}, {"horizon": 400.0}):
-        with pytest.raises(ProblemError, match="lay them out again"):
+        with pytest.raises(ProblemError, match="prepare the rows again"):
             rows.fit(made(ConeR, **{"tau": 12.0, **options}))
 
 

@@ -395,7 +395,7 @@ def test_progress_is_told_round_by_round():
         ({"lb": "low"}, 'lb is "low": must be a number, or one per synapse, mV'),
         ({"margin": 0.0}, "margin is 0 mV: must be above 0 in continuous time"),
         ({"slope": -1.0}, "slope is -1 mV/ms"),
-        ({"slope": 0.1, "time": "grid"}, 'slope is 0.1 mV/ms: belongs to time "continuous"'),
+        ({"slope": 0.1, "time": "grid"}, 'slope is 0.1 mV/ms: is only for time "continuous"'),
         ({"horizon": float("nan")}, "horizon is nan"),
         ({"tolerance": 0}, "tolerance is 0: must be from 1e-12 to 0.1"),
         ({"max_seconds": 0}, "max_seconds is 0 s: must be above 0"),

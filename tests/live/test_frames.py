@@ -367,8 +367,8 @@ def test_a_readout_of_another_unit_or_shape_is_refused(tmp_path: Path) -> None:
     for options, why in [
         ("array=2x2,unit=kPa", "live values are in kPa, but the readout was trained on N.*state unit=N in --source"),
         ("array=2x3,unit=N", "trained on 2 x 2"),
-        ("array=2x2,columns=a:b:c", "lines have 3 values: must be 4 a frame"),
-        ("array=2x2,frame_lines=3", "lines have 1 values, 3 lines a frame: must be 4 a frame"),
+        ("array=2x2,columns=a:b:c", "lines have 3 values: must be 4 per frame"),
+        ("array=2x2,frame_lines=3", "lines have 1 values, 3 lines per frame: must be 4 per frame"),
     ]:
         with pytest.raises(taxel.ProblemError, match=why):
             Live(readout=readout_of(2, 2, "N"), sources=f"given,{options},rate=10", record=tmp_path / "a.mcap")

@@ -34,7 +34,7 @@ KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "reported_us
             12,
             np.full((2, 3), 0.5, np.float32),
             "row 0, column 0 is 0.5; must be a whole number from 0 to 4095 (12 bits); scale readings to it first: "
-            "np.rint(readings / full * 4095), full the greatest of them",
+            "np.rint(readings / full * 4095), where full is the greatest of them",
         ),
         (
             16,

@@ -260,13 +260,16 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
         (lambda: Calibration.fit([Load(frames(1.0), 1.0)], each=True), "each: no load determines a single taxel"),
         (
             lambda: Calibration.fit([Load(frames(1.0), 1.0), Load(frames(1.0, "ticks"), 1.0)]),
-            "frames of load 2: in ticks; the calibration takes counts",
+            "frames of load 2: in ticks; the calibration needs loads in counts",
         ),
         (
             lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]),
             "reading_unit is 'N': must be the unit of the readings",
         ),
-        (lambda: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"), r"readings\[1\] is 1: must rise"),
+        (
+            lambda: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"),
+            r"readings\[1\] is 1: must begin at 0 or more, and rise",
+        ),
         (lambda: Calibration.table(ARRAY, [1.0], [1.0, 2.0], unit="N"), "1 reading and 2 values"),
         (
             lambda: Calibration.table(ARRAY, [0.0, 1.0], [1.0, 2.0], unit="N"),
@@ -276,10 +279,16 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
         (lambda: Calibration.law(ARRAY, sensor={"exponent": 2.0}), "exponent is 2: must be from 0.5 to 1"),
         (lambda: Calibration.law(ARRAY, sensor={"foam": 1.0}), "foam"),
         (lambda: Calibration.law(ARRAY, ramp=0.0), "ramp is 0: must be above 0"),
-        (lambda: Calibration.law(ARRAY, date="yesterday"), "date is 'yesterday': must be a day as 2026-11-21"),
+        (
+            lambda: Calibration.law(ARRAY, date="yesterday"),
+            "date is 'yesterday': must be a day, for example 2026-11-21",
+        ),
         (lambda: Calibration.law(ARRAY, rest=[[1.0]]), "rest has shape"),
         (lambda: Calibration.law(ARRAY, gain=0.0), "gain: must be above 0"),
-        (lambda: Calibration.law(ARRAY).apply(frames(1.0)), "the frames: in counts; the calibration takes ticks"),
+        (
+            lambda: Calibration.law(ARRAY).apply(frames(1.0)),
+            "the frames: in counts; the calibration needs loads in ticks",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_said(call, said):

@@ -292,14 +292,14 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
     [
         (
             "Zeit;Ereignis\n0,21;auf\n",
-            r"line 2: Zeit is '0,21'; its unit is not known; name its column as 'Zeit "
-            r"\[s\]' or \(ms\)",
+            r"line 2: Zeit is '0,21'; its unit is not known; write the unit in the name of the column, for example "
+            r"'Zeit \[s\]' or \(ms\)",
         ),
-        ("t_s,event\n0:0x,auf\n", "line 2: t_s is '0:0x'; must be a number, or as 2024-05-01"),
+        ("t_s,event\n0:0x,auf\n", "line 2: t_s is '0:0x'; must be a number, or a time like 2024-05-01"),
         ('t_s,event\n"0,21",auf\n', "line 2: t_s is '0,21'; must be a number"),
         ("t_s,event\n1e308,auf\n", "line 2: t_s is '1e308'; must be a number"),
         ("t_s,event\nnan,auf\n", "line 2: t_s is 'nan'; must be a number"),
-        ("time,t_s,event\n1,1,auf\n", "line 1: 'time' and 't_s' are times; name that of the labels t_us"),
+        ("time,t_s,event\n1,1,auf\n", "line 1: 'time' and 't_s' are all times; name the column of the labels t_us"),
         ("t_s,what,comment\n1,auf,late\n", "line 1: 'what' and 'comment' are texts; there are 't_s', 'what', "),
         ("t_s,value\n1,2\n", "line 1: no column 'label'; there are 't_s', 'value'; must be label,t_us"),
         *(
@@ -314,7 +314,10 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
             "time,event\n250,auf\n",
             r"time is '250'; its unit is not known; .*if these are numbers of frames, write t_us",
         ),
-        ("time,event\n0.25,auf\n", r"its unit is not known; name its column as 'time \[s\]' or \(ms\)$"),
+        (
+            "time,event\n0.25,auf\n",
+            r"its unit is not known; write the unit in the name of the column, for example 'time \[s\]' or \(ms\)$",
+        ),
         ("start;Ereignis\n1;auf\n", "line 1: no column 't_us'; there are 'start', 'Ereignis'; must be label,t_us"),
         ("# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
         ("t_s;Ereignis\n1\n", "line 2: 1 cells, must have 2"),

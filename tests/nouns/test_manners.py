@@ -67,7 +67,7 @@ def test_what_is_iterated_is_what_the_columns_hold(seed: int, n: int, other: boo
     assert (len(list(events)), len(list(detections))) == (n, n)
     for noun in (events, detections):
         for outside in (n, -n - 1, 10**30):
-            with pytest.raises(IndexError, match=f" of {n}"):
+            with pytest.raises(IndexError, match=f": there are only {n}"):
                 noun[outside]
         with pytest.raises(ProblemError):
             noun[True]

@@ -306,5 +306,5 @@ def test_nonsense_in_a_method_is_one_error(call) -> None:
 
 def test_a_train_that_is_not_there_is_an_index_error() -> None:
     # Python's own error, so that a for loop over trains ends.
-    with pytest.raises(IndexError, match="train 2 of 2"):
+    with pytest.raises(IndexError, match="train 2: there are only 2"):
         SpikeTrains.from_lists([[], []])[2]

@@ -124,7 +124,7 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
         (("info", "WALK", "--array", "6x6"), "holds its own sensor, Array("),
         (
             ("info", "WALK", "--array", "6 by 6"),
-            "--array is 6 by 6: must be rows x columns, as 64x64, or with the pitch",
+            "--array is 6 by 6: must be rows x columns, for example 64x64, or with the pitch",
         ),
         (("convert", "WALK", "nowhere/a.csv"), "nowhere: no such folder"),
         (("convert", "WALK", "a.mcap", "--compression", "gzip"), "compression is 'gzip'"),

@@ -266,7 +266,7 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
     taxel.convert(both, tmp_path / "a.mcap")
     code, _, errors = call(capsys, "info", tmp_path / "a.mcap", "--tare", "0.5")
     assert code == 0
-    assert re.search(r"warning: tare is 0\.5: the beginning of .*a\.mcap right is not quiet but holds", errors)
+    assert re.search(r"warning: tare is 0\.5: the beginning of .*a\.mcap right is not quiet but contains", errors)
 
 
 def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:

@@ -305,7 +305,11 @@ def test_parent_and_child_take_half_as_much_as_the_array_beside_it(tmp_path: Pat
 def test_what_would_take_more_memory_is_refused_with_both_sizes(tmp_path: Path) -> None:
     for name, how, said in (
         ("chunk", {"shape": (1 << 24,), "chunks": (1 << 24,), "compression": "gzip"}, "67108864 bytes; at most 3355"),
-        ("shape", {"shape": (1 << 40,), "chunks": (1024,)}, "claims 4398046511104 bytes, unpacked; at most 4294967296"),
+        (
+            "shape",
+            {"shape": (1 << 40,), "chunks": (1024,)},
+            "states 4398046511104 bytes when unpacked; at most 4294967296",
+        ),
     ):
         with h5py.File(tmp_path / f"{name}.h5", "w") as h5:
             h5.create_dataset("x", dtype=np.float32, **how)
@@ -313,7 +317,7 @@ def test_what_would_take_more_memory_is_refused_with_both_sizes(tmp_path: Path) 
             file.numbers("x")
     with h5py.File(tmp_path / "text.h5", "w") as h5:
         h5.create_dataset("x", (), "S200000000")
-    with H5File(tmp_path / "text.h5") as file, refused("claims 200000000 bytes of text; at most 67108864", FormatError):
+    with H5File(tmp_path / "text.h5") as file, refused("states 200000000 bytes of text; at most 67108864", FormatError):
         file.text("x")
 
 
@@ -324,7 +328,7 @@ def test_data_sets_count_together(tmp_path: Path) -> None:
         h5.create_dataset("huge", (limits.UNPACKED - 5,), "u1", chunks=(1024,))
     with H5File(tmp_path / "a.h5") as file:
         assert len(file.numbers("a")) == len(file.numbers("b")) == 3
-        said = r"a.h5: claims 4294967297 bytes, unpacked; at most 4294967296"
+        said = r"a.h5: states 4294967297 bytes when unpacked; at most 4294967296"
         for ask in (lambda: file.check_size(["a", "b", "huge"]), lambda: file.numbers("huge")):
             with refused(said, FormatError):
                 ask()

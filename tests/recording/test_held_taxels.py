@@ -38,7 +38,7 @@ def test_a_taxel_that_sticks_is_named_with_its_value_and_since_when(seed: int, s
     [held] = health(changed(frames, slice(since, None), y, x, value)).held
     assert (held.x, held.y, held.value) == (x, y, value)
     assert held.t == frames.t[since]
-    assert held.text(frames) == f"column {x}, row {y}, reads {value:g} N from {since / HZ:.1f} s on"
+    assert held.text(frames) == f"column {x}, row {y}, reads {value:g} N from {since / HZ:.1f} s to the end"
     assert health(changed(frames, slice(since, None), y, x, value)).stuck.sum() == 1
     back = health(changed(frames, slice(since, -50), y, x, value)).held
     assert [each.text(frames).endswith(f" to {frames.t[-51] / 1e6:.1f} s") for each in back] == [True]

@@ -52,7 +52,7 @@ def npz(**columns: object) -> bytes:
         ("a.csv", b"time,x,y\n", "line 1: 'time,x,y': must be t_us,x,y,p[,intensity]"),
         ("a.csv", b"\xff\xfe\x00", "byte 2: not text in UTF-16 (truncated data); save it as UTF-8"),
         ("a.csv", b"t_us,x,y,p,colour\n", "line 1: 'colour' after p"),
-        ("a.csv", b"t_us,x,y,p\n1,2,3\n", "must be 4 numbers a line"),
+        ("a.csv", b"t_us,x,y,p\n1,2,3\n", "must be 4 numbers per line"),
         ("a.csv", b"t_us,x,y,p\n1,2,3,1\n5,6,abc,1\n", "line 3, column y"),
         ("a.csv", b"t_us,x,y,p\n\n1,2,3,1\n\n5,6,,1\n", "line 5, column y"),
         ("a.csv", b"t_us,x,y,p\n1,2,3,2\n", "line 2, column p: is 2; must be 0 to 1"),
@@ -170,7 +170,7 @@ def test_a_table_with_a_layout_beside_a_recording_is_left_out_with_a_warning(tmp
     taxel.convert(taxel.open(tmp_path / "day1.csv"), tmp_path / "day1.npz")
     with pytest.warns(
         UserWarning,
-        match=r": day2.csv left out, as tables and arrays are not read in a folder with recordings \(day1.npz\)",
+        match=r": day2.csv left out, because tables and arrays are not read in a folder with recordings \(day1.npz\)",
     ):
         assert [one.name for one in taxel.open_all(tmp_path)] == ["day1.npz"]
     (tmp_path / "day2.csv").unlink()

@@ -207,7 +207,7 @@ def test_the_command_line_shows_and_writes_one_source(
         ({"imu": "given,columns=a:a"}, "two of that name"),
         ({"imu": "given,columns=t_us"}, "holds no column of values"),
         ({"board": "given,columns=a"}, "there are two of that name"),
-        ({"a b": "given,columns=a"}, "a name is of letters, digits"),
+        ({"a b": "given,columns=a"}, "a name must have at most 64 letters, digits"),
         ({"imu": 3}, "source imu is 3"),
         (["imu"], 'source "imu": must be'),
         ({"imu": "given,columns=a,speed=3"}, 'has no option "speed"'),

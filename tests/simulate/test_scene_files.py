@@ -153,7 +153,7 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
         (("seed = 5", "seed = 1.5"), "seed is 1.5"),
         (("seed = 5", 'preset = "9 kHz"'), "preset"),
         (("seed = 5", "foam.modulus_kpa = -1"), "modulus_kpa is -1 kPa: must be above 0"),
-        (("seed = 5", "foam.modulus_kpa = 1e300"), "foam: the force on it is beyond what a float32 holds"),
+        (("seed = 5", "foam.modulus_kpa = 1e300"), "foam: the force on it is too large for a float32"),
         (("seed = 5", "foam.modulus = 1"), r"foam.modulus is not known"),
         (("seed = 5", "taxels.exponent = 3"), "exponent is 3"),
         (("seed = 5", "taxels.noise = 3"), "taxels.noise is not known"),

@@ -363,7 +363,10 @@ def test_what_happens_while_a_touch_lasts_is_no_label_of_another_recording(seed:
     plan = Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example]))
     (cause,) = Evidence([example], check_examples([example]), plan).causes({"slip": 15})
     assert (cause.kind, cause.labels, cause.mistakes) == ("label_name", ("slip",), 15)
-    assert "are within touches, which onset, release fit, and no recipe tells what happens while a" in cause.measured
+    assert (
+        "are within touches, which onset, release fitwhere touches begin or end; no recipe detects what happens while a"
+        in cause.measured
+    )
     # Where no label fits the touches, labels may be of another recording.
     alone = example._replace(labels={"slip": labels["slip"]})
     causes = Evidence([alone], check_examples([alone]), plan).causes({"slip": 15})

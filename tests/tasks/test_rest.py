@@ -69,7 +69,7 @@ def test_a_training_takes_the_first_quiet_stretch_where_a_touch_comes_before_the
         assert (quiet.start_us - begin_us, quiet.stop_us - begin_us) == (0, 500_000)
         (line,) = warned
         end = (labels["contact"][4] - 20_000) / 1e6
-        assert f"0.000 to {end:.3f} s, before the first label, holds a touch of " in line
+        assert f"0.000 to {end:.3f} s, before the first label, contains a touch of " in line
         assert line.endswith("so the tare is of the first quiet stretch, 0.000 to 0.500 s")
 
 
@@ -97,7 +97,7 @@ def test_forces_that_do_not_rest_near_0_are_said_with_the_tare_that_takes_that_o
     assert "offset.npz: 36 of 36 taxels read 4." in line
     assert f" {unit} in a quiet stretch, 0.000 to 0.500 s, and not 0; if nothing touches them then, --tare 0.5 " in line
     (line,) = warned("below", presses - random.uniform(4, 8, (6, 6)))
-    assert "--tare 0.5 takes that off" in line
+    assert "--tare 0.5 subtracts this" in line
     assert warned("tared", presses + 5.0, 0.5) == []
     assert warned("noise", presses + random.normal(0, 0.05, presses.shape)) == []
     # A foot that stands at first and is lifted later is a load.
@@ -192,7 +192,7 @@ def test_a_recording_at_rest_is_a_tare(tmp_path: Path, begin_us: int) -> None:
     with collected() as warned:
         rest(recording, tmp_path / "a.npz")
     assert len(warned) == 1
-    assert "a.npz: it is not quiet but holds a touch of " in warned[0]
+    assert "a.npz: it is not quiet but contains a touch of " in warned[0]
     taxel.convert(Frames(later.values, later.t, unit="N", array=frames.array), tmp_path / "force.npz")
     with pytest.raises(ProblemError, match=r"force\.npz: a recording in N; must be in counts, as .*a\.npz is"):
         rest(recording, tmp_path / "force.npz")
@@ -208,7 +208,7 @@ def test_a_warning_about_the_rest_names_a_command_that_takes_it(tmp_path: Path) 
     place = tmp_path / "a walk.npz"
     taxel.convert(Frames(values, frames.t, unit="N", array=frames.array), place)
     (line,) = taxel.tasks.info(taxel.open(place), None).warnings
-    found = re.search(r"--tare rest\.npz takes that off, which (taxel cut .*) makes$", line)
+    found = re.search(r"--tare rest\.npz subtracts this; (taxel cut .*) makes$", line)
     assert found is not None
     _, *words = shlex.split(found[1])
     words[2] = str(tmp_path / "rest.npz")

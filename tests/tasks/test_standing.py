@@ -42,7 +42,7 @@ def test_a_tare_that_takes_off_what_lies_there_is_advised_after_a_trial(tmp_path
     values[:, 5:7, 1:4] += 25
     [cause] = said(tmp_path, rule, values, t, labels)
     assert (cause.kind, set(cause.labels)) == ("standing_load", {"contact", "lift"})
-    assert "an object is on it from beginning to end, at rows 5 to 6, columns 1 to 3 (up to 2" in cause.measured
+    assert "an object is on the sensor from beginning to end, at rows 5 to 6, columns 1 to 3 (up to 2" in cause.measured
     assert "; tried with it: 40 found and 0 false, where " in cause.measured
     option, seconds = cause.option.split()
     assert (option, cause.arguments) == ("--tare", {"tare": float(seconds)})
@@ -59,5 +59,5 @@ def test_a_channel_that_sticks_is_no_two_loads(tmp_path: Path, seed: int) -> Non
     values[300:, 0, int(np.random.default_rng(seed).integers(6))] = 150
     causes = said(tmp_path, rule, values, t, labels)
     assert "standing_load" in [cause.kind for cause in causes]
-    assert not any("a region for each load" in cause.advice for cause in causes)
-    assert any("reads 150 N from 6.0 s on" in cause.measured for cause in causes)
+    assert not any("source or region for each load" in cause.advice for cause in causes)
+    assert any("reads 150 N from 6.0 s to the end" in cause.measured for cause in causes)

@@ -134,7 +134,7 @@ def test_a_training_asks_first_about_labels_within_touches(seed: int) -> None:
     labels["slip"] = (labels["contact"] + labels["lift"]) // 2
     text = asked(frames, labels)
     assert text.startswith("slip: ")
-    assert "no recipe tells what happens while a touch lasts" in text
+    assert "no recipe detects what happens while a touch lasts" in text
 
 
 def test_a_training_names_the_part_of_each_recording_whose_labels_are_off(tmp_path: Path, capsys: Any) -> None:
@@ -152,12 +152,12 @@ def test_a_training_names_the_part_of_each_recording_whose_labels_are_off(tmp_pa
     assert code == 0
     assert UNLEARNT not in error
     lines = out.splitlines()
-    [cause] = [line for line in lines if line.startswith("contact, lift: what may help is labels of ")]
+    [cause] = [line for line in lines if line.startswith("contact, lift: what may help is to move the labels of ")]
     for seed, begin_s in zip((11, 12), begins, strict=True):
-        assert f"of {folder / f'{seed}.npz'} from {begin_s:.1f} s on 2" in cause
+        assert f"of {folder / f'{seed}.npz'} from {begin_s:.1f} s to the end 2" in cause
     assert not any("the plain rule is better" in line for line in lines), "it learnt wrong labels"
     [last] = [line for line in lines if line.startswith("written to ")]
-    assert "; next: train again with labels of " in last
+    assert "; next: move the labels of " in last
     assert "taxel detect" not in last
 
 
@@ -172,7 +172,7 @@ def test_a_window_is_advised_only_with_what_a_trial_of_it_left() -> None:
         mistakes = Mistakes(None, scores[50.0], scores[50.0], tried=tried)  # type: ignore[arg-type]
         [found] = mistakes._tried_windows([cause])
         assert (found.advice, found.option) == (advice, advice)
-        trial = "; tried on the same folds: 0 missed, 0 false, where this training has 25 missed, 25 false"
+        trial = "; tried on the same folds: 0 missed, 0 false, while this training has 25 missed, 25 false"
         assert found.measured == fact + trial * bool(advice)
 
 
@@ -203,7 +203,7 @@ def test_labels_of_another_clock_are_moved_by_the_option_that_is_named(
         )
         assert said, line
         assert float(said[1]) == pytest.approx(abs(late_ms), abs=30)
-    assert "contact, lift: what may help is labels" in cause
+    assert "contact, lift: what may help is to move the labels by" in cause
     assert "the detections are where loads begin or end, the labels are not" in cause
     option = cause.partition("(")[2].partition(")")[0].split()
     assert float(option[1]) == pytest.approx(-late_ms, abs=30)
@@ -216,10 +216,11 @@ def test_a_stretch_of_labels_missing_ones_and_those_of_nothing_are_named(
     frames, labels = drawn(trained.shape, trained.rate, 5)
     random, since = np.random.default_rng(5), labels["contact"][15]
     [line] = trained.told(capsys, tmp_path, frames, {k: t - 300_000 * (t >= since) for k, t in labels.items()})
-    assert f"contact, lift: what may help is labels from {np.floor((since - 300_000) / 1e5) / 10:.1f} s on 3" in line
+    begin_s = np.floor((since - 300_000) / 1e5) / 10
+    assert f"contact, lift: what may help is to move the labels from {begin_s:.1f} s to the end 3" in line
     fewer = {label: np.sort(random.choice(t, 20, replace=False)) for label, t in labels.items()}
     [line] = trained.told(capsys, tmp_path, frames, fewer)
-    assert line.startswith("contact, lift: what may help is labels of these loads too: 5 of 5 false are ")
+    assert line.startswith("contact, lift: what may help is to label these loads too: 5 of 5 false are ")
     middles = labels["contact"] + (labels["lift"] - labels["contact"]) // 2
     more = labels | {"contact": np.sort(np.append(labels["contact"], middles[::5]))}
     [line] = trained.told(capsys, tmp_path, frames, more)
@@ -239,7 +240,7 @@ def test_what_differs_from_the_training_is_said_once_and_is_the_cause(
     dead = 6 if trained.shape[0] > 1 else 3
     frames, labels = drawn(trained.shape, trained.rate, 7, dead=dead)
     lines = trained.told(capsys, tmp_path, frames, labels)
-    assert any("that touches loaded are never loaded" in line for line in lines)
+    assert any("that touches of the training loaded are never loaded" in line for line in lines)
     assert not any("look at these labels" in line for line in lines)
 
 
@@ -265,7 +266,9 @@ def test_stuck_taxels_are_named_also_where_all_is_found(trained: Trained, tmp_pa
     values = frames.values.copy()
     values[:, 3, 10] = 1023
     stuck = taxel.Frames(values, frames.t, unit="counts", array=frames.array)
-    assert "1 stuck taxel, as column 10, row 3 (taxel info lists them)" in trained.told(capsys, tmp_path, stuck, labels)
+    assert "1 stuck taxel, for example column 10, row 3 (taxel info lists them)" in trained.told(
+        capsys, tmp_path, stuck, labels
+    )
 
 
 def test_a_rest_that_moves_is_named_in_the_place_of_weak_touches(trained: Trained, tmp_path: Path, capsys: Any) -> None:
@@ -276,7 +279,8 @@ def test_a_rest_that_moves_is_named_in_the_place_of_weak_touches(trained: Traine
     count = taxel.Array(*trained.shape).taxels
     taxels = f"{count} taxel{'s' * (count > 1)}"
     assert (
-        f"unlike the training: {taxels} end with other readings than they began: a drift, or a load that stays" in lines
+        f"unlike the training: {taxels} have other readings at the end than at the beginning: "
+        "a drift, or a load that stays" in lines
     )
     assert not any("times as strong" in line for line in lines)
 
@@ -297,7 +301,7 @@ def test_no_move_is_advised_where_only_a_part_of_the_labels_of_each_recording_is
         capsys, "detect", folder, "--readout", trained.file, "--tare", 2.0, "--truth", tmp_path / "days.csv"
     )
     assert "--shift-ms" not in out
-    assert "what may help is labels from" in out
+    assert "what may help is to move the labels from" in out
     assert "this score" in out
 
 
@@ -311,7 +315,7 @@ def test_touches_that_rise_slowly_are_felt_later_and_no_window_is_advised(
         # The least of the touch is felt at once.
         assert lines == []
         return
-    assert any("ms later, as the load rises slowly: contact is felt later there" in line for line in lines), lines
+    assert any("ms later, because the load rises slowly: contact is felt later there" in line for line in lines), lines
     assert not any("what may help is" in line for line in lines)
 
 
@@ -324,7 +328,7 @@ def test_false_detections_inside_loads_are_named(size: str) -> None:
     example = Example(frames, truth, taxel.Tare.take(frames, stop_us=2_000_000))
     [cause] = causes_of([Outcome("a", example, found, taxel.detect.score(found, truth), None)], 50.0)
     assert (cause.kind, cause.mistakes) == ("unlabelled_loads", 25)
-    where = "inside a load, more than 50 ms from where it begins or ends, as at "
+    where = "inside a load, more than 50 ms from where it begins or ends, for example at "
     assert cause.measured.startswith(f"25 of 25 false are {where}{middles[0] / 1e6:.3f} s, ")
 
 

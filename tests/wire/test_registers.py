@@ -123,7 +123,7 @@ def test_the_manuals_names_are_aliases_in_its_own_units():
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: Registers(speed=1), 'register "speed": there are random_lines, '),
+        (lambda: Registers(speed=1), 'register "speed" is not known; registers: random_lines, '),
         (lambda: Registers(line_period=3.001), "line_period is 3.001 us: must be a whole multiple of 0.01 us"),
         (lambda: Registers(line_period="slow"), "line_period is 'slow': must be a number"),
         (lambda: Registers(line_period=float("nan")), "line_period is nan: must be finite"),

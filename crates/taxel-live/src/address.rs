@@ -28,7 +28,7 @@ pub fn of_host(host: &str, port: u16) -> Result<SocketAddr> {
 pub fn of_text(text: &str) -> Result<SocketAddr> {
     match host_and_port(text) {
         Some((host, port)) => of_host(host, port),
-        None => Err(problem!("address {text:?}: must be a host and a port, as 127.0.0.1:5208").into()),
+        None => Err(problem!("address {text:?}: must be a host and a port, for example 127.0.0.1:5208").into()),
     }
 }
 

@@ -80,7 +80,7 @@ impl FrameLayout {
         };
         let lines = match self.end {
             FrameEnd::Lines(1) => String::new(),
-            FrameEnd::Lines(lines) => format!(", {lines} lines a frame"),
+            FrameEnd::Lines(lines) => format!(", {lines} lines per frame"),
             FrameEnd::EmptyLine => ", an empty line after each frame".to_owned(),
         };
         let (frame, row) = (self.array.len(), usize::from(columns));
@@ -89,11 +89,11 @@ impl FrameLayout {
                 several @ 2.. if self.end == FrameEnd::Lines(1) && several * n == frame => {
                     format!(" (or add frame_lines={several}, or frame_end=blank where an empty line ends each frame)")
                 }
-                0 => " (name a column of times, as time=1:ms, and columns without values, as leave_out=1)".to_owned(),
+                0 => " (name a column of times, for example time=1:ms, and columns without values, for example leave_out=1)".to_owned(),
                 _ => String::new(),
             };
             return Err(problem!(
-                "array={rows}x{columns}: lines have {n} values{lines}: must be {frame} a frame{several}"
+                "array={rows}x{columns}: lines have {n} values{lines}: must be {frame} per frame{several}"
             ));
         }
         if !n.is_multiple_of(row) && !row.is_multiple_of(n) {

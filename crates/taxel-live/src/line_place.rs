@@ -40,7 +40,7 @@ impl LinePlace {
                 let stated = options.remove("baud");
                 let Ok(baud) = stated.map_or(Ok(BAUD), str::parse) else {
                     let baud = stated.unwrap_or_default();
-                    return Err(problem!("baud"; " is {baud:?}: must be a number of bits/s, as {BAUD}").into());
+                    return Err(problem!("baud"; " is {baud:?}: must be a number of bits/s, for example {BAUD}").into());
                 };
                 match (SerialPlace::new(place, baud)?, stated) {
                     (SerialPlace::Tcp(..), Some(baud)) => {
@@ -52,7 +52,7 @@ impl LinePlace {
             "lines" => Self::File(place.into()),
             "lines+tcp" => match address::host_and_port(place) {
                 Some((host, port)) => Self::Tcp(SerialPlace::Tcp(host.to_owned(), port)),
-                None => return Err(problem!("{place:?}: must be HOST:PORT, as 127.0.0.1:9000").into()),
+                None => return Err(problem!("{place:?}: must be HOST:PORT, for example 127.0.0.1:9000").into()),
             },
             "lines+udp" => Self::Udp(address::of_text(place)?),
             _ => return Ok(None),

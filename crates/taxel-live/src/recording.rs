@@ -297,7 +297,7 @@ impl Header {
 fn check_name(name: &str) -> taxel_core::Result<()> {
     let fits = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if name.is_empty() || name.len() > 64 || !name.chars().all(fits) {
-        return Err(problem!("source {name:?}: a name is of letters, digits, _ and -, at most 64"));
+        return Err(problem!("source {name:?}: a name must have at most 64 letters, digits, _ and -"));
     }
     Ok(())
 }

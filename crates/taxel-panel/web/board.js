@@ -28,7 +28,7 @@ const SPOKEN = {
   random_lines: "Random line order",
   mechanoreceptor: "FA-1 mode",
   invert_comparator: "Invert comparator",
-  frame_sync: "One stamp a frame",
+  frame_sync: "One stamp per frame",
   wire_version: "Wire version",
   pattern: "Test pattern",
   threshold_jump: "FA-1 jump",

@@ -153,7 +153,7 @@ export class Connection {
     return this.server.request({ type: "read_source", source: this.source.address });
   }
 
-  /** Ticks "Turn values" as the source says, and shows the command that reads the same. */
+  /** Ticks "Invert values" as the source says, and shows the command that reads the same. */
   showSource() {
     const source = this.source.address;
     entitle(this.source.input, "title", source);

@@ -46,13 +46,13 @@ function fall(opened) {
   if (!opened || !falling.length) return "";
   const names = falling.length < sources.length ? ` of ${falling.join(", ")}` : "";
   const file = `${opened.name.replace(/\.[^.]+$/, "")}.layout.toml`;
-  return `The values${names} fall from their rest, so no pressure is shown. If smaller values mean more pressure, turn the values. This writes “falls = true” into ${file} beside the recording, which every command reads.`;
+  return `The values${names} fall from their rest, so no pressure is shown. If smaller values mean more pressure, invert the values. This writes “falls = true” into ${file} beside the recording, which every command reads.`;
 }
 
 /** The same of the live source. @param {Hello | null} hello @param {Counters | null} counters @returns {string} */
 function liveFall(hello, counters) {
   if (!counters?.falls || !hello?.lines) return "";
-  return "The values fall from their rest, so no pressure is shown. If smaller values mean more pressure, turn the values. The source is then read again with “falls=true”.";
+  return "The values fall from their rest, so no pressure is shown. If smaller values mean more pressure, invert the values. The source is then read again with “falls=true”.";
 }
 
 /** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */

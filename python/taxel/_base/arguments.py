@@ -405,7 +405,9 @@ def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
     if index.dtype.kind == "b" and len(index) != length:
         raise refused(name, f": the mask has {len(index)} entries, must have {length}")
     if index.dtype.kind != "b" and not (-length <= index.min() and index.max() < length):
-        raise refused(name, f": rows {index.min()} to {index.max()} are asked for, there are 0 to {length - 1}")
+        raise refused(
+            name, f": rows {index.min()} to {index.max()} are asked for, but only rows 0 to {length - 1} exist"
+        )
     return index
 
 
@@ -422,7 +424,7 @@ def nth(noun: str, chosen: SupportsIndex, length: int) -> int:
     except TypeError:
         raise ProblemError(f"{noun} {shown(chosen)}: must be a whole number") from None
     if not -length <= n < length:
-        raise IndexError(f"{noun} {n} of {length}")
+        raise IndexError(f"{noun} {n}: there are only {length}")
     return n % length
 
 

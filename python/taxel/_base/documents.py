@@ -51,7 +51,7 @@ def read_text(path: str | os.PathLike[str], most: int = BY_HAND, otherwise: str 
     with open_file(path) as file:
         data = file.read(most + 1)
     if len(data) > most:
-        raise FormatError(f"{path}: more than {most} bytes; must be at most that")
+        raise FormatError(f"{path}: more than {most} bytes; must have at most {most}")
     return decoded(path, data, otherwise)
 
 
@@ -121,7 +121,7 @@ def of_toml(location: str, text: str) -> dict[str, Any]:
     _check_length(location, text, BY_HAND)
     for line, key in _between_marks(text):
         if key.count(".") > _DOTS:
-            raise FormatError(f"{location}, line {line}: a key of {key.count('.')} dots; must have at most {_DOTS}")
+            raise FormatError(f"{location}, line {line}: a key with {key.count('.')} dots; must have at most {_DOTS}")
     try:
         values = tomllib.loads(text)
     except RecursionError:

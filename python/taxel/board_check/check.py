@@ -42,7 +42,8 @@ def _nothing(port: int, seconds: float) -> str:
         if address == HOST:
             if not up:
                 return (
-                    f"{begin}{name} has {HOST}, to which the board of rtl/boards sends, but is down: is the cable in?"
+                    f"{begin}The interface {name} has {HOST}, to which the board of rtl/boards sends, but is down: is "
+                    "the cable plugged in?"
                 )
             slow = f" at {speed} Mbit/s, not at 1000" if 0 < speed < 1000 else ""
             return (
@@ -91,21 +92,23 @@ class _Check:
         )
         said = {registers.wire_version for registers in given} if device is not None else {values.version}
         more = (
-            "" if values.version in said else f", and the registers say {said.pop()}: another program sends here, too?"
+            ""
+            if values.version in said
+            else f", and the registers say {said.pop()}: does another program send here, too?"
         )
         self.tell("version", not more, f"version {values.version} of the wire{more}")
         self.losses(values, before, device)
         if len(values.t) < 32:
-            why = "is its register pattern set, and intensity not left out?"
+            why = "is its register pattern set, and are intensities sent?"
             self.tell("values", False, f"{len(values.t)} values are too few to find the ball: {why}")
             return None
         fits = [(registers, *numbered(values, array, registers)) for registers in given]
         registers, frames, share = max(fits, key=lambda fit: fit[2])
         if share < _EXPLAINED:
             why = (
-                "their frame takes another time than the registers say"
+                "a frame does not last as long as the registers say"
                 if device is not None
-                else "the pattern is off, or the registers are not those of a preset: name the serial line"
+                else "the pattern is off, or the registers are not those of a preset: give the serial line"
             )
             self.tell("values", False, f"only {share:.0%} of the values can be the ball's: {why}")
         found = compared(values, len(capture.datagrams), array, registers, frames, device is not None)
@@ -150,7 +153,7 @@ class _Check:
         registers, speed = found.registers, found.speed
         pace = ""
         if speed < 0.5:
-            pace = f"; the board's clock takes {1 / speed:.0f} s for a second, as a simulated board's does"
+            pace = f"; the board's clock takes {1 / speed:.0f} s for a second, like that of a simulated board"
         period = period_of(array) * registers.frame_us / 1e6
         rest = (
             ""
@@ -160,7 +163,7 @@ class _Check:
         whose = " (guessed: no serial line)" if guessed else ""
         return (
             f"{found.frames} stamps with events, {1e6 / registers.frame_us:.0f} frames/s{whose}; {found.taxels} of"
-            f" {array.rows * array.columns} taxels had one{rest}{pace}"
+            f" {array.rows * array.columns} taxels had an event{rest}{pace}"
         )
 
     def rest(self, receiver: Receiver, seconds: float, array: Array, device: Device, speed: float) -> RestCheck:
@@ -203,7 +206,7 @@ class _Check:
             f"{end}{f' ({lines})' if lines else ''}: {why}" if full.any() else "no taxel stays there",
         )
         zero = int(driven.sum())
-        why = "right where nothing presses and the circuit has no offset; else no current arrives"
+        why = "this is right if nothing presses and the circuit has no offset; otherwise no current arrives"
         self.tell(
             "zero",
             None,
@@ -220,8 +223,8 @@ class _Check:
             self.tell(
                 "noise",
                 None,
-                f"standard deviation {median:.2f} ticks (the median), at most {largest:.2f} ({place}); three of"
-                f" them are above the noise floor, {floor}, for {above}",
+                f"standard deviation {median:.2f} ticks (the median), at most {largest:.2f} ({place}); three standard "
+                f"deviations are above the noise floor, {floor}, for {above}",
             )
 
 
@@ -303,7 +306,7 @@ def check_board(
         if place is None:
             sensor = Array._of(array)
             found = check.pattern(receiver, where, seconds, sensor, _presets(sensor, preset), None)
-            check.tell("rest", None, "not looked at: that needs the board's serial line")
+            check.tell("rest", None, "not checked: this needs the board's serial line")
             return BoardCheck(tuple(check.findings), found, None)
         with Device(place, array=array, timeout=_ANSWER_S) as device:
             rest = None

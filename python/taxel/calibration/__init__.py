@@ -511,4 +511,4 @@ def _iso(value: object) -> str:
     try:
         return day.fromisoformat(written).isoformat()
     except ValueError:
-        raise refused("date", f" is {shown(written)}: must be a day as 2026-11-21") from None
+        raise refused("date", f" is {shown(written)}: must be a day, for example 2026-11-21") from None

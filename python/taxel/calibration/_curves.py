@@ -69,8 +69,8 @@ class PointCurve:
         if self.x.ndim not in (1, 3) or not self.y.size or len(self.x) != len(self.y):
             points = len(self.x) if self.x.ndim else 0
             raise ProblemError(
-                f"a table of {counted(points, 'reading')} and {counted(len(self.y), 'value')}: must be as many, 1 or "
-                "more, of one taxel (points,) or of each (points, rows, columns)"
+                f"a table of {counted(points, 'reading')} and {counted(len(self.y), 'value')}: must be equally many, 1 "
+                "or more, for one taxel (points,) or for each (points, rows, columns)"
             )
         for name, column in (("readings", self.x), ("values", self.y)):
             rising = np.isfinite(column) & (np.diff(column, axis=0, prepend=-np.inf) > 0) & (column >= 0)
@@ -78,13 +78,13 @@ class PointCurve:
             if len(wrong):
                 position = tuple(wrong[0])
                 index = "".join(f"[{k}]" for k in position)
-                raise ProblemError(f"{name}{index} is {column[position]:g}: must rise from 0 or more")
+                raise ProblemError(f"{name}{index} is {column[position]:g}: must begin at 0 or more, and rise")
         at_rest = self.x[0] == 0
         if np.any(at_rest != (self.y[0] == 0)):
             first = float(np.ravel(self.x[0])[0])
             raise ProblemError(
-                f"the table begins at {first:g}, {self.y[0]:g}: must be 0 where the reading above "
-                f"rest is 0, and only there"
+                f"the table begins with reading {first:g}, value {self.y[0]:g}: the value must be 0 where the reading "
+                "above rest is 0, and only there"
             )
         if not np.any(at_rest):
             self.x, self.y = np.concatenate([0 * self.x[:1], self.x]), np.append(0.0, self.y)
@@ -110,7 +110,7 @@ class PointCurve:
         return {"table": {"readings": self.x.tolist(), "values": self.y.tolist()}}
 
     def bent(self, exponent: float) -> PointCurve:  # noqa: ARG002  what a curve with an exponent takes
-        raise refused("exponent", ": a table has none; its gain alone is fitted")
+        raise refused("exponent", ": a table has none; only its gain is fitted")
 
 
 class Law:

@@ -82,7 +82,7 @@ class LoadEquations(NamedTuple):
         same(sensor.array, frames.array, f"the frames of {location}", frames.unit, sensor.reading_unit)
         value, unit = above_0(location, load.load), checked_text("unit", load.unit, UNITS)
         if not len(frames):
-            raise ProblemError(f"{location}: there is no frame while it is on the array")
+            raise ProblemError(f"{location}: there is no frame while the load is on the array")
         rest = sensor.rest
         readings = frames.values.mean(axis=0, dtype=np.float64)
         chosen = sensor.array._there() & ~np.isnan(rest)
@@ -157,8 +157,8 @@ def best_exponent(curve: Curve, equations: Sequence[LoadEquations]) -> float:
     if alike:
         also = ", ".join(f"{exponent:.3g}" for exponent in alike)
         warn(
-            f"loads: an exponent of {best[1]:.3g} is used, but {also} fits them as well; one more load, or exponent, "
-            "would decide",
+            f"loads: an exponent of {best[1]:.3g} is used, but {also} fits them as well; one more load, or a given "
+            "exponent, would decide",
             stacklevel=3,
         )
     return best[1]
@@ -171,7 +171,9 @@ def gains(array: Array, curve: Curve, equations: Sequence[LoadEquations], each: 
     if not each:
         return by_taxel, common
     if not any(load.alone for load in equations):
-        raise refused("each", ": no load determines a single taxel; give a uniform pressure (kPa), or its taxel")
+        raise refused(
+            "each", ": no load determines a single taxel; give a uniform pressure (kPa), or the taxel of a load"
+        )
     share = np.array([load.by_taxel(curve) / load.load for load in equations if load.alone])
     squares = (share**2).sum(axis=0)
     np.divide(share.sum(axis=0), squares, out=by_taxel, where=squares > 0)
@@ -184,4 +186,4 @@ def same(calibrated: Array, given: Array, subject: str, unit: str | None = None,
         raise ProblemError(f"{subject}: of {given!r}; the calibration is of another array, {calibrated!r}")
     calibrated._warn_apart(given, subject, stacklevel=3)
     if unit != expected:
-        raise ProblemError(f"{subject}: in {unit}; the calibration takes {expected}")
+        raise ProblemError(f"{subject}: in {unit}; the calibration needs loads in {expected}")

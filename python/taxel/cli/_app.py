@@ -25,7 +25,7 @@ WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
 
 #: Option of the commands that run until they are stopped.
 SecondsOption = Annotated[
-    float | None, typer.Option(min=0.001, help="End after this many seconds; without it with Ctrl-C.")
+    float | None, typer.Option(min=0.001, help="End after this many seconds. Default: end with Ctrl-C.")
 ]
 
 
@@ -36,8 +36,8 @@ OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace outp
 
 #: What can be done instead of giving an option twice.
 _INSTEAD = {
-    "--readout": "; a command reads out one: train one readout on the labels of both, or record and run taxel detect "
-    "with each"
+    "--readout": "; a command uses one readout: train one readout on the labels of both, or record and run taxel "
+    "detect with each"
 }
 
 

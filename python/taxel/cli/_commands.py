@@ -35,7 +35,7 @@ OWN = {
     "train": "Train neurons to detect labelled events.",
     "detect": "Detect events in recordings by a readout; score them.",
     "export": "Write a readout for other simulators and for chips.",
-    "information": "Estimate how many bits labelled touches hold.",
+    "information": "Estimate how many bits of information labelled touches give.",
 }
 
 

@@ -31,8 +31,8 @@ def convert(
     target: Annotated[
         Path,
         typer.Argument(
-            help="The new file; its extension gives the format. Without one, or for several recordings: a folder, to "
-            "which a .mcap of each is written."
+            help="The new file; its extension gives the format. Without an extension, or for several recordings: a "
+            "folder, to which a .mcap of each is written."
         ),
     ],
     files: FileOptions,

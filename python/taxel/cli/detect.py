@@ -54,8 +54,7 @@ def detect(
     shift_ms: Annotated[
         float,
         typer.Option(
-            help="Before all else, move all labels of --truth by this many ms, for example if their times are of "
-            "another clock."
+            help="First move all labels of --truth by this many ms, for example if their times are of another clock."
         ),
     ] = 0.0,
     lists: Annotated[
@@ -192,7 +191,7 @@ def _score_lines(found: Detecting, labels: Sequence[str], truth: str | None, *, 
     for label, sources in found.unlabelled.items():
         yield f"not scored, because no row of {truth} names it: {label}{' of ' * bool(sources)}{', '.join(sources)}"
     if found.not_scored:
-        yield f"not scored, as the readout has {', '.join(labels)}: {', '.join(found.not_scored)}"
+        yield f"not scored, because the readout has only {', '.join(labels)}: {', '.join(found.not_scored)}"
     if several:
         yield from score_rows([(Path(outcome.name).name, outcome.score) for outcome in found.outcomes])
 
@@ -224,4 +223,4 @@ def _detection_lines(
     for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):
         yield f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13.4g}" * sloped
     if len(detections) > len(first):
-        yield f"... and {len(detections) - len(first)} more; --list prints all, --out and --json hold them"
+        yield f"... and {len(detections) - len(first)} more; --list prints all, --out and --json write all"

@@ -24,7 +24,7 @@ from taxel.live.sending import PORT
 from taxel.wire import PRESETS, Registers, described
 from taxel.wire.registers import QUOTED_PRESETS
 
-app = App(no_args_is_help=True, help="Find a board on its serial line, set it by name, and read back its registers.")
+app = App(no_args_is_help=True, help="Find a board on its serial line, set its registers by name, and read them back.")
 
 PlaceArgument = Annotated[str, typer.Argument(help="A serial port (COM3, /dev/ttyACM0), or host:port.")]
 BaudOption = Annotated[int, typer.Option(help="Baud rate of the serial line.")]
@@ -32,7 +32,7 @@ BaudOption = Annotated[int, typer.Option(help="Baud rate of the serial line.")]
 
 @app.callback()
 def _root() -> None:
-    """Find a board on its serial line, set it by name, and read back its registers."""
+    """Find a board on its serial line, set its registers by name, and read them back."""
 
 
 @app.command("ports")

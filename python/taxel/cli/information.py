@@ -169,8 +169,8 @@ def lines(answer: Answer) -> list[str]:
         f"{100 * full.found.right:.0f} % right"
         + "".join(f"; frames {e.bits:.2f}" for p, e in answer.frames.items() if p == full.period_ms)
         + "".join(f"; {name} {e.bits:.2f}" for name, e in answer.classifiers.items()),
-        "in brackets: the range of the bits in 95 % of new draws of these trials, or of whole groups; with few "
-        "trials the truth is outside it more often than that",
+        "in brackets: the range of the bits in 95 % of new draws of these trials, or of whole groups; with few trials, "
+        "the true bits are outside this range more often",
     ]
     text += [f"warning: {warning}" for warning in answer.warnings]
     columns = ("bits", "events", "millibits/event", "kb/s", "silent")
@@ -194,7 +194,9 @@ def lines(answer: Answer) -> list[str]:
     if len(answer.training) > 1:
         (n, less), (most, bits) = answer.training[-2:]
         rises, then = ("still", "more would add bits") if bits - less > 0.02 else ("hardly", "more would add little")
-        text.append(f"{rises} rising with trials: {n} -> {most} training trials a label {bits - less:+.2f}; {then}")
+        text.append(
+            f"bits {rises} rise with trials: {n} -> {most} training trials per label {bits - less:+.2f}; {then}"
+        )
     text += [f"note: {note}" for note in answer.notes]
     text.append(f"rates are of {answer.wire}")
     return text

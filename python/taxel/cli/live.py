@@ -266,8 +266,9 @@ def _warn_of_unknown(tare: Tare) -> None:
     known = int(np.count_nonzero(~np.isnan(tare.rest)))
     if 2 * known < tare.array.taxels:
         say(
-            f"taxel: the tare holds {known} of {tare.array.taxels} taxels, those that changed while it was taken; "
-            "events of the others are ignored. Start taxel live before the board, which then sends all values, or "
+            f"taxel: the tare has only the {known} of {tare.array.taxels} taxels that changed while it was taken; "
+            "events of the other taxels are ignored. Start taxel live before the board, which then sends all values, "
+            "or "
             "give --tare FILE",
             err=True,
         )

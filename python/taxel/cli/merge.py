@@ -25,7 +25,9 @@ def merge(
     gap: Annotated[
         float | None,
         typer.Option(
-            min=0.0, metavar="S", help="Put the recordings one after another, with this pause, s. Default: times stay."
+            min=0.0,
+            metavar="S",
+            help="Put the recordings one after another, with this pause, s. Default: times are kept.",
         ),
     ] = None,
     beside: Annotated[bool, typer.Option("--beside", help="Put the sensors side by side, left to right.")] = False,

@@ -30,7 +30,7 @@ def simulate(
         typer.Option("--out", "-o", help="Write the recording that a host would make: .mcap, .lsa, .npz, .csv or .h5."),
     ] = None,
     movie: Annotated[
-        Path | None, typer.Option(help="Draw a movie: .gif, or another format of matplotlib's writers, as .mp4.")
+        Path | None, typer.Option(help="Draw a movie: .gif, or another format of matplotlib's writers, such as .mp4.")
     ] = None,
     slower: Annotated[
         float, typer.Option(min=0.1, max=1000, help="How many times slower than real time the movie runs.")

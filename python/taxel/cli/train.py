@@ -97,9 +97,7 @@ def train(
     ] = False,
     shift_ms: Annotated[
         float,
-        typer.Option(
-            help="Before all else, move all labels by this many ms, for example if their times are of another clock."
-        ),
+        typer.Option(help="First move all labels by this many ms, for example if their times are of another clock."),
     ] = 0.0,
     labels_as_given: Annotated[
         bool,
@@ -221,5 +219,6 @@ def _of_label(path: Path, label: str) -> Path:
 def _next(training: Training, out: Path) -> str:
     """Return what to do with a readout: detect by it, or train again as the advice for all its labels says; else ""."""
     advice = training.again()
-    following = training.command(str(out)) or (f"train again with {advice}" if advice else "")
+    again = f"{advice[3:]}, then train again" if advice.startswith("to ") else f"train again with {advice}"
+    following = training.command(str(out)) or (again if advice else "")
     return f"; next: {following}" if following else ""

@@ -68,7 +68,7 @@ class Cause:
     - ``standing_load`` (*): while these labels happen, an object is on the array, or a taxel is stuck. ``--tare``.
     - ``foreign_labels``: labels are more than 50 ms from any load, or all at the beginning. Labels of this recording;
       times in us.
-    - ``tare``: the tare holds a touch, or untouched taxels read above rest. ``--tare``.
+    - ``tare``: the tare contains a touch, or untouched taxels read above rest. ``--tare``.
     - ``begun_loaded``: labels are in the first two frames, already loaded. ``zeros_before_s`` in a layout file.
     - ``durations``, ``plain_rule``: a rule makes at most half the mistakes. ``--rule FILE`` writes it, for
       ``taxel detect --readout FILE``.

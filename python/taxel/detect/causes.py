@@ -151,7 +151,7 @@ class Mistakes:
                 name, other_name = (examples[place].name.removeprefix(group) for place in (k, best))
                 same = f"where its labels are those of {other_name}" if len(labelled) else "which has no labels"
                 measured = f"{score.missed} missed and {score.false} false in {name}, {same}"
-                advice = f"a column source in the labels, {other_name} in its rows"
+                advice = f"a column source in the labels, with {other_name} in its rows"
                 yield k, Cause("unlabelled_source", (label,), score.rank[0], measured, advice)
 
     def _unlabelled_time(self, examples: Sequence[Example], label: str) -> Iterator[Cause]:
@@ -164,8 +164,8 @@ class Mistakes:
                 (label,),
                 scored.rank[0],
                 f"{outside / 1e6:.1f} of {total / 1e6:.1f} s are before the first or after the last label, and an "
-                "event without its label counts as false: label those too, or cut the recording (taxel cut) to what is "
-                "labelled",
+                "event without its label counts as false: label these events too, or cut the recording (taxel cut) to "
+                "the labelled part",
                 "labels of all events",
             )
 
@@ -230,8 +230,8 @@ class Mistakes:
         if not kinds or self.scored[label].found or alignment is None or alignment.train is not None:
             return
         measured = (
-            "the recipe touch learns it as a kind of touch, which it detects when a touch begins; names of the end of "
-            f"a touch are {recipes.names_of('touch', 'lift')}"
+            "the recipe touch learns it as a kind of touch, and detects it when a touch begins; names of the end of a "
+            f"touch are {recipes.names_of('touch', 'lift')}"
         )
         yield Cause("label_name", (label,), wrong, measured, "another name of the label")
 
@@ -245,7 +245,9 @@ class Mistakes:
             return
         alone = self.learnt[label]
         if 2 * alone.rank[0] <= wrong:
-            measured = f"of those that it learnt {alone.missed} are missed, and {alone.false} are false"
+            measured = (
+                f"of the labels that it learnt, {alone.missed} are missed, and {alone.false} detections are false"
+            )
             yield Cause("overfitting", (label,), wrong, measured, "more labels")
             return
         measured, points = "no cause was found in the data", len(self.trained.recipe.points_of(label))
@@ -259,8 +261,9 @@ class Mistakes:
         moments = any(isinstance(encoder, Moments) for encoder in self.trained.recipe.encoder._each())
         if moments and (chance := self._by_chance(label)):
             measured = (
-                f"{chance}, from moments of the frame, as area and load, its centre, and how long a touch lasts; "
-                "taxel information says whether they differ otherwise, or labels are few or mixed up"
+                f"{chance}, from moments of the frame, for example area, load and centre, and from how long a touch "
+                "lasts; taxel information shows whether the kinds differ otherwise; the labels may also be few or "
+                "mixed up"
             )
             yield Cause("indistinct_kinds", (label,), wrong, measured, "other kinds")
 
@@ -268,7 +271,7 @@ class Mistakes:
         """Return how many of a kind are detected, where chance would detect as many and they are enough; else ""."""
         shares = [_by_chance(label, who, score) for who, score in self._by.items()]
         enough = self.scored[label].events >= FIVE_FOLDS
-        return ", ".join(shares) + ", as by chance" if enough and all(shares) else ""
+        return ", ".join(shares) + ", no better than chance" if enough and all(shares) else ""
 
     def _rule(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the plain rule if it halves the mistakes."""
@@ -277,10 +280,11 @@ class Mistakes:
         left, rule = self.plain.together[label].rank[0], self.plain.rules[label]
         if 2 * left > wrong:
             return
-        measured = f"leaves {left} missed and false on the same labels, the neuron {wrong}"
+        measured = f"leaves {left} missed and false on the same labels, and the neuron {wrong}"
         lasting = rule is not None and isinstance(rule.age_ms, str)
         measured = (
-            f"it {measured}{', as it knows how long touches last' * lasting}; taxel detect --readout FILE runs it"
+            f"it {measured}{'; the rule knows how long touches last' * lasting}; taxel detect --readout FILE runs the "
+            "rule"
         )
         kind = "durations" if lasting else "plain_rule"
         yield Cause(kind, (label,), wrong - left, measured, "the plain rule (--rule FILE)", "--rule FILE")
@@ -305,7 +309,7 @@ def _left(label: str, scored: Score, tried: Score, by: str = "") -> str:
     """Return what a trial on the same folds left of a label's mistakes, if it is at most half of them; else ""."""
     left, left_now = (f"{score[label].missed} missed, {score[label].false} false" for score in (tried, scored))
     halved = 2 * tried[label].rank[0] <= scored[label].rank[0]
-    return f"tried on the same folds: {by}{left}, where this training has {left_now}" if halved else ""
+    return f"tried on the same folds: {by}{left}, while this training has {left_now}" if halved else ""
 
 
 def without_explained(warnings: Sequence[str], causes: Sequence[Cause]) -> tuple[str, ...]:
@@ -338,14 +342,14 @@ def _off_in_parts(evidence: Evidence, each: Sequence[Score], wrong: Mapping[str,
             more = f" and of {counted(len(parts) - _NAMED, 'other recording')} alike" if len(parts) > _NAMED else ""
             advice = ", ".join(f"of {name} {_moved(cause)}" for name, cause in parts[:_NAMED])
             measured = "; ".join(f"{name}: {cause.measured.partition(', all ')[0]}" for name, cause in parts[:_NAMED])
-            yield Cause("shifted_labels", (label,), mistakes, measured, f"labels {advice}{more}")
+            yield Cause("shifted_labels", (label,), mistakes, measured, f"to move the labels {advice}{more}")
 
 
 def _moved(cause: Cause) -> str:
     """Return how the labels of a recording are to be moved."""
     ms = cause.arguments.get("shift_ms", 0.0)
     distance = f"{abs(ms):.0f} ms {'earlier' if ms < 0 else 'later'}"
-    return distance if cause.option else cause.advice.removeprefix("labels ").removeprefix("of ")
+    return distance if cause.option else cause.advice.removeprefix("to move the labels ").removeprefix("of ")
 
 
 def _by_chance(label: str, who: str, together: Score) -> str:
@@ -366,4 +370,4 @@ def _by_chance(label: str, who: str, together: Score) -> str:
     )
     if ways <= _CHANCE * comb(kind.events + others, right + taken):
         return ""
-    return f"{who} tells {right} of {kind.events} and takes {taken} of {others} others for {label}"
+    return f"{who} recognises {right} of {kind.events} and mistakes {taken} of {others} others for {label}"

@@ -87,7 +87,7 @@ class Evidence:
     def falls(self) -> str:
         """That values fall from their rest, and what turns them; empty where none do."""
         advice, measured = self._fall
-        return f"{measured}: if less means more pressure, {advice} helps" if advice else ""
+        return f"{measured}: if smaller values mean more pressure, {advice} helps" if advice else ""
 
     @cached_property
     def _fall(self) -> tuple[str, str]:
@@ -96,7 +96,7 @@ class Evidence:
             source = recorded(example.source, hold=False)
             if isinstance(source, Frames) and (rest := of_frames(source)).falls:
                 layout, advice = rest.turning(getattr(example.source, "path", None))
-                turned = f" as {layout} turns them" * bool(layout)
+                turned = f" after {layout} inverted them" * bool(layout)
                 return advice, f"{example.name}: " * bool(example.name) + f"values fall from their rest{turned}"
         return "", ""
 
@@ -171,9 +171,9 @@ class Evidence:
         if held >= TOUCH:
             seconds = quiet_s(self.sound)
             by = ("--tare FILE", {}) if seconds is None else (f"--tare {seconds:g}", {"tare": seconds})
-            return f"it holds a touch of {held} taxels", *by
+            return f"the tare contains a touch of {held} taxels", *by
         if self._loaded >= TOUCH:
-            return f"{self._loaded} taxels read above theirs while nothing touches them", "--tare FILE", {}
+            return f"{self._loaded} taxels read above the tare while nothing touches them", "--tare FILE", {}
         return "", "", {}
 
     @cached_property
@@ -234,10 +234,11 @@ class Evidence:
         if recipes.knows("touch", label) or not fits or 2 * within <= total or self._loaded >= TOUCH:
             return
         measured = (
-            f"{within} of {counted(total, 'label')} {are(within)} within touches, which {', '.join(fits)} "
-            f"{'fits' if len(fits) == 1 else 'fit'}, and no recipe tells what happens while a touch lasts"
+            f"{within} of {counted(total, 'label')} {are(within)} within touches; {', '.join(fits)} "
+            f"{'fits' if len(fits) == 1 else 'fit'} where touches begin or end; no recipe detects what happens while a "
+            "touch lasts"
         )
-        yield Cause("label_name", (label,), wrong, measured, "labels of where touches begin or end")
+        yield Cause("label_name", (label,), wrong, measured, "labels where touches begin or end")
 
     def within_touches(self) -> str:
         """Return which labels are within touches, where no recipe tells anything; "" where none are."""
@@ -265,8 +266,8 @@ class Evidence:
         if 2 * away <= total or 2 * self.felt.count < total or not self.felt.at_edges_by_chance(at_edge, total):
             return
         measured = (
-            f"{at_edge} of {counted(total, 'label')} {are(at_edge)} within {WINDOW_MS:.0f} ms of where a load begins "
-            f"or ends, as chance has it, while the sensor felt {counted(self.felt.count, 'load')}"
+            f"{at_edge} of {counted(total, 'label')} {are(at_edge)} within {WINDOW_MS:.0f} ms of the beginning or end "
+            f"of a load, no more than by chance, while the sensor felt {counted(self.felt.count, 'load')}"
         )
         yield Cause("foreign_labels", (label,), wrong, measured, FOREIGN)
 
@@ -292,8 +293,8 @@ class Evidence:
                 yield by_option("shifted_labels", label, wrong[label], measured, option, **arguments)
             else:
                 side = "earlier" if distance.ms > 0 else "later"
-                fit = ", as others fit" * (not best.is_far)
-                advice = f"times of {label} {abs(distance.ms):.0f} ms {side} in the labels{fit}"
+                fit = ", because the other labels fit" * (not best.is_far)
+                advice = f"to move the labels of {label} {abs(distance.ms):.0f} ms {side}{fit}"
                 yield Cause("shifted_labels", (label,), wrong[label], str(distance), advice)
 
     def _part_off(self, wrong: Mapping[str, int]) -> Iterator[Cause]:
@@ -314,7 +315,7 @@ class Evidence:
                     (label,),
                     wrong[label],
                     f"{measured}, all {stretch}",
-                    f"{labels} {stretch} {distance} {back}",
+                    f"to move the {labels} {stretch} {distance} {back}",
                 )
             if len(names) > 1:
                 return
@@ -322,22 +323,22 @@ class Evidence:
     def _of_label(self, label: str, wrong: int) -> Iterator[Cause]:
         if (count := self._counts.get(label, 0)) < TWO_FOLDS:
             there = f"there {are(count)} {count}"
-            folds = f"{TWO_FOLDS} are the least to score it held out, {FIVE_FOLDS} for five folds"
+            folds = f"a score on held-out data needs at least {TWO_FOLDS}, and five folds need {FIVE_FOLDS}"
             yield Cause("few_labels", (label,), wrong, f"{there}; {folds}", "more labels")
         if not self.plan.fit_levels:
             stretches = [(k, -np.inf, np.inf) for k in range(len(self.sound))]
             loaded = loaded_levels(self.plan.encoder, self.sound, stretches)
             if loaded is not None and loaded.within < min(LEAST_LEVELS, len(self.plan.encoder.levels)):  # type: ignore[attr-defined]
                 measured = (
-                    f"{loaded.within} of the encoder's levels {are(loaded.within)} within what "
-                    f"loaded taxels read, {loaded.low:.3g} to {loaded.high:.3g}"
+                    f"{loaded.within} of the encoder's levels {are(loaded.within)} within the range that loaded taxels "
+                    f"read, {loaded.low:.3g} to {loaded.high:.3g}"
                 )
                 changes = {"fit_levels": True}
                 yield by_option("levels", label, wrong, measured, "--set fit_levels=true", changes=changes)
         because, option, arguments = self._of_tare
         if because:
-            advice = option if arguments else "another tare, of the time just before (--tare FILE)"
-            measured = f"of the tare: {because}" + ("" if arguments else f"; {_MAKES_TARE} makes that file, a .npz")
+            advice = option if arguments else "a tare of the time just before (--tare FILE)"
+            measured = because + ("" if arguments else f"; {_MAKES_TARE} makes that file, a .npz")
             yield Cause("tare", (label,), wrong, measured, advice, option, arguments)
         yield from self._begun_loaded(label, wrong)
 
@@ -404,9 +405,9 @@ def of_weak_bursts(examples: Sequence[Example], label: str, alignment: Alignment
     times, most = max(_LONGER, key=lambda k: np.median([burst.by[k] for burst in weak])), weak[0].window_ms
     present, longer = (np.median([burst.by[k] for burst in weak]) for k in (1, times))
     measured = (
-        f"{counted(len(weak), 'burst')} {are(len(weak))} weaker than the level that {label} is "
-        f"learnt from, at the median {events:.0f} events in {most:g} ms where the rest has {rest:.0f}: {present:.3g} "
-        "times its noise"
+        f"{counted(len(weak), 'burst')} {are(len(weak))} weaker than the level that {label} is learnt from: the median "
+        f"has {events:.0f} events in {most:g} ms, and the rest {rest:.0f}; this is {present:.3g} times the noise of "
+        "the rest"
     )
     advice = ""
     if times > 1:

@@ -117,7 +117,7 @@ class Outcome(NamedTuple):
             return ""
         noun = "with an input outside what was seen in training"
         if self.outside is None:
-            return f"detections {noun}: unknown, as the readout's file does not hold the range"
+            return f"detections {noun}: unknown, because the readout's file does not state the range"
         return f"detections {noun}: {self.outside} of {len(self.found)} ({self.outside / len(self.found):.0%})"
 
     @property
@@ -235,5 +235,5 @@ def unit_of(examples: Sequence[Example]) -> str | None:
     for k, unit in enumerate(units):
         if unit != units[0]:
             difference = f"{name_of(k, examples[k])} is in {unit}, {name_of(0, examples[0])} in {units[0]}"
-            raise ProblemError(f"{difference}: must be in one unit, as a readout learns values of one only")
+            raise ProblemError(f"{difference}: must be in one unit, because a readout learns values of one unit only")
     return units[0]

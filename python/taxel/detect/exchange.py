@@ -106,8 +106,8 @@ def lost(readout: Parts) -> list[str]:
     if any(neuron.theta_plus > 0 for neuron in neurons):
         lines.append("the rise of the threshold by a spike")
     lines.append(
-        f'after_spike="{readout.after_spike}": a NIR neuron falls to 0 and keeps its current; first spikes agree, later'
-        " ones need not"
+        f'after_spike="{readout.after_spike}": a NIR neuron falls to 0 and keeps its current; its first spike is that '
+        "of taxel's neuron, later spikes may differ"
     )
     if readout.time == "continuous":
         lines.append("continuous time: a simulator has a time step, and fires up to one step later")
@@ -295,7 +295,7 @@ def _parts(
     """Return a readout's parts from nodes; the rest comes from the caller, the metadata, or by default."""
     encoder = encoder or (stored.encoder if stored is not None else None)
     if encoder is None:
-        raise ProblemError("NIR holds no encoder: give encoder=")
+        raise ProblemError("a NIR file has no encoder: give encoder=")
     _check_ungraded(encoder)
     weights, delays_ms, nir_neurons = _layers(graph)
     spike_s = None if spike_ms is None else spike_ms / 1000.0

@@ -64,7 +64,7 @@ _MOST_WAIT_MS = 100.0
 #: Where a neuron waits for its first inputs, those of this share of the labels have come.
 _MOST_LABELS = 0.9
 #: Why events cannot be learnt that have too few inputs.
-UNLEARNT = "cannot be learnt, as too few input spikes come before them"
+UNLEARNT = "cannot be learnt, because too few input spikes come before them"
 #: With so many of the quantities that follow the labels best a point is tried.
 _FOLLOWED = 2
 
@@ -359,7 +359,7 @@ def _waits(label: str, planned: Fitting, early: ConeR, later: Fitting) -> str:
     count, more_ms = len(early.unreachable_), later.delay_ms - planned.delay_ms
     return (
         f"{label}: {count} of {counted(planned.count, 'label')} {'comes' if count == 1 else 'come'} before the first "
-        f"input, for which the neuron waits: it is known {more_ms:.3g} ms later"
+        f"input: the neuron waits for this input, and {label} is known {more_ms:.3g} ms later"
     )
 
 
@@ -538,8 +538,9 @@ class Fitting:
         for k in np.flatnonzero(np.diff(times) <= to_us(refractory_ms))[:1]:
             before, t = times[k : k + 2].tolist()
             raise ProblemError(
-                f"{self._label}: {name} has one at {t} us, {t - before} us after the one before; must be more than "
-                f"{refractory_ms:g} ms apart, as it fires once in that time. Are times in us, and each there once?"
+                f"{self._label}: {name} has a label at {t} us, {t - before} us after the label before; labels must be "
+                f"more than {refractory_ms:g} ms apart, because the neuron fires once in that time. Are times in us, "
+                "and is each there once?"
             )
 
     def _check_felt(self, trains: Sequence[SpikeTrains]) -> None:
@@ -629,7 +630,9 @@ def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     outside = times[(times < source.start) | (times > source.stop + SILENCE_MS)]
     if len(outside):
         at, start, stop = (ms - _begin_ms(source) for ms in (outside[0], source.start, source.stop))
-        raise ProblemError(f"{name_of(k, example)}: {label} at {at:.3f} ms is outside it, {start:.3f} to {stop:.3f} ms")
+        raise ProblemError(
+            f"{name_of(k, example)}: {label} at {at:.3f} ms is outside the trains, {start:.3f} to {stop:.3f} ms"
+        )
     return events
 
 
@@ -653,7 +656,7 @@ def _inputs(k: int, example: Example, recipe: Recipe, label: str, array: Array |
         return trains
     received = encoder.places(names, array or Array(1, 1))
     if len(received) != len(trains):
-        trains_text = f"{counted(len(trains), 'train')}, the encoders make {len(received)}"
+        trains_text = f"{counted(len(trains), 'train')}, but the encoders make {len(received)}"
         raise ProblemError(f"{name_of(k, example)}: {trains_text}: must be equally many")
     return trains.select(received)
 
@@ -676,8 +679,8 @@ def _remarks(
         why = f"{UNLEARNT} ({listed})"
         if found > count - len(missed):
             yield (
-                f"the inputs of {len(missed)} of {counted(count, 'label')} come too late to fire by them ({listed}); "
-                f"the neuron fires later, and finds {found} of {count}"
+                f"the inputs of {len(missed)} of {counted(count, 'label')} come too late to fire at the label "
+                f"({listed}); the neuron fires later, and finds {found} of {count}"
             )
         elif count < TWO_FOLDS:
             there = f"there {are(count)} {counted(count, 'event')} to learn from"

@@ -304,8 +304,8 @@ def _choose(
         ways = _folds_for(label, examples, parts, folds) if isinstance(folds, int) else folds
         if not ways:
             warn(
-                f"{label}: too few events to choose its parameters on held-out data, as two folds need 4: the first of "
-                "the recipe's are taken",
+                f"{label}: too few events to choose its parameters on held-out data, because two folds need 4: the "
+                "recipe's first parameters are used",
                 stacklevel=4,
             )
         else:
@@ -446,13 +446,13 @@ def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
     recordings = len(_group(examples, parts))
     most = min(_MOST, counts[rarest] // 2, *([recordings] if recordings > 1 else []))
     if most < 2:
-        return 0, f"{counted(counts[rarest], 'label')} of {rarest}, and two folds need 4"
+        return 0, f"{counted(counts[rarest], 'label')} of {rarest}, but two folds need 4"
     for count in range(most, 1, -1):
         lacking = [_lacks(examples, fold.train, counts) for fold in _split(examples, parts, count)]
         if not any(lacking):
             return count, ""
     where = "recording" if recordings > 1 else "stretch of the recording"
-    return 0, f"every {next(filter(None, lacking))} is in one {where}"
+    return 0, f"all events {next(filter(None, lacking))} are in the same {where}"
 
 
 def _lacks(examples: Sequence[Example], parts: Sequence[Part], labels: Iterable[str]) -> str | None:

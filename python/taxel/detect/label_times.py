@@ -72,10 +72,10 @@ class Off(NamedTuple):
         side = "after" if self.ms > 0 else "before"
         if self.changes_from_label:
             return (
-                f"the load changes after the labels, and is felt {abs(self.ms):.0f} ms behind {self.alike} of "
-                f"{self.labels} (median): slowly, the labels are not off"
+                f"the load changes slowly after the labels, and is felt {abs(self.ms):.0f} ms after {self.alike} of "
+                f"{self.labels} (median): the labels are not off"
             )
-        hand = f" and within {self.within_ms:.0f} ms of that, as keys pressed live" if self.within_ms else ""
+        hand = f" and within {self.within_ms:.0f} ms of that, like keys pressed live" if self.within_ms else ""
         return f"{self.alike} of {self.labels} are {abs(self.ms):.0f} ms {side} what the sensor felt (median){hand}"
 
 

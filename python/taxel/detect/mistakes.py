@@ -244,10 +244,10 @@ class Measured:
                 yield cause
         events = self._scores[label].events
         if len(left.false) > max(1, _FAR_MORE * events) and 2 * explained < count:
-            measured = f"{len(left.false)} detections are false, of {counted(events, 'label')}"
-            if events:
-                measured += f": {len(left.false) / events:.3g} times as many"
-            yield Cause("many_false", (label,), len(left.false), measured, "")
+            false = len(left.false)
+            more = f"{false / events:.3g} times as many as the labels ({events})" if events else "there are no labels"
+            measured = f"{false} detections are false: {more}"
+            yield Cause("many_false", (label,), false, measured, "")
 
     def _differs(self, left: _Times) -> bool:
         """Whether most of what is wrong is in examples that differ from the training."""
@@ -262,7 +262,7 @@ class Measured:
         places = np.unique(np.concatenate([_example_of(t)[here] for t, here in zip(left, members, strict=True)]))
         measured = "; ".join(of_names([("", text) for k in places for text in self._differences[k]], 1))
         count = sum(int(here.sum()) for here in members)
-        advice = "a training that has such recordings too"
+        advice = "to train on recordings like these too"
         return Cause("unlike_training", (label,), count, measured, advice), left.without(*members)
 
     def _wrong(self, label: str, *, is_missed: bool) -> NDArray[np.int64]:
@@ -297,7 +297,7 @@ class Measured:
             return None
         parts = [f"{missed} of {len(inside)} missed {are(missed)} where the recording has no frames"] if missed else []
         parts += [f"{false} of {len(behind)} false {are(false)} at the first frames behind such a gap"] if false else []
-        measured = f"{', and '.join(parts)}, as {first}"
+        measured = f"{', and '.join(parts)}, for example {first}"
         return Cause("gaps", (label,), missed + false, measured, ""), left.without(inside, behind)
 
     def _slow(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
@@ -320,7 +320,7 @@ class Measured:
         count = int(here.sum())
         measured = (
             f"{count} of {len(left.missed)} missed have a false detection "
-            f"{ranged(later_ms[here].min(), later_ms[here].max())} ms later, as the load "
+            f"{ranged(later_ms[here].min(), later_ms[here].max())} ms later, because the load "
             f"{'falls' if falls else 'rises'} slowly: {label} is felt later there"
         )
         is_missed, is_false = _at(events[here], left.missed), _at(detected[here], left.false)
@@ -382,7 +382,10 @@ class Measured:
             return Cause(kind, names, count + len(false), measured, advice, option, arguments)
 
         if stretch:
-            advice = f"labels {stretch} {abs(round(ms, -1)):.0f} ms {side}, if the clock of the recording is right"
+            advice = (
+                f"to move the labels {stretch} {abs(round(ms, -1)):.0f} ms {side}, "
+                "if the clock of the recording is right"
+            )
             return cause(f"{measured}, all {stretch}", advice)
         fits = [name for name, part in self._scores.items() if name not in names and 2 * part.found > part.events]
         if fits:
@@ -397,7 +400,8 @@ class Measured:
             measured += f", the other {len(labels) - count} of {len(labels)} labels do not"
             more = f" and in {counted(len(where) - 1, 'other recording')} alike" if len(where) > 1 else ""
             shifted = (
-                f"labels {where[0]}{more} {abs(round(ms, -1)):.0f} ms {side}, if the clock of the recording is right"
+                f"to move the labels {where[0]}{more} {abs(round(ms, -1)):.0f} ms {side}, if the clock of the "
+                "recording is right"
             )
             return cause(measured, shifted if all(where) else "")
         fitting = self._fitting(labels, false)
@@ -462,7 +466,7 @@ class Measured:
             return None
         measured = (
             f"{count} of {counted(len(left.false), 'false detection')} of {label} {are(count)} within {reach_ms:g} ms "
-            f"of labels of {name}: these inputs do not tell them apart"
+            f"of labels of {name}: these inputs do not distinguish the two"
         )
         cause = Cause("other_name", (label,), count, measured, "")
         return cause, left.without(np.zeros(len(left.missed), np.bool_), at)
@@ -486,21 +490,22 @@ class Measured:
         parts = []
         if count:
             parts.append(
-                f"{count} of {len(strong)} false {are(count)} in loads without a label of {label}, as strong as others"
+                f"{count} of {len(strong)} false {are(count)} in loads without a label of {label} that are as strong "
+                "as labelled loads"
             )
         if n := int(unfelt.sum()):
             parts.append(
                 f"{n} of {len(unfelt)} missed {are(n)} more than {WINDOW_MS:.0f} ms from where a load begins or ends"
             )
         times = left.false[strong] if count else left.missed[unfelt]
-        measured = f"{', and '.join(parts)}, as at {self._places(times)}"
+        measured = f"{', and '.join(parts)}, for example at {self._places(times)}"
         is_most = 2 * count >= left.total
         cause = Cause(
             "unlabelled_loads" if count else "unfelt_labels",
             (label,),
             mistakes,
             measured,
-            "labels of these loads too" * is_most,
+            "to label these loads too" * is_most,
         )
         return cause, left.without(unfelt, strong)
 
@@ -514,7 +519,7 @@ class Measured:
             return None
         measured = (
             f"{count} of {len(inside)} false {are(count)} inside a load, more than {WINDOW_MS:.0f} ms from where it "
-            f"begins or ends, as at {self._places(left.false[inside])}"
+            f"begins or ends, for example at {self._places(left.false[inside])}"
         )
         cause = Cause("unlabelled_loads", (label,), count, measured, "")
         return cause, left.without(np.zeros(len(left.missed), np.bool_), inside)
@@ -541,23 +546,23 @@ def _of_clock(cause: Callable[..., Cause], ms: float, measured: str, fits: str) 
         side, back, is_late, was = back, side, was, is_late
     if fits == "detections":
         measured += "; the detections are where loads begin or end, the labels are not"
-        return cause(measured, f"labels {distance} {side} (--shift-ms {shift_ms})", f"--shift-ms {shift_ms}")
+        return cause(measured, f"to move the labels by {shift_ms} ms (--shift-ms {shift_ms})", f"--shift-ms {shift_ms}")
     if fits == "labels":
-        measured += f"; the labels are where loads begin or end: those of the training were {was}"
-        advice = f"a training on labels {distance} {back} (taxel train --shift-ms {-shift_ms})"
+        measured += f"; the labels are where loads begin or end: the labels of the training were {was}"
+        advice = f"to train on labels that are {distance} {back} (taxel train --shift-ms {-shift_ms})"
         return cause(measured, advice, kind="shifted_training")
-    measured += f": either these labels are {is_late} or those of the training were {was}"
-    advice = f"a look at where a load begins (taxel view); --shift-ms {shift_ms} moves these labels"
+    measured += f": either these labels are {is_late} or the labels of the training were {was}"
+    advice = f"to look where a load begins (taxel view); --shift-ms {shift_ms} moves these labels"
     return cause(measured, advice, f"--shift-ms {shift_ms}")
 
 
 def overlapping(label: str, count: int, labels: int, mistakes: int) -> Cause:
     """Return the cause that labels are within a load of several."""
     measured = (
-        f"{count} of {counted(labels, 'label')} of {label} {are(count)} while another load lasts; the recipe tells the "
-        "first begin and the last end of loads that overlap"
+        f"{count} of {counted(labels, 'label')} of {label} {are(count)} at times when another load lasts; if loads "
+        "overlap, the recipe detects only the first begin and the last end"
     )
-    advice = "a source or a region for each load, as left and right"
+    advice = "a separate source or region for each load, for example left and right"
     return Cause("overlapping_loads", (label,), mistakes, measured, advice)
 
 
@@ -587,7 +592,7 @@ def stretch_of(labels: NDArray[np.int64], members: NDArray[np.bool_], examples: 
         return _of(example, examples).replace(" of", "in", 1)
     where = f"from {begin_s:.1f} to {end_s:.1f} s"
     if starts or ends:
-        where = f"from {begin_s:.1f} s on" if ends else f"until {end_s:.1f} s"
+        where = f"from {begin_s:.1f} s to the end" if ends else f"until {end_s:.1f} s"
     return where + _of(example, examples)
 
 

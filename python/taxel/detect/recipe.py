@@ -321,7 +321,7 @@ class Recipe:
         labels: Sequence[str] | None = None,
         noise_floor: float | None = None,
     ) -> Recipe:
-        """Load one of `taxel.detect.recipes.names`, or a TOML or JSON file, whose path holds a dot or a slash.
+        """Load one of `taxel.detect.recipes.names`, or a TOML or JSON file, whose path contains a dot or a slash.
 
         Parameters
         ----------
@@ -430,7 +430,7 @@ def change_values(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[st
         for table in tables:
             inner = inner.setdefault(table, {})
             if not isinstance(inner, dict):
-                raise ProblemError(f"{key}: {table} is a value and holds no other")
+                raise ProblemError(f"{key}: {table} is a value, so it has no keys")
         inner[last] = value
     return values
 
@@ -441,8 +441,8 @@ def _check_age(location: str, delay_ms: float, encoder: Encoder) -> None:
     if ages is not None and round(to_us(delay_ms)) not in {round(to_us(age)) for age in ages}:
         listed = ", ".join(f"{age:g}" for age in ages)
         raise ProblemError(
-            f"{location}: delay_ms is {delay_ms:g}, and the encoder's ages_ms are {listed}: must be one of them, as a "
-            "neuron is trained to fire where an age begins"
+            f"{location}: delay_ms is {delay_ms:g}, but the encoder's ages_ms are {listed}: must be one of them, "
+            "because a neuron is trained to fire where an age begins"
         )
 
 

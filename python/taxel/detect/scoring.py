@@ -360,7 +360,7 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
     if widths.ndim > 1 or (widths.ndim == 1 and len(widths) != len(labels)):
         raise refused(
             "window_ms",
-            f" has shape {widths.shape}: must be one number, or one each of {counted(len(labels), 'event')}",
+            f" has shape {widths.shape}: must be one number, or one number for each of {counted(len(labels), 'event')}",
         )
     wrong = ~((widths >= 0) & (widths <= 3_600_000))
     if wrong.any():

@@ -143,7 +143,7 @@ class Unlike(NamedTuple):
     sensor: Sequence[str] = ()
     """Noise, touches and taxels: what may keep detections away, or make false ones."""
     detections: Sequence[str] = ()
-    """Touches without a detection, and detections that follow one another too soon or are of one label alone."""
+    """Touches without a detection, detections that follow one another too soon, and labels without a detection."""
 
     def lines(self) -> list[str]:
         """Return all as lines."""
@@ -172,7 +172,8 @@ def unlike(readout: _Detector, example: Example, found: Detections) -> Unlike:
     if measured is not None and (count := _moved(source, data["noise"], measured.reading)):
         # Touches are measured above the rest.
         sensor.append(
-            f"{counted(count, 'taxel')} end with other readings than they began: a drift, or a load that stays"
+            f"{counted(count, 'taxel')} have other readings at the end than at the beginning: a drift, or a load that "
+            "stays"
         )
     elif measured is not None:
         sensor += _of_touches(data, measured, noisier, is_counts=is_counts)
@@ -185,9 +186,9 @@ def _of_noise(noisier: float, *, is_counts: bool) -> Iterator[str]:
     """Yield that the noise is so many times that of the training, if that is much more."""
     if is_counts and noisier**2 >= _NOISIER:
         # The variance of events by chance is their number.
-        yield f"events at rest are {noisier**2:.2g} times as many"
+        yield f"{noisier**2:.2g} times as many events at rest as in the training"
     elif not is_counts and noisier >= _NOISIER:
-        yield f"the noise at rest is {noisier:.2g} times as strong"
+        yield f"the noise at rest is {noisier:.2g} times as strong as in the training"
 
 
 def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *, is_counts: bool) -> Iterator[str]:
@@ -199,22 +200,23 @@ def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *,
     if larger:
         yield "{} x {} taxels, where the training had {} x {}".format(*measured.loaded.shape, *shape)
     if not touches and strength:
-        yield f"no load is {_TOUCH:g} times as strong as its touches"
+        yield f"no load reaches {_TOUCH:g} of the strength of the training's touches"
     # Much noise makes loads of its own.
     if noisier >= _MUCH_NOISE or not strength:
         return
     if touches >= _LEAST:
         ratio = _usual(measured.peaks[are_touches]) / strength
         if not _WEAKER <= ratio <= _STRONGER:
-            yield f"touches are {ratio:.2g} times as strong"
+            yield f"touches are {ratio:.2g} times as strong as in the training"
     elif touches and len(measured.rises) >= _LEAST:
-        yield f"most loads are less than {_TOUCH:g} times as strong as its touches"
+        yield f"most loads do not reach {_TOUCH:g} of the strength of the training's touches"
     # Hot pixels are the most loaded ones of counts.
     if touches >= _LEAST and not is_counts and not larger:
         touched = np.frombuffer(data["touched"].encode(), np.uint8).reshape(shape) == ord("1")
         never = int(np.count_nonzero(touched & ~_within(measured.reached, shape)))
         if never >= max(1.0, _FEWER * np.count_nonzero(touched)):
-            yield f"{never} of {counted(int(touched.sum()), 'taxel')} that touches loaded are never loaded"
+            trained = counted(int(touched.sum()), "taxel")
+            yield f"{never} of {trained} that touches of the training loaded are never loaded"
 
 
 def _undetected(data: Mapping[str, Any], measured: _Measured, found: Detections) -> Iterator[str]:
@@ -238,8 +240,7 @@ def _of_detections(apart_ms: Mapping[str, float], labels: Sequence[str], found: 
         if close > max(2.0, _MANY * len(t)):
             parts.append(
                 f"{close} of {len(t)} detections of {label} follow another within "
-                f"{three_digits(_CLOSE * shortest)} ms, half "
-                "the shortest time between its labels"
+                f"{three_digits(_CLOSE * shortest)} ms, half the shortest time between labels of the training"
             )
     counts = {label: sum(each == label for each in found.label) for label in labels}
     if max(counts.values(), default=0) >= _LEAST:

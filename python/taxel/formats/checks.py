@@ -110,7 +110,9 @@ def ascending(location: str, t: NDArray[np.int64], first_line: int | Callable[[i
         line = first_line(k) if callable(first_line) else first_line + k
         is_midnight = 0 <= t[k] < _NOON_US < t[k - 1] <= 2 * _NOON_US
         hint = "; if these are times of day, they begin again at midnight: write dates too" if is_midnight else ""
-        raise FormatError(f"{location}, line {line}: time {in_s(t[k])} s does not ascend from {in_s(t[k - 1])} s{hint}")
+        raise FormatError(
+            f"{location}, line {line}: time {in_s(t[k])} s is not after {in_s(t[k - 1])} s, the time before{hint}"
+        )
     return t
 
 

@@ -111,14 +111,17 @@ def _read(file: Path) -> Trial:
     for first, lines in _pages(len(above) + 1, begin, content):
         page, indices, cells = _page(file, lines, first, shape)
         if pages and page.number <= pages[-1].number:
-            raise FormatError(f"{file.name}, line {page.line}: frame {page.number} after frame {pages[-1].number}")
+            raise FormatError(
+                f"{file.name}, line {page.line}: frame {page.number} follows frame {pages[-1].number}; numbers must "
+                "ascend"
+            )
         frame = np.zeros((1, *shape), np.float32)
         frame[0][np.ix_(*indices)] = cells
         read.add(values=frame)
         pages.append(page)
     t = np.rint(to_us((np.array([page.number for page in pages], np.float64) - 1) * period))
     if t[-1] > TIME_US or (np.diff(t) <= 0).any():
-        raise FormatError(f"{file.name}: {period:g} ms a frame; must be .001 ms or more, and end within 142 years")
+        raise FormatError(f"{file.name}: {period:g} ms per frame; must be .001 ms or more, and end within 142 years")
     # The size is named as the matrix is: across first.
     array = Array(*shape, pitch_mm=(10 * size[1], 10 * size[0]), name="emed plate")
     return Trial(
@@ -143,11 +146,13 @@ def _head(file: Path, content: Sequence[str], first: int) -> tuple[tuple[int, in
     values = {name: tuple(float(n) for n in match.groups()) for name, match in matches.items() if match is not None}
     for name, numbers in values.items():
         if min(numbers) <= 0:
-            raise FormatError(f"{file.name}, line {first + 1}: before it a {name} of 0; must be as '{expected[name]}'")
+            raise FormatError(
+                f"{file.name}, line {first + 1}: before it a {name} of 0; must be like '{expected[name]}'"
+            )
     # The columns are named first, so the printed rows begin after the first number.
     columns, rows = (int(n) for n in values["matrix"])
     if max(rows, columns) > 65_535:
-        raise FormatError(f"{file.name}: a matrix of {columns} x {rows}; at most 65535 a side")
+        raise FormatError(f"{file.name}: a matrix of {columns} x {rows}; at most 65535 on each side")
     sensor(file.name, Array(rows, columns))
     return (rows, columns), (values["size"][0], values["size"][1]), values["period"][0]
 

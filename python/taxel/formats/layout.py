@@ -86,7 +86,7 @@ class Table:
         if len(text("separator", self.separator)) != 1:
             raise refused("separator", f" is {shown(self.separator)}: must be one character")
         if text("decimal", self.decimal, (".", ",")) == self.separator:
-            raise refused("decimal", f" is {shown(self.decimal)}, and so is separator: must differ")
+            raise refused("decimal", f" is {shown(self.decimal)}, and separator is too: they must differ")
         for column in several("columns", self.columns):
             text("columns", column)
         _check_end(self)
@@ -137,7 +137,7 @@ def _column(name: str, value: object) -> None:
 
 @dataclass(frozen=True)
 class Data:
-    """Name the array of another program's .npz or .h5 that holds the frames; a .npy holds one array without a name.
+    """Name the array of another program's file that holds the frames; a .npy holds one array without a name.
 
     Parameters
     ----------
@@ -146,6 +146,8 @@ class Data:
     time : str, optional
         An array with a time for each frame; default: none.
     time_unit : {"s", "ms", "us", "ns"}
+    frames : {"first", "last"}
+        Which axis of the array counts frames; MATLAB's are often (rows, columns, frames) or (taxels, frames).
 
     Raises
     ------
@@ -155,12 +157,14 @@ class Data:
     array: str | None = None
     time: str | None = None
     time_unit: str = "s"
+    frames: str = "first"
 
     def __post_init__(self) -> None:
         for name in ("array", "time"):
             if getattr(self, name) is not None:
                 text(name, getattr(self, name))
         text("time_unit", self.time_unit, UNITS_US)
+        text("frames", self.frames, ("first", "last"))
 
 
 @dataclass(frozen=True)

@@ -143,7 +143,7 @@ def _is_there(row: Sequence[str], columns: list[int], names: list[str], file: Pa
     """Return whether a foot has values in a row; a row that has some of them is an error."""
     empty = [c for c in columns if not row[c].strip()]
     if empty and len(empty) < len(columns):
-        raise FormatError(f"{file.name}, line {line}: {names[empty[0]]} is empty, other cells of that foot are not")
+        raise FormatError(f"{file.name}, line {line}: {names[empty[0]]} is empty, but other cells of this foot are not")
     return not empty
 
 

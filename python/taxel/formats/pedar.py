@@ -73,7 +73,8 @@ def _read(file: Path) -> Iterator[Trial]:
     begins = [k for k, name in enumerate(names) if name == "1"]
     if len(begins) != 2:
         raise FormatError(
-            f"{file.name}, line {head + 1}: numbers begin at 1 {len(begins)} times; two insoles begin twice"
+            f"{file.name}, line {head + 1}: the numbers of the columns begin at 1 {len(begins)} times; must be twice, "
+            "for two insoles"
         )
     feet = {"left": slice(begins[0], begins[1]), "right": slice(begins[1], len(names))}
     shapes: dict[str, Any] = {foot: ((len(names[part]),), np.float32) for foot, part in feet.items()}

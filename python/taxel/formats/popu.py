@@ -51,7 +51,9 @@ def trials(path: str | Path) -> Iterator[Trial]:
         arrays = read_arrays(file, ("readings", "pose"))
         readings, names = arrays["readings"], arrays["pose"]
         if readings.ndim != 4 or readings.dtype.kind not in "ui" or names.shape != readings.shape[:1]:
-            raise FormatError(f"{file.name}: readings must be poses x snapshots x rows x columns, with a name a pose")
+            raise FormatError(
+                f"{file.name}: readings must be poses x snapshots x rows x columns, with a name for each pose"
+            )
         array = Array(readings.shape[2], readings.shape[3], name="bed mat")
         for name, frames in zip(names, readings, strict=True):
             match = _NAME.fullmatch(str(name))

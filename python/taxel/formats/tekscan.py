@@ -214,10 +214,10 @@ def _frames(file: Path, content: Iterator[str], begin: int, rows: int) -> Iterat
             return
         match = _FRAME.fullmatch(line)
         if match is None or len(match[1]) > 15:
-            raise FormatError(f"{file.name}, line {at}: {arguments.shown(line)}; must begin a frame, as 'Frame 7'")
+            raise FormatError(f"{file.name}, line {at}: {arguments.shown(line)}; must begin a frame, like 'Frame 7'")
         number = int(match[1])
         if before and number <= before:
-            raise FormatError(f"{file.name}, line {at}: frame {number} after frame {before}")
+            raise FormatError(f"{file.name}, line {at}: frame {number} follows frame {before}; numbers must ascend")
         lines = list(islice(content, rows))
         if len(lines) < rows:
             raise FormatError(

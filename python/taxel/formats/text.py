@@ -89,7 +89,7 @@ def stream(path: Path) -> Iterator[str]:
         # A carriage return at the end of a piece may be half of a line end.
         end = max(data.rfind(b"\n"), data.rfind(b"\r", 0, len(data) - 1)) + 1
         if len(data) - end > LINE:
-            raise FormatError(f"{path.name}, line {number}: more than {LINE} bytes; at most that are read")
+            raise FormatError(f"{path.name}, line {number}: more than {LINE} bytes; at most {LINE} are read")
         found = _lines(path, data[:end], begin)
         empty += found.count("") + sum(map(str.isspace, found))
         if empty > _EMPTY:
@@ -156,7 +156,7 @@ def beginning(path: Path, most: int = _BEGINNING) -> list[str]:
     data = _bytes(path, most)
     ended = data if len(data) < most else data[: max(data.rfind(b"\n"), data.rfind(b"\r", 0, -1)) + 1]
     if not ended and len(data) > LINE:
-        raise FormatError(f"{path.name}, line 1: more than {LINE} bytes; at most that are read")
+        raise FormatError(f"{path.name}, line 1: more than {LINE} bytes; at most {LINE} are read")
     return _lines(path, ended.removeprefix(_UTF_8))
 
 

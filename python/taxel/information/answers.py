@@ -173,7 +173,8 @@ class Answer:
         if estimate.right < least:
             lines.append(
                 f"{100 * estimate.right:.0f} % are classified correctly, guessing gives {100 * guessed:.0f} %: the "
-                "bits are those of wrong answers" + (", as where a group has mostly one label" if self.groups else "")
+                "bits are from the wrong answers"
+                + (", for example if a group has mostly one label" if self.groups else "")
             )
         if not self.empty:
             lines += [

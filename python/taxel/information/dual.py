@@ -45,11 +45,11 @@ def residual(square: NDArray[np.float64], level: float) -> NDArray[np.float64]:
     if level < least:
         raise refused(
             "ridge",
-            f": {level:.3g} in the unit of inner products is lost in their rounding; must be {least:.3g} at least",
+            f": {level:.3g} in the unit of inner products is lost in their rounding; must be at least {least:.3g}",
         )
     factor, fault = scipy.linalg.lapack.dpotrf(centred / level + np.eye(trials), lower=1, clean=1)
     if fault:
-        raise refused("grams", ": a matrix has a direction of negative length, so it is of no inner product")
+        raise refused("grams", ": a matrix has a direction of negative length, so it is not a matrix of inner products")
     inverse = scipy.linalg.lapack.dpotri(factor, lower=1, overwrite_c=1)[0]
     return np.asarray(inverse + np.tril(inverse, -1).T - 1 / trials)
 

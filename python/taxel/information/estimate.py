@@ -187,7 +187,8 @@ def estimate(
     row, column = numbered(classes, truth), numbered(classes, answered)
     if len(np.unique(row)) < 2:
         raise refused(
-            "labels", f" are all {shown(truth[0].item())}: must be two at least, or there is nothing to distinguish"
+            "labels",
+            f" are all {shown(truth[0].item())}: must be at least two, otherwise there is nothing to distinguish",
         )
     belongs = None if groups is None else belonging(groups, len(truth))
     cells = row * len(classes) + column
@@ -275,14 +276,14 @@ def zero_test(
     belongs = None if groups is None else belonging(groups, len(truth))
     there = finite("found", found)
     if not len(truth):
-        raise refused("labels", " is []: must hold a trial at least")
+        raise refused("labels", " is []: must hold at least one trial")
     classes, row = np.unique(truth, return_inverse=True)
     bits = []
     for _ in range(integer("shuffles", shuffles, 1)):
         mixed = _shuffled(row, belongs, random)
         answered = np.searchsorted(classes, words("responses", answer(classes[mixed])))
         if answered.shape != row.shape or answered.max() >= len(classes):
-            raise refused("answer", " does not return one of the labels a trial")
+            raise refused("answer", " does not return one of the labels for each trial")
         bits.append(
             float(panzeri_treves(_tables(mixed * len(classes) + answered, np.ones((1, len(row))), len(classes))[0]))
         )
@@ -417,5 +418,5 @@ def _warnings(least: int, relevant: float, interval: tuple[float, float], tenth:
         )
     half = (interval[1] - interval[0]) / 2
     if half > 0.1:
-        lines.append(f"uncertain by {half:.2f} bit: a tenth needs some {tenth} trials")
+        lines.append(f"uncertain by {half:.2f} bit: for a tenth, about {tenth} trials are needed")
     return tuple(lines)

@@ -49,16 +49,16 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
     classes, row = np.unique(truth, return_inverse=True)
     if len(classes) < 2:
         values = f"all {shown(truth[0].item())}" if len(truth) else "[]"
-        raise refused("labels", f" are {values}: must be two at least, or there is nothing to distinguish")
+        raise refused("labels", f" are {values}: must be at least two, otherwise there is nothing to distinguish")
     if groups is None:
         if len(truth) < parts:
             raise ProblemError(
-                f"{counted(len(truth), 'trial')} for {counted(parts, 'fold')}: must be a trial a fold at least"
+                f"{counted(len(truth), 'trial')} for {counted(parts, 'fold')}: must be at least one trial per fold"
             )
         alone = np.flatnonzero(np.bincount(row) < 2)
         if len(alone):
             raise ProblemError(
-                f"label {shown(classes[alone[0]].item())} has one trial: must be two at least, to be trained and tested"
+                f"label {shown(classes[alone[0]].item())} has one trial: must be at least two, to be trained and tested"
             )
         return _dealt(row, parts, random)
     belongs = belonging(groups, len(truth))

@@ -89,7 +89,7 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
     if not 0 < part < 1:
         raise refused("share", f" is {shown(share)}: must be between 0 and 1")
     if len(a) != len(b):
-        raise ProblemError(f"estimates of {len(a)} and {len(b)} trials: must be of the same")
+        raise ProblemError(f"estimates of {len(a)} and {len(b)} trials: must be of the same trials")
     belongs = np.arange(len(a)) if groups is None else belonging(groups, len(a))
 
     def error_of(by_trial: NDArray[np.float64]) -> float:

@@ -221,10 +221,10 @@ class Matrices:
     def __init__(self, grams: object, features: object) -> None:
         self.squares = [gram_matrix(gram) for gram in several("grams", grams)]
         if not self.squares:
-            raise refused("grams", " is []: must hold a matrix at least")
+            raise refused("grams", " is []: must hold at least one matrix")
         self.trials = len(self.squares[0])
         if any(len(gram) != self.trials for gram in self.squares):
-            raise refused("grams", f" are of {[len(gram) for gram in self.squares]} trials: must all be of the same")
+            raise refused("grams", f" are of {[len(gram) for gram in self.squares]} trials: must be equally many")
         self.features = [integer("features", count, 1) for count in several("features", features)]
         if len(self.features) != len(self.squares):
             raise refused("features", f" has {len(self.features)} entries: must be {len(self.squares)}, one per matrix")

@@ -55,14 +55,14 @@ class Question:
 
     def __post_init__(self) -> None:
         if not self.trials:
-            raise refused("trials", " is []: must hold one at least")
+            raise refused("trials", " is []: must hold at least one")
         shape = self.trials[0].array.shape
         differing = next((trial for trial in self.trials if trial.array.shape != shape), None)
         if differing is not None:
             sizes = " x ".join(map(str, differing.array.shape)), " x ".join(map(str, shape))
             raise ProblemError(
-                f"{differing.name}: is of an array of {sizes[0]}, {self.trials[0].name} of {sizes[1]}: must all be "
-                "of one"
+                f"{differing.name}: is of an array of {sizes[0]}, {self.trials[0].name} of {sizes[1]}: must all be of "
+                "one size"
             )
         self.labels = np.array([trial.label for trial in self.trials])
         groups = [trial.group for trial in self.trials]
@@ -85,7 +85,7 @@ class Question:
             reach = to_us(number("window_ms", self.window_ms))
             if not self.finest <= reach < 1e12:
                 raise refused(
-                    "window_ms", f" is {shown(self.window_ms)}: must be {to_ms(self.finest):g} at least, and below 1e9"
+                    "window_ms", f" is {shown(self.window_ms)}: must be at least {to_ms(self.finest):g}, and below 1e9"
                 )
         self.contact = contacts(self.trials, self.held, self.encoder, self.finest, reach)
         if np.isnan(self.contact).all():
@@ -103,7 +103,8 @@ class Question:
         if np.isfinite(reach) and (lengths < self.window_us).any():
             short = int((lengths < self.window_us).sum())
             self.notes.append(
-                f"{counted(short, 'trial')} shorter than {to_ms(self.window_us):g} ms: late events may tell the length"
+                f"{counted(short, 'trial')} shorter than {to_ms(self.window_us):g} ms: late events may show how long a "
+                "trial is"
             )
 
     def set_out(
@@ -147,7 +148,7 @@ class Question:
         there = len(self.active)
         numbers = [integer("taxels", n, 1) for n in several("taxels", (10, 30, 100, 300) if taxels is None else taxels)]
         if taxels is not None and any(n > there for n in numbers):
-            raise refused("taxels", f" is {shown(taxels)}: {there} of the array's ever send an event")
+            raise refused("taxels", f" is {shown(taxels)}: only {there} taxels of the array send events")
         self.random_taxels = [n for n in numbers if n < there]
         sides = [integer("pools", n, 2) for n in several("pools", (2, 4, 7) if pools is None else pools)]
         rows, columns = self.trials[0].array.shape

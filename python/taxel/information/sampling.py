@@ -327,7 +327,7 @@ def checked_periods(periods_us: Sequence[int], finest: int) -> list[int]:
     """Return the periods, ascending; refuse one that is finer than the recording."""
     periods = sorted(set(periods_us))
     if not periods:
-        raise ProblemError("periods is []: must name one at least")
+        raise ProblemError("periods is []: must name at least one")
     if periods[0] < finest:
         raise ProblemError(
             f"period {to_ms(periods[0]):g} ms is finer than the recordings, which show {to_ms(finest):g} ms at best"

@@ -169,7 +169,7 @@ def read_trials(
         _inside(trials[-1], recording.name, spans[id(recording)], window_us)
     if any(trial.group for trial in trials) and not all(trial.group for trial in trials):
         nameless = next(trial for trial in trials if not trial.group)
-        raise ProblemError(f"{nameless.name}: group is empty; give every trial one, or none")
+        raise ProblemError(f"{nameless.name}: group is empty; give every trial a group, or none")
     _apart(trials, window_us)
     return trials
 

@@ -42,11 +42,11 @@ def checked_examples(
         raise ProblemError(
             f"{counted(len(trained), 'pattern')}, {counted(len(times), 'list')} of targets"
             + f" and {len(silences)} of silence" * (silence is not None)
-            + ": must be one of each a pattern, and one pattern or more"
+            + ": must be one of each per pattern, and one pattern or more"
         )
     for p, pattern in enumerate(trained):
         if len(pattern) != trains:
-            raise ProblemError(f"pattern {p}: {counted(len(pattern), 'train')}, must be the {trains} of the fit")
+            raise ProblemError(f"pattern {p}: {counted(len(pattern), 'train')}, must be {trains}, as in the fit")
         if pattern.kind == "signed":
             raise ProblemError(f"pattern {p}: spikes are signed, split them into ON and OFF trains first")
         for k in np.flatnonzero(~((pattern.start <= times[p]) & (times[p] <= pattern.stop)))[:1]:

@@ -38,5 +38,5 @@ def windows(name: str, given: object) -> NDArray[float64] | None:
         return None
     ends = numbers(name, given, np.float64, "ms")  # type: ignore[arg-type]
     if ends.size and (ends.ndim != 2 or ends.shape[1] != 2):
-        raise refused(name, f" has shape {ends.shape}: must hold windows, a start and a stop each")
+        raise refused(name, f" has shape {ends.shape}: must hold windows, each with a start and a stop")
     return ends.reshape(-1)

@@ -85,7 +85,7 @@ class SpikeLearner(Learner):
         weights, fit = self._fitted(), vars(self)
         if fit.get("status_") == "infeasible":
             raise ProblemError(
-                "the fit is infeasible: no weights meet its targets (status_, certificate_), so none can be run"
+                "the fit is infeasible: no weights meet its targets (status_, certificate_), so it cannot be run"
             )
         return [fit["neuron_"].run(weights, pattern) for pattern in patterns]
 

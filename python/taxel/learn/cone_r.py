@@ -382,7 +382,8 @@ def _weighed(name: str, count: int, trains: str) -> None:
     if count > _MOST_TRAINS:
         raise refused(
             name,
-            f": {count} {trains}, at most {_MOST_TRAINS} can be weighed, as memory grows with their square and time "
+            f": {count} {trains}, at most {_MOST_TRAINS} can be weighed, because memory grows with their square and "
+            "time "
             f"with their cube; take an encoder that pools taxels (taxel train --recipe touch, or --encoder "
             "contact_area), fewer levels, or a part of the array",
         )

@@ -119,7 +119,7 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
     missed, room, slope = 0.0, np.inf, np.inf
     lb, ub = (np.broadcast_to(np.asarray(bound, np.float64), len(w)) for bound in (cone.lb, cone.ub))
     out = np.flatnonzero((w < lb) | (w > ub))[:1]
-    wrong = [f"weight {n}: {w[n]} mV is outside of its bounds, {lb[n]} to {ub[n]} mV" for n in out]
+    wrong = [f"weight {n}: {w[n]} mV is outside its bounds, {lb[n]} to {ub[n]} mV" for n in out]
     unproven: list[str] = []
     touch, exponentials = _TOUCH * cone.neuron_.theta_0, _EXPONENTIALS
     for p, rows in enumerate(all_rows):

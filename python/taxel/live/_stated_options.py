@@ -92,7 +92,7 @@ class StatedOptions:
     )
     gap_frames: float = option(
         1.0,
-        "With version 2 of the wire: how many frames to wait at a gap in the sequence, as the data may only be late.",
+        "With version 2 of the wire: how many frames to wait at a gap in the sequence: the data may only be late.",
         least=0,
         commands="",
     )

@@ -100,7 +100,7 @@ class Live:
     guard_frames : float, 0 or more
         How far, in frames, a readout stays behind the host's clock while no events arrive.
     gap_frames : float, 0 or more
-        With version 2 of the wire: how many frames to wait at a gap in the sequence, as the data may only be late.
+        With version 2 of the wire: how many frames to wait at a gap in the sequence: the data may only be late.
     lines : bool
         Print one line of JSON for each detection, and nothing else.
     send : str or sequence of str
@@ -415,7 +415,7 @@ class Live:
         columns, rows = (numbers(name, value, np.int64).reshape(-1) for name, value in (("x", x), ("y", y)))
         if len(columns) != len(rows):
             raise refused(
-                "x", f" has {counted(len(columns), 'column')}, y {counted(len(rows), 'row')}: must be as many"
+                "x", f" has {counted(len(columns), 'column')}, y {counted(len(rows), 'row')}: must be equally many"
             )
         for name, indices in (("x", columns), ("y", rows)):
             if len(indices) and (indices.min() < 0 or indices.max() > _MOST_INDEX):

@@ -63,7 +63,9 @@ def receiver_of(address: str) -> Any:
     """
     scheme, colon, _ = text("address", address).partition(":")
     if not colon:
-        raise ProblemError(f"address {address!r}: must be zenoh:HOST:PORT/NAME, as zenoh:192.168.1.5:7447/left")
+        raise ProblemError(
+            f"address {address!r}: must be zenoh:HOST:PORT/NAME, for example zenoh:192.168.1.5:7447/left"
+        )
     for point in entry_points(group="taxel.remotes", name=scheme):
         return point.load()
-    raise DeviceError(f"{address}: nothing that is installed receives {scheme}: addresses; zenoh: needs taxel_bridge")
+    raise DeviceError(f"{address}: no installed package receives {scheme}: addresses; zenoh: needs taxel_bridge")

@@ -102,7 +102,9 @@ class Source:
         if len(wrong):
             row, column = (int(k) for k in wrong[0])
             value = float(values[row, column])
-            scaled = f"; scale readings to it first: np.rint(readings / full * {most}), full the greatest of them"
+            scaled = (
+                f"; scale readings to it first: np.rint(readings / full * {most}), where full is the greatest of them"
+            )
             raise refused(
                 "frame",
                 f": row {row}, column {column} is {plain(value)}; must be a whole number from 0 to {most} "

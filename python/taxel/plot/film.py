@@ -71,7 +71,7 @@ def film(
         raise refused("slower", f" is {slower:g}: must be above 0")
     writer = writer_of(target)
     if not len(events) or events.intensity is None:
-        raise refused("events", ": nothing to draw; a film is of events with intensities")
+        raise refused("events", ": nothing to draw; a film needs events with intensities")
     begin = events.markers[0][0] if events.markers else int(events.t[0])
     period_us = 1e6 / _RATE_HZ / slower
     events = events.sorted()

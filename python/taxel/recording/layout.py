@@ -184,7 +184,7 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_al
                 raise FormatError(f"{layout.path}: {name}: {error}") from None
         elif strict and len(t) > 1 and abs(layout.rate_hz * (step := _median_step(t)) / 1e6 - 1) > _SLACK:
             raise FormatError(
-                f"{layout.path}: states {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz"
+                f"{layout.path}: states {layout.rate_hz:g} Hz, but the times of {name} give {1e6 / step:g} Hz"
             )
     if full is not None:
         values = _writable(values)

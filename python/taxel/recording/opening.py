@@ -101,8 +101,8 @@ class OpenOptions(SharedOptions):
 
 def _no_camera(path: Path) -> ProblemError:
     return ProblemError(
-        f"{path}: holds no events without intensities, as files of event cameras do; region, bin, window_ms and "
-        f"polarity are only for such events"
+        f"{path}: holds no events without intensities; region, bin, window_ms and polarity are only for such events, "
+        "for example of an event camera"
     )
 
 
@@ -369,7 +369,11 @@ def _refuse_folder(folder: Path, files: Sequence[Path], names: Sequence[str]) ->
         for inner in folder.iterdir()
         if inner.is_dir() and os.access(inner, os.R_OK | os.X_OK) and recognition.recorded_by_taxel(inner.iterdir())
     )
-    hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
+    hint = (
+        f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} hold recordings: name these folders"
+        if deeper
+        else ""
+    )
     known_kinds = (
         f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and by a "
         "layout file .npy, .txt and other arrays and tables (docs/files.md)"
@@ -413,7 +417,8 @@ def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
         beside = ", ".join(file.name for file in recorded[:3]) + " ..." * (len(recorded) > 3)
         warn(
-            f"{folder}: {names} left out, as tables and arrays are not read in a folder with recordings ({beside}): "
+            f"{folder}: {names} left out, because tables and arrays are not read in a folder with recordings "
+            f"({beside}): "
             f"convert them, or move them to a separate folder",
             stacklevel=6,
         )
@@ -566,5 +571,5 @@ def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordi
     """Return each sensor of recordings as a separate recording; refuse anything except recordings."""
     entries = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
     if not len(entries):
-        raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
+        raise refused(name, " is empty: must be one Recording or more, as taxel.open or taxel.open_all returns")
     return [recording for entry in entries for recording in sensors(instance(name, entry, Recording))]

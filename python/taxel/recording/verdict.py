@@ -292,7 +292,8 @@ def _check(held: Any) -> dict[str, Any]:
             least = max(part[name].get(cause, 0) for part in stated.values())
             if totals.get(cause, 0) < least:
                 raise ProblemError(
-                    f"verdict: its {name} has {totals.get(cause, 0)} of {cause}, its parts {least}: must be no fewer"
+                    f"verdict: its {name} has {totals.get(cause, 0)} of {cause}, its parts {least}: must be at least "
+                    "as many"
                 )
     fields = {"status": values["status"], "text": values["text"], doubtful: values.get(doubtful)}
     fields |= {"steps_back": [dict(step) for step in values.get("steps_back", [])]}

@@ -484,7 +484,7 @@ def _only_input(readout: Readout, label: str) -> str:
     quantity, level = divmod(at, len(levels))
     value = levels[level] * (getattr(encoder, "release", 1.0) if falls else 1.0)
     way = "falls below" if falls else "rises to"
-    return f"The neuron has one input, and is a threshold: it fires as {names[quantity]} {way} {value:.4g}."
+    return f"The neuron has one input, and is a threshold: it fires when {names[quantity]} {way} {value:.4g}."
 
 
 def _beside_mean(name: str) -> str:

@@ -158,7 +158,9 @@ class Scene:
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         if not isinstance(parameters, Mapping):
-            raise refused("parameters", f" are {shown(parameters)}: must be a mapping, as Scene.draw(seed).parameters")
+            raise refused(
+                "parameters", f" are {shown(parameters)}: must be a mapping, such as Scene.draw(seed).parameters"
+            )
         self.parameters = dict(parameters)
         self._warned = False
 

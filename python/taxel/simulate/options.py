@@ -80,7 +80,7 @@ class EmulateOptions:
     sync: str | os.PathLike[str] | None = option(
         None, "Write the sync line as text to a new file or a pipe: board us, 1 or 0, host ns."
     )
-    overwrite: bool = option(False, "Replace the files that are written if they exist.")
+    overwrite: bool = option(False, "Replace output files that exist already.")
     source_port: int = option(0, "The UDP port to send from; 0: any.", least=0, most=65_535)
     begun: Callable[[str | None], object] = _nothing
     watch: Callable[[EmulatorReport], object] = _nothing

@@ -129,7 +129,7 @@ class SceneFile:
         sensor = document.get("taxels", {})
         _known("taxels", sensor, _TAXELS)
         if "bodies" not in document:
-            raise SceneError("bodies is missing: write [[bodies]] and what one is")
+            raise SceneError("bodies is missing: write [[bodies]] and describe a body")
         scene = Scene(
             {name: document[name] for name in _SCENE if name in document}
             | {"bodies": _bodies(document["bodies"], folder)}
@@ -137,7 +137,7 @@ class SceneFile:
         # Refuses what is invalid here, instead of when the scene is played.
         _core.check_scene(array._parts(), scene._part(), json.dumps(sensor))
         if not np.isfinite(scene.motion(array=array).force_n).all():
-            raise SceneError("foam: the force on it is beyond what a float32 holds; must be softer")
+            raise SceneError("foam: the force on it is too large for a float32; must be softer")
         preset = text("preset", document["preset"]) if "preset" in document else cls.preset
         fitting(preset, array)
         tare_ms = number("tare_ms", document.get("tare_ms", cls.tare_ms))
@@ -181,7 +181,9 @@ def _known(location: str, table: object, names: tuple[str, ...] | list[str]) -> 
 def _bodies(described: Any, folder: Path) -> Any:
     """Return bodies with the height maps that are in files."""
     if not isinstance(described, list):
-        raise SceneError(f"bodies is {json.dumps(described, default=str)}: must be written [[bodies]], once a body")
+        raise SceneError(
+            f"bodies is {json.dumps(described, default=str)}: must be written [[bodies]], once for each body"
+        )
     bodies = []
     for n, body in enumerate(described):
         if isinstance(body, Mapping):

@@ -369,9 +369,7 @@ class SpikeTrains(FrozenColumns):
     def _ungraded(self, reader: str) -> SpikeTrains:
         """Return the trains; refuse graded ones on behalf of `reader`, which reads no values."""
         if self.kind == "graded":
-            raise ProblemError(
-                f"{reader} takes no graded trains: their spikes have values, and it does not read values"
-            )
+            raise ProblemError(f"{reader} takes no graded trains: their spikes have values, which it does not read")
         return self
 
     def to_numpy(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -194,7 +194,7 @@ def calibrate(
     if not known and not options.law and options.table is None:
         raise helped(ProblemError("there is no law and no table to calibrate by"), "loads", "give")
     if not known and (options.each or options.exponent is not None):
-        raise helped(ProblemError("each and exponent belong to a fit"), "loads", "give")
+        raise helped(ProblemError("each and exponent are only for a fit"), "loads", "give")
     with collected() as warnings:
         made = _calibrated(recording, [instance("loads", load, KnownLoad) for load in known], options)
     return replace(Calibrated(made), warnings=tuple(warnings))
@@ -207,7 +207,7 @@ def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: Calib
     calibration: Calibration | None = None
     if options.law:
         if frames.unit != "ticks":
-            raise refused("law", f": turns ticks of a board into {options.unit}; {recording.path} holds {frames.unit}")
+            raise refused("law", f": converts ticks of a board to {options.unit}; {recording.path} holds {frames.unit}")
         registers = recording.registers
         ramp = 150.0 if registers is None else float(registers.ramp)
         calibration = Calibration.law(recording.array, ramp=ramp, sensor=options.sensor, **how)
@@ -248,7 +248,7 @@ def _load(frames: Frames, known: KnownLoad) -> Load:
 def _span(start: float | None, stop: float | None) -> str:
     """Return a stretch of time, s, as the end of a sentence; None is the recording's own beginning or end."""
     if stop is None:
-        return "" if start is None else f" from {start} s on"
+        return "" if start is None else f" from {start} s to the end"
     return f" before {stop} s" if start is None else f" from {start} to {stop} s"
 
 

@@ -417,7 +417,11 @@ def _detected(
     felt = outcome if tare is not None else outcome._replace(example=example._replace(tare=_quiet(recording)))
     remarks, differs = _remarks(recording, felt, readout)
     if scored is not None and not scored.events:
-        remarks.insert(0, f"0 labels: {counted(scored.false, 'detection')} count as false, which says nothing of them")
+        remarks.insert(
+            0,
+            f"0 labels: {counted(scored.false, 'detection')} count as false, so this does not show whether they are "
+            "right",
+        )
     stays = None if scored is None or not scored.rank[0] else _standing(readout, recording, felt, options)
     return _Found(Detected(recording, outcome, taken, tuple(remarks)), felt, differs.sensor, stays)
 
@@ -435,7 +439,7 @@ def _standing(
     where = "" if options.tare is not None else standing(source)
     if not where:
         return None
-    text, quiet = f"an object is on it from beginning to end, at {where}", of_quiet(source).quiet_us
+    text, quiet = f"an object is on the sensor from beginning to end, at {where}", of_quiet(source).quiet_us
     if quiet is None or quiet[0] > source.t[0]:
         return Standing(text, "a region without it")
     seconds = np.floor((quiet[1] - quiet[0]) / 1e4) / 100
@@ -444,7 +448,7 @@ def _standing(
     tried = score(outcome.example._known(found), outcome.example.labels, options.window_ms)
     if 2 * tried.rank[0] > now.rank[0]:
         return Standing(text, "a region without it")
-    trial = f"{tried.found} found and {tried.false} false, where {now.found} are found and {now.false} false"
+    trial = f"{tried.found} found and {tried.false} false, instead of {now.found} found and {now.false} false"
     text += f"; tried with it: {trial}"
     return Standing(text, f"--tare {seconds:g}", f"--tare {seconds:g}", {"tare": float(seconds)})
 
@@ -518,7 +522,8 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
         if count:
             lines.append(
                 f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that touches "
-                "may seem not to end, and others be missed: take a tare between touches nearer to them "
+                "may seem not to end, and other touches may be missed: take a tare between touches, at a time nearer "
+                "to them "
                 "(taxel cut RECORDING FILE --from S --to S, --tare FILE)"
             )
     if tare is not None and isinstance(source, Frames) and (floor := measured_floor([outcome.example])) is not None:
@@ -526,8 +531,8 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
         if count:
             # Touches are measured above the rest.
             lines.append(
-                f"rest: the recording begins loaded: {counted(count, 'taxel')} read less later than in the rest that "
-                "was taken, so that touches may be missed: take a tare while nothing touches (taxel cut RECORDING FILE "
+                f"rest: the recording begins loaded: {counted(count, 'taxel')} later read less than the rest that was "
+                "taken, so that touches may be missed: take a tare while nothing touches (taxel cut RECORDING FILE "
                 "--from S --to S, --tare FILE)"
             )
             return lines, Unlike()
@@ -552,13 +557,14 @@ def _of_taxels(source: Events | Frames | SpikeTrains) -> Iterator[str]:
     for word, mask in masks.items():
         if (rest := mask & ~within).any():
             y, x = np.argwhere(rest)[0]
-            yield f"{counted(int(rest.sum()), f'{word} taxel')}, as column {x}, row {y} (taxel info lists them)"
+            faulty = counted(int(rest.sum()), f"{word} taxel")
+            yield f"{faulty}, for example column {x}, row {y} (taxel info lists them)"
 
 
 def _of_gaps(recording: Recording, outcome: Outcome) -> Iterator[str]:
     """Yield where the recording has gaps, and which detections may have happened in one."""
     if gaps := recording._gaps():
-        yield f"{gaps}: nothing is detected in there"
+        yield f"{gaps}: nothing is detected there"
         behind = outcome.found[behind_gaps(outcome.example, outcome.found)]
         if len(behind):
             at = [

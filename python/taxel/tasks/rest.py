@@ -219,7 +219,8 @@ def tare_of(path: Path, recording: Recording | None = None) -> Tare:
     FileNotFoundError : no such file
     """
     if not path.exists():
-        raise FileNotFoundError(ENOENT, "no such file; seconds are a number with a point, as 0.5", f"tare: {path}")
+        why = "no such file; seconds are a number with a point, for example 0.5"
+        raise FileNotFoundError(ENOENT, why, f"tare: {path}")
     if path.suffix == ".json" or (path.is_file() and _is_json(path)):
         return Tare.load(path)
     resting = open_one(path)
@@ -290,16 +291,18 @@ def zero_by_unit(recording: Recording) -> Tare | None:
         stretch_s = [(t - beginning_us(source.t[:1])) / 1e6 for t in (first, end)]
         stretch = "{:.3f} to {:.3f} s".format(*stretch_s)
         # Of several recordings one number is right for all: the shortest that is quiet.
-        option = f"--tare {_QUIET_US / 1e6:g} takes that off"
+        option = f"--tare {_QUIET_US / 1e6:g} subtracts this"
         if first > source.t[0]:
             cut = "taxel cut {} rest.npz --from {:.3f} --to {:.3f}".format(quote(str(recording.path)), *stretch_s)
-            option = f"--tare rest.npz takes that off, which {cut} makes"
+            option = f"--tare rest.npz subtracts this; {cut} makes that file"
         reads = (
             f"{count} of {source.array.taxels} taxels read {middle[off].min():.3g} to {middle[off].max():.3g} "
             f"{source.unit} in a quiet stretch, {stretch}, and not 0; if nothing touches them then"
         )
         if where:
-            reads = f"an object is on it from beginning to end, at {where}; if nothing else touches it in {stretch}"
+            reads = (
+                f"an object is on the sensor from beginning to end, at {where}; if nothing else touches it in {stretch}"
+            )
         warn(f"{recording.path}: {reads}, {option}", stacklevel=3)
     return zero
 
@@ -308,7 +311,7 @@ def _warn_of_touch(subject: str, remedy: str, source: Events | Frames, measured:
     """Warn of a tare in which something was touched, by which lifts are missed or false."""
     taxels = held_by_tare([Example(source, {}, measured)])
     if taxels >= TOUCH:
-        warn(f"{subject} is not quiet but holds a touch of {taxels} taxels; {remedy}", stacklevel=3)
+        warn(f"{subject} is not quiet but contains a touch of {taxels} taxels; {remedy}", stacklevel=3)
 
 
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
@@ -338,8 +341,8 @@ def _without_touch(tare: Tare, recording: Recording, source: Events | Frames) ->
     begin_us = beginning_us(source.t[:1])
     first, end, *stretch = ((t - begin_us) / 1e6 for t in (tare.start_us, tare.stop_us, *span))
     warn(
-        f"{recording.path}: {first:.3f} to {end:.3f} s, before the first label, holds a touch of {taxels} taxels, so "
-        "the tare is of the first quiet stretch, {:.3f} to {:.3f} s".format(*stretch),
+        f"{recording.path}: {first:.3f} to {end:.3f} s, before the first label, contains a touch of {taxels} taxels, "
+        "so the tare is that of the first quiet stretch, {:.3f} to {:.3f} s".format(*stretch),
         stacklevel=2,
     )
     return quiet
@@ -369,7 +372,7 @@ def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Ta
     if not ends or min(ends) - first < _LEAST_REST_US:
         content = f"only {to_ms(max(0, min(ends) - first)):g} ms before its first label" if ends else "no label"
         error = UnknownRestError(
-            f"{recording.path}: holds {content}, from which to take the taxels' rest{_begun_loaded(source)}"
+            f"{recording.path}: holds {content}, so the taxels' rest is not known{_begun_loaded(source)}"
         )
         raise helped(error, "tare", "give")
     return _measured(recording, source, min(ends))
@@ -449,8 +452,9 @@ def _measured(recording: Recording, source: Events | Frames, stop_us: int, start
         unknown = int(np.count_nonzero(present & np.isnan(tare.rest)))
         if unknown > _MOST_UNKNOWN * np.count_nonzero(present):
             warn(
-                f"{recording.path}: the rest of {unknown} of {np.count_nonzero(present)} taxels is not known, as none "
-                f"of their changes is in its first {to_ms(stop_us - int(source.t[0])):g} ms: their events are left "
+                f"{recording.path}: the rest of {unknown} of {np.count_nonzero(present)} taxels is not known, because "
+                f"none of their changes is in its first {to_ms(stop_us - int(source.t[0])):g} ms: their events are "
+                "left "
                 "out; start the recording before the board, which then sends all values, or give a tare's file",
                 stacklevel=2,
             )

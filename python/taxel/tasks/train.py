@@ -141,7 +141,9 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     examples = _examples(opened, labelled, without, options.tare, plan)
     if sizes := sizes_of(examples):
         smallest, largest = ("{} x {}".format(*extreme) for extreme in (sizes[0], np.max(sizes, axis=0)))
-        warn(f"arrays of {len(sizes)} sizes, from {smallest} taxels on, are padded at their far edges to {largest}")
+        warn(
+            f"arrays of {len(sizes)} sizes, the smallest {smallest} taxels, are padded at their far edges to {largest}"
+        )
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
     return replace(_Work(opened, examples, options, update).training(plan), unlabelled=unlabelled)

@@ -283,8 +283,9 @@ class Training:
         recipe = self.options.recipe
         if recipe is not None and (kinds := recipes.kinds(recipe, self.readout.labels)):
             yield (
-                f"{', '.join(kinds)}: learnt as a kind of touch, detected at an age of the touch; its begin is called "
-                f"{recipes.names_of(recipe, 'contact')}; its end {recipes.names_of(recipe, 'lift')}"
+                f"{', '.join(kinds)}: learnt as a kind of touch, detected at an age of the touch; its beginning is "
+                "called "
+                f"{recipes.names_of(recipe, 'contact')}, its end {recipes.names_of(recipe, 'lift')}"
             )
 
     def _levels(self) -> Iterator[str]:
@@ -292,8 +293,9 @@ class Training:
         if self.fitted_levels:
             levels = ", ".join(f"{level:g}" for level in self.fitted_levels)
             yield (
-                f"levels: {levels} {self.readout.unit}, of the training data, as fewer than {LEAST_LEVELS} of the "
-                "recipe's are within what loaded taxels read; --set encoder.levels=[...] gives others"
+                f"levels: {levels} {self.readout.unit}, from the training data, because fewer than {LEAST_LEVELS} "
+                "levels of the recipe are within the range that loaded taxels read; --set encoder.levels=[...] sets "
+                "others"
             )
 
     def _tares(self) -> Iterator[str]:
@@ -301,7 +303,7 @@ class Training:
         if not self.tares_us:
             return
         lengths = [to_ms(end - begin) for begin, end, _ in self.tares_us]
-        text = f"of each of {len(lengths)} recordings its own, {min(lengths):g} to {max(lengths):g} ms long"
+        text = f"a separate one for each of {len(lengths)} recordings, {min(lengths):g} to {max(lengths):g} ms long"
         if len(lengths) == 1:
             text = "what the recording holds from {:g} to {:g} ms".format(*map(to_ms, self.tares_us[0][:2]))
         yield f"tare: {text}; another can be given"
@@ -327,7 +329,9 @@ class Training:
         scores = [outcome.score.by_label[label] for outcome in self.outcomes if outcome.score is not None]
         known_ms = np.concatenate([score.delays_ms for score in scores])
         return (
-            f"; the readout that is written {three_digits(float(np.median(known_ms)), '+')} ms" if len(known_ms) else ""
+            f"; for the readout that is written, {three_digits(float(np.median(known_ms)), '+')} ms"
+            if len(known_ms)
+            else ""
         )
 
     def _better(self) -> Iterator[str]:
@@ -393,9 +397,11 @@ class Training:
         return {label: text for label, text in texts.items() if text}
 
     def again(self) -> str:
-        """Return the first advice that concerns all labels of which the readout cannot be relied on, or ""."""
+        """Return the first printed advice that concerns all labels of which the readout cannot be relied on, or ""."""
         labels = set(self._unreliable())
-        return next((cause.advice for cause in self.causes if cause.advice and labels.issubset(cause.labels)), "")
+        return next(
+            (cause.advice for cause in self._first_causes() if cause.advice and labels.issubset(cause.labels)), ""
+        )
 
     def _aligned(self) -> Iterator[str]:
         """Yield by how much labels were moved to what the sensor felt, and which found no pair."""

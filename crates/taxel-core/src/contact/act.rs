@@ -46,7 +46,7 @@ impl FrameSequence {
         if !(self.period_us.is_finite() && self.period_us >= frame_us) {
             let period = self.period_us;
             return Err(Error::scene(format!(
-                "frames each {period} us: must be {frame_us} (a frame of the board) or more"
+                "frames of {period} us: must be {frame_us} (a frame of the board) or more"
             )));
         }
         Ok(count)

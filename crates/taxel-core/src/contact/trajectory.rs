@@ -200,7 +200,7 @@ impl<'a> Trajectory<'a> {
             return Ok(());
         }
         Err(Error::scene(format!(
-            "the body is to be pressed through all of the {} mm of foam; press it less, or take stiffer foam",
+            "the body is to be pressed through all of the {} mm of foam; press it less, or use stiffer foam",
             self.scene.foam.thickness_mm
         )))
     }
@@ -291,7 +291,8 @@ impl<'a> Trajectory<'a> {
         let depth = self.depth + dt * speed;
         if depth >= self.push.floor_mm() {
             return Err(Error::scene(format!(
-                "the body bottoms out: {:?} g at {:.2} m/s crush {} mm of foam at {} kPa; drop it from lower, or take stiffer foam",
+                "the body bottoms out: {:?} g at {:.2} m/s crush {} mm of foam at {} kPa; drop it from lower, or use \
+                 stiffer foam",
                 (10.0 * mass).round() / 10.0,
                 speed,
                 self.scene.foam.thickness_mm,

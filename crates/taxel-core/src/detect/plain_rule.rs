@@ -104,7 +104,7 @@ impl PlainRule {
             }
             if self.release < 1.0 || self.frames > 1 {
                 return Err(problem!(
-                    "release {} and frames {} with age_ms: must be 1, as a touch begins with 1 frame of 2 taxels",
+                    "release {} and frames {} with age_ms: must be 1, because a touch begins with 1 frame of 2 taxels",
                     self.release,
                     self.frames
                 ));

@@ -111,7 +111,11 @@ impl Readout {
             match self.seen.get(label) {
                 Some(seen) => seen.check(cell.weights.len()).map_err(|error| error.in_part(label))?,
                 None if self.seen.is_empty() => {}
-                None => return Err(problem!("{label}: seen has no ranges of its inputs, as other neurons have")),
+                None => {
+                    return Err(problem!(
+                        "{label}: seen has no ranges of its inputs, although other neurons have them"
+                    ));
+                }
             }
         }
         match self.seen.keys().find(|&label| !self.neurons.contains_key(label)) {
@@ -158,7 +162,8 @@ impl Readout {
         }
         let (rows, columns, signed) = (array.rows, array.columns, encoder.kind() == SpikeKind::Signed);
         Err(problem!(
-            "{label}: {} weights, the encoder makes {inputs} trains{}{} of {rows} x {columns} taxels: must be one each",
+            "{label}: {} weights, but the encoder makes {inputs} trains{}{} of {rows} x {columns} taxels: must be one \
+             per train",
             cell.weights.len(),
             if signed { ", ON and OFF," } else { "" },
             if copies > 1 { format!(" at {copies} delays") } else { String::new() }

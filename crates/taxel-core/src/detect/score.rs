@@ -86,7 +86,7 @@ impl Spread {
 /// or if so many detections are within the windows that matching would take too long; `Interrupted` if asked to stop.
 pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: Stop<'_>) -> Result<Vec<Tally>> {
     if windows.len() != truth.len() {
-        return Err(problem!("{} windows for {} reference events: must be one each", windows.len(), truth.len()));
+        return Err(problem!("{} windows for {} reference events: must be one per event", windows.len(), truth.len()));
     }
     if let Some(window) = windows.iter().find(|w| !(0..=WIDEST_WINDOW_US).contains(*w)) {
         return Err(problem!("window_us"; " is {window} us: must be from 0 to {WIDEST_WINDOW_US}"));

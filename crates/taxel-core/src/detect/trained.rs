@@ -44,7 +44,7 @@ impl Seen {
             let Some(values) = values else { continue };
             if values.len() != inputs {
                 return Err(problem!(
-                    "seen: {name} has {} entries for {inputs} weights: must be one each",
+                    "seen: {name} has {} entries for {inputs} weights: must be one per weight",
                     values.len()
                 ));
             }

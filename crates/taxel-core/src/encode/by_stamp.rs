@@ -117,7 +117,7 @@ impl<M: Measure> Stream for ByStamp<M> {
     fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Spike>) -> Result<()> {
         self.channels.check(events)?;
         let Some(intensity) = &events.intensity else {
-            return Err(problem!("events without intensities: this encoder reads held values, so record intensities"));
+            return Err(problem!("events without intensities: this encoder needs intensities, so record them"));
         };
         let Some(mut present) = self.source.events(events.t)? else { return Ok(()) };
         for k in 0..events.len() {

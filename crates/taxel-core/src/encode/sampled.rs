@@ -263,7 +263,7 @@ impl<R: Rule> Stream for Sampled<R> {
     fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Spike>) -> Result<()> {
         self.channels.check(events)?;
         let Some(intensity) = &events.intensity else {
-            return Err(problem!("events without intensities: this encoder reads held values, so record intensities"));
+            return Err(problem!("events without intensities: this encoder needs intensities, so record them"));
         };
         let fresh = matches!(self.source, StreamInput::Unknown);
         let Some(mut present) = self.source.events(events.t)? else { return Ok(()) };

@@ -38,7 +38,10 @@ impl Tare {
         let (rows, columns) = (self.array.rows, self.array.columns);
         self.array.check().map_err(|error| problem!("tare: {error}"))?;
         if self.rest.len() != self.array.len() {
-            return Err(problem!("tare: {} rests for {rows} x {columns} taxels: must be one each", self.rest.len()));
+            return Err(problem!(
+                "tare: {} rests for {rows} x {columns} taxels: must be one per taxel",
+                self.rest.len()
+            ));
         }
         if self.start_us >= self.stop_us {
             return Err(problem!("tare from {} to {} us: start must be before stop", self.start_us, self.stop_us));
@@ -48,7 +51,7 @@ impl Tare {
         }
         if self.noise.len() != self.array.len() {
             return Err(problem!(
-                "tare: noise of {} taxels for {rows} x {columns}: must be one each",
+                "tare: noise of {} taxels for {rows} x {columns} taxels: must be one value per taxel",
                 self.noise.len()
             ));
         }
@@ -254,7 +257,7 @@ impl TareBuilder {
         }
         events.check()?;
         let Some(intensity) = &events.intensity else {
-            return Err(problem!("events without intensities: a tare needs the held values"));
+            return Err(problem!("events without intensities: a tare needs intensities"));
         };
         for k in 0..events.len() {
             self.present = events.t[k].max(self.present);

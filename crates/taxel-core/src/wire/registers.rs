@@ -344,7 +344,7 @@ impl Registers {
             }
             let Some(field) = fields().iter().find(|f| f.name == name || f.manual == name) else {
                 let names: Vec<_> = fields().iter().map(|f| f.name).collect();
-                return Err(problem!("register {name:?}: there are {}, channels", names.join(", ")));
+                return Err(problem!("register {name:?} is not known; registers: {}, channels", names.join(", ")));
             };
             // The manual's name takes the value as the register holds it; ours takes the number meant, without the
             // register's offset.

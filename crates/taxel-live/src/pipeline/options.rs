@@ -124,7 +124,7 @@ options! {
         overwrite: bool = false, "commands" = "live record";
         /// How far, in frames, a readout stays behind the host's clock while no events arrive.
         guard_frames: f64 = 5.0, "minimum" = 0;
-        /// With version 2 of the wire: how many frames to wait at a gap in the sequence, as the data may only be late.
+        /// With version 2 of the wire: how many frames to wait at a gap in the sequence: the data may only be late.
         gap_frames: f64 = 1.0, "commands" = "", "minimum" = 0;
         /// Print one line of JSON for each detection, and nothing else.
         lines: bool = false, "flag" = "--json";

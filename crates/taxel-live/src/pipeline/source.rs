@@ -263,10 +263,10 @@ impl FromStr for SourceText {
                 (None, None) => None,
             };
             if source.unit.as_ref().is_some_and(String::is_empty) {
-                return Err(refused("unit is empty: must be that of the values, as N or kPa".to_owned()));
+                return Err(refused("unit is empty: must be that of the values, for example N or kPa".to_owned()));
             }
             if let Some(rate_hz) = source.rate_hz.filter(|rate_hz| !(1e6 / 3.6e9..=1e6).contains(rate_hz)) {
-                return Err(refused(format!("rate is {rate_hz} Hz: must be from 1 an hour to 1000000")));
+                return Err(refused(format!("rate is {rate_hz} Hz: must be from 1 per hour to 1000000")));
             }
         }
         match options.keys().next() {
@@ -461,7 +461,7 @@ impl SourceText {
         if self.rate_hz.is_none() {
             let Some(input) = input else {
                 return Err(
-                    problem!("rate=HZ is missing: it states how many frames a second the program passes").into()
+                    problem!("rate=HZ is missing: it states how many frames per second the program passes").into()
                 );
             };
             let mut lines = opened.map_or_else(|| OpenedLines::open(input), Ok)?;
@@ -515,7 +515,8 @@ impl SourceText {
                 let field = index_of("time", column, columns)?;
                 let Some(unit_us) = unit_us.or_else(|| clock_unit_us(&columns[field])) else {
                     return Err(problem!(
-                        "time={column}: state its unit, as time={column}:ms, or time={column}:{DATES} of dates"
+                        "time={column}: state its unit, for example time={column}:ms, or time={column}:{DATES} for \
+                         dates"
                     ));
                 };
                 vec![(field, unit_us)]
@@ -575,8 +576,12 @@ fn index_of(key: &str, column: &str, columns: &[String]) -> taxel_core::Result<u
 /// Parses an array of rows x columns, with or without a pitch, mm; without one that of a board is the thesis', and that of other
 /// sensors is unknown.
 fn array_of(text: &str, size: &str, is_board: bool) -> Result<Array> {
-    let wrong =
-        || problem!("source {text:?}: array {size:?} must be rows x columns, as 64x64, or with a pitch, as 64x64x5");
+    let wrong = || {
+        problem!(
+            "source {text:?}: array {size:?} must be rows x columns, for example 64x64, or with a pitch, for example \
+             64x64x5"
+        )
+    };
     let sides: Vec<&str> = size.split('x').collect();
     let (rows, columns, pitch_mm) = match sides[..] {
         [rows, columns] => (rows, columns, None),
@@ -938,9 +943,12 @@ mod tests {
         for (keys, said) in [
             ("array=7x8,frame_lines=8,rate=9", "must be rows of 8: is it array=8x7?"),
             ("array=7x8,frame_end=blank,rate=9", "must be rows of 8: is it array=8x7?"),
-            ("array=8x7,rate=9", "must be 56 a frame (or add frame_lines=8, or frame_end=blank"),
-            ("array=8x9,rate=9", "must be 72 a frame"),
-            ("array=2x3,rate=9", "lines have 7 values: must be 6 a frame (name a column of times, as time=1:ms, and"),
+            ("array=8x7,rate=9", "must be 56 per frame (or add frame_lines=8, or frame_end=blank"),
+            ("array=8x9,rate=9", "must be 72 per frame"),
+            (
+                "array=2x3,rate=9",
+                "lines have 7 values: must be 6 per frame (name a column of times, for example time=1:ms, and",
+            ),
         ] {
             let error = opened("rows", &frames, keys, FirstLineWait::default()).unwrap_err().to_string();
             assert!(error.contains(said), "{keys}: {error}");

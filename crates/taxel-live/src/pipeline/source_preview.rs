@@ -97,7 +97,7 @@ fn guess(lines: &[PreviewLine], array_is_stated: bool) -> (String, String) {
     let unlike = numbers.len() - usual_lines.len() + text;
     let beside = if unlike > 0 { format!("; {unlike} other lines") } else { String::new() };
     if array_is_stated {
-        return (String::new(), format!("{width} numbers a line{beside}"));
+        return (String::new(), format!("{width} numbers per line{beside}"));
     }
     // Whole groups lie between two empty lines.
     let groups: Vec<usize> = lines.split(|line| line.is_empty).map(<[PreviewLine]>::len).collect();
@@ -116,7 +116,7 @@ fn guess(lines: &[PreviewLine], array_is_stated: bool) -> (String, String) {
         Some(DATES) => " after a date".to_owned(),
         Some(unit) => format!(" after a time in {unit}"),
     };
-    (format!("array={rows}x{columns}{time}"), format!("{values} numbers a line{first}: {rows} x {columns}{beside}"))
+    (format!("array={rows}x{columns}{time}"), format!("{values} numbers per line{first}: {rows} x {columns}{beside}"))
 }
 
 /// The most frequent of some numbers.
@@ -180,6 +180,6 @@ mod tests {
         ] {
             assert_eq!(guess(&lines(&text), false).0, keys, "{text}");
         }
-        assert_eq!(guess(&lines(&repeated(&|_| row(9))), true), (String::new(), "9 numbers a line".to_owned()));
+        assert_eq!(guess(&lines(&repeated(&|_| row(9))), true), (String::new(), "9 numbers per line".to_owned()));
     }
 }

@@ -60,7 +60,7 @@ impl StreamColumns {
         }
         for (k, column) in self.columns.iter().enumerate() {
             if column.is_empty() || column.contains(',') {
-                return refused(format!("column {column:?}: a name is not empty, and holds no comma"));
+                return refused(format!("column {column:?}: a name must not be empty, and must not contain a comma"));
             }
             if self.columns[..k].contains(column) {
                 return refused(format!("column {column:?}: there are two of that name"));

@@ -177,7 +177,10 @@ pub(crate) async fn save_preset(hub: &Hub, name: &str) -> Answer {
     read_presets(hub).await?;
     let exists = PRESETS.iter().any(|preset| preset.name == name) || hub.presets().presets.contains_key(name);
     if exists {
-        return Err(Refusal::of_field("name", format!("{name} is taken: delete it first, or name another")));
+        return Err(Refusal::of_field(
+            "name",
+            format!("{name} exists already: delete it first, or choose another name"),
+        ));
     }
     let held = Registers { record: false, ..hub.board().registers };
     hub.presets().presets.insert(name.to_owned(), presets::from_registers(&held));

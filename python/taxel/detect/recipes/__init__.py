@@ -194,7 +194,8 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
     if isinstance(recipe, str) and not {".", "/", os.sep} & set(recipe):
         if recipe not in names():
             raise ProblemError(
-                f"recipe {shown(recipe)}: there are {', '.join(names())}; the path of a file holds a dot or a slash"
+                f"recipe {shown(recipe)}: must be one of {', '.join(names())}, or the path of a file, with a dot or a "
+                "slash in it"
             )
         file = Path(__file__).parent / f"{recipe}.toml"
     values = read_json(file) if file.suffix.lower() == ".json" else read_toml(file)
@@ -238,7 +239,7 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
         if neuron is None:
             raise ProblemError(
                 f"recipe: it is for {' and '.join(listed)}, not for {shown(label)}: leave that label out, or choose "
-                f"another recipe: there are {', '.join(names())}"
+                f"another recipe; the recipes are {', '.join(names())}"
             )
         neurons[label] = dict(neuron)
     return {**values, "neurons": neurons}

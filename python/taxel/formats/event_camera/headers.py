@@ -77,13 +77,13 @@ def _check_words(path: Path, file: BinaryIO, size: int, kind: str) -> None:
     # Two bytes say the type of a .dat's events and their size.
     begin = end + 2 * (kind == "dat")
     if begin >= size:
-        raise FormatError(f"{path}: ends after its header, byte {size}: damaged, as it holds no event")
+        raise FormatError(f"{path}: ends after its header, byte {size}: damaged, because it holds no event")
     if (size - begin) % word:
         over = (size - begin) % word
         at_word = size - over
         raise FormatError(
-            f"{path}: ends within a word, {over} of {word} bytes from byte {at_word} on: damaged; without them, as "
-            f"head -c {at_word} {escaped(shlex.quote(str(path)))} > whole{path.suffix} writes it, it is read"
+            f"{path}: ends within a word, {over} of {word} bytes from byte {at_word} on: damaged; taxel reads the file "
+            f"without them: head -c {at_word} {escaped(shlex.quote(str(path)))} > whole{path.suffix}"
         )
 
 
@@ -120,7 +120,7 @@ def _check_packets(path: Path, file: BinaryIO, size: int) -> None:
     if end > size:
         raise FormatError(f"{path}: ends at byte {size}, before its table of packets at byte {table}: damaged")
     if at == end:
-        raise FormatError(f"{path}: ends after its header, byte {size}: damaged, as it holds no event")
+        raise FormatError(f"{path}: ends after its header, byte {size}: damaged, because it holds no event")
     while at < end:
         file.seek(at)
         packet = file.read(8)

@@ -98,8 +98,8 @@ class Reduction:
             part = "the region" if self.region else "the sensor"
             raise refused(
                 "bin",
-                f" is {self.side}: must be a whole number from 1 to {max(width, height)}, as {part} has "
-                f"{width} columns and {height} rows",
+                f" is {self.side}: must be a whole number from 1 to {max(width, height)}, because {part} has {width} "
+                f"columns and {height} rows",
             )
         return -(-height // self.side), -(-width // self.side)
 
@@ -114,12 +114,16 @@ class Reduction:
         right, bottom = columns if right is None else right, rows if bottom is None else bottom
         for name, first, end in (("columns", left, right), ("rows", top, bottom)):
             if first >= end:
-                order = ": the first must be below the last" if first > end else " holds none: the last is not included"
+                order = (
+                    ": the first must be below the last"
+                    if first > end
+                    else " is empty, because the last is not included"
+                )
                 raise ProblemError(f"region {shown(self.region)}: {name} {first}:{end}{order}")
         if not (right <= columns and bottom <= rows):
             size = f"{columns} columns and {rows} rows"
             raise ProblemError(
-                f"region {shown(self.region)}: must be within the sensor's {size}, as 0:{columns},0:{rows}"
+                f"region {shown(self.region)}: must be within the sensor's {size}, for example 0:{columns},0:{rows}"
             )
         return left, right, top, bottom
 
@@ -133,6 +137,6 @@ def _ends(region: str) -> tuple[int, int | None, int, int | None]:
     """Return the ends of a region's columns and rows; None for the sensor's own."""
     found = re.fullmatch(r"(\d{0,5}):(\d{0,5}),(\d{0,5}):(\d{0,5})", text("region", region), re.ASCII)
     if found is None:
-        raise refused("region", f" is {shown(region)}: must be columns and rows A:B,C:D, as 100:420,60:300")
+        raise refused("region", f" is {shown(region)}: must be columns and rows A:B,C:D, for example 100:420,60:300")
     left, right, top, bottom = (int(end) if end else None for end in found.groups())
     return left or 0, right, top or 0, bottom

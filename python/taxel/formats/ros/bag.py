@@ -77,8 +77,8 @@ class Bag:
         undefined = self.undefined(types[0])
         if undefined:
             error = FormatError(
-                f"{self.path}: holds no definition of {undefined} (topic {topic}); a folder of .msg or .idl files may, "
-                f"or a release of ROS, one of {', '.join(_stores())}"
+                f"{self.path}: holds no definition of {undefined} (topic {topic}); a folder of .msg or .idl files may "
+                f"have it, or a release of ROS, one of {', '.join(_stores())}"
             )
             raise helped(error, "types", "give")
         for connection in found:

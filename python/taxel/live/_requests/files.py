@@ -160,7 +160,9 @@ class FileRequests:
             keys |= {"ros.field": topic[1]} if topic[1] else {}
         for option, key in (("layout", ""), ("rate_hz", "rate_hz"), ("array", "rows"), ("topic", "ros.topic")):
             if option in stated and (key in keys or not key):
-                raise refused(option, f" is {stated[option]} by the command: start taxel view without it, or change it")
+                raise refused(
+                    option, f" is {stated[option]} by the command: start taxel view without it, or change this option"
+                )
         with reasons():
             # A layout of the whole folder stays as it is; this recording gets a copy with these keys.
             there = Layout.beside(path)

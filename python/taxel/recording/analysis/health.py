@@ -101,7 +101,7 @@ class Held(NamedTuple):
         assert isinstance(frames, Frames)
         name = f"{frames.array.names[self.x + self.y * frames.array.columns]}, " if frames.array.names else ""
         first, end = ((t - beginning_us(frames.t[:1])) / 1e6 for t in (self.t, self.until))
-        when = f"{first:.1f} s on" if self.until == frames.t[-1] else f"{first:.1f} to {end:.1f} s"
+        when = f"{first:.1f} s to the end" if self.until == frames.t[-1] else f"{first:.1f} to {end:.1f} s"
         return f"{name}column {self.x}, row {self.y}, reads {self.value:g} {frames.unit} from {when}"
 
 

@@ -82,7 +82,7 @@ class Rest:
     Parameters
     ----------
     source : {"tare", "calibration", "unit", "quiet", "none"}
-        A given tare; the calibration's own rest; 0, as the values are force or pressure; a quiet stretch; nothing.
+        A given tare; the calibration's own rest; 0, because the values are force or pressure; a quiet stretch; nothing.
     values : float64, one per taxel, in the sensor's unit
         NaN for a taxel whose rest is not known. That of a quiet stretch is where the rest is tracked from.
     quiet_us : (int, int), us, optional
@@ -119,14 +119,14 @@ class Rest:
         words = {
             "tare": "the given tare",
             "calibration": "the calibration's",
-            "unit": "0, as the values are force or pressure",
-            "none": "not known, as no half second was both quiet and without load; a tare can be given",
+            "unit": "0, because the values are force or pressure",
+            "none": "not known, because no half second was both quiet and without load; a tare can be given",
         }
         text = words.get(self.source, "")
         if self.quiet_us is not None:
             first, end = ((us - self.begin_us) / 1e6 for us in self.quiet_us)
             text = f"a quiet stretch, {first:.3f} to {end:.3f} s, tracked from there"
-            text += f"; something lay on {self.preload_at} in it" * bool(self.preload_at)
+            text += f"; something was on {self.preload_at} in it" * bool(self.preload_at)
         if self.falls:
             text += f"; {self.fall(path)}"
         return text + f"; {self.zeroed} zeroed" * bool(self.zeroed)
@@ -136,7 +136,10 @@ class Rest:
         """Return what to do of values that fall; of the recording of a path it names the layout file."""
         layout, turning = Rest.turning(path)
         if layout:
-            return f"values fall from their rest as {layout} turns them: if that is wrong, remove falls from the file"
+            return (
+                f"values fall from their rest after {layout} inverted them: if that is wrong, remove falls from the "
+                "file"
+            )
         return f"values fall from their rest: if smaller values mean more pressure, write {turning}"
 
     @staticmethod

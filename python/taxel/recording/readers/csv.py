@@ -83,7 +83,7 @@ def _head(path: Path, file: BinaryIO) -> tuple[list[str], bytes]:
     """Return the names of the columns, and what separates the cells."""
     head = file.readline(_HEAD + 1)
     if len(head) > _HEAD:
-        raise FormatError(f"{path}, line 1: more than {_HEAD} bytes; at most that are read")
+        raise FormatError(f"{path}, line 1: more than {_HEAD} bytes; at most {_HEAD} are read")
     return _names(path, head), _separator(head)
 
 
@@ -151,7 +151,7 @@ def _blocks(path: Path, file: BinaryIO, separator: bytes) -> Iterator[_Block]:
         block += (end := file.readline(LINE + 1))
         if len(end) > LINE:
             line = first + block.count(b"\n")
-            raise FormatError(f"{path}, line {line}: more than {LINE} bytes; at most that are read")
+            raise FormatError(f"{path}, line {line}: more than {LINE} bytes; at most {LINE} are read")
         if separator != b",":
             block = block.replace(b",", b".").replace(separator, b",")
         yield first, block.replace(b"\r\n", b"\n")
@@ -261,10 +261,10 @@ def _numbers(path: Path, names: list[str], first: int, body: bytes, dtype: type[
         if match is not None and match[2] is not None and int(match[2]) <= len(names):
             where += f", column {names[int(match[2]) - 1]}"
         reason = re.sub(r" at row .*|; use `usecols`.*", "", first_line(error))
-        raise FormatError(f"{path}{where}: {reason}; must be {len(names)} numbers a line") from None
+        raise FormatError(f"{path}{where}: {reason}; must be {len(names)} numbers per line") from None
     if table.shape[1] != len(names):
         raise FormatError(
-            f"{path}, line {first + _line_number(body, 0)}: {table.shape[1]} numbers; must be {len(names)} numbers a "
+            f"{path}, line {first + _line_number(body, 0)}: {table.shape[1]} numbers; must be {len(names)} numbers per "
             "line"
         )
     return table

@@ -14,6 +14,7 @@ from taxel._base.archive import read_array, read_arrays, shapes
 from taxel._base.columns import frozen_whole
 from taxel._base.h5_file import H5File
 from taxel._base.limits import VALUE
+from taxel._base.mat_file import is_mat_in_hdf5, mat_shapes, read_mat
 from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -27,7 +28,7 @@ from taxel.recording.readers.table import Readings, frames_hint, read_events, re
 from taxel.recording.sections import Losses, Origin
 
 #: The endings of files of arrays.
-ARRAYS = (".npy", ".npz", ".h5", ".hdf5")
+ARRAYS = (".npy", ".npz", ".h5", ".hdf5", ".mat")
 #: Characters of the name of an array that errors show; a path in a .h5 may have thousands.
 _NAME = 60
 #: Bytes of frames that are compared at once, and times that are converted at once.
@@ -127,11 +128,17 @@ def _data(path: Path, how: Data) -> Readings:
             size = as_size(missing)
             hint = f"; a size is given by {size}" if size else ""
             raise FormatError(f"{path}: holds no array {missing}; there are {list_arrays(stored_shapes)}{hint}")
-        if len(wanted) > 1 and stored_shapes[wanted[1]] != stored_shapes[wanted[0]][:1]:
-            count, frames = math.prod(stored_shapes[wanted[1]]), math.prod(stored_shapes[wanted[0]][:1])
+        along = -1 if how.frames == "last" else 0
+        frames = math.prod(stored_shapes[wanted[0]][along : along + 1 or None])
+        # MATLAB's times are a column or a row.
+        if len(wanted) > 1 and [n for n in stored_shapes[wanted[1]] if n != 1] != [n for n in (frames,) if n != 1]:
+            count = math.prod(stored_shapes[wanted[1]])
             raise FormatError(f"{path}, {wanted[1]}: {counted(count, 'time')} for {counted(frames, 'frame')}")
         arrays = arrays_of(path, wanted, frames=wanted[0])
-    values, unread = arrays[wanted[0]], ", ".join(name for name in stored_names if name not in wanted)
+    values = arrays[wanted[0]]
+    if how.frames == "last" and values.ndim > 1:
+        values = np.ascontiguousarray(np.moveaxis(values, -1, 0))
+    unread = ", ".join(name for name in stored_names if name not in wanted)
     lost = (f"other arrays of the file: {unread}",) if unread else ()
     if values.dtype.kind not in "uifb" or values.ndim not in (2, 3) or 0 in values.shape:
         shape = " x ".join(map(str, values.shape))
@@ -150,19 +157,23 @@ def _data(path: Path, how: Data) -> Readings:
     size = f"frames of {' x '.join(map(str, values.shape[1:]))}"
     if len(wanted) == 1:
         return Readings(values, None, size, lost=lost)
-    times = arrays[wanted[1]]
+    return Readings(values, _times(path, wanted[1], arrays[wanted[1]].reshape(-1), how), size, lost=lost)
+
+
+def _times(path: Path, name: str, times: NDArray[Any], how: Data) -> NDArray[np.int64]:
+    """Return times in us; their memory may become that of the result."""
     if times.dtype.kind not in "uif":
-        raise FormatError(f"{path}, {wanted[1]}: {times.dtype}; must be times as numbers")
+        raise FormatError(f"{path}, {name}: {times.dtype}; must be times as numbers")
     # Nobody else has the times, which take more memory than the readings of a single taxel.
     t = (
         times.view(np.int64)
-        if times.dtype.itemsize == 8 and times.flags.c_contiguous
+        if times.dtype.itemsize == 8 and times.flags.c_contiguous and times.flags.writeable
         else np.empty(len(times), np.int64)
     )
     for begin in range(0, len(times), _TIMES_AT_ONCE):
         block = slice(begin, begin + _TIMES_AT_ONCE)
         t[block] = whole_us(path.name, times[block].astype(np.float64) * UNITS_US[how.time_unit] / 1e6, begin)
-    return Readings(values, t, size, lost=lost)
+    return t
 
 
 def _too_large(values: NDArray[Any]) -> tuple[int, ...] | None:
@@ -181,21 +192,36 @@ def shapes_of(path: Path) -> dict[str, tuple[int, ...]]:
     """Return the shapes of the arrays of numbers by name; the one of a .npy has the name ""."""
     if path.suffix.lower() in (".npy", ".npz"):
         return shapes(path)
+    if not _is_hdf5(path):
+        return mat_shapes(path)
     with H5File(path) as h5:
-        return {name: entry.shape for name, entry in h5.entries.items() if entry.is_numbers}
+        entries = {name: entry.shape for name, entry in h5.entries.items() if entry.is_numbers}
+    # HDF5 has MATLAB's axes in reverse.
+    return {name: shape[::-1] for name, shape in entries.items()} if _is_mat(path) else entries
+
+
+def _is_mat(path: Path) -> bool:
+    return path.suffix.lower() == ".mat"
+
+
+def _is_hdf5(path: Path) -> bool:
+    return is_mat_in_hdf5(path) if _is_mat(path) else path.suffix.lower() in (".h5", ".hdf5")
 
 
 def _left_out_of(path: Path) -> dict[str, str]:
     """Return the names in a .h5 that lead to no array, and why."""
-    if path.suffix.lower() in (".npy", ".npz"):
+    if not _is_hdf5(path):
         return {}
     with H5File(path) as h5:
         return h5.left_out
 
 
 def arrays_of(path: Path, names: Sequence[str], frames: str | None = None) -> dict[str, NDArray[Any]]:
-    """Read the arrays of these names of a .npz or .h5; of a .h5 that of the frames as float32, without a copy."""
+    """Read the arrays of these names of a file; of a .h5 that of the frames as float32, without a copy."""
     if path.suffix.lower() == ".npz":
         return read_arrays(path, names, dtypes={} if frames is None else {frames: np.float32})
+    if not _is_hdf5(path):
+        return read_mat(path, names)
     with H5File(path) as h5:
-        return {name: h5.numbers(name, np.float32 if name == frames else None) for name in names}
+        read = {name: h5.numbers(name, np.float32 if name == frames else None) for name in names}
+    return {name: values.T for name, values in read.items()} if _is_mat(path) else read

@@ -65,7 +65,7 @@ class Topics:
         count = max(len(topics), len(fields), len(arrays))
         for name, times in (("topic", len(topics)), ("field", len(fields)), ("array", len(arrays))):
             if times not in (0, 1, count):
-                raise refused(name, f": given {times} times for {count} sources; must be once, or for each")
+                raise refused(name, f": given {times} times for {count} sources; must be given once, or once for each")
         topics = topics * count if len(topics) == 1 else topics
         every_field: Sequence[str | None] = fields * count if len(fields) == 1 else fields or [None] * count
         every_array: Sequence[Array | None] = arrays * count if len(arrays) == 1 else arrays or [None] * count
@@ -114,7 +114,7 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
                     "times_by_the_bag": topic.by_the_bag,
                 }
             ),
-            remarks=() if topic.has_stamps else ("at the bag's times, as its messages have no header",),
+            remarks=() if topic.has_stamps else ("at the bag's times, because its messages have no header",),
             lost=known(
                 (*left_out, f"other topics of the bag: {', '.join(topic.unread)}") if topic.unread else left_out
             ),
@@ -148,9 +148,9 @@ def _lines_of_losses(topic: Read) -> Iterator[str]:
     if topic.left_out:
         total = counted(topic.left_out + len(topic.t), "message")
         rows, columns = topic.array.shape
-        yield f"{topic.left_out} of {total} left out, as they do not hold {rows} x {columns} values"
+        yield f"{topic.left_out} of {total} left out, because they do not hold {rows} x {columns} values"
     if topic.by_the_bag:
         yield (
-            f"{topic.by_the_bag} of {counted(len(topic.t), 'message')} at the bag's time, as stamps are 0, do not "
+            f"{topic.by_the_bag} of {counted(len(topic.t), 'message')} at the bag's time, because stamps are 0, do not "
             "ascend, or are far from it"
         )

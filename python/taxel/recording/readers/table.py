@@ -95,8 +95,8 @@ class _Head:
         is_decimal = separator == how.decimal
         if len(names) == 1 and separator is not None and not is_decimal:
             raise FormatError(
-                f"{path.name}, line {first}: one column by the separator {shown(how.separator)}, and "
-                f"{shown(separator)} within it; write in the layout file which it is: [table] separator"
+                f"{path.name}, line {first}: the separator {shown(how.separator)} gives one column, which contains "
+                f"{shown(separator)}; write the right separator in the layout file: [table] separator"
             )
         _refuse_skipped(path, how, skipped, len(names))
         named = not how.columns and not _are_of_frame(names, how)
@@ -197,7 +197,7 @@ def read_table(path: Path, layout: Layout) -> Readings:
     lost, end = head.lost, rows // lines * lines
     if end < rows:
         lost = (*lost, f"lines at the end that are not a whole frame: {rows - end} of {lines}")
-    size = counted(width, "column") if lines == 1 else f"{lines} lines of {counted(width, 'column')} a frame"
+    size = counted(width, "column") if lines == 1 else f"{lines} lines of {counted(width, 'column')} per frame"
     if how.has_lines:
         values = values[:end].reshape(-1, lines, width)
         t = None if t is None else t[:end:lines].copy()
@@ -383,7 +383,7 @@ def _with_points(texts: list[str], time: int | None, names: Sequence[str], path:
         k = next(k for k, cell in enumerate(texts) if "." in cell)
         name = short(names[k]) if k < len(names) else "a cell"
         raise FormatError(
-            f"{path.name}, line {line}: {name} is {shown(texts[k])}; must be without a point, as decimal is ','"
+            f"{path.name}, line {line}: {name} is {shown(texts[k])}; must be without a point, because decimal is ','"
         )
     return joined.replace(",", ".").split("\0")
 

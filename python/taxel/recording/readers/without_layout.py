@@ -96,6 +96,8 @@ def refuse_without_layout(path: Path) -> None:
             raise FormatError(
                 f"{path}: holds {list_arrays(shapes)}; must be t, x, y, p (events), values, t (frames), or, with a "
                 "layout file, an array of frames x rows x columns or frames x taxels (docs/files.md)"
+                + "; of a struct, save the fields: save('FILE.mat', '-struct', 'NAME')"
+                * path.name.endswith(".mat")
             )
         holds, lines = list_arrays(shapes), _of_arrays(path, name, shapes)
         says = "names the array of frames" if len(shapes) > 1 else "or rate_hz, describes it"
@@ -122,10 +124,18 @@ def _begin_of_frames(lines: Sequence[str]) -> str:
 
 def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
     """Return the layout of the array of a name."""
-    count, *shape = shapes[name]
-    time = next((name for name, shape_of in shapes.items() if shape_of == (count,) and unit_of(name) is not None), None)
-    times = [] if time is None else [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time], count)]
-    data = [f"array = {_quote(name)}"] * bool(name) + times
+    of_times = {name: max(shape, default=0) for name, shape in shapes.items() if unit_of(name) is not None}
+    of_times = {name: count for name, count in of_times.items() if math.prod(shapes[name]) == count}
+    first, *inner, last = shapes[name]
+    # MATLAB's frames are often along the last axis.
+    timed = set(of_times.values())
+    is_last = last in timed if (first in timed) != (last in timed) else last > max([first, *inner])
+    count, shape = (last, [first, *inner]) if is_last else (first, [*inner, last])
+    time = next((name for name, times in of_times.items() if times == count), None)
+    times = []
+    if time is not None:
+        times = [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time].ravel(), count)]
+    data = [f"array = {_quote(name)}"] * bool(name) + ['frames = "last"'] * is_last + times
     # An array of frames x rows x columns says its size, and others of the folder may have another.
     size = [_NO_UNIT] if len(shape) == 2 else _size(shape[0], ())
     return [*size, *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
@@ -394,7 +404,7 @@ def _of_table(found: _TextTable, longer: float, begin: str) -> tuple[str, list[s
         [] if name is None else [f"unit = {_quote(name or found.unit_above)}" if name or found.unit_above else _NO_UNIT]
     )
     rate = [_NO_RATE] if time is None else []
-    holds = f"a table of {counted(len(found.numeric), 'column')}" + f", {lines} lines a frame" * (lines > 1)
+    holds = f"a table of {counted(len(found.numeric), 'column')}" + f", {lines} lines per frame" * (lines > 1)
     names = [found.names[k] for k in taxels] if found.names else []
     size = _size(len(taxels), names) if lines == 1 else [f"rows = {lines}", f"columns = {len(taxels)}"]
     return holds, [*size, *unit, *rate, *(["[table]", *table] if table else [])]

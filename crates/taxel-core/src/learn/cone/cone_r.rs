@@ -66,7 +66,7 @@ impl ConeR {
         self.neuron.check()?;
         if self.neuron.time != Time::Grid {
             return Err(
-                problem!("time"; " is \"continuous\": must be \"grid\", as equation 6.13 is a sum over grid points"),
+                problem!("time"; " is \"continuous\": must be \"grid\", because equation 6.13 is a sum over grid points"),
             );
         }
         self.check_ranges()?;
@@ -379,7 +379,7 @@ impl ConeRProblem {
         let mut shares = vec![0.0; all];
         for (&row, &share) in multipliers.rows.iter().zip(&multipliers.values) {
             let Some(entry) = shares.get_mut(row) else {
-                return Err(problem!("start"; ": a multiplier of row {row}, there are {all} rows"));
+                return Err(problem!("start"; ": a multiplier of row {row}, but there are only {all} rows"));
             };
             let low = if row < silent { 0.0 } else { objective.kink_of_c().1 };
             if !(low <= share && share <= low + 1.0) {
@@ -402,7 +402,7 @@ impl ConeRProblem {
         if same {
             Ok(())
         } else {
-            Err(problem!("neuron, delta_t_ms, margin and horizon are in the rows: lay them out again"))
+            Err(problem!("neuron, delta_t_ms, margin and horizon are in the rows: prepare the rows again"))
         }
     }
 

@@ -127,7 +127,7 @@ impl ConeX {
         }
         if slope > 0.0 && self.neuron.time == Time::Grid {
             return Err(
-                problem!("slope"; " is {slope} mV/ms: belongs to time \"continuous\", on the grid nothing tapers"),
+                problem!("slope"; " is {slope} mV/ms: is only for time \"continuous\", because on the grid nothing tapers"),
             );
         }
         Ok(())
@@ -158,7 +158,7 @@ impl ConeX {
 
 /// Reasons for a search that ended early.
 const ASKED: &str = "asked to stop, by max_seconds or Ctrl-C";
-const UNDECIDED: &str = "rows that rounding cannot tell apart are neither met nor refuted";
+const UNDECIDED: &str = "rows that differ by no more than rounding are neither met nor refuted";
 
 /// A fit of CONE-X.
 #[derive(Debug, Clone, PartialEq)]
@@ -345,7 +345,7 @@ impl ConeXProblem {
         let proof = found.certificate.as_ref().map_or("", |proof| proof.text.as_str());
         let reason = format!(
             "no weights keep silence {height:.1e} mV below the threshold and come up to targets by {slope:.1e} mV/ms, the \
-             least margin that is tried; whether any do with less is not known ({proof})"
+             least margin that is tried; whether any do with a smaller margin is not known ({proof})"
         );
         ConeXFit {
             fit: Fit { status: Status::Stopped, gap: f64::INFINITY, ..found.fit.clone() },

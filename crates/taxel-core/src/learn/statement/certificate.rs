@@ -113,9 +113,9 @@ fn explain(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: 
             let why = if stated.coefficients.iter().all(|&a| a == 0.0) {
                 "no input counts before it".to_owned()
             } else if most < stated.limit {
-                format!("full weights come to {} mV there, the threshold is {} mV", mv(most), mv(stated.limit))
+                format!("the greatest weights give {} mV there, but the threshold is {} mV", mv(most), mv(stated.limit))
             } else {
-                format!("the least weights come to {} mV there, the threshold is {} mV", mv(least), mv(stated.limit))
+                format!("the least weights give {} mV there, but the threshold is {} mV", mv(least), mv(stated.limit))
             };
             format!("no weights within the bounds fire at pattern {pattern} target {target} ({} ms): {why}", short(t))
         }
@@ -132,7 +132,7 @@ fn explain(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: 
     };
     let Margin { height, slope } = statement.margin.times(statement.unit);
     if at_all {
-        text += ". Impossible at all: it needs no margin";
+        text += ". Impossible also without a margin";
     } else if slope > 0.0 {
         text += &format!(
             ". This holds for silence {height} mV below the threshold, coming up to targets by {slope} mV/ms or more"

@@ -34,7 +34,7 @@ pub fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<
 /// `Problem` where none has one.
 pub fn check_some_target(targets: &[Vec<f64>]) -> Result<()> {
     if targets.iter().all(Vec::is_empty) {
-        return Err(problem!("targets"; ": no pattern has one, so nothing is to be learnt"));
+        return Err(problem!("targets"; ": no pattern has one, so there is nothing to learn"));
     }
     Ok(())
 }

@@ -366,7 +366,7 @@ impl Statement {
 
     fn example(&self, pattern: usize) -> Result<&Example> {
         let count = self.examples.len();
-        self.examples.get(pattern).ok_or_else(|| problem!("pattern {pattern}: there are {count}"))
+        self.examples.get(pattern).ok_or_else(|| problem!("pattern {pattern}: there are only {count} patterns"))
     }
 
     fn target(&self, pattern: usize, target: usize) -> Result<(&Example, f64)> {
@@ -374,7 +374,7 @@ impl Statement {
         let count = example.targets.len();
         match example.targets.get(target) {
             Some(&t) => Ok((example, t)),
-            None => Err(problem!("pattern {pattern}, target {target}: the pattern has {count} targets")),
+            None => Err(problem!("pattern {pattern}, target {target}: the pattern has only {count} targets")),
         }
     }
 

@@ -1,0 +1,95 @@
+"""MATLAB files of arrays, as SciPy writes them, and as MATLAB does with -v7.3: by the axes that MATLAB shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.io import savemat
+
+import taxel
+from taxel import FormatError
+from taxel._base.mat_file import mat_shapes, read_mat
+from taxel.recorded import recorded
+
+TIMED = 'unit = "kPa"\n[data]\narray = "pressure"\ntime = "time_s"\ntime_unit = "s"\n'
+
+
+def save(place: Path, arrays: dict[str, NDArray[np.generic]], how: str) -> None:
+    if how != "-v7.3":
+        savemat(place, arrays, do_compression=how == "-v7")
+        return
+    with h5py.File(place, "w", userblock_size=512) as file:
+        for name, values in arrays.items():
+            file[name] = values.T
+    with place.open("r+b") as begun:
+        begun.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM")
+
+
+@pytest.mark.parametrize(
+    ("how", "dtype"),
+    [*(("-v7", dtype) for dtype in ("f8", "f4", "u1", "i2", ">f8", "u8")), ("-v6", "f8"), ("-v7.3", "f8")],
+)
+@pytest.mark.parametrize("frames", ["first", "last"])
+@pytest.mark.parametrize("shape", [(4, 6), (24,), (1,), (1, 1)])
+def test_frames_are_those_that_were_saved(
+    how: str, frames: str, dtype: str, shape: tuple[int, ...], tmp_path: Path
+) -> None:
+    random = np.random.default_rng(1)
+    values = random.integers(0, 200, (50, *shape)).astype(dtype)
+    t = np.arange(50.0) / 25
+    place = tmp_path / "walk.mat"
+    stored = np.moveaxis(values, 0, -1) if frames == "last" else values
+    save(place, {"pressure": stored, "time_s": t[:, None], "left": np.array(3.0)}, how)
+    # What the refusal proposes reads the file.
+    with pytest.raises(FormatError) as refused:
+        taxel.open(place)
+    proposed = (
+        str(refused.value).split("\n", 1)[1] if "\n" in str(refused.value) else "\n".join(refused.value.__notes__)
+    )
+    for text in (proposed, TIMED + f'frames = "{frames}"\n'):
+        (tmp_path / "walk.layout.toml").write_text(text)
+        read = recorded(taxel.open(place))
+        assert isinstance(read, taxel.Frames)
+        assert np.array_equal(read.values.reshape(values.shape), values.astype(np.float32))
+        assert np.array_equal(read.t, 40_000 * np.arange(50))
+
+
+def test_what_is_no_array_of_numbers_is_named_or_left_out(tmp_path: Path) -> None:
+    place = tmp_path / "walk.mat"
+    savemat(place, {"trial": {"pressure": np.ones((5, 2))}, "name": "walk", "z": np.array([1j])})
+    assert mat_shapes(place) == {}
+    with pytest.raises(FormatError, match=r"holds no numbers; .*; of a struct, save the fields: save\('FILE.mat', "):
+        taxel.open(place)
+    place.write_bytes(b"5, 6\n7, 8\n" * 30)
+    with pytest.raises(FormatError, match=r"not a MATLAB file of version 5 to 7\.3"):
+        taxel.open(place)
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_damage_is_refused_in_a_line_or_reads(tmp_path: Path, *, compressed: bool) -> None:
+    place, random = tmp_path / "walk.mat", np.random.default_rng(5)
+    savemat(place, {"pressure": np.ones((30, 4)), "t": np.arange(30.0)}, do_compression=compressed)
+    whole, refused = place.read_bytes(), list[str]()
+    for k in range(300):
+        damaged = np.frombuffer(whole, np.uint8).copy()
+        damaged[random.integers(0, len(whole), random.integers(1, 6))] = random.integers(0, 256)
+        place.write_bytes(damaged[: random.integers(1, len(whole)) if k % 5 == 0 else None].tobytes())
+        try:
+            read_mat(place, list(mat_shapes(place)))
+        except FormatError as error:
+            refused.append(str(error))
+    assert len(refused) > 50
+    assert not any("\n" in text for text in refused)
+
+
+def test_an_array_that_unpacks_to_more_than_a_file_may_hold_is_refused(tmp_path: Path) -> None:
+    place = tmp_path / "zeros.mat"
+    savemat(place, {"pressure": np.zeros((1 << 17, 32), np.uint8)}, do_compression=True)
+    (tmp_path / "zeros.layout.toml").write_text('rows = 1\ncolumns = 32\n[data]\narray = "pressure"\n')
+    assert len(recorded(taxel.open(place).at_rate(100.0))) == 1 << 17
+    with pytest.raises(FormatError, match="bytes"):
+        taxel.open(place, limit=1 << 20)
