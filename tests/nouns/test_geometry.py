@@ -128,7 +128,7 @@ def test_without_a_pitch_a_grid_counts_in_columns_and_rows_and_channels_refuse()
     assert grid.centre().tolist() == [[1.0, 0.5]]
     assert grid.loaded().tolist() == [2]
     channels = Frames([[[0.0, 2.0]]], [0])
-    for refused, match in ((grid.area, "mm2"), (channels.area, "mm2"), (channels.centre, "no position")):
+    for refused, match in ((grid.area, "mm2"), (channels.area, "mm2"), (channels.centre, "positions are not known")):
         with pytest.raises(ProblemError, match=match):
             refused()
 
