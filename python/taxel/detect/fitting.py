@@ -40,7 +40,7 @@ from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, score_together
 from taxel.detect.seen import seen
 from taxel.detections import Detections
-from taxel.encode import Composite, Encoder, LocalLoad
+from taxel.encode import Composite, Encoder, LocalLoad, TouchEnds
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -164,10 +164,13 @@ def fit_aligned(examples: Sequence[Example], recipe: Recipe, progress: Progress 
 def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
     """Return the recipe without the points to choose from that (checked) examples do not allow.
 
-    The local load requires a tare; channels have no neighbours, so that only encoders that need none remain.
+    The local load requires a tare; channels have no neighbours, so that only encoders that need none remain. Contact
+    and lift of channels, without kinds of touch, are not told as touches end, which is later than by the peak.
     """
     if lacks_neighbours(examples) and isinstance(recipe.encoder, Composite):
         near = {name for name, part in recipe.encoder.parts.items() if part._needs_neighbours}
+        if all(near & set(recipe.inputs_of(label)) for label in recipe.neurons):
+            near |= {name for name, part in recipe.encoder.parts.items() if isinstance(part, TouchEnds)}
         recipe = recipe._without_parts(near)
     return recipe._without_choices(LocalLoad.name) if any(example.tare is None for example in examples) else recipe
 
