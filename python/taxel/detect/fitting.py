@@ -65,6 +65,8 @@ _MOST_WAIT_MS = 100.0
 _MOST_LABELS = 0.9
 #: Why events cannot be learnt that have too few inputs.
 UNLEARNT = "cannot be learnt, as too few input spikes come before them"
+#: What is nearer to a point of a neuron's grid than this part of a step is there.
+_SAME_STEP = 1e-3
 #: With so many of the quantities that follow the labels best a point is tried.
 _FOLLOWED = 2
 
@@ -448,7 +450,7 @@ class Fitting:
             self._check_apart(name, times, neuron.refractory)
         later = self._later(sources, felt, ages, delay_ms, received.latency_ms if behind_input else None)
         shift_ms = received.latency_ms + self.delay_ms
-        self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
+        self._targets = [self._at(to_ms(t + more) + shift_ms, neuron) for t, more in zip(felt, later, strict=True)]
         if self._duration is None:
             self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
         self._shift_ms = received.latency_ms + self.delay_ms
@@ -505,6 +507,15 @@ class Fitting:
             return [later_us(source, ages, to_ms(t), delay_ms) for source, t in zip(sources, felt, strict=True)]
         wait_ms = 0.0 if behind_input_ms is None else _first_input_ms(sources, felt, behind_input_ms)
         return [np.full(len(times), round(to_us(wait_ms)), np.int64) for times in felt]
+
+    def _at(self, targets: NDArray[np.float64], neuron: Neuron) -> NDArray[np.float64]:
+        """Return targets; those as touches end at the first point of the grid behind these ends.
+
+        There a potential that jumped is greatest, and silence before the target must not be asked of it.
+        """
+        if self._duration is None:
+            return targets
+        return neuron.step_ms * np.floor(targets / neuron.step_ms + _SAME_STEP)
 
     @property
     def count(self) -> int:
