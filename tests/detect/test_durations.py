@@ -8,7 +8,7 @@ from refusal import refused
 
 from taxel import Array, Frames, Readout, Tare
 from taxel.detect import Example, PlainRule, Recipe, fit, recipes, run, score, tune
-from taxel.detect.floors import measured_floor
+from taxel.detect.floors import floor_alone, measured_floor
 from taxel.encode import TouchEnds
 
 HZ = 60
@@ -69,6 +69,17 @@ def test_on_channels_each_counts_alone(count: int, hz: int, unit: str) -> None:
     assert rule is not None
     assert rule.quantity == "duration"
     assert score(run(rule, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] == 0
+
+
+def test_the_floor_of_channels_is_that_of_the_noise_before_labels() -> None:
+    learnt = on_channels(1, 1, 20, 10)
+    for clipped in (False, True):
+        values = learnt.source.values - 20.0
+        values = np.maximum(values, 0.0) if clipped else values
+        frames = Frames(values, learnt.source.t, unit="N", array=learnt.source.array)
+        assert floor_alone([learnt._replace(source=frames)], 0.1) == pytest.approx(6.0, rel=0.25)
+    assert floor_alone([learnt], 30.0) == 30.0
+    assert floor_alone([learnt._replace(labels={})], 0.1) == 0.1
 
 
 def trained(seed: int = 1) -> Readout:

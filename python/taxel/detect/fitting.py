@@ -32,6 +32,7 @@ from taxel.detect.ages import (
 )
 from taxel.detect.alignment import WINDOW_MS, Alignment, align, align_by
 from taxel.detect.examples import Example, array_of, check_examples, name_of, sizes_of, unit_of
+from taxel.detect.floors import floor_alone
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
 from taxel.detect.levels import fit_levels
 from taxel.detect.loads import clock_of, lacks_neighbours
@@ -40,7 +41,7 @@ from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, score_together
 from taxel.detect.seen import seen
 from taxel.detections import Detections
-from taxel.encode import Composite, Encoder, LocalLoad, TouchEnds
+from taxel.encode import Composite, Encoder, LocalLoad, Moments, TouchEnds
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -173,8 +174,20 @@ def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
         near = {name for name, part in recipe.encoder.parts.items() if part._needs_neighbours}
         if all(near & set(recipe.inputs_of(label)) for label in recipe.neurons):
             near |= {name for name, part in recipe.encoder.parts.items() if isinstance(part, TouchEnds)}
-        recipe = recipe._without_parts(near)
+        recipe = _counting_alone(recipe._without_parts(near), examples)
     return recipe._without_choices(LocalLoad.name) if any(example.tare is None for example in examples) else recipe
+
+
+def _counting_alone(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
+    """Return a recipe for channels, whose noise alone must not load them."""
+    assert isinstance(recipe.encoder, Composite)
+    parts = {
+        name: copy(part).set_params(noise_floor=floor_alone(examples, part.noise_floor))
+        if isinstance(part, Moments | TouchEnds)
+        else part
+        for name, part in recipe.encoder.parts.items()
+    }
+    return replace(recipe, encoder=Composite(parts))
 
 
 class EncodedExamples:
