@@ -10,6 +10,7 @@ from taxel import Array, Frames, Readout, Tare
 from taxel.detect import Example, PlainRule, Recipe, fit, recipes, run, score, tune
 from taxel.detect.floors import floor_alone, measured_floor
 from taxel.encode import TouchEnds
+from taxel.recording.analysis.rest import by_unit
 
 HZ = 60
 
@@ -71,15 +72,15 @@ def test_on_channels_each_counts_alone(count: int, hz: int, unit: str) -> None:
     assert score(run(rule, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] == 0
 
 
-def test_the_floor_of_channels_is_that_of_the_noise_before_labels() -> None:
-    learnt = on_channels(1, 1, 20, 10)
-    for clipped in (False, True):
-        values = learnt.source.values - 20.0
-        values = np.maximum(values, 0.0) if clipped else values
+def test_the_floor_of_channels_without_a_measured_rest_is_by_the_noise_before_labels() -> None:
+    learnt = on_channels(1, 1, 20, 10, unit="N")
+    assert floor_alone([learnt], 0.1) == 0.1
+    for values in (learnt.source.values, np.maximum(learnt.source.values, 0.0)):
         frames = Frames(values, learnt.source.t, unit="N", array=learnt.source.array)
-        assert floor_alone([learnt._replace(source=frames)], 0.1) == pytest.approx(6.0, rel=0.25)
-    assert floor_alone([learnt], 30.0) == 30.0
-    assert floor_alone([learnt._replace(labels={})], 0.1) == 0.1
+        of_unit = Example(frames, learnt.labels, by_unit(frames))
+        assert floor_alone([of_unit], 0.1) == pytest.approx(6.0, rel=0.25)
+        assert floor_alone([of_unit], 30.0) == 30.0
+        assert floor_alone([of_unit._replace(labels={})], 0.1) == 0.1
 
 
 def trained(seed: int = 1) -> Readout:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from taxel.detect.examples import Example
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.analysis.rest import NOISE_FLOOR, SHARE, TIMES_NOISE
+from taxel.recording.analysis.rest import BY_UNIT, NOISE_FLOOR, SHARE, TIMES_NOISE
 
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01
@@ -51,9 +51,9 @@ def measured_floor(examples: Sequence[Example]) -> float | None:
 
 
 def floor_alone(examples: Sequence[Example], floor: float) -> float:
-    """Return the noise floor of channels, each of which counts alone: of the noise before labels, if that is more.
+    """Return the noise floor of channels, each of which counts alone: by the noise before labels, if that is more.
 
-    A tare by the unit has the noise of half a second that is quiet, which is less than it is elsewhere, or none.
+    Of those with a tare by the unit, which has the noise of half a second that is quiet: less than elsewhere, or none.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def floor_alone(examples: Sequence[Example], floor: float) -> float:
     noises = []
     for example in examples:
         source = example.source
-        if not isinstance(source, Frames):
+        if not isinstance(source, Frames) or example.tare is None or example.tare.note != BY_UNIT:
             continue
         for t in np.concatenate([*example.labels.values(), np.empty(0, np.int64)]).tolist():
             values = source.between(t - _BEFORE_US - _LOOK_US, t - _BEFORE_US).values
