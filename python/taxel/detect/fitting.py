@@ -168,7 +168,7 @@ def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
     """Return the recipe without the points to choose from that (checked) examples do not allow.
 
     The local load requires a tare; channels have no neighbours, so that only encoders that need none remain. Contact
-    and lift of channels, without kinds of touch, are not told as touches end, which is later than by the peak.
+    and lift of channels, without kinds of touch, are not detected as touches end, which is later than by the peak.
     """
     if lacks_neighbours(examples) and isinstance(recipe.encoder, Composite):
         near = {name for name, part in recipe.encoder.parts.items() if part._needs_neighbours}
@@ -463,7 +463,10 @@ class Fitting:
             self._check_apart(name, times, neuron.refractory)
         later = self._later(sources, felt, ages, delay_ms, received.latency_ms if behind_input else None)
         shift_ms = received.latency_ms + self.delay_ms
-        self._targets = [self._at(to_ms(t + more) + shift_ms, neuron) for t, more in zip(felt, later, strict=True)]
+        self._targets = [
+            self._at(to_ms(t + more) + shift_ms, neuron, trains.start)
+            for trains, t, more in zip(sources, felt, later, strict=True)
+        ]
         if self._duration is None:
             self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
         self._shift_ms = received.latency_ms + self.delay_ms
@@ -521,14 +524,14 @@ class Fitting:
         wait_ms = 0.0 if behind_input_ms is None else _first_input_ms(sources, felt, behind_input_ms)
         return [np.full(len(times), round(to_us(wait_ms)), np.int64) for times in felt]
 
-    def _at(self, targets: NDArray[np.float64], neuron: Neuron) -> NDArray[np.float64]:
-        """Return targets; those as touches end at the first point of the grid behind these ends.
+    def _at(self, targets: NDArray[np.float64], neuron: Neuron, start: float) -> NDArray[np.float64]:
+        """Return targets; those as touches end at the first point behind these ends of the grid from a start on.
 
         There a potential that jumped is greatest, and silence before the target must not be asked of it.
         """
         if self._duration is None:
             return targets
-        return neuron.step_ms * np.floor(targets / neuron.step_ms + _SAME_STEP)
+        return start + neuron.step_ms * np.floor((targets - start) / neuron.step_ms + _SAME_STEP)
 
     @property
     def count(self) -> int:
