@@ -525,7 +525,7 @@ class Fitting:
         return [np.full(len(times), round(to_us(wait_ms)), np.int64) for times in felt]
 
     def _at(self, targets: NDArray[np.float64], neuron: Neuron, start: float) -> NDArray[np.float64]:
-        """Return targets; those as touches end at the first point behind these ends of the grid from a start on.
+        """Return targets; those as touches end at the first point behind these ends of the grid that begins at `start`.
 
         There a potential that jumped is greatest, and silence before the target must not be asked of it.
         """
