@@ -7,8 +7,10 @@ import pytest
 from refusal import refused
 
 from taxel import Array, Frames, Readout, Tare
-from taxel.detect import Example, PlainRule, Recipe, fit, run, score, tune
+from taxel.detect import Example, PlainRule, Recipe, fit, recipes, run, score, tune
+from taxel.detect.floors import floor_alone, measured_floor
 from taxel.encode import TouchEnds
+from taxel.recording.analysis.rest import by_unit
 
 HZ = 60
 
@@ -30,6 +32,55 @@ def touches(seed: int, taps: int, presses: int, *, held: bool = False) -> Exampl
     frames = Frames(np.rint(values), t, unit="counts", array=Array(8, 8))
     labels = {kind: t[[begin for of, begin, _ in begun if of == kind]] for kind in ("tap", "press")}
     return Example(frames, labels, Tare.take(frames, stop_us=1_900_000))
+
+
+def on_channels(seed: int, count: int, taps: int, presses: int, hz: int = HZ, unit: str = "counts") -> Example:
+    """Return taps and presses of 8 to 100 times the noise, each on one or two channels."""
+    rng = np.random.default_rng(seed)
+    at, begun = 2 * hz, []
+    for kind in rng.permutation(["tap"] * taps + ["press"] * presses):
+        last = round(rng.uniform(*((0.1, 0.2) if kind == "tap" else (1.0, 2.0))) * hz)
+        begun.append((kind, at, last))
+        at += last + int(rng.integers(hz // 2, hz))
+    values = rng.normal(20.0 if unit == "counts" else 0.0, 1.0, (at + hz, 1, count))
+    for _, begin, last in begun:
+        touched = rng.permutation(count)[: rng.integers(1, 3)]
+        values[begin : begin + last, 0, touched] += np.exp(rng.uniform(np.log(8.0), np.log(100.0)))
+    t = (np.arange(len(values)) * (1e6 / hz)).astype(np.int64)
+    frames = Frames(np.rint(values) if unit == "counts" else values, t, unit=unit, array=Array(1, count))
+    labels = {kind: t[[begin for of, begin, _ in begun if of == kind]] for kind in ("tap", "press")}
+    return Example(frames, labels, Tare.take(frames, stop_us=1_900_000))
+
+
+@pytest.mark.parametrize(("count", "hz", "unit"), [(1, 60, "kPa"), (2, 250, "counts"), (6, 60, "N")])
+def test_on_channels_each_counts_alone(count: int, hz: int, unit: str) -> None:
+    learnt, unseen = on_channels(1, count, 20, 10, hz, unit), on_channels(2, count, 20, 10, hz, unit)
+    recipe = recipes.fitting(learnt.source, ["press", "tap"])
+    assert recipe == "touch"
+    readout = fit([learnt], Recipe.load(recipe, labels=["press", "tap"], noise_floor=measured_floor([learnt])))
+    found = run(readout, unseen.source, tare=unseen.tare)
+    assert score(found, unseen.labels, 50.0).rank[0] == 0
+    stream = readout.stream(unseen.source.array, frame_us=1e6 / hz, tare=unseen.tare)
+    live = []
+    for piece in np.array_split(np.arange(len(unseen.source)), 37):
+        live += list(stream.push(unseen.source[piece[0] : piece[-1] + 1]))
+    live += list(stream.advance(int(unseen.source.t[-1]) + 1_000_000))
+    assert [(d.label, d.t, d.known) for d in live] == [(d.label, d.t, d.known) for d in found]
+    rule = tune([learnt], ["press", "tap"], noise_floor=measured_floor([learnt]))["tap"]
+    assert rule is not None
+    assert rule.quantity == "duration"
+    assert score(run(rule, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] == 0
+
+
+def test_the_floor_of_channels_without_a_measured_rest_is_by_the_noise_before_labels() -> None:
+    learnt = on_channels(1, 1, 20, 10, unit="N")
+    assert floor_alone([learnt], 0.1) == 0.1
+    for values in (learnt.source.values, np.maximum(learnt.source.values, 0.0)):
+        frames = Frames(values, learnt.source.t, unit="N", array=learnt.source.array)
+        of_unit = Example(frames, learnt.labels, by_unit(frames))
+        assert floor_alone([of_unit], 0.1) == pytest.approx(6.0, rel=0.25)
+        assert floor_alone([of_unit], 30.0) == 30.0
+        assert floor_alone([of_unit._replace(labels={})], 0.1) == 0.1
 
 
 def trained(seed: int = 1) -> Readout:

@@ -41,10 +41,13 @@ def test_one_loaded_taxel_is_learnt_on_any_array(shape: tuple[int, int], times: 
         assert score(run(rule, learnt.source, tare=learnt.tare), {label: learnt.labels[label]}, 50.0).rank[0] <= 1
 
 
-def test_steps_and_kinds_of_channels_keep_their_recipes() -> None:
+def test_steps_of_channels_keep_their_recipes_and_kinds_need_a_rest() -> None:
     source = single((1, 6), 1).source
     assert recipes.fitting(source, ["contact", "foot_off"]) == "gait_insole"
-    assert recipes.fitting(source, ["soft", "hard"]) == "gait_insole"
+    assert [recipes.fitting(source, ["soft", "hard"], rests=rests) for rests in (True, False)] == [
+        "touch",
+        "gait_insole",
+    ]
 
 
 def test_a_rule_by_peak_needs_no_neighbours_and_follows_its_unit() -> None:

@@ -130,7 +130,11 @@ def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys
         (("contact", "lift"), "V", (1, 4), "touch"),
         (("press", "release"), "N", (1, 1), "touch"),
         (("contact",), "N", (1, 4), "gait_insole"),
-        (("contact", "lift", "slip"), "V", (1, 4), "gait_channel"),
+        (("contact", "lift", "slip"), "V", (1, 4), "touch"),
+        (("press", "tap"), "N", (1, 6), "touch"),
+        (("press", "tap"), "counts", (1, 1), "touch"),
+        (("heel_off", "tap"), "N", (1, 6), "gait_insole"),
+        (("left foot", "right foot"), "V", (1, 16), "gait_channel"),
         (("soft", "hard"), "V", (16, 16), "touch"),
         (("soft", "hard"), "V", (3, 11), "touch"),
         (("soft", "hard"), "V", (4, 8), "touch"),
@@ -143,7 +147,7 @@ def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys
         (("heel strike", "toe-off"), "counts", (16, 16), "gait_plate"),
         (("left foot", "right foot"), "V", (16, 16), "touch"),
         (("footfall",), "counts", (16, 16), "gait_plate"),
-        (("soft", "hard"), "V", (1, 64), "gait_channel"),
+        (("soft", "hard"), "V", (1, 64), "touch"),
         (("soft", "hard"), "counts", (16, 16), "touch"),
         (("contact", "foot_off"), "kPa", (16, 16), "touch"),
         (("Initial Contact", "Toe Off"), "kPa", (16, 16), "touch"),
@@ -159,21 +163,6 @@ def test_labels_and_neighbours_choose_the_recipe(
     labels: tuple[str, ...], unit: str, shape: tuple[int, int], recipe: str
 ) -> None:
     assert recipes.fitting(Frames(np.zeros((1, *shape)), [0], unit=unit, array=Array(*shape)), labels) == recipe
-
-
-@pytest.mark.parametrize(
-    ("labels", "asks"), [(("press", "tap"), True), (("press", "release"), False), (("tap",), False)]
-)
-def test_kinds_of_touch_on_channels_are_a_question_that_names_the_row(
-    tmp_path: Path, labels: tuple[str, ...], asks: bool
-) -> None:
-    values = np.random.default_rng(1).normal(size=(300, 1, 6))
-    channels = Frames(values, 10_000 * np.arange(300), unit="kPa", array=Array(1, 6))
-    assert ("--array 1x6x5 " in recipes.lacking_places(channels, labels)) == asks
-    taxel.convert(channels, tmp_path / "skin.npz")
-    if asks:
-        with pytest.raises(taxel.ProblemError, match=r"--array 1x6x5 .*; to continue anyway, give labels_as_given"):
-            taxel.train(taxel.open(tmp_path / "skin.npz"), [{label: [1_000_000] for label in labels}])
 
 
 def test_a_row_of_taxels_at_a_known_distance_is_no_channels() -> None:

@@ -68,7 +68,7 @@ def test_counts_of_an_event_camera_have_their_recipe_whatever_window_and_label()
         frames = Frames(np.zeros((2, 3, 4)), [0, 1000], unit=unit)
         for labels in (["contact", "lift"], ["slip"], ["foot_off"], []):
             assert recipes.fitting(frames, labels) == "event_counts"
-    # A row of channels has no neighbours, which moments need.
+    # A row of channels has no neighbours.
     assert recipes.fitting(Frames(np.zeros((2, 1, 4)), [0, 1000], unit="events/5 ms")) == "gait_channel"
 
 

@@ -52,9 +52,41 @@ def test_each_touch_is_told_when_it_ends_with_its_duration(seed, rate_hz):
     assert (values[4] == 1.0).all()
 
 
-def test_it_needs_neighbours_and_a_tare():
+def test_it_needs_a_tare():
     with refused("touch ends without a tare"):
         TouchEnds().encode(Frames(np.zeros((2, 2, 2)), [0, 1000]))
-    channels = Frames(np.zeros((2, 1, 5)), [0, 1000])
-    with refused("touch ends needs neighbours on a grid"):
-        TouchEnds(tare=Tare.take(channels)).encode(channels)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    shape=st.sampled_from([(1, 1), (1, 2), (1, 6), (21, 1)]),
+    floor=st.sampled_from([0.01, 5.0]),
+)
+def test_a_channel_counts_alone_from_six_times_its_noise_until_half_of_that(seed, shape, floor):
+    rng = np.random.default_rng(seed)
+    array = Array(*shape)
+    values = rng.normal(50.0, rng.uniform(0.2, 3.0, array.taxels), (300, array.taxels))
+    for begin in range(100, 280, 40):
+        values[begin : begin + 20, rng.integers(array.taxels)] += rng.uniform(1.0, 40.0)
+    frames = Frames(values.reshape(300, *shape), np.arange(300) * 10_000, array=array)
+    tare = Tare.take(frames, stop_us=900_000)
+    enough = np.maximum(6.0 * tare.noise.ravel(), floor)
+    loaded, begun, expected = np.zeros(array.taxels, bool), None, []
+    for k, above in enumerate(frames.values.reshape(300, -1).astype(np.float64) - tare.rest.ravel()):
+        loaded = above >= np.where(loaded, 0.5 * enough, enough)
+        if loaded.any() and begun is None:
+            begun = k
+        elif not loaded.any() and begun is not None:
+            expected.append((10.0 * k, np.float32(np.log1p(10.0 * (k - begun)))))
+            begun = None
+    spikes = TouchEnds(noise_floor=floor, tare=tare).encode(frames)
+    assert list(zip(spikes[0].tolist(), spikes.values[: len(spikes[0])], strict=True)) == expected
+
+
+def test_a_channel_that_reads_one_value_is_never_loaded():
+    values = np.full((50, 1, 3), 512.0)
+    values[20:30, 0, 1] += 1.0
+    frames = Frames(values, np.arange(50) * 10_000, array=Array(1, 3))
+    spikes = TouchEnds(noise_floor=0.0, tare=Tare.take(frames, stop_us=100_000)).encode(frames)
+    assert spikes[0].tolist() == [300.0]

@@ -279,13 +279,19 @@ impl Array {
         ))
     }
 
+    /// Whether taxels are known to be side by side: those of channels and a single one are not.
+    #[must_use]
+    pub fn has_neighbours(&self) -> bool {
+        self.len() > 1 && (self.pitch_mm.is_some() || (self.rows > 1 && self.columns > 1))
+    }
+
     /// Refuses, for `subject` that needs them, an array whose taxels are not known to have neighbours: channels.
     ///
     /// # Errors
     ///
     /// `Problem` for a single row or column without a pitch.
     pub fn check_neighbours(&self, subject: &str) -> Result<()> {
-        if self.pitch_mm.is_some() || (self.rows > 1 && self.columns > 1) || self.len() == 1 {
+        if self.has_neighbours() || self.len() == 1 {
             return Ok(());
         }
         Err(problem!(

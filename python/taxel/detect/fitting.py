@@ -32,6 +32,7 @@ from taxel.detect.ages import (
 )
 from taxel.detect.alignment import WINDOW_MS, Alignment, align, align_by
 from taxel.detect.examples import Example, array_of, check_examples, name_of, sizes_of, unit_of
+from taxel.detect.floors import floor_alone
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
 from taxel.detect.levels import fit_levels
 from taxel.detect.loads import clock_of, lacks_neighbours
@@ -40,7 +41,7 @@ from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, score_together
 from taxel.detect.seen import seen
 from taxel.detections import Detections
-from taxel.encode import Composite, Encoder, LocalLoad
+from taxel.encode import Composite, Encoder, LocalLoad, Moments, TouchEnds
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -65,6 +66,8 @@ _MOST_WAIT_MS = 100.0
 _MOST_LABELS = 0.9
 #: Why events cannot be learnt that have too few inputs.
 UNLEARNT = "cannot be learnt, because too few input spikes come before them"
+#: What is nearer to a point of a neuron's grid than this part of a step is there.
+_SAME_STEP = 1e-3
 #: With so many of the quantities that follow the labels best a point is tried.
 _FOLLOWED = 2
 
@@ -164,12 +167,27 @@ def fit_aligned(examples: Sequence[Example], recipe: Recipe, progress: Progress 
 def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
     """Return the recipe without the points to choose from that (checked) examples do not allow.
 
-    The local load requires a tare; channels have no neighbours, so that only encoders that need none remain.
+    The local load requires a tare; channels have no neighbours, so that only encoders that need none remain. Contact
+    and lift of channels, without kinds of touch, are not detected as touches end, which is later than by the peak.
     """
     if lacks_neighbours(examples) and isinstance(recipe.encoder, Composite):
         near = {name for name, part in recipe.encoder.parts.items() if part._needs_neighbours}
-        recipe = recipe._without_parts(near)
+        if all(near & set(recipe.inputs_of(label)) for label in recipe.neurons):
+            near |= {name for name, part in recipe.encoder.parts.items() if isinstance(part, TouchEnds)}
+        recipe = _counting_alone(recipe._without_parts(near), examples)
     return recipe._without_choices(LocalLoad.name) if any(example.tare is None for example in examples) else recipe
+
+
+def _counting_alone(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
+    """Return a recipe for channels, whose noise alone must not load them."""
+    assert isinstance(recipe.encoder, Composite)
+    parts = {
+        name: copy(part).set_params(noise_floor=floor_alone(examples, part.noise_floor))
+        if isinstance(part, Moments | TouchEnds)
+        else part
+        for name, part in recipe.encoder.parts.items()
+    }
+    return replace(recipe, encoder=Composite(parts))
 
 
 class EncodedExamples:
@@ -445,7 +463,10 @@ class Fitting:
             self._check_apart(name, times, neuron.refractory)
         later = self._later(sources, felt, ages, delay_ms, received.latency_ms if behind_input else None)
         shift_ms = received.latency_ms + self.delay_ms
-        self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
+        self._targets = [
+            self._at(to_ms(t + more) + shift_ms, neuron, trains.start)
+            for trains, t, more in zip(sources, felt, later, strict=True)
+        ]
         if self._duration is None:
             self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
         self._shift_ms = received.latency_ms + self.delay_ms
@@ -502,6 +523,15 @@ class Fitting:
             return [later_us(source, ages, to_ms(t), delay_ms) for source, t in zip(sources, felt, strict=True)]
         wait_ms = 0.0 if behind_input_ms is None else _first_input_ms(sources, felt, behind_input_ms)
         return [np.full(len(times), round(to_us(wait_ms)), np.int64) for times in felt]
+
+    def _at(self, targets: NDArray[np.float64], neuron: Neuron, start: float) -> NDArray[np.float64]:
+        """Return targets; those as touches end at the first point behind these ends of the grid that begins at `start`.
+
+        There a potential that jumped is greatest, and silence before the target must not be asked of it.
+        """
+        if self._duration is None:
+            return targets
+        return start + neuron.step_ms * np.floor((targets - start) / neuron.step_ms + _SAME_STEP)
 
     @property
     def count(self) -> int:

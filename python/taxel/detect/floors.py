@@ -10,10 +10,14 @@ from numpy.typing import NDArray
 from taxel.detect.examples import Example
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.analysis.rest import NOISE_FLOOR, SHARE, TIMES_NOISE
+from taxel.recording.analysis.rest import BY_UNIT, NOISE_FLOOR, SHARE, TIMES_NOISE
 
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01
+#: The third quartile of normal noise is so many standard deviations above its median.
+_THIRD_QUARTILE = 0.6745
+#: The noise of channels is looked at until so long before each label, for so long, us, if there are so many frames.
+_BEFORE_US, _LOOK_US, _LEAST_FRAMES = 20_000, 500_000, 8
 
 
 def floor_at_rest(noise: NDArray[np.float64]) -> float:
@@ -44,6 +48,30 @@ def measured_floor(examples: Sequence[Example]) -> float | None:
         reach = float(np.quantile(above[known], SHARE))
         floors.append(max(floor_at_rest(example.tare.noise[known]), _SHARE_OF_RANGE * reach))
     return float(f"{max(floors):.3g}") if max(floors, default=0.0) > 0.0 else None
+
+
+def floor_alone(examples: Sequence[Example], floor: float) -> float:
+    """Return the noise floor of channels, each of which counts alone: by the noise before labels, if that is more.
+
+    Of those with a tare by the unit, which has the noise of half a second that is quiet: less than elsewhere, or none.
+
+    Parameters
+    ----------
+    examples : sequence of Example, checked
+    floor : float, in the sensor's unit
+        As of `measured_floor`, or stated.
+    """
+    noises = []
+    for example in examples:
+        source = example.source
+        if not isinstance(source, Frames) or example.tare is None or example.tare.note != BY_UNIT:
+            continue
+        for t in np.concatenate([*example.labels.values(), np.empty(0, np.int64)]).tolist():
+            values = source.between(t - _BEFORE_US - _LOOK_US, t - _BEFORE_US).values
+            if len(values) >= _LEAST_FRAMES:
+                middle, above = np.nanquantile(values, (0.5, 0.75), axis=0)
+                noises.append(float(np.nanmedian(above - middle)) / _THIRD_QUARTILE)
+    return max(floor, float(f"{TIMES_NOISE * np.median(noises or [0.0]):.3g}"))
 
 
 def floor_of(examples: Sequence[Example]) -> float:

@@ -73,18 +73,18 @@ class Loads:
         self._edges: dict[tuple[str, float, float, int], tuple[FoundTimes, FoundTimes]] = {}
         self._ages: dict[float, FoundTimes] = {}
         if quantities is None:
-            # The others need neighbours.
+            # Of channels the local load is not known, and the area and total tell edges no better than the peak.
             quantities = ("peak",) if lacks_neighbours(examples) else ("area", "total", "local_load", "peak")
-        for quantity in quantities:
+            measured = dict.fromkeys(("area", *quantities))  # kinds are decided by the area
+        else:
+            measured = dict.fromkeys(quantities)
+        #: The names of the quantities that rules compare at the edges of loads.
+        self.quantities = tuple(quantities)
+        for quantity in measured:
             report(f"measuring the {quantity.replace('_', ' ')} for plain rules", 0, 0)
             self._curves[quantity] = [
                 _curve(quantity, noise_floor, example, *clock) for example, clock in zip(examples, clocks, strict=True)
             ]
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """The names of the quantities."""
-        return tuple(self._curves)
 
     def edges(self, quantity: str, threshold: float, release: float, frames: int) -> tuple[FoundTimes, FoundTimes]:
         """Return the begins and the ends of loads."""

@@ -25,19 +25,20 @@ class PlainRule(_Detector):
     loaded. A detection's `t` is the time of the first of these frames, and it is `known` at the end of the last.
 
     With `age_ms` it decides once a touch between two kinds, by the quantity at that age. A touch begins with the first
-    frame in which 2 taxels or more are loaded and ends with the first in which fewer are; `t` is its begin, and `known`
-    the end of the frame that holds at the age. A touch that is over by then is decided by what the quantity is then.
-    With the age "end" it decides when the touch ends, by the quantity "duration"; `known` is the end of the frame in
-    which it ends. A touch that has not ended is not decided.
+    frame in which 2 taxels or more are loaded, or one channel, and ends with the first in which none is; `t` is its
+    begin, and `known` the end of the frame that holds at the age. A touch that is over by then is decided by what the
+    quantity is then. With the age "end" it decides when the touch ends, by the quantity "duration"; `known` is the end
+    of the frame in which it ends. A touch that has not ended is not decided.
 
     Parameters
     ----------
     quantity : {"area", "total", "local_load", "peak", "duration"}
-        The number of loaded taxels, as `taxel.encode.ContactArea` counts them; the sum of their values above rest in
-        the sensor's unit, as `taxel.encode.Moments` adds them; the largest sum over 3 x 3 taxels above a rest that
-        follows the sensor, in units of its noise, as of `taxel.encode.LocalLoad` ("largest"); the largest value of a
-        taxel above such a rest, in units of that taxel's noise, with what several add, as of `taxel.encode.Peak`; or
-        how long a touch lasts, with the age "end". In single precision.
+        The number of loaded taxels, as `taxel.encode.ContactArea` counts them, of channels as `taxel.encode.TouchEnds`
+        does; the sum of their values above rest in the sensor's unit, as `taxel.encode.Moments` adds them; the largest
+        sum over 3 x 3 taxels above a rest that follows the sensor, in units of its noise, as of
+        `taxel.encode.LocalLoad` ("largest"); the largest value of a taxel above such a rest, in units of that taxel's
+        noise, with what several add, as of `taxel.encode.Peak`; or how long a touch lasts, with the age "end". In
+        single precision.
     threshold : float, above 0
         Number of taxels, the sensor's unit, units of noise, or ms.
     release : float, above 0, at most 1
@@ -58,8 +59,8 @@ class PlainRule(_Detector):
 
     Raises
     ------
-    ProblemError : parameters that are invalid or do not fit together (names the parameter); when it runs, channels, of
-        which no taxel is known to have neighbours, except by peak
+    ProblemError : parameters that are invalid or do not fit together (names the parameter); when it runs by local load,
+        channels, of which no taxel is known to have neighbours
 
     Notes
     -----

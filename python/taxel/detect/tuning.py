@@ -63,10 +63,10 @@ def tune(
 
     Tried are all thresholds of the area (`AREAS`), of the total (`QUANTILES` of its values above 0), of the local load
     (`LOCAL_LOADS`) and of the peak (`PEAKS`), with all numbers of frames (`FRAMES`) and releases (`RELEASES`), at the
-    onset and at the end of a load; of channels the peak alone. Two labels are kinds where exactly two are nearer to
-    onsets than to ends, or where there are only two: then thresholds of the area at each of `AGES_MS` are tried too, on
-    a logarithmic scale, and thresholds of the duration as touches end, and hold for both where they are better for both
-    together. Of frames each counts once that holds at one of these ages.
+    onset and at the end of a load; of channels those of the peak alone. Two labels are kinds where exactly two are
+    nearer to onsets than to ends, or where there are only two: then thresholds of the area at each of `AGES_MS` are
+    tried too, on a logarithmic scale, and thresholds of the duration as touches end, and hold for both where they are
+    better for both together. Of frames each counts once that holds at one of these ages.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def best_rules(
     onsets = [name for name, (onset, end) in best.items() if onset.fit.error_ms < end.fit.error_ms]
     single = {name: min(pair, key=lambda tuned: tuned.fit[:2]) for name, pair in best.items()}
     kinds = onsets if len(onsets) == 2 else list(names) if len(names) == 2 else []
-    if kinds and "area" in loads.quantities:
+    if kinds:
         windows = loads.windows(loads.labelled(kinds, parts))
         touches: dict[float | str, FoundTimes] = {
             age: loads.at_age(age).between(windows) for age in loads.ages_ms(AGES_MS)

@@ -37,8 +37,8 @@ class Encoder(Value):
 
     name: ClassVar[str]
     _by_name: ClassVar[dict[str, type[Encoder]]] = {}
-    #: Whether it counts taxels beside each other, which channels do not have.
-    _needs_neighbours: ClassVar[bool] = False
+    #: Whether channels have no such trains, as it counts taxels beside each other or needs their places.
+    _needs_neighbours: bool = False
     #: Whether its trains are levels of one quantity, of which a neuron learns the one that follows its labels best.
     _learns_one: ClassVar[bool] = False
 

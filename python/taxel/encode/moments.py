@@ -16,11 +16,12 @@ _DEFAULT = defaults("moments")
 class Moments(Tared):
     """Fire when the area, total, peak or displacement of the centre of a touch crosses levels in geometric steps.
 
-    The moments of the loaded taxels (as in `ContactArea`) are their number (area), the sum and the largest of their
-    values above rest (total, peak), and the displacement to the right and downwards of their centre, weighted by these
-    values, since the present touch began. A touch begins when area rises above 0 and ends when it is 0; between touches
-    all moments are 0. Each level of the displacement applies on both sides of 0. The moments do not depend on the
-    position of the touch on the array, so weights that are learnt at one position apply to others; `centre` adds it.
+    The moments of the loaded taxels (as in `ContactArea`; of channels as in `TouchEnds`) are their number (area), the
+    sum and the largest of their values above rest (total, peak), and the displacement to the right and downwards of
+    their centre, weighted by these values, since the present touch began. A touch begins when area rises above 0 and
+    ends when it is 0; between touches all moments are 0. Each level of the displacement applies on both sides of 0. The
+    moments do not depend on the position of the touch on the array, so weights that are learnt at one position apply to
+    others; `centre` adds it.
 
     Trains are unsigned, one for each level in the order area, total, peak, x right, x left, y down, y up, levels
     ascending: first the trains of levels reached, then those of levels left, then (with `tonic_ms`) those that fire
@@ -67,7 +68,8 @@ class Moments(Tared):
 
     Raises
     ------
-    ProblemError : an invalid parameter; encoding without a tare, or with another array's
+    ProblemError : an invalid parameter; encoding without a tare, or with another array's; the centre, or its
+        displacement, of channels, which have no places
 
     Examples
     --------
@@ -90,7 +92,6 @@ class Moments(Tared):
     """
 
     name = "moments"
-    _needs_neighbours = True
 
     noise_floor: float = _DEFAULT.noise_floor
     levels: int = _DEFAULT.levels
@@ -104,3 +105,7 @@ class Moments(Tared):
     ages_ms: Sequence[float] | None = _DEFAULT.ages_ms
     period_ms: float = _DEFAULT.period_ms
     tare: Tare | float | None = _DEFAULT.tare
+
+    @property
+    def _needs_neighbours(self) -> bool:  # type: ignore[override]
+        return self.centre or self.displacement_mm is not None

@@ -16,6 +16,9 @@ class TouchEnds(Tared):
     """Give a graded spike on each train when a touch ends, with the duration and size of the touch.
 
     A touch begins when the number of taxels that count for `ContactArea` rises above 0, and ends when it is 0 again.
+    Channels and a single taxel have no neighbours and count alone: from the noise floor on, or from six times their
+    noise in the tare if that is more, until they are below half of it.
+
     The trains are log(1 + duration in ms); log(1 + the largest) of its area, of its total and of its peak, as in
     `Moments`; and 1. A touch that has not ended gives nothing. The detections of a neuron that receives them have the
     beginning of the touch as their time `t`, and are `known` after its end.
@@ -30,7 +33,7 @@ class TouchEnds(Tared):
 
     Raises
     ------
-    ProblemError : an invalid parameter; encoding without a tare, or with another array's, or of channels
+    ProblemError : an invalid parameter; encoding without a tare, or with another array's
 
     Notes
     -----
@@ -49,7 +52,6 @@ class TouchEnds(Tared):
     """
 
     name = "touch_ends"
-    _needs_neighbours = True
 
     noise_floor: float = _DEFAULT.noise_floor
     tare: Tare | float | None = _DEFAULT.tare

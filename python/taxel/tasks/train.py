@@ -127,8 +127,6 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     opened, labelled, without = [opened[k] for k in some], [labelled[k] for k in some], [without[k] for k in some]
     if options.recipe is None and "encoder.name" not in options.changes:
         source, rests = recorded(opened[0]), True
-        if not options.labels_as_given and (doubt := recipes.lacking_places(source, names)):
-            raise helped(ProblemError(f"labels: {doubt}"), "labels_as_given", "go_on")
         if isinstance(source, Frames) and not source.array._has_neighbours and options.tare is None:
             rests = all(map(has_rest, labelled, opened))
         recipe, why = recipes.chosen(source, names, rests=rests)

@@ -35,9 +35,9 @@ pub(super) enum When {
 }
 
 impl Limits {
-    /// The area from which on a sensor is touched, where a rule decides at an age: the smallest that there is, as a
-    /// loaded taxel counts only beside another one.
-    const TOUCHED: f64 = 2.0;
+    /// The area from which on a sensor is touched, where a rule decides at an age: the smallest that there is, of channels,
+    /// which count alone. A loaded taxel of a grid counts only beside another one.
+    const TOUCHED: f64 = 1.0;
 
     /// Decides at an age of each touch, which the area on `touch_train` begins in one frame.
     pub(super) fn at_age(touch_train: u32, threshold: f64, age_ms: f64) -> Self {

@@ -6,6 +6,15 @@ use crate::rest::{Rest, touched_from};
 use crate::vectors::wide;
 use crate::{Array, Hint, Result, problem};
 
+/// A channel that counts alone is loaded from so many times its noise on, which noise alone does not reach.
+const TIMES_NOISE: f64 = 6.0;
+
+/// It is loaded until it is below this part of that, so that noise does not end a touch.
+const RELEASE: f64 = 0.5;
+
+/// The smallest value above rest at which it is loaded, where neither noise nor floor is known.
+const LEAST: f64 = 1e-9;
+
 /// The smallest f32 that is not below `x`.
 fn round_up(x: f64) -> f32 {
     let near = x as f32;
@@ -23,18 +32,21 @@ wide! {
     }
 }
 
-/// The taxels of an array at or above a value of their own, and how many of them have such a neighbour.
+/// The taxels of an array at or above a value of their own, and how many of them have such a neighbour, or are channels,
+/// which count alone.
 #[derive(Clone)]
 pub(super) struct Paired {
     rows: usize,
     columns: usize,
-    /// Smallest value at which each taxel is loaded; infinite if there is none.
+    /// Smallest value at which each taxel is loaded, or stays so; infinite if there is none.
     from: Vec<Block>,
+    /// Of channels: the smallest value at which each is loaded, and at which it stays so; empty on a grid.
+    alone: Vec<[f32; 2]>,
     /// 1 for each loaded taxel, otherwise 0.
     loaded: Vec<[u32; BLOCK]>,
     /// Number of loaded neighbours of each taxel.
     neighbours: Vec<u8>,
-    /// Number of loaded taxels with a loaded neighbour.
+    /// Number of taxels that count.
     area: u32,
 }
 
@@ -46,10 +58,16 @@ impl Paired {
             rows,
             columns,
             from: vec![[f32::INFINITY; BLOCK]; n],
+            alone: vec![],
             loaded: vec![[0; BLOCK]; n],
             neighbours: vec![0; rows * columns],
             area: 0,
         }
+    }
+
+    /// Starts likewise with channels, each of which counts alone.
+    fn alone(channels: usize) -> Self {
+        Self { alone: vec![[f32::INFINITY; 2]; channels], neighbours: vec![1; channels], ..Self::new(1, channels) }
     }
 
     /// Sets the smallest value at which a taxel is loaded; the caller must pass its value again.
@@ -57,12 +75,18 @@ impl Paired {
         self.from[taxel / BLOCK][taxel % BLOCK] = round_up(from);
     }
 
+    /// Sets the smallest value at which a channel is loaded, and at which it stays so; likewise.
+    fn set_alone(&mut self, channel: usize, values: [f64; 2]) {
+        self.alone[channel] = values.map(round_up);
+        self.set_from(channel, values[usize::from(self.is_loaded(channel))]);
+    }
+
     /// Number of blocks of taxels.
     pub(super) fn blocks(&self) -> usize {
         self.loaded.len()
     }
 
-    /// Number of loaded taxels with a loaded neighbour.
+    /// Number of taxels that count.
     pub(super) fn area(&self) -> u32 {
         self.area
     }
@@ -72,7 +96,7 @@ impl Paired {
         self.loaded[block].iter().any(|&l| l != 0)
     }
 
-    /// Whether a taxel counts: it and one of its neighbours are loaded.
+    /// Whether a taxel counts: it and one of its neighbours are loaded, or it is a channel.
     pub(super) fn counts(&self, taxel: usize) -> bool {
         self.is_loaded(taxel) && self.neighbours[taxel] > 0
     }
@@ -102,6 +126,11 @@ impl Paired {
     fn toggle(&mut self, taxel: usize) {
         let loaded = !self.is_loaded(taxel);
         self.loaded[taxel / BLOCK][taxel % BLOCK] = u32::from(loaded);
+        if let Some(values) = self.alone.get(taxel) {
+            self.from[taxel / BLOCK][taxel % BLOCK] = values[usize::from(loaded)];
+            self.area = if loaded { self.area + 1 } else { self.area - 1 };
+            return;
+        }
         let (row, column) = (taxel / self.columns, taxel % self.columns);
         for y in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
             for x in column.saturating_sub(1)..=(column + 1).min(self.columns - 1) {
@@ -129,11 +158,14 @@ impl Paired {
 /// The loaded taxels of an array.
 ///
 /// A taxel is loaded while its value exceeds its rest by more than the noise floor and half a tick; it counts only if
-/// one of its 8 neighbours is loaded too, which rejects noise.
+/// one of its 8 neighbours is loaded too, which rejects noise. Channels, and a single taxel, have no neighbours and count
+/// alone: from the noise floor and six times their own noise on, until they are below half of that.
 #[derive(Clone)]
 pub(super) struct Loaded {
     paired: Paired,
     noise_floor: f64,
+    /// The noise of each channel; empty on a grid.
+    noise: Vec<f64>,
     rest: Rest<f64>,
 }
 
@@ -153,9 +185,14 @@ pub(super) struct LoadedSums {
 impl Loaded {
     /// Starts with no taxel loaded; `subject` names the encoder in an error.
     pub(super) fn new(subject: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
-        let rest = require_tare(subject, tare)?.rest_of(array)?;
-        let paired = Paired::new(usize::from(array.rows), usize::from(array.columns));
-        let mut fresh = Self { paired, noise_floor, rest };
+        let tare = require_tare(subject, tare)?;
+        let rest = tare.rest_of(array)?;
+        let (paired, noise) = if array.has_neighbours() {
+            (Paired::new(usize::from(array.rows), usize::from(array.columns)), vec![])
+        } else {
+            (Paired::alone(array.len()), tare.place_noise())
+        };
+        let mut fresh = Self { paired, noise_floor, noise, rest };
         (0..array.len()).for_each(|taxel| fresh.update_threshold(taxel));
         Ok(fresh)
     }
@@ -173,7 +210,13 @@ impl Loaded {
     }
 
     fn update_threshold(&mut self, taxel: usize) {
-        self.paired.set_from(taxel, touched_from(self.rest.values()[taxel], self.noise_floor));
+        let rest = self.rest.values()[taxel];
+        if let Some(noise) = self.noise.get(taxel) {
+            let above = (TIMES_NOISE * noise).max(self.noise_floor).max(LEAST);
+            self.paired.set_alone(taxel, [rest + above, rest + RELEASE * above]);
+        } else {
+            self.paired.set_from(taxel, touched_from(rest, self.noise_floor));
+        }
     }
 
     /// The rest of a taxel; `None` if it is not known.

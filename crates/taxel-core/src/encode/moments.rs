@@ -155,7 +155,9 @@ impl Encoding for Moments {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        array.check_neighbours("moments")?;
+        if self.centre || self.displacement_mm.is_some() {
+            array.check_neighbours("moments")?;
+        }
         let loaded = Loaded::new("moments", array, self.tare.as_ref(), self.noise_floor)?;
         let way = if self.displacement_mm.is_some() { Some(Way::on(array)?) } else { None };
         let levels = self.all_levels();

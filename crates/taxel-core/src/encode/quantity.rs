@@ -17,7 +17,7 @@ use crate::{Array, Result, Spike, problem};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
-    /// The number of loaded taxels, as of [`ContactArea`](super::ContactArea).
+    /// The number of loaded taxels, as of [`ContactArea`](super::ContactArea); of channels each counts alone.
     Area,
     /// The sum of their values above rest, in the sensor's unit, as of [`Moments`](super::Moments).
     Total,
@@ -37,18 +37,18 @@ impl Quantity {
     ///
     /// # Errors
     ///
-    /// `Problem` for channels, of which no taxel is known to have neighbours, except of the peak; without a tare, or with
-    /// one of another array; for the local load and the peak, with one without the taxels' noise; for the duration.
+    /// `Problem` for the local load of channels, of which no taxel is known to have neighbours; without a tare, or with one
+    /// of another array; for the local load and the peak, with one without the taxels' noise; for the duration.
     pub fn stream(several: &[Self], array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Box<dyn Stream>> {
         for quantity in several {
             match quantity {
-                Self::Peak => {}
                 Self::Duration => {
                     return Err(
                         problem!("quantity"; " duration: does not change during a touch; choose another quantity"),
                     );
                 }
-                _ => array.check_neighbours(quantity.rule())?,
+                Self::LocalLoad => array.check_neighbours("a plain rule by local load")?,
+                Self::Area | Self::Total | Self::Peak => {}
             }
         }
         let by_loaded = several.iter().any(|quantity| matches!(quantity, Self::Area | Self::Total));
@@ -61,17 +61,6 @@ impl Quantity {
         let peak = several.contains(&Self::Peak).then(|| PeakLoad::new(array, tare, least)).transpose()?;
         let loads = QuantityMeasure { quantities: several.to_vec(), values: vec![0.0; several.len()], local, peak };
         Ok(Box::new(ByStamp::new(loads, loaded, array)))
-    }
-
-    /// A plain rule by this quantity, in errors.
-    fn rule(self) -> &'static str {
-        match self {
-            Self::Area => "a plain rule by area",
-            Self::Total => "a plain rule by total",
-            Self::LocalLoad => "a plain rule by local load",
-            Self::Peak => "a plain rule by peak",
-            Self::Duration => "a plain rule by duration",
-        }
     }
 }
 

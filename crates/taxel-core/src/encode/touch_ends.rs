@@ -24,7 +24,8 @@ parameters! {
     /// A graded spike on each train when a touch ends, which says how long it lasted and how large it was.
     ///
     /// A touch begins when the area, the number of taxels that count for [`ContactArea`](super::ContactArea), rises
-    /// above 0 and ends when it is 0 again. Trains: log(1 + duration, ms), then log(1 + the largest) of the touch of area,
+    /// above 0 and ends when it is 0 again. A channel, which has no neighbours, counts alone: from the noise floor on, or
+    /// from six times its noise in the tare if that is more, until it is below half of it. Trains: log(1 + duration, ms), then log(1 + the largest) of the touch of area,
     /// total and peak, as of [`Moments`](super::Moments), and 1. A touch that has not ended gives nothing.
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
@@ -45,7 +46,6 @@ impl Encoding for TouchEnds {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        array.check_neighbours("touch ends")?;
         let loaded = Loaded::new("touch ends", array, self.tare.as_ref(), self.noise_floor)?;
         Ok(Box::new(ByStamp::new(PresentTouch::default(), loaded, array)))
     }

@@ -30,7 +30,6 @@ __all__ = [
     "for_labels",
     "kinds",
     "knows",
-    "lacking_places",
     "names",
     "names_of",
     "neuron_of",
@@ -78,9 +77,10 @@ def fitting(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool 
     ----------
     source : Events or Frames
     labels : sequence of str
-        What is to be learnt. Contact, lift and kinds of touch of a grid have one recipe whatever the unit; steps, as
-        "foot_off", and no labels have that of the unit. Where there is none, contact and foot off of a grid have that
-        of touches, if each is of one label, and so have those of channels; all else that of channels.
+        What is to be learnt. Contact, lift and kinds of touch have one recipe whatever the unit; steps, as "foot_off",
+        no labels, and of channels a contact or one kind alone have that of the unit. Where there is none, contact and
+        foot off of a grid have that of touches, if each is of one label, and so have those of channels; all else that
+        of channels.
     rests : bool
         Whether the rest of its taxels is known, from which touches of channels are distinguished.
 
@@ -93,8 +93,8 @@ def fitting(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool 
     'touch'
     >>> fitting(Frames([[[0.0]]], [0], unit="N")), fitting(Frames([[[0.0]]], [0], unit="V"))
     ('gait_insole', 'gait_channel')
-    >>> fitting(Frames([[[0.0] * 6] * 6], [0], unit="V"), ["soft", "hard"])
-    'touch'
+    >>> [fitting(Frames([[[0.0] * 6] * rows], [0], unit="V"), ["soft", "hard"]) for rows in (1, 6)]
+    ['touch', 'touch']
     """
     return chosen(source, labels, rests=rests)[0]
 
@@ -117,11 +117,15 @@ def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool =
     known, steps = False, None
     if array.taxels < 2 or not array._has_neighbours:
         sensor = counted(array.taxels, "channel" if array.is_channels else "taxel")
-        # Of these it knows contact and lift alone; a contact without its lift may be that of a step.
+        # A contact without its lift may be that of a step, and so may one label that no recipe knows.
         kinds = {_listed(recipes[grids], label) for label in labels} if grids is not None else set()
         ends = [] if grids is None else [_own(recipes[grids], label) for label in labels]
         if "lift" in kinds and None not in kinds:
             return str(grids), f"{' and '.join(labels)} on {sensor}"
+        others = [label for label, end in zip(labels, ends, strict=False) if end is None]
+        of_steps = (_is_of_step(label) or _is_known(recipes, label) for label in others)
+        if rests and others and len(labels) > 1 and not any(of_steps):
+            return str(grids), f"kinds of touch on {sensor}"
         if rests and ends and None not in ends and len(set(ends)) == len(ends):
             steps = str(grids), f"{' and '.join(labels)} on {sensor}"
         grids = None
@@ -130,7 +134,7 @@ def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool =
     else:
         sensor = f"a grid of {array.rows} x {array.columns} taxels"
         others = [label for label in labels if _listed(recipes[grids], label) is None]
-        known = any(_listed(values, label) for label in others for values in recipes.values())
+        known = any(_is_known(recipes, label) for label in others)
         ends = [_own(recipes[grids], label) for label in labels]
         subject = f"{'kinds of touch' if None in ends else ' and '.join(labels)} on {sensor}"
         if not known and not any(map(_is_of_step, others)):
@@ -145,35 +149,6 @@ def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool =
         # The levels of `_ANY`, 22 trains a taxel, take minutes.
         steps = grids, sensor
     return steps or (_ANY, f"{sensor} in {source.unit}")
-
-
-def lacking_places(source: Events | Frames, labels: Sequence[str]) -> str:
-    """Return why no recipe distinguishes kinds of touch on channels, and which option lays these out in a row; else "".
-
-    Steps have recipes of channels, and so have contact and lift alone.
-
-    Examples
-    --------
-    >>> channels = Frames([[[0.0] * 6]], [0], unit="kPa")
-    >>> lacking_places(channels, ["press", "tap"])
-    'no recipe distinguishes press and tap on 6 channels without places; if these are in a row, give --array 1x6x5 ...'
-    >>> lacking_places(channels, ["contact", "lift"]), lacking_places(channels, ["heel_off", "foot_off"])
-    ('', '')
-    """
-    if not isinstance(source, Frames) or source.array._has_neighbours or len(labels) < 2:
-        return ""
-    recipes = {name: read(name) for name in names()}
-    others = [label for label in labels if _own(recipes["touch"], label) is None]
-    if not others or any(
-        _is_of_step(label) or _listed(values, label) for label in others for values in recipes.values()
-    ):
-        return ""
-    rows, columns = source.array.shape
-    return (
-        f"no recipe distinguishes {' and '.join(labels)} on {counted(source.array.taxels, 'channel')} without "
-        f"places; if these are in a row, give --array {rows}x{columns}x5 with "
-        "the distance from one to the next in mm (here 5)"
-    )
 
 
 def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
@@ -299,6 +274,11 @@ def _listed(values: Mapping[str, Any], label: str) -> str | None:
     plain = spelling(label)
     name = values.get("also", {}).get(plain, plain)
     return name if name in values.get("neurons", {}) else None
+
+
+def _is_known(recipes: Mapping[str, Mapping[str, Any]], label: str) -> bool:
+    """Whether any of some recipes lists a label."""
+    return any(_listed(values, label) for values in recipes.values())
 
 
 def _own(values: Mapping[str, Any], label: str) -> str | None:
