@@ -299,14 +299,14 @@ def test_a_command_of_another_distribution_is_listed_and_runs(stranger: Path, ca
 @pytest.mark.parametrize(
     ("name", "source", "said"),
     [
-        ("nod", None, "stranger:absent of stranger 2.0 cannot be used: AttributeError: "),
+        ("nod", None, "stranger:absent of stranger 2.0 could not be loaded: AttributeError: "),
         (
             "wave",
             "import nowhere_at_all",
-            "stranger:app of stranger 2.0 cannot be used: ModuleNotFoundError: No",
+            "stranger:app of stranger 2.0 could not be loaded: ModuleNotFoundError: No",
         ),
-        ("wave", "app = 3", "stranger:app of stranger 2.0 cannot be used: AttributeError: "),
-        ("wave", "raise RuntimeError('a\\nb')", "stranger:app of stranger 2.0 cannot be used: RuntimeError: a"),
+        ("wave", "app = 3", "stranger:app of stranger 2.0 could not be loaded: AttributeError: "),
+        ("wave", "raise RuntimeError('a\\nb')", "stranger:app of stranger 2.0 could not be loaded: RuntimeError: a"),
     ],
 )
 def test_a_command_of_another_distribution_that_is_broken_is_one_error_and_breaks_no_other(
@@ -316,7 +316,7 @@ def test_a_command_of_another_distribution_that_is_broken_is_one_error_and_break
         stranger.write_text(source)
     code, out, error = call(capsys, name)
     assert (code, out) == (2, "")
-    assert error.startswith(f"taxel: taxel {name}: {said}")
+    assert error.startswith(f"taxel: taxel {name}: the command {said}")
     assert error.count("\n") == 1
     assert call(capsys, "--help")[0] == call(capsys, "merge", "--help")[0] == 0
 

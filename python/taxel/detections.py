@@ -416,7 +416,9 @@ class Detections(FrozenColumns):
         """
         notes = getattr(events, "array_annotations", None)
         if notes is None or "known" not in notes:
-            raise refused("events", f" is {shown(events)}: must be a neo.Event with the array annotation known (us)")
+            raise refused(
+                "events", f" is {shown(events)}: must be a neo.Event that has an array annotation named 'known' (us)"
+            )
         t = np.rint(events.rescale("us").magnitude).astype(np.int64)
         return cls._of(
             events.labels, t, notes["known"], notes.get("slope"), notes.get("reported"), notes.get(_REPAIRED)

@@ -98,7 +98,8 @@ def _time(table: HeaderTable) -> int:
     if times:
         names = " and ".join(shown(table.header[k]) for k in times)
         raise FormatError(
-            f"{table.location}, line 1: {names} are all times; name the column of the labels t_us, or remove the others"
+            f"{table.location}, line 1: {names} all hold times: rename the column with the times of the labels to "
+            "t_us, or remove the others"
         )
     missing = "t_us" if any(name.lower() in _LABELS for name in table.header) else "label"
     frames = next((name for name in table.header if _FRAMES.fullmatch(name)), None)

@@ -204,7 +204,7 @@ class Study:
         values = {**self.parameters, **self.sizes.get(size, {})}
         for name, value in changes.items():
             if name not in values:
-                raise ProblemError(f"{self.name} has no parameter {name!r}: there are {', '.join(values)}")
+                raise ProblemError(f"{self.name} has no parameter {name!r}: its parameters are {', '.join(values)}")
             if not _alike(value, values[name]):
                 raise ProblemError(f"{name} is {value!r}: must be {_kind(values[name])}, as {values[name]!r}")
             values[name] = value

@@ -377,7 +377,7 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
         ),
         (
             ("train", "1.npz", "--recipe", "recipe.toml", "--set", "wings=2"),
-            "a recipe has no key 'wings': there are encoder, learner",
+            "a recipe has no key 'wings': its keys are encoder, learner",
         ),
         (("train", "1.npz", "--recipe", "recipe.toml", "-o", "touch.json"), "touch.json: exists already"),
     ],

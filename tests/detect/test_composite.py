@@ -123,7 +123,7 @@ def test_inputs_are_given_by_label_too() -> None:
         ((Neuron(), [1.0] * 4, 0.0, ("area", "area")), {}, 'a: inputs: "area" comes twice'),
         ((Neuron(), [1.0] * 5, 0.0, ("area",)), {}, "a: 5 weights, but the encoder makes 4 trains"),
         ((Neuron(), [1.0] * 4), {}, "a: 4 weights, but the encoder makes 36 trains"),
-        ((Neuron(), [1.0] * 4), {"inputs": {"b": ["area"]}}, "inputs: no neuron 'b': there are a"),
+        ((Neuron(), [1.0] * 4), {"inputs": {"b": ["area"]}}, "inputs: no neuron 'b': the neurons are a"),
         ((Neuron(), [1.0] * 4), {"inputs": ["area"]}, "inputs is "),
         ((Neuron(), [1.0] * 4), {"inputs": {"a": 3}}, "a: inputs is 3"),
     ],
@@ -140,7 +140,7 @@ def test_one_encoder_has_no_inputs() -> None:
         composite(1).encoder_of,
         lambda label: composite(1).trains_of(label, Composite(PARTS).encode(held(1))),
     ):
-        with refused("label 'z': there are a, b, c, d, e"):
+        with refused("label 'z' is not one of a, b, c, d, e"):
             call("z")
 
 
@@ -278,9 +278,12 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"neurons": {"a": {"inputs": ["skin"]}}}, "neurons.a: inputs: no encoder 'skin': there are area, moments"),
+        (
+            {"neurons": {"a": {"inputs": ["skin"]}}},
+            "neurons.a: inputs: no encoder 'skin': the encoders are area, moments",
+        ),
         ({"neurons": {"a": {"inputs": []}}}, "neurons.a: inputs is empty"),
-        ({"neurons": {"a": {"inputs": ["moments"], "delay_ms": 3.0}}}, "neurons.a: delay_ms is 3, and .* 0, 4, 6"),
+        ({"neurons": {"a": {"inputs": ["moments"], "delay_ms": 3.0}}}, "neurons.a: delay_ms is 3, but .* 0, 4, 6"),
         ({"neurons": {"a": {"delay_ms": 4.0, "search": [{"inputs": ["b"]}]}}}, "neurons.a.search: inputs: no encoder"),
         ({"encoders": {"area": {"name": "areas"}}}, "recipe: encoders.area: encoder areas: must be one of"),
         ({"encoders": {"area": 3}}, "recipe: encoders.area"),

@@ -140,12 +140,17 @@ SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
     "rising slowly": (rising_slowly, "window", "20 of 20 missed have a false detection 60 ms", "--window-ms 60"),
     "felt late": (felt_late, "shifted_labels", "170 ms later, while lift fits: contact is felt later there", ""),
     "alike": (alike, "other_name", "20 of 20 false detections of lift are within 100 ms of labels of contact", ""),
-    "misplaced": (misplaced, "unlabelled_loads", "6 of 6 false are in loads without a label", "to label these"),
-    "gap": (gap, "gaps", "missed are where the recording has no frames, for example ", ""),
+    "misplaced": (
+        misplaced,
+        "unlabelled_loads",
+        "6 of 6 false detections are in loads without a label",
+        "to label these",
+    ),
+    "gap": (gap, "gaps", "missed labels are where the recording has no frames, for example ", ""),
     "no releases": (
         no_releases,
         "unlabelled_loads",
-        "4 of 4 false are in loads without a label of release",
+        "4 of 4 false detections are in loads without a label of release",
         "to label these loads too",
     ),
 }
@@ -249,7 +254,7 @@ def test_a_detection_at_the_first_frames_behind_a_gap_is_of_the_gap(seed: int) -
         end + 40_000,
     ]
     first, *_ = causes_of([behind], 50.0)
-    assert "and 2 of 2 false are at the first frames behind such a gap" in first.measured
+    assert "and 2 of 2 false detections are at the first frames behind such a gap" in first.measured
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -76,7 +76,7 @@ def test_labels_are_scored_apart() -> None:
     assert result.to_dict()["by_label"]["b"]["error_ms"]["mean"] == pytest.approx(-0.0005)
     assert result.to_dict()["by_label"]["a"]["error_ms"]["sd"] is None
     assert repr(result).splitlines()[-1].startswith("all")
-    with pytest.raises(taxel.ProblemError, match="no label 'd': there are a, b, c"):
+    with pytest.raises(taxel.ProblemError, match="no label 'd': the labels are a, b, c"):
         result["d"]
 
 

@@ -312,8 +312,8 @@ def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
     (cause, *_) = causes(readout, [stale], scored(9, 1, 0), scored(9, 1, 0))
     assert (cause.kind, cause.advice) == ("tare", "a tare of the time just before (--tare FILE)")
     assert cause.measured == (
-        "64 taxels read above the tare while nothing touches them; taxel cut RECORDING FILE "
-        "--from S --to S makes that file, a .npz"
+        "64 taxels read above the tare while nothing touches them; to make this file, a .npz, run: "
+        "taxel cut RECORDING FILE --from S --to S"
     )
 
 

@@ -113,7 +113,12 @@ def test_an_error_in_a_part_names_it(parts: object, text: str) -> None:
 
 @pytest.mark.parametrize(
     ("names", "text"),
-    [(["b"], "no encoder 'b': there are a"), (["a", "a"], "'a' comes twice"), ([], "inputs is empty"), (3, "sequence")],
+    [
+        (["b"], "no encoder 'b': the encoders are a"),
+        (["a", "a"], "'a' comes twice"),
+        ([], "inputs is empty"),
+        (3, "sequence"),
+    ],
 )
 def test_parts_are_chosen_by_their_names(names: object, text: str) -> None:
     for call in (

@@ -401,7 +401,7 @@ def test_a_long_silence_costs_no_time_once_nothing_can_come():
         (lambda: ENCODERS["area"].encode(Frames(np.zeros((1, 4, 3)), [0])), "tare of 3 x 4 taxels"),
         (lambda: FA1().with_tare(5), "tare is 5"),
         (lambda: Encoder.from_json("{"), "encoder: not JSON"),
-        (lambda: Encoder.from_json("[]"), r"encoder is \[\]: must be values by name"),
+        (lambda: Encoder.from_json("[]"), r"encoder is \[\]: must be an object \(names and values\)"),
         (lambda: Encoder.from_json("{}"), "without a name: must be one of change_events"),
         (lambda: Encoder.from_json('{"name": "sa3"}'), "encoder sa3: must be one of"),
         (lambda: Encoder.from_json('{"name": "fa1", "tau": 5}'), 'tau is not known: there is "alpha", '),

@@ -184,7 +184,9 @@ def test_texts_count_from_the_recordings_beginning_and_json_from_1970(tmp_path: 
     info = ("info", bag, "--topic", "/a")
     said = call(capsys, *info)[1]
     assert said.splitlines()[0].startswith(f"{bag}: ROS bag, from /a.data")
-    assert re.search(r"^  rest +a quiet stretch, 0\.\d+ to [01]\.\d+ s, tracked from there$", said, re.M)
+    assert re.search(
+        r"^  rest +that of a quiet stretch, 0\.\d+ to [01]\.\d+ s, later following slow changes$", said, re.M
+    )
     assert "losses unknown: the ROS bag does not record them" in said
     # Only the line that says the beginning has the time since 1970.
     assert [line.split()[0] for line in said.splitlines() if "1795" in line] == ["from"]

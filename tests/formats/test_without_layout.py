@@ -315,9 +315,9 @@ def test_two_sides_in_one_table_are_said_with_the_columns_of_each(tmp_path: Path
     place = tmp_path / "a.csv"
     place.write_text("".join(",".join(row) + "\n" for row in [names, *rows]))
     lines = layout_said_of(place)
-    said = [line.partition(" alone: ") for line in lines.splitlines() if " alone: " in line]
+    said = [line.partition(" side: ") for line in lines.splitlines() if " side: " in line]
     for (side, _, keys), asked, values in zip(said, sides, ([1, 2, 3], [4, 5, 6]), strict=True):
-        assert side == f"# {asked.lower()}"
+        assert side == f"# to read only the {asked.lower()}"
         columns, _, left = keys.partition(", ")
         (tmp_path / "a.layout.toml").write_text(
             "\n".join(
@@ -328,7 +328,7 @@ def test_two_sides_in_one_table_are_said_with_the_columns_of_each(tmp_path: Path
         assert taxel.open(place).frames().values[0].tolist() == [values]
     place.write_text(place.read_text().replace(name.format(sides[1], 3), "other"))
     (tmp_path / "a.layout.toml").unlink()
-    assert " alone: " not in layout_said_of(place)
+    assert " side: " not in layout_said_of(place)
 
 
 @pytest.mark.parametrize("above", ["Frame {k}", "Bild {k}", "Time {k},5 s"])

@@ -175,7 +175,7 @@ def test_training_keeps_its_rows_and_the_trained_neuron_runs_with_it() -> None:
     trains = SpikeTrains.from_lists([[20.0 + n] for n in range(20)], stop=150.0)
     options = {"tau": 30.0, "theta_plus": 0.0, "time": "grid"}
     learner = {"lambdas": (0, 1, 0, 1000, 0)}
-    with pytest.warns(UserWarning, match="fires again"):
+    with pytest.warns(UserWarning, match="extra spikes? within tau"):
         free = ConeR(neuron=Neuron(**options), **learner).fit([trains], [[45.0]])
     bound = ConeR(neuron=Neuron(**options, rearm=0.5), **learner).fit([trains], [[45.0]])
     online = OnlineConeR(window=2, neuron=Neuron(**options, rearm=0.5), **learner).fit([trains], [[45.0]])
@@ -207,8 +207,8 @@ def test_who_cannot_have_it_refuses_it_by_name(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("after_spike", "said"),
     [
-        ("keep", 'after_spike "reset", a refractory above 3 ms or a theta_plus above 0.2 mV would end that'),
-        ("reset", "its training patterns: a refractory above 3 ms or a theta_plus above 0.2 mV would end that"),
+        ("keep", 'after_spike "reset", a refractory above 3 ms or a theta_plus above 0.2 mV would prevent them'),
+        ("reset", "with no target between: a refractory above 3 ms or a theta_plus above 0.2 mV would prevent them"),
     ],
 )
 def test_the_warning_of_repeated_spikes_names_what_is_not_set(after_spike: str, said: str) -> None:

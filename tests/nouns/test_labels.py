@@ -299,7 +299,10 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
         ('t_s,event\n"0,21",auf\n', "line 2: t_s is '0,21'; must be a number"),
         ("t_s,event\n1e308,auf\n", "line 2: t_s is '1e308'; must be a number"),
         ("t_s,event\nnan,auf\n", "line 2: t_s is 'nan'; must be a number"),
-        ("time,t_s,event\n1,1,auf\n", "line 1: 'time' and 't_s' are all times; name the column of the labels t_us"),
+        (
+            "time,t_s,event\n1,1,auf\n",
+            "line 1: 'time' and 't_s' all hold times: rename the column with the times of the labels to t_us",
+        ),
         ("t_s,what,comment\n1,auf,late\n", "line 1: 'what' and 'comment' are texts; there are 't_s', 'what', "),
         ("t_s,value\n1,2\n", "line 1: no column 'label'; there are 't_s', 'value'; must be label,t_us"),
         *(

@@ -144,7 +144,7 @@ def test_what_lay_on_the_array_in_its_quiet_stretch_is_said_and_is_no_rest_of_a_
     tmp_path: Path, events: bool
 ) -> None:
     source, truth = preloaded(events=events)
-    path, where = tmp_path / "a.npz", "something lay on rows 2 to 4, columns 5 to 7 (up to 4"
+    path, where = tmp_path / "a.npz", "something was on rows 2 to 4, columns 5 to 7 (up to 4"
     taxel.convert(source, path)
     rows = sorted((t, label) for label, times in truth.items() for t in times)
     (tmp_path / "a.notes.csv").write_text("label,t_us\n" + "".join(f"{label},{t}\n" for t, label in rows))

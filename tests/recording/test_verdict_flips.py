@@ -275,4 +275,4 @@ def test_damaged_final_counts_are_not_believed(whole: Path, tmp_path: Path) -> N
     verdict = assert_told(tmp_path / "a.mcap", bytes(data), held_by(taxel.open(whole)), "the counts")
     assert verdict is not None
     assert (verdict.status, verdict.lost, verdict.damaged) == ("damaged", {}, {"no_final_counts": 1})
-    assert verdict.startswith("the final counts are damaged: losses after the counts before them are unknown; ")
+    assert verdict.startswith("the final counts are damaged: losses since the last intact counts are unknown; ")

@@ -70,7 +70,7 @@ def test_a_training_takes_the_first_quiet_stretch_where_a_touch_comes_before_the
         (line,) = warned
         end = (labels["contact"][4] - 20_000) / 1e6
         assert f"0.000 to {end:.3f} s, before the first label, contains a touch of " in line
-        assert line.endswith("so the tare is of the first quiet stretch, 0.000 to 0.500 s")
+        assert line.endswith("so the tare is that of the first quiet stretch, 0.000 to 0.500 s")
 
 
 @pytest.mark.parametrize("unit", ["N", "kPa"])
@@ -95,9 +95,12 @@ def test_forces_that_do_not_rest_near_0_are_said_with_the_tare_that_takes_that_o
 
     (line,) = warned("offset", presses + random.uniform(4, 8, (6, 6)) + drift)
     assert "offset.npz: 36 of 36 taxels read 4." in line
-    assert f" {unit} in a quiet stretch, 0.000 to 0.500 s, and not 0; if nothing touches them then, --tare 0.5 " in line
+    assert (
+        f" {unit} in a quiet stretch, 0.000 to 0.500 s, and not 0; if nothing touches them then, give --tare 0.5 "
+        in line
+    )
     (line,) = warned("below", presses - random.uniform(4, 8, (6, 6)))
-    assert "--tare 0.5 subtracts this" in line
+    assert "--tare 0.5 to subtract the values of this stretch" in line
     assert warned("tared", presses + 5.0, 0.5) == []
     assert warned("noise", presses + random.normal(0, 0.05, presses.shape)) == []
     # A foot that stands at first and is lifted later is a load.
@@ -164,12 +167,12 @@ def test_where_nothing_is_quiet_it_is_refused_with_what_to_give(tmp_path: Path) 
 def test_what_lay_on_the_array_in_its_first_quiet_stretch_is_no_rest(tmp_path: Path, events: bool) -> None:
     source, _ = preloaded(events=events)
     taxel.convert(source, tmp_path / "a.npz")
-    with pytest.warns(UserWarning, match="something lay on rows 2 to 4, columns 5 to 7 .* in a time without it"):
+    with pytest.warns(UserWarning, match="something was on rows 2 to 4, columns 5 to 7 .* in a time without it"):
         taken = rest(taxel.open(tmp_path / "a.npz"))
     assert (taken.source, taken.tare.start_us >= 800_000) == ("quiet", True)
     assert np.nanmax(np.abs(taken.tare.rest - 50)) < 2.5
     rule = PlainRule("area", 2, noise_floor=6.0)
-    assert any("something lay on" in text for text in detect(rule, taxel.open(tmp_path / "a.npz")).warnings)
+    assert any("something was on" in text for text in detect(rule, taxel.open(tmp_path / "a.npz")).warnings)
 
 
 @pytest.mark.parametrize("begin_us", [0, 1_795_000_000_000_000])
@@ -208,7 +211,9 @@ def test_a_warning_about_the_rest_names_a_command_that_takes_it(tmp_path: Path) 
     place = tmp_path / "a walk.npz"
     taxel.convert(Frames(values, frames.t, unit="N", array=frames.array), place)
     (line,) = taxel.tasks.info(taxel.open(place), None).warnings
-    found = re.search(r"--tare rest\.npz subtracts this; (taxel cut .*) makes$", line)
+    found = re.search(
+        r"give --tare rest\.npz to subtract the values of this stretch; to make this file, run: (taxel cut .*)$", line
+    )
     assert found is not None
     _, *words = shlex.split(found[1])
     words[2] = str(tmp_path / "rest.npz")

@@ -220,11 +220,11 @@ def test_a_stretch_of_labels_missing_ones_and_those_of_nothing_are_named(
     assert f"contact, lift: what may help is to move the labels from {begin_s:.1f} s to the end 3" in line
     fewer = {label: np.sort(random.choice(t, 20, replace=False)) for label, t in labels.items()}
     [line] = trained.told(capsys, tmp_path, frames, fewer)
-    assert line.startswith("contact, lift: what may help is to label these loads too: 5 of 5 false are ")
+    assert line.startswith("contact, lift: what may help is to label these loads too: 5 of 5 false detections are ")
     middles = labels["contact"] + (labels["lift"] - labels["contact"]) // 2
     more = labels | {"contact": np.sort(np.append(labels["contact"], middles[::5]))}
     [line] = trained.told(capsys, tmp_path, frames, more)
-    assert "5 of 5 missed are more than 50 ms from" in line
+    assert "5 of 5 missed labels are more than 50 ms from" in line
     assert "what may help" not in line
 
 
@@ -256,7 +256,10 @@ def test_a_gap_and_what_it_holds_are_named(trained: Trained, tmp_path: Path, cap
     assert lines[1].startswith(
         f"may have happened in a gap that ends just before them: contact at {behind / 1e6:.3f}"[:-2]
     )
-    assert "missed are where the recording has no frames, and 1 of 1 false is at the first frames" in lines[-1]
+    assert (
+        "missed labels are where the recording has no frames, and 1 of 1 false detection is at the first frames"
+        in lines[-1]
+    )
 
 
 def test_stuck_taxels_are_named_also_where_all_is_found(trained: Trained, tmp_path: Path, capsys: Any) -> None:
@@ -328,8 +331,8 @@ def test_false_detections_inside_loads_are_named(size: str) -> None:
     example = Example(frames, truth, taxel.Tare.take(frames, stop_us=2_000_000))
     [cause] = causes_of([Outcome("a", example, found, taxel.detect.score(found, truth), None)], 50.0)
     assert (cause.kind, cause.mistakes) == ("unlabelled_loads", 25)
-    where = "inside a load, more than 50 ms from where it begins or ends, for example at "
-    assert cause.measured.startswith(f"25 of 25 false are {where}{middles[0] / 1e6:.3f} s, ")
+    where = "inside a load, more than 50 ms from its beginning and end, for example at "
+    assert cause.measured.startswith(f"25 of 25 false detections are {where}{middles[0] / 1e6:.3f} s, ")
 
 
 @pytest.mark.parametrize("seed", [16, 17])

@@ -177,8 +177,8 @@ fn kind(wanted: &str, value: Option<&Value>) -> String {
         ("a boolean", ..) => "true or false".to_owned(),
         ("a string" | "a borrowed string", ..) => "a name".to_owned(),
         ("a sequence", ..) => "a list".to_owned(),
-        ("a map", ..) => "values by name".to_owned(),
-        _ if wanted.starts_with("struct ") => "values by name".to_owned(),
+        ("a map", ..) => "an object (names and values)".to_owned(),
+        _ if wanted.starts_with("struct ") => "an object (names and values)".to_owned(),
         _ if wanted.contains("array of length") || wanted.contains("tuple") => {
             format!("a list of {}", wanted.chars().filter(char::is_ascii_digit).collect::<String>())
         }
@@ -242,8 +242,8 @@ mod tests {
             (r#""tau": 1, "list": 5"#, "list is 5: must be a list"),
             (r#""tau": 1, "yes": 1"#, "yes is 1: must be true or false"),
             (r#""tau": 1, "text": 1"#, "text is 1: must be a name"),
-            (r#""tau": 1, "inner": []"#, "inner is []: must be values by name"),
-            (r#""tau": 1, "inner": 7"#, "inner is 7: must be values by name"),
+            (r#""tau": 1, "inner": []"#, "inner is []: must be an object (names and values)"),
+            (r#""tau": 1, "inner": 7"#, "inner is 7: must be an object (names and values)"),
             (r#""tau": 1, "each": {"a b": {}}"#, "each.a b.tau is missing"),
             (r#""small": 1"#, "tau is missing"),
             (r#""tau": 1, "inner": {"tau": 1, "wings": 2}"#, "inner.wings is not known: there is \"tau\""),
@@ -252,7 +252,7 @@ mod tests {
             let text = format!("{{{parameter}}}");
             assert!(message(&text).starts_with(&format!("whole: {words}")), "{}", message(&text));
         }
-        assert_eq!(message("7"), "whole is 7: must be values by name");
+        assert_eq!(message("7"), "whole is 7: must be an object (names and values)");
     }
 
     #[test]

@@ -82,7 +82,8 @@ impl ViewEncoder {
                 Ok(Self { encoder: encoder.clone(), name: name.to_owned(), of_readout: true })
             }
             (Some("composite"), None) => {
-                Err(problem!("encoder composite: no readout with several encoders reads what is shown").into())
+                Err(problem!("encoder composite: needs a readout with several encoders; none reads the shown sensor")
+                    .into())
             }
             _ => Ok(Encoder::from_json(&json!(request).to_string())?.into()),
         }

@@ -287,7 +287,9 @@ impl Live {
                 *summary = Some(pipeline.stop()?);
             }
             let ended = summary.clone();
-            ended.ok_or_else(|| taxel_live::Error::from(problem!("live: ended by an error, which was raised then")))
+            ended.ok_or_else(|| {
+                taxel_live::Error::from(problem!("live: an earlier error ended it, so there is no summary"))
+            })
         })
         .map(Ended::from)
     }

@@ -83,7 +83,9 @@ pub fn distance<'py>(py: Python<'py>, metric: &str, a: PatternsIn<'py>, b: Patte
 /// Vector instructions by their names; the widest that may be used where none is named.
 fn to_instructions(name: Option<&str>) -> PyResult<Instructions> {
     let Some(name) = name else { return Ok(Instructions::best()) };
-    let named = Instructions::named(name).ok_or_else(|| core(problem!("vectors is {name:?}: no such instructions")))?;
+    let names = Instructions::ALL.map(Instructions::name).join(", ");
+    let named =
+        Instructions::named(name).ok_or_else(|| core(problem!("vectors is {name:?}: must be one of {names}")))?;
     named.checked().map_err(core)
 }
 

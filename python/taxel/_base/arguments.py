@@ -116,7 +116,7 @@ def callback(name: str, value: T) -> T:
 def mapping(name: str, value: object) -> dict[str, Any]:
     """Return a mapping as a dict; refuse any other value."""
     if not isinstance(value, Mapping):
-        raise refused(name, f" is {shown(value)}: must be values by name")
+        raise refused(name, f" is {shown(value)}: must be a dict (names and values)")
     return {text(f"a name in {name}", key): entry for key, entry in value.items()}
 
 
@@ -366,7 +366,7 @@ def _refuse_others(name: str, values: NDArray[Any]) -> None:
 def _refuse_repeated(name: str, values: object) -> None:
     """Refuse a broadcast array whose copy would exceed the memory limit."""
     if isinstance(values, np.ndarray) and values.size > _MOST_REPEATED and 0 in values.strides:
-        raise refused(name, f" holds {values.size} values, repeated: must be at most {_MOST_REPEATED}")
+        raise refused(name, f" is an array broadcast to {values.size} values: must be at most {_MOST_REPEATED}")
 
 
 def finite_numbers(name: str, values: ArrayLike, unit: str | None = None) -> NDArray[np.float64]:

@@ -153,7 +153,9 @@ class Parameters:
         for name, value in parameters.items():
             outer, nested, rest = name.partition("__")
             if outer not in names:
-                raise ProblemError(f"{type(self).__name__}: no parameter {outer!r}: there are {', '.join(names)}")
+                raise ProblemError(
+                    f"{type(self).__name__}: no parameter {outer!r}: the parameters are {', '.join(names)}"
+                )
             if nested:
                 inner.setdefault(outer, {})[rest] = value
             else:

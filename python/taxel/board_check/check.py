@@ -108,7 +108,8 @@ class _Check:
             why = (
                 "a frame does not last as long as the registers say"
                 if device is not None
-                else "the pattern is off, or the registers are not those of a preset: give the serial line"
+                else "the board does not make the pattern, or its registers are those of no preset: "
+                "state its serial port, for example taxel device check /dev/ttyACM0"
             )
             self.tell("values", False, f"only {share:.0%} of the values can be the ball's: {why}")
         found = compared(values, len(capture.datagrams), array, registers, frames, device is not None)
@@ -136,16 +137,16 @@ class _Check:
 
     def values(self, found: PatternCheck) -> None:
         """Tell whether all values are the pattern's."""
-        first, lagged = found.first, counted(found.behind, "taxel")
+        first, behind = found.first, counted(found.behind, "taxel")
         if first is None:
             self.tell("values", True, f"all {found.events} values are the pattern's")
             return
         self.tell(
             "values",
             False,
-            f"{found.wrong} of {found.events} values are not the pattern's, and {lagged} lagged;"
-            f" the first: taxel ({first.x}, {first.y}) at {first.t} us, frame {first.frame}, has {first.value} and must"
-            f" have {first.expected}: {first.meaning}",
+            f"{found.wrong} of {found.events} values differ from the pattern, and {behind} kept an old value; "
+            f"the first difference: taxel ({first.x}, {first.y}) at {first.t} us, frame {first.frame}, has "
+            f"{first.value} and must have {first.expected}: {first.meaning}",
         )
 
     def covered(self, found: PatternCheck, array: Array, guessed: bool) -> str:

@@ -97,5 +97,6 @@ def _import(point: EntryPoint) -> Any:
     except Exception as error:  # another distribution's code may raise any error
         source = f" of {point.dist.name} {point.dist.version}" if point.dist else ""
         raise ProblemError(
-            f"taxel {point.name}: {point.value}{source} cannot be used: {type(error).__name__}: {first_line(error)}"
+            f"taxel {point.name}: the command {point.value}{source} could not be loaded: {type(error).__name__}: "
+            f"{first_line(error)}"
         ) from error

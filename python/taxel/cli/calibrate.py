@@ -38,12 +38,18 @@ def calibrate(
         typer.Option(help="A .csv of loads: load,unit,from_s,to_s and, for a load on a single taxel, x,y."),
     ] = None,
     law: Annotated[
-        bool, typer.Option("--law", help="Use the law of the fabric, amplifier and ramp; loads correct its gain.")
+        bool,
+        typer.Option(
+            "--law",
+            help="Use the physical model of fabric, amplifier and ramp. "
+            "Loads, if given, correct the gain of this model.",
+        ),
     ] = False,
     table: Annotated[
         Path | None,
         typer.Option(
-            help="Use a .csv of reading,value (above rest); with columns x,y for each taxel. Loads correct its gain."
+            help="Use a .csv of reading,value (above rest); with columns x,y for each taxel. Loads, if given, correct "
+            "the gain of this table."
         ),
     ] = None,
     set_: Annotated[

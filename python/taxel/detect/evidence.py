@@ -338,7 +338,7 @@ class Evidence:
         because, option, arguments = self._of_tare
         if because:
             advice = option if arguments else "a tare of the time just before (--tare FILE)"
-            measured = because + ("" if arguments else f"; {_MAKES_TARE} makes that file, a .npz")
+            measured = because + ("" if arguments else f"; to make this file, a .npz, run: {_MAKES_TARE}")
             yield Cause("tare", (label,), wrong, measured, advice, option, arguments)
         yield from self._begun_loaded(label, wrong)
 
@@ -355,7 +355,7 @@ class Evidence:
         if count:
             measured = (
                 f"{count} of {counted(self._counts[label], 'label')} {are(count)} in the first two frames of "
-                "recordings that begin loaded, where no load begins"
+                "recordings whose sensor is loaded from the first frame: the encoder cannot see this load begin"
             )
             yield Cause("begun_loaded", (label,), min(count, wrong), measured, ZEROS_BEFORE)
 
@@ -405,9 +405,9 @@ def of_weak_bursts(examples: Sequence[Example], label: str, alignment: Alignment
     times, most = max(_LONGER, key=lambda k: np.median([burst.by[k] for burst in weak])), weak[0].window_ms
     present, longer = (np.median([burst.by[k] for burst in weak]) for k in (1, times))
     measured = (
-        f"{counted(len(weak), 'burst')} {are(len(weak))} weaker than the level that {label} is learnt from: the median "
-        f"has {events:.0f} events in {most:g} ms, and the rest {rest:.0f}; this is {present:.3g} times the noise of "
-        "the rest"
+        f"at {counted(len(weak), 'label')} a burst of events is weaker than the level that {label} is learnt from: "
+        f"at the median it has {events:.0f} events in {most:g} ms, against {rest:.0f} at rest; the difference is "
+        f"{present:.3g} times the noise at rest"
     )
     advice = ""
     if times > 1:

@@ -295,8 +295,13 @@ class Measured:
         missed, false = int(inside.sum()), int(behind.sum())
         if not missed and not false:
             return None
-        parts = [f"{missed} of {len(inside)} missed {are(missed)} where the recording has no frames"] if missed else []
-        parts += [f"{false} of {len(behind)} false {are(false)} at the first frames behind such a gap"] if false else []
+        parts = []
+        if missed:
+            among = counted(len(inside), "missed label")
+            parts.append(f"{missed} of {among} {are(missed)} where the recording has no frames")
+        if false:
+            among = counted(len(behind), "false detection")
+            parts.append(f"{false} of {among} {are(false)} at the first frames behind such a gap")
         measured = f"{', and '.join(parts)}, for example {first}"
         return Cause("gaps", (label,), missed + false, measured, ""), left.without(inside, behind)
 
@@ -490,12 +495,13 @@ class Measured:
         parts = []
         if count:
             parts.append(
-                f"{count} of {len(strong)} false {are(count)} in loads without a label of {label} that are as strong "
-                "as labelled loads"
+                f"{count} of {counted(len(strong), 'false detection')} {are(count)} in loads without a label of "
+                f"{label} that are as strong as labelled loads"
             )
         if n := int(unfelt.sum()):
             parts.append(
-                f"{n} of {len(unfelt)} missed {are(n)} more than {WINDOW_MS:.0f} ms from where a load begins or ends"
+                f"{n} of {counted(len(unfelt), 'missed label')} {are(n)} more than {WINDOW_MS:.0f} ms from "
+                "where a load begins or ends"
             )
         times = left.false[strong] if count else left.missed[unfelt]
         measured = f"{', and '.join(parts)}, for example at {self._places(times)}"
@@ -518,8 +524,8 @@ class Measured:
         if 2 * (count := int(inside.sum())) <= len(inside):
             return None
         measured = (
-            f"{count} of {len(inside)} false {are(count)} inside a load, more than {WINDOW_MS:.0f} ms from where it "
-            f"begins or ends, for example at {self._places(left.false[inside])}"
+            f"{count} of {counted(len(inside), 'false detection')} {are(count)} inside a load, more than "
+            f"{WINDOW_MS:.0f} ms from its beginning and end, for example at {self._places(left.false[inside])}"
         )
         cause = Cause("unlabelled_loads", (label,), count, measured, "")
         return cause, left.without(np.zeros(len(left.missed), np.bool_), inside)

@@ -113,7 +113,7 @@ class Readout(_Detector):
         named = {} if inputs is None else mapping("inputs", inputs)
         for label in named:
             if label not in neurons:
-                raise refused("inputs", f": no neuron {shown(label)}: there are {', '.join(map(str, neurons))}")
+                raise refused("inputs", f": no neuron {shown(label)}: the neurons are {', '.join(map(str, neurons))}")
         trained = {
             text("label", label): _neuron_of(label, trained_neuron, delay_ms, named.get(label))
             for label, trained_neuron in neurons.items()
@@ -177,7 +177,7 @@ class Readout(_Detector):
     def _neuron(self, label: str) -> TrainedNeuron:
         """Return the neuron of a label; refuse one that there is not."""
         if text("label", label) not in self.labels:
-            raise ProblemError(f"label {shown(label)}: there are {', '.join(self.labels)}")
+            raise ProblemError(f"label {shown(label)} is not one of {', '.join(self.labels)}")
         return self.neurons[label]
 
     def encoder_of(self, label: str) -> Encoder:

@@ -305,11 +305,11 @@ class Recipe:
         {'tau': 5.0}
         """
         if not isinstance(values, Mapping):
-            raise ProblemError(f"recipe is {shown(values)}: must be values by name")
+            raise ProblemError(f"recipe is {shown(values)}: must be a dict (names and values)")
         known = tuple(inspect.signature(cls).parameters)
         for key in values:
             if key not in (*known, "encoders", *_OF_THE_FILE):
-                raise ProblemError(f"a recipe has no key {shown(key)}: there are {', '.join(known)}, encoders")
+                raise ProblemError(f"a recipe has no key {shown(key)}: its keys are {', '.join(known)}, encoders")
         arguments = {key: value for key, value in values.items() if key in known}
         return cls(**{**arguments, "encoder": _encoder_of(values)})
 
@@ -459,7 +459,8 @@ def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
     for key in values:
         if key not in learner + neuron:
             raise refused(
-                name, f": no parameter {shown(key)}: there are {', '.join(neuron + learner)}, delay_ms and inputs"
+                name,
+                f": no parameter {shown(key)}: the parameters are {', '.join(neuron + learner)}, delay_ms and inputs",
             )
     nested = {f"neuron__{key}" if key in neuron else key: value for key, value in values.items()} | {
         "neuron__time": "grid"

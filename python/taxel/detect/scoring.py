@@ -167,7 +167,7 @@ class Score:
     def __getitem__(self, label: str) -> Score:
         """Return the score of one label."""
         if label not in self.by_label:
-            raise ProblemError(f"no label {label!r}: there are {', '.join(self.by_label) or 'none'}")
+            raise ProblemError(f"no label {label!r}: the labels are {', '.join(self.by_label) or 'none'}")
         return self.by_label[label]
 
     def to_dict(self) -> dict[str, Any]:

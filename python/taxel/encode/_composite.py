@@ -137,7 +137,7 @@ class Composite(Encoder):
         given = [text("inputs", name) for name in several("inputs", names)]
         for n, name in enumerate(given):
             if name not in self.parts:
-                raise refused("inputs", f": no encoder {name!r}: there are {', '.join(sorted(self.parts))}")
+                raise refused("inputs", f": no encoder {name!r}: the encoders are {', '.join(sorted(self.parts))}")
             if name in given[:n]:
                 raise refused("inputs", f": {name!r} comes twice")
         if not given:

@@ -209,7 +209,10 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
 def _check_image(image: NDArray[np.int32]) -> NDArray[np.int32]:
     counts: NDArray[np.int32] = arguments.numbers("image", image, np.int32)
     if counts.ndim != 3 or not counts.any() or counts.min() < 0:
-        raise refused("image", f" has shape {counts.shape}: must be rows x columns x frames of counts, loaded once")
+        raise refused(
+            "image",
+            f" has shape {counts.shape}: must be rows x columns x frames of counts from 0, at least one above 0",
+        )
     return counts
 
 

@@ -290,7 +290,10 @@ class _Answering(Question):
                 "the label"
             )
         if not self.ended:
-            self.notes.append("trials have no stop_us: the length of a touch is known within the window only")
+            self.notes.append(
+                "trials have no stop_us: the control 'length' uses the last event in the window instead "
+                "of the trial's end"
+            )
 
 
 def _about(spikes: SampledEvents, window: float, values: bool) -> tuple[float, float, float]:

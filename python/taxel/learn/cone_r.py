@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import callback, floats, instance, optional, parameters, several
 from taxel._base.errors import refused
-from taxel._base.messages import warn
+from taxel._base.messages import counted, warn
 from taxel._base.parameters import defaults
 from taxel._core import NotFittedError
 from taxel.learn._examples import examples, windows
@@ -445,8 +445,9 @@ def _warn(cone: ConeR) -> None:
         others = [] if neuron.after_spike == "reset" else ['after_spike "reset"']
         others += [f"a refractory above {neuron.refractory:g} ms", f"a theta_plus above {neuron.theta_plus:g} mV"]
         warn(
-            f"the trained neuron fires again {cone.refires_} times after its own spikes on its training patterns: "
-            f"{', '.join(others[:-1])} or {others[-1]} would end that",
+            f"on its training patterns the trained neuron fires {counted(cone.refires_, 'extra spike')} within tau of "
+            f"another of its spikes, with no target between: {', '.join(others[:-1])} or {others[-1]} would "
+            "prevent them",
             stacklevel=4,
         )
     if cone.status_ != "solved":

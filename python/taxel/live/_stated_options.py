@@ -105,10 +105,18 @@ class StatedOptions:
         typed="May be repeated.",
     )
     kernel_buffer_bytes: int = option(
-        33554432, "How much may wait in the kernel, bytes.", least=0, most=2_147_483_647, commands=""
+        33554432,
+        "How much received data may wait in the operating system, bytes.",
+        least=0,
+        most=2_147_483_647,
+        commands="",
     )
     queue_bytes: int = option(
-        67108864, "How much may wait for the decoder, bytes.", least=0, most=2_147_483_647, commands=""
+        67108864,
+        "How much received data may wait for the decoder, bytes.",
+        least=0,
+        most=2_147_483_647,
+        commands="",
     )
     readout_events: int = option(
         1048576, "How many events may wait for the readout.", least=0, most=2_147_483_647, commands=""

@@ -110,9 +110,9 @@ class Live:
         for a slow reader; lines without room, or without a reader, are lost and counted. Without a readout nothing is
         sent until one is chosen on the page.
     kernel_buffer_bytes : int, 0 to 2147483647
-        How much may wait in the kernel, bytes.
+        How much received data may wait in the operating system, bytes.
     queue_bytes : int, 0 to 2147483647
-        How much may wait for the decoder, bytes.
+        How much received data may wait for the decoder, bytes.
     readout_events : int, 0 to 2147483647
         How many events may wait for the readout.
     gro : bool
@@ -354,18 +354,18 @@ class Live:
 
         Raises
         ------
-        ProblemError : no other board has that name
+        ProblemError : no further board of this recording has that name
 
         Examples
         --------
         >>> with Live(0, host="127.0.0.1") as live:
         ...     live.source_address("left")
         Traceback (most recent call last):
-        taxel.ProblemError: source 'left': no other board has that name
+        taxel.ProblemError: source 'left': no further board of this recording has that name
         """
         address = self._core.source_address(text("name", name))
         if address is None:
-            raise ProblemError(f"source {name!r}: no other board has that name")
+            raise ProblemError(f"source {name!r}: no further board of this recording has that name")
         return address
 
     def sample(self, name: str, values: ArrayLike, arrived_ns: int | None = None) -> None:

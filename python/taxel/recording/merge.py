@@ -274,7 +274,9 @@ class _Merging:
         for source, zeroings, shift in zip(self.sources, of_sources, self.shifts, strict=True):
             stop = _end(source) + shift
             if not self.beside and {z for z in together if z.t < stop} != {z for z in zeroings if z.t < stop}:
-                self.lost.append(f"{len(together)} zeroed taxels (the recordings differ)")
+                self.lost.append(
+                    f"{len(together)} zeroed taxels (they would change the rest in a recording without them)"
+                )
                 return ()
         return together
 

@@ -273,11 +273,13 @@ def _check(held: Any) -> dict[str, Any]:
     for name, least in (("lost", "lost"), ("damaged", "damaged")):
         if STATUSES.index(values["status"]) < STATUSES.index(least) and any(values.get(name, {}).values()):
             raise ProblemError(
-                f"verdict: its status is {values['status']}, but its {name} is not empty: must be {least}, or worse"
+                f"verdict: its status is {values['status']}, but its {name} is not empty: the status "
+                f"must be {least!r} or worse"
             )
     if STATUSES.index(values["status"]) < STATUSES.index("damaged") and values.get(doubtful) is not None:
         raise ProblemError(
-            f"verdict: its status is {values['status']}, but its times are doubtful: must be damaged, or worse"
+            f"verdict: its status is {values['status']}, but its times are doubtful: the status must be "
+            "'damaged' or worse"
         )
     stated = {str(name): _check(part) for name, part in parts.items()}
     for name, part in stated.items():

@@ -129,5 +129,5 @@ def _kind_of(h5: H5File) -> Kind:
     kinds = h5.texts("units/value_kind") if "units/value_kind" in h5.entries else np.array([""])
     graded = {kind == "graded" for kind in kinds.flat}
     if graded == {True, False}:
-        raise FormatError(f"{h5.path}: units of different value_kind: must be one for all")
+        raise FormatError(f"{h5.path}: the units have different value_kind: all must have the same")
     return "graded" if graded == {True} else "signed"

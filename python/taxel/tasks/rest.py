@@ -291,10 +291,10 @@ def zero_by_unit(recording: Recording) -> Tare | None:
         stretch_s = [(t - beginning_us(source.t[:1])) / 1e6 for t in (first, end)]
         stretch = "{:.3f} to {:.3f} s".format(*stretch_s)
         # Of several recordings one number is right for all: the shortest that is quiet.
-        option = f"--tare {_QUIET_US / 1e6:g} subtracts this"
+        option = f"give --tare {_QUIET_US / 1e6:g} to subtract the values of this stretch"
         if first > source.t[0]:
             cut = "taxel cut {} rest.npz --from {:.3f} --to {:.3f}".format(quote(str(recording.path)), *stretch_s)
-            option = f"--tare rest.npz subtracts this; {cut} makes that file"
+            option = f"give --tare rest.npz to subtract the values of this stretch; to make this file, run: {cut}"
         reads = (
             f"{count} of {source.array.taxels} taxels read {middle[off].min():.3g} to {middle[off].max():.3g} "
             f"{source.unit} in a quiet stretch, {stretch}, and not 0; if nothing touches them then"
@@ -421,7 +421,7 @@ def _begun_loaded(source: Events | Frames) -> str:
     sums = np.asarray(np.nansum(source.values, axis=(1, 2), dtype=np.float64))
     begin, (least, most) = np.median(sums[:_FIRST_FRAMES]), np.quantile(sums, (_LOWEST, 1 - _LOWEST))
     is_loaded = begin > 0 and begin >= _LOADED_TIMES * least and begin >= most / _LOADED_TIMES
-    return f"; where trials begin loaded, {ZEROS_BEFORE} helps" if is_loaded else ""
+    return f"; where trials begin with load on the sensor, {ZEROS_BEFORE} helps" if is_loaded else ""
 
 
 def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare | None:

@@ -104,7 +104,8 @@ impl PlainRule {
             }
             if self.release < 1.0 || self.frames > 1 {
                 return Err(problem!(
-                    "release {} and frames {} with age_ms: must be 1, because a touch begins with 1 frame of 2 taxels",
+                    "release is {} and frames is {}: with age_ms both must be 1, because a touch then begins with the first \
+                     frame in which 2 taxels are loaded",
                     self.release,
                     self.frames
                 ));

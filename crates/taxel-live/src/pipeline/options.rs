@@ -135,10 +135,10 @@ options! {
         /// streaming layer. Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and
         /// counted. Without a readout nothing is sent until one is chosen on the page.
         send: Vec<String> = vec![], "metavar" = "WHERE", "python" = "str | Sequence[str]", "typed" = "May be repeated.";
-        /// How much may wait in the kernel, bytes.
+        /// How much received data may wait in the operating system, bytes.
         kernel_buffer_bytes: usize = ReceiverOptions::default().kernel_buffer_bytes, "commands" = "",
             "maximum" = 2_147_483_647;
-        /// How much may wait for the decoder, bytes.
+        /// How much received data may wait for the decoder, bytes.
         queue_bytes: usize = ReceiverOptions::default().queue_bytes, "commands" = "", "maximum" = 2_147_483_647;
         /// How many events may wait for the readout.
         readout_events: usize = 1 << 20, "commands" = "", "maximum" = 2_147_483_647;

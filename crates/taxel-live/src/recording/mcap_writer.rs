@@ -324,7 +324,7 @@ impl SourceWriter {
     pub fn zeroing(&self, at_ns: i64, zeroing: &Zeroing) -> Result<()> {
         let Zeroing { t, x, y, rest, before } = *zeroing;
         let before_text = before.map_or_else(|| "unknown".to_owned(), |before| format!("{before:.1}"));
-        let text = format!("zeroed row {y}, column {x}: rest {before_text} to {rest:.1} ticks");
+        let text = format!("zeroed row {y}, column {x}: its rest was {before_text}, is now {rest:.1} ticks");
         let mut note = log(at_ns, Some(t), &text);
         note["zeroed"] = json!({ "x": x, "y": y, "rest": rest, "before": before });
         self.grey_scale().zero(usize::from(y) * self.columns + usize::from(x), rest);

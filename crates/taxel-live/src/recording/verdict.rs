@@ -27,7 +27,7 @@ const NO_LINE_LOST: &str = "nothing lost after arrival (lines without numbers ca
 const UNCOUNTED: &str = "losses unknown: the kernel does not count what it drops";
 
 /// The wording where the record with the final counts is damaged.
-const NO_END: &str = "the final counts are damaged: losses after the counts before them are unknown";
+const NO_END: &str = "the final counts are damaged: losses since the last intact counts are unknown";
 
 /// How much of a recording is there, from the best to the worst; of several parts the worst counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]

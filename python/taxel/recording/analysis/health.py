@@ -283,13 +283,13 @@ class Touches(NamedTuple):
     touches: NDArray[np.uint32]
     """Number of touches of its place, as its neighbours show them."""
     missed: NDArray[np.uint32]
-    """Those in which it did not change."""
+    """Number of these touches in which the taxel did not change."""
     pressed: NDArray[np.uint32]
     """Number of bins in which it was touched itself."""
     changed: NDArray[np.uint32]
     """Number of bins in which it changed."""
     by_itself: NDArray[np.uint32]
-    """Those in which hardly any taxel around it did."""
+    """Number of these bins in which hardly any neighbour of the taxel changed."""
 
     @classmethod
     def from_counts(cls, taxels: NDArray[np.uint32], counts: NDArray[np.uint32]) -> Touches:

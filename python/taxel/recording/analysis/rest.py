@@ -125,8 +125,8 @@ class Rest:
         text = words.get(self.source, "")
         if self.quiet_us is not None:
             first, end = ((us - self.begin_us) / 1e6 for us in self.quiet_us)
-            text = f"a quiet stretch, {first:.3f} to {end:.3f} s, tracked from there"
-            text += f"; something was on {self.preload_at} in it" * bool(self.preload_at)
+            text = f"that of a quiet stretch, {first:.3f} to {end:.3f} s, later following slow changes"
+            text += f"; something was on {self.preload_at} during this stretch" * bool(self.preload_at)
         if self.falls:
             text += f"; {self.fall(path)}"
         return text + f"; {self.zeroed} zeroed" * bool(self.zeroed)
@@ -137,8 +137,8 @@ class Rest:
         layout, turning = Rest.turning(path)
         if layout:
             return (
-                f"values fall from their rest after {layout} inverted them: if that is wrong, remove falls from the "
-                "file"
+                f"values fall from their rest after {layout} inverted them: if they need no inversion, remove the "
+                f"line falls from {layout}"
             )
         return f"values fall from their rest: if smaller values mean more pressure, write {turning}"
 

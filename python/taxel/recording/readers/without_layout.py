@@ -94,8 +94,9 @@ def refuse_without_layout(path: Path) -> None:
         name = next((name for name, shape in shapes.items() if len(shape) in (2, 3)), None)
         if name is None:
             raise FormatError(
-                f"{path}: holds {list_arrays(shapes)}; must be t, x, y, p (events), values, t (frames), or, with a "
-                "layout file, an array of frames x rows x columns or frames x taxels (docs/files.md)"
+                f"{path}: holds {list_arrays(shapes)}; must be either arrays t, x, y, p (events), or arrays values, t "
+                "(frames); with a layout file also one array of frames x rows x columns or frames x taxels "
+                "(docs/files.md)"
                 + "; of a struct, save the fields: save('FILE.mat', '-struct', 'NAME')"
                 * path.name.endswith(".mat")
             )
@@ -315,7 +316,9 @@ class _TextTable:
         lines = []
         for name, columns in sides.items():
             others = sorted({*left, *taxels} - set(columns))
-            lines.append(f"# {name} alone: columns = {len(columns)}, leave_out = {[k + 1 for k in others]}")
+            lines.append(
+                f"# to read only the {name} side: columns = {len(columns)}, leave_out = {[k + 1 for k in others]}"
+            )
         return lines
 
     def form(self) -> list[str]:

@@ -43,7 +43,10 @@ fn parts_that_make_no_sense_are_refused_by_name() {
         (|r| r.release = 1.5, "release is 1.5"),
         (|r| r.frames = 0, "frames is 0"),
         (|r| r.age_ms = Some(Age::Ms(-1.0)), "age_ms is -1"),
-        (|r| r.age_ms = Some(Age::Ms(1.0)), "release 0.30000000000000004 and frames 20 with age_ms"),
+        (
+            |r| r.age_ms = Some(Age::Ms(1.0)),
+            "release is 0.30000000000000004 and frames is 20: with age_ms both must be 1",
+        ),
         (|r| r.noise_floor = f64::INFINITY, "noise_floor is inf"),
         (|r| r.labels = [None, None], "labels are both left out"),
         (|r| r.labels[1] = r.labels[0].clone(), "labels are both contact"),

@@ -73,7 +73,7 @@ fn files_that_are_no_readout_are_refused_by_name() {
         (&good.replacen("\"after_spike\": \"keep\"", "\"after_spike\": \"reset\"", 1), "trained for after_spike"),
         (&good.replacen("\"delay_ms\": 0.2", "\"delay_ms\": -0.2", 1), "contact: delay_ms is -0.2"),
         (&good.replacen("\"tau\": 0.5", "\"tau\": 0", 1), "contact: tau is 0"),
-        (&good.replacen("1.0,", "", 1), "contact: 9 weights, the encoder makes 10 trains of 64 x 64"),
+        (&good.replacen("1.0,", "", 1), "contact: 9 weights, but the encoder makes 10 trains of 64 x 64"),
     ];
     for (text, message) in cases {
         let error = Readout::from_json(text).unwrap_err();
