@@ -65,5 +65,8 @@ def _exchanged(
     if events < _LEAST or found < _FITS * events or own_found > _OWN * own_events or left > _FEWER * own_left:
         return None
     names = " and ".join(sorted((source, partner)))
-    measured = f"the labels of {names} are exchanged: with them exchanged {found} of {events} are found"
+    measured = (
+        f"{names} are exchanged, in the labels or in the recording: with the labels exchanged {found} of {events} are "
+        "found"
+    )
     return Cause("exchanged_sources", tuple(labels), own_left, measured, "")
