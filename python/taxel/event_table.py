@@ -19,6 +19,9 @@ __all__ = ["are_of_events", "with_known_columns"]
 _LABELS = ("label", "event", "ereignis", "name", "marker", "annotation")
 #: What the column of the recordings is called, if none is called `recording`; capitals do not matter.
 _RECORDINGS = ("recording", "trial", "versuch", "file", "filename", "datei", "aufnahme")
+#: What the column of the sources is called, if none is called `source`, and what sides are; capitals do not matter.
+_SOURCES = ("source", "side", "foot", "seite", "fuss", "fuß")
+_SIDES = {"": "", "l": "left", "links": "left", "left": "left", "r": "right", "rechts": "right", "right": "right"}
 #: Columns that hold neither times of events nor labels.
 _OTHERS = ("recording", "source", "host_ns", "replaces_us")
 _US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
@@ -33,7 +36,7 @@ _RIGHT = "must be label,t_us ..., or a column of texts and times with their unit
 
 
 def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
-    """Return a table with its labels in a column `label`, its times in `t_us`, and names of recordings in `recording`.
+    """Return a table with its columns named `label`, `t_us`, and, where it has them, `recording` and `source`.
 
     Parameters
     ----------
@@ -54,6 +57,13 @@ def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
     header = list(table.header)
     if header and (recording := _recording(table, separator)) is not None:
         header[recording] = "recording"
+    if header and (side := _side(table)) is not None:
+        header[side] = "source"
+        sides = (
+            (line, (*cells[:side], _SIDES[cells[side].strip().lower()], *cells[side + 1 :]))
+            for line, cells in table.rows
+        )
+        table = replace(table, lines=tuple(sides))
     if not header or {"label", "t_us"} <= set(header):
         return replace(table, header=tuple(header))
     time = header.index("t_us") if "t_us" in header else _time(table)
@@ -76,7 +86,7 @@ def are_of_events(names: Sequence[str], cells: Sequence[str]) -> bool:
     """
     kinds = ["time" if unit_of(name) is not None else name.lower() for name in names]
     labels = [k for k, kind in enumerate(kinds) if kind in _LABELS]
-    known = all(kind == "time" or kind in (*_LABELS, *_OTHERS, *_RECORDINGS) for kind in kinds)
+    known = all(kind == "time" or kind in (*_LABELS, *_OTHERS, *_RECORDINGS, *_SOURCES) for kind in kinds)
     return known and kinds.count("time") == len(labels) == 1 and len(cells) == len(names) and _is_text(cells[labels[0]])
 
 
@@ -87,6 +97,13 @@ def _recording(table: HeaderTable, separator: str) -> int | None:
     names = [name.lower() for name in table.header]
     named = (names.index(name) for name in _RECORDINGS if name in names)
     return next((k for k in named if any(_is_text(cells[k], separator) for _, cells in table.rows)), None)
+
+
+def _side(table: HeaderTable) -> int | None:
+    """Return which column holds the foot or the side of labels, by its name and its texts."""
+    names = [name.lower() for name in table.header]
+    named = () if "source" in names else (names.index(name) for name in _SOURCES if name in names)
+    return next((k for k in named if all(cells[k].strip().lower() in _SIDES for _, cells in table.rows)), None)
 
 
 def _time(table: HeaderTable) -> int:

@@ -405,3 +405,11 @@ def test_two_numbers_for_an_array_are_told_what_makes_one(tmp_path: Path, array:
     (tmp_path / "a.layout.toml").write_text("rate_hz = 100\n")
     with pytest.raises(taxel.ProblemError, match=r"must be taxel\.Array\(5, 7\), with as many rows and columns"):
         taxel.open(tmp_path / "a.npy", array=array)
+
+
+def test_a_table_of_times_and_texts_alone_is_no_recording(tmp_path: Path) -> None:
+    place = tmp_path / "a.csv"
+    place.write_text("Aufnahme;Zeit [s];Bemerkung;Ereignis\n" + "gang1;2,4;gut;heel\n" * 9)
+    with pytest.raises(FormatError) as refused:
+        taxel.open(place)
+    assert "\n" not in str(refused.value)

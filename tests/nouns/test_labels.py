@@ -373,6 +373,19 @@ def test_recordings_are_named_in_a_column_of_another_name(tmp_path: Path, name: 
         assert is_label_table(place)
 
 
+@pytest.mark.parametrize("name", ["Fuss", "FUSS", "Fuß", "foot", "Side", "Seite"])
+@pytest.mark.parametrize(("cells", "sources"), [("links rechts", ["left", "right"]), ("L R", ["left", "right"])])
+def test_feet_are_named_in_a_column_of_another_name(tmp_path: Path, name: str, cells: str, sources: list[str]) -> None:
+    place = tmp_path / "labels.csv"
+    first, second = cells.split()
+    place.write_text(f"Aufnahme;Zeit [s];{name};Ereignis\ngang;0,3;{first};heel\ngang;0,4;{second};heel\n")
+    assert [row.source for row in taxel.Labels(place).rows] == sources
+    assert is_label_table(place)
+    # Other texts are a remark.
+    place.write_text(f"Aufnahme;Zeit [s];{name};Ereignis\ngang;0,3;bare;heel\n")
+    assert [row.source for row in taxel.Labels(place).rows] == [""]
+
+
 def test_numbers_of_trials_name_no_recording_and_the_columns_are_said(tmp_path: Path) -> None:
     made = [record(tmp_path / f"{name}.mcap", 0, 1.0) for name in "ab"]
     place = tmp_path / "given" / "labels.csv"

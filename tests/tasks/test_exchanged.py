@@ -47,8 +47,10 @@ def test_exchanged_labels_of_two_sources_are_named_first(tmp_path: Path, names: 
     assert (right.score.found, right.each[0].outcome.causes) == (80, ())
     swapped = dict(zip(names, [*begins.values()][::-1], strict=True))
     found = detect(RULE, recordings, table(tmp_path / "swapped.csv", swapped))
-    pair = " and ".join(sorted(names))
-    said = f"the labels of {pair} seem to be exchanged: if they are exchanged back, 80 of 80 events are found"
+    both = " and ".join(sorted(names))
+    said = (
+        f"{both} are exchanged, in the labels or in the recording: with the labels exchanged, 80 of 80 events are found"
+    )
     for each in found.each:
         assert [str(cause) for cause in each.outcome.causes] == [said]
     assert all("do not rely on this score" in text for text in found.unreliable)
@@ -61,9 +63,8 @@ def test_labels_of_the_side_that_was_not_read_are_compared_too(tmp_path: Path, s
     swapped = table(tmp_path / "swapped.csv", {"left": begins["right"], "right": begins["left"]})
     (each,) = detect(RULE, recordings[0].sources["left"], swapped).each
     [cause] = each.outcome.causes
-    assert (
-        str(cause)
-        == "the labels of left and right seem to be exchanged: if they are exchanged back, 40 of 40 events are found"
+    assert str(cause) == (
+        "left and right are exchanged, in the labels or in the recording: with the labels exchanged, 40 of 40 events are found"
     )
 
 

@@ -66,6 +66,7 @@ def _exchanged(
         return None
     names = " and ".join(sorted((source, partner)))
     measured = (
-        f"the labels of {names} seem to be exchanged: if they are exchanged back, {found} of {events} events are found"
+        f"{names} are exchanged, in the labels or in the recording: with the labels exchanged, {found} of {events} "
+        "events are found"
     )
     return Cause("exchanged_sources", tuple(labels), own_left, measured, "")

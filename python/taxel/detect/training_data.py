@@ -35,8 +35,11 @@ _STRETCHES, _FRAMES, _QUIET = 64, 16, 0.1
 _LOOKS, _LOADED = 2000, 0.05
 #: A touch has this share of the strength of those that are detected in the training: weaker loads are noise.
 _TOUCH = 0.1
-#: Noise and strength differ from these times on.
-_NOISIER, _WEAKER, _STRONGER = 1.5, 0.6, 1.7
+#: The strength is by the sum: the peak is in units of the recording's own noise.
+_SUM = "total"
+#: Noise and strength differ from these times on. The strength is this quantile of touches, so that a stretch of strong
+#: ones counts.
+_NOISIER, _WEAKER, _STRONGER, _STRONG = 1.5, 0.6, 1.7, 0.75
 #: From so many times the noise on the loads are not compared.
 _MUCH_NOISE = 2.0
 #: Noise is that of the sum at so many moments from so long before a load until as long after it, us; the median
@@ -109,7 +112,7 @@ def training_data(examples: Sequence[Example], found: Sequence[Detections]) -> d
     touched = np.any([_within(each.loaded, shape) for each in known], axis=0)
     has = np.concatenate([each.detected(detections.t) for each, detections in zip(known, found, strict=True)])
     labels = [np.concatenate([*example.labels.values(), np.empty(0, np.int64)]) for example in sound]
-    strength = _usual(np.concatenate([each.peaks_at(t) for each, t in zip(known, labels, strict=True)]))
+    strength = _strength(np.concatenate([each.peaks_at(t) for each, t in zip(known, labels, strict=True)]))
     are_touches = np.concatenate([each.are_touches(strength) for each in known])
     return {
         "shape": list(shape),
@@ -119,6 +122,11 @@ def training_data(examples: Sequence[Example], found: Sequence[Detections]) -> d
         "detected": float(has[are_touches].mean()) if are_touches.any() else 0.0,
         "apart_ms": _apart_ms(sound),
     }
+
+
+def _strength(peaks: NDArray[np.float64]) -> float:
+    """Return the strength of touches by their peaks; 0 of none."""
+    return float(np.quantile(peaks, _STRONG)) if len(peaks) else 0.0
 
 
 def _usual(values: NDArray[np.float64]) -> float:
@@ -176,7 +184,7 @@ def unlike(readout: _Detector, example: Example, found: Detections) -> Unlike:
             "stays"
         )
     elif measured is not None:
-        sensor += _of_touches(data, measured, noisier, is_counts=is_counts)
+        sensor += _of_touches(data, measured, found, noisier, is_counts=is_counts)
         # Much noise makes loads of its own.
         detections += _undetected(data, measured, found) if noisier < _MUCH_NOISE else []
     return Unlike(sensor, [*detections, *_of_detections(data["apart_ms"], readout.labels, found)])
@@ -191,7 +199,9 @@ def _of_noise(noisier: float, *, is_counts: bool) -> Iterator[str]:
         yield f"the noise at rest is {noisier:.2g} times as strong as in the training"
 
 
-def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *, is_counts: bool) -> Iterator[str]:
+def _of_touches(
+    data: Mapping[str, Any], measured: _Measured, found: Detections, noisier: float, *, is_counts: bool
+) -> Iterator[str]:
     """Yield in what touches and taxels differ."""
     shape, strength = tuple(data["shape"]), data["strength"]
     are_touches = measured.are_touches(strength)
@@ -205,7 +215,8 @@ def _of_touches(data: Mapping[str, Any], measured: _Measured, noisier: float, *,
     if noisier >= _MUCH_NOISE or not strength:
         return
     if touches >= _LEAST:
-        ratio = _usual(measured.peaks[are_touches]) / strength
+        at_detections = measured.peaks_at(found.t)
+        ratio = _strength(at_detections if len(at_detections) >= _LEAST else measured.peaks[are_touches]) / strength
         if not _WEAKER <= ratio <= _STRONGER:
             yield f"touches are {ratio:.2g} times as strong as in the training"
     elif touches and len(measured.rises) >= _LEAST:
@@ -264,12 +275,11 @@ def _measured(given: Example) -> _Measured | None:
         return None
     assert isinstance(source, Events | Frames)
     quantity, threshold = ("peak", PEAK) if lacks_neighbours([example]) else ("area", TOUCH)
-    strength = "peak" if quantity == "peak" else "total"
     floor = floor_of([example])
-    loads = Loads([example], [clock_of(given)], floor, reporting(None), sorted({quantity, strength}))
+    loads = Loads([example], [clock_of(given)], floor, reporting(None), sorted({quantity, _SUM}))
     begins, ends = (loads.off(edge, 0).t for edge in loads.edges(quantity, threshold, 1.0, 1))
     begin, end = _touches(begins, ends, int(source.t[-1]))
-    above, sums = _core.touched_above(floor), loads.changes(strength, 0)
+    above, sums = _core.touched_above(floor), loads.changes(_SUM, 0)
     rises = _rises(source, above, sums, begin, end)
     begin, end, rises = begin[rises > 0.0], end[rises > 0.0], rises[rises > 0.0]
     values = tare.off(_touched(source, begin, end)).values

@@ -30,7 +30,7 @@ from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
-from taxel.recording.analysis.health import health, unchanging_taxels, whole_lines
+from taxel.recording.analysis.health import Held, health, unchanging_taxels, whole_lines
 from taxel.recording.analysis.preload import standing
 from taxel.recording.analysis.rest import FORCE_UNITS, of_frames, of_quiet
 from taxel.recording.opening import sensors_of
@@ -51,6 +51,8 @@ from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare,
 
 #: At most so many frames are looked at for dead and stuck taxels.
 _LOOKS = 2000
+#: So many taxels that stick are all named.
+_FEW_HELD = 2
 #: Causes of a bad score that are of labels or of the recording, not of the readout.
 _OF_LABELS = (
     "exchanged_sources",
@@ -540,6 +542,16 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
     return [*lines, *differs.lines()], differs
 
 
+def _held(held: Sequence[Held], source: Events | Frames) -> Iterator[str]:
+    """Yield which taxels stick at a value from some time on: the first of many, and the row or column of all."""
+    if len(held) <= _FEW_HELD:
+        yield from (f"stuck taxel: {each.text(source)}" for each in held)
+        return
+    rows, columns = {each.y for each in held}, {each.x for each in held}
+    line = f" in row {rows.pop()}" if len(rows) == 1 else f" in column {columns.pop()}" if len(columns) == 1 else ""
+    yield f"{len(held)} stuck taxels{line}, for example {held[0].text(source)}"
+
+
 def _of_taxels(source: Events | Frames | SpikeTrains) -> Iterator[str]:
     """Yield how many taxels are dead, and how many are stuck; nothing of counts, of which pixels may have no event."""
     if isinstance(source, SpikeTrains) or (isinstance(source, Frames) and are_counts(source.unit)):
@@ -551,8 +563,8 @@ def _of_taxels(source: Events | Frames | SpikeTrains) -> Iterator[str]:
     masks = {"dead": of_taxels.dead, "stuck": of_taxels.stuck, "unchanging": unchanging_taxels(of_taxels, source)}
     lines, within = whole_lines(masks, source.array)
     yield from (f"{line} (taxel info lists them)" for line in lines)
+    yield from _held(of_taxels.held, source)
     for held in of_taxels.held:
-        yield f"stuck taxel: {held.text(source)}"
         within[held.y, held.x] = True
     for word, mask in masks.items():
         if (rest := mask & ~within).any():

@@ -47,10 +47,9 @@ _OF_STEPS = {"foot", "footfall", "heel", "toe", "step", "stride"}
 #: way round.
 _ENDS = {
     **dict.fromkeys(("heel_strike", "foot_strike", "foot_contact", "initial_contact", "touch_down"), "contact"),
-    **dict.fromkeys(("erstkontakt", "fersenkontakt", "aufsetzen", "ic", "hs"), "contact"),
-    **dict.fromkeys(
-        ("foot_off", "toe_off", "final_contact", "zehenablösung", "zehenabloesung", "fo", "to"), "foot_off"
-    ),
+    **dict.fromkeys(("erstkontakt", "fersenkontakt", "fersenauftritt", "aufsetzen", "ic", "hs"), "contact"),
+    **dict.fromkeys(("foot_off", "toe_off", "final_contact", "fo", "to"), "foot_off"),
+    **dict.fromkeys(("zehenablösung", "zehenabloesung", "zehenabstoß", "zehenabstoss"), "foot_off"),
     **dict.fromkeys(("lift_off", "abheben"), "lift"),
 }
 _SAME_END = {"foot_off": "lift", "lift": "foot_off"}

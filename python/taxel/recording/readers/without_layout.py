@@ -83,7 +83,7 @@ def refuse_without_layout(path: Path) -> None:
         lines = _beginning(path)
         begin = _begin_of_frames(lines)
         found = _TextTable.find([line if not begin or not line.startswith(begin) else "" for line in lines])
-        if found is None:
+        if found is None or not (found.events() or found.taxels()):
             return
         # Compressed texts are several times larger.
         size = path.stat().st_size * (4 if path.suffix.lower() == ".gz" else 1)
@@ -277,6 +277,12 @@ class _TextTable:
         numbers = self.numbers(0)
         return bool((np.diff(numbers[:: self.lines_of(numbers)]) == 1).all())
 
+    def taxels(self) -> list[int]:
+        """Return the columns of readings."""
+        time = self.time()
+        left = self.left_out(time)
+        return [k for k in range(len(self.numeric)) if k not in left and k != time]
+
     def left_out(self, time: int | None) -> list[int]:
         """Return which columns are not taxels: texts, other times, another unit than most, and numbers of lines."""
         times = [] if time is None else times_of(self.names)
@@ -384,9 +390,8 @@ def _of_table(found: _TextTable, longer: float, begin: str) -> tuple[str, list[s
     """Return what a table holds, and its layout; the file is `longer` than what was read, `begin` is above frames."""
     if events := found.events():
         return _of_events(found, events)
-    time = found.time()
+    time, taxels = found.time(), found.taxels()
     left = found.left_out(time)
-    taxels = [k for k in range(len(found.numeric)) if k not in left and k != time]
     table = found.form()
     lines = found.between_empty
     if lines > 1:
