@@ -52,7 +52,7 @@ def test_exchanged_labels_of_two_sources_are_named_first(tmp_path: Path, names: 
         f"{both} are exchanged, in the labels or in the recording: with the labels exchanged, 80 of 80 events are found"
     )
     for each in found.each:
-        assert [str(cause) for cause in each.outcome.causes] == [said]
+        assert [str(cause) for cause in each.outcome.causes] == [f"{said} found"]
     assert all("do not rely on this score" in text for text in found.unreliable)
     assert found.unreliable
 
@@ -64,7 +64,8 @@ def test_labels_of_the_side_that_was_not_read_are_compared_too(tmp_path: Path, s
     (each,) = detect(RULE, recordings[0].sources["left"], swapped).each
     [cause] = each.outcome.causes
     assert str(cause) == (
-        "left and right are exchanged, in the labels or in the recording: with the labels exchanged, 40 of 40 events are found"
+        "left and right are exchanged, in the labels or in the recording: with the labels exchanged, 40 of 40 events are "
+        "found"
     )
 
 
