@@ -64,8 +64,8 @@ def test_labels_of_the_side_that_was_not_read_are_compared_too(tmp_path: Path, s
     (each,) = detect(RULE, recordings[0].sources["left"], swapped).each
     [cause] = each.outcome.causes
     assert str(cause) == (
-        "left and right are exchanged, in the labels or in the recording: with the labels exchanged, 40 of 40 events are "
-        "found"
+        "left and right are exchanged, in the labels or in the recording: with the labels exchanged, 40 of 40 events "
+        "are found"
     )
 
 
