@@ -112,11 +112,7 @@ class StatedOptions:
         commands="",
     )
     queue_bytes: int = option(
-        67108864,
-        "How much received data may wait for the decoder, bytes.",
-        least=0,
-        most=2_147_483_647,
-        commands="",
+        67108864, "How much received data may wait for the decoder, bytes.", least=0, most=2_147_483_647, commands=""
     )
     readout_events: int = option(
         1048576, "How many events may wait for the readout.", least=0, most=2_147_483_647, commands=""
