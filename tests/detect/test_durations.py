@@ -7,7 +7,7 @@ import pytest
 from refusal import refused
 
 from taxel import Array, Frames, Readout, Tare
-from taxel.detect import Example, PlainRule, Recipe, fit, recipes, run, score, tune
+from taxel.detect import Example, PlainRule, Recipe, fit, judge, recipes, run, score, tune
 from taxel.detect.floors import floor_alone, measured_floor
 from taxel.encode import TouchEnds
 from taxel.recording.analysis.rest import by_unit
@@ -99,6 +99,12 @@ def test_taps_and_presses_are_told_when_they_end(seed: int) -> None:
     lasted = found.known - found.t
     assert (lasted[found.label == "press"] > 1_150_000).all()
     assert (lasted[found.label == "tap"] < 300_000).all()
+
+
+def test_held_out_presses_of_one_recording_end_in_the_part_of_their_label() -> None:
+    learnt = on_channels(3, 6, 20, 10)
+    loaded = Recipe.load("touch", labels=["press", "tap"], noise_floor=measured_floor([learnt]))
+    assert judge([learnt], loaded, 5).together.rank[0] == 0
 
 
 def test_what_is_still_held_at_the_end_is_not_decided() -> None:

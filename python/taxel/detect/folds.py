@@ -47,6 +47,8 @@ __all__ = ["Fold", "Judged", "Part", "choose", "count_of_folds", "judge"]
 INNER = 3
 #: Into how many folds examples are split at most by default.
 _MOST = 5
+#: A recording is cut so long before the end of a pause between its events, if that is at least so long, us.
+_CUT_US, _LONG_US = 250_000, 1_000_000
 
 
 class Part(NamedTuple):
@@ -587,5 +589,6 @@ def _between_events(times: NDArray[np.int64], count: int) -> Iterator[float]:
         )
     for n in range(1, count):
         near = np.arange(max(1, n * len(times) // count - reach + 1), min(len(times), n * len(times) // count + reach))
-        widest = near[np.argmax(times[near] - times[near - 1])]
-        yield float(times[widest - 1] + times[widest]) / 2
+        before, after = max(((times[k - 1], times[k]) for k in near), key=lambda pause: pause[1] - pause[0])
+        # A touch that lasts may fill the most of a long pause, and what it is may be known when it ends.
+        yield float(after - _CUT_US if after - before >= _LONG_US else (before + after) / 2)

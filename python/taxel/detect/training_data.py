@@ -40,6 +40,8 @@ _SUM = "total"
 #: Noise and strength differ from these times on. The strength is this quantile of touches, so that a stretch of strong
 #: ones counts.
 _NOISIER, _WEAKER, _STRONGER, _STRONG = 1.5, 0.6, 1.7, 0.75
+#: Touches are weaker where this quantile is, too; a load of a recording that lasts longer than this share of it stays.
+_STRONGEST, _STAYS = 0.95, 0.5
 #: From so many times the noise on the loads are not compared.
 _MUCH_NOISE = 2.0
 #: Noise is that of the sum at so many moments from so long before a load until as long after it, us; the median
@@ -180,8 +182,8 @@ def unlike(readout: _Detector, example: Example, found: Detections) -> Unlike:
     if measured is not None and (count := _moved(source, data["noise"], measured.reading)):
         # Touches are measured above the rest.
         sensor.append(
-            f"{counted(count, 'taxel')} have other readings at the end than at the beginning: a drift, or a load that "
-            "stays"
+            f"{counted(count, 'taxel')} {'has' if count == 1 else 'have'} other readings at the end than at the "
+            "beginning: a drift, or a load that stays"
         )
     elif measured is not None:
         sensor += _of_touches(data, measured, found, noisier, is_counts=is_counts)
@@ -216,8 +218,10 @@ def _of_touches(
         return
     if touches >= _LEAST:
         at_detections = measured.peaks_at(found.t)
-        ratio = _strength(at_detections if len(at_detections) >= _LEAST else measured.peaks[are_touches]) / strength
-        if not _WEAKER <= ratio <= _STRONGER:
+        peaks = at_detections if len(at_detections) >= _LEAST else measured.peaks[are_touches]
+        ratio = _strength(peaks) / strength
+        # Fewer strong ones than in the training are no weaker touches.
+        if ratio > _STRONGER or (ratio < _WEAKER and np.quantile(peaks, _STRONGEST) < _WEAKER * strength):
             yield f"touches are {ratio:.2g} times as strong as in the training"
     elif touches and len(measured.rises) >= _LEAST:
         yield f"most loads do not reach {_TOUCH:g} of the strength of the training's touches"
@@ -265,7 +269,7 @@ def _within(mask: NDArray[np.bool_], shape: Sequence[int]) -> NDArray[np.bool_]:
 
 
 def _measured(given: Example) -> _Measured | None:
-    """Return what is measured in an example; None of spike trains, of one without a rest, and of one that is empty."""
+    """Return what is measured in an example; None of spike trains, without frames or a rest, and where a load stays."""
     try:
         (example,) = check_examples([given])
     except ProblemError:
@@ -279,6 +283,8 @@ def _measured(given: Example) -> _Measured | None:
     loads = Loads([example], [clock_of(given)], floor, reporting(None), sorted({quantity, _SUM}))
     begins, ends = (loads.off(edge, 0).t for edge in loads.edges(quantity, threshold, 1.0, 1))
     begin, end = _touches(begins, ends, int(source.t[-1]))
+    if (end - begin).max(initial=0) > _STAYS * (source.t[-1] - source.t[0]):
+        return None
     above, sums = _core.touched_above(floor), loads.changes(_SUM, 0)
     rises = _rises(source, above, sums, begin, end)
     begin, end, rises = begin[rises > 0.0], end[rises > 0.0], rises[rises > 0.0]

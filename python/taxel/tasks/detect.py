@@ -543,7 +543,7 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
 
 
 def _held(held: Sequence[Held], source: Events | Frames) -> Iterator[str]:
-    """Yield which taxels stick at a value from some time on: the first of many, and the row or column of all."""
+    """Yield which taxels stick at a value after some time: the first of many, and the row or column of all."""
     if len(held) <= _FEW_HELD:
         yield from (f"stuck taxel: {each.text(source)}" for each in held)
         return

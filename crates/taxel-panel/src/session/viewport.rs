@@ -617,7 +617,7 @@ mod tests {
             let (whole, _) = encode(&mut view, json!(composite)).await;
             assert_eq!(encode(&mut view, json!({ "name": "composite" })).await, (whole, true));
             view.set_readout("walk.mcap", &ReadoutEncoders::default()).await;
-            assert!(view.take_warnings()[0].contains("no readout with several encoders"));
+            assert!(view.take_warnings()[0].contains("needs a readout with several encoders"));
         });
         std::fs::remove_file(&path).unwrap();
     }
