@@ -358,7 +358,7 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
         (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings"), "--set wings: must be KEY=VALUE"),
         (
             ("train", "1.npz", "--labels", "labels.csv", "--recipe", "gaitpdb", "-o", "new.json"),
-            "recipe 'gaitpdb': there are",
+            "recipe 'gaitpdb': must be one of event_counts, gait_channel, ",
         ),
         (("train", "1.npz", "--labels", "labels.csv", "--recipe", "./gait", "-o", "new.json"), "gait: no such file"),
         (("train", "1.npz", "--labels", "none.csv", "--encoder", "fa1", "-o", "new.json"), "none.csv: no such file"),

@@ -80,7 +80,7 @@ def test_levels_that_a_user_states_stay(tmp_path: Path) -> None:
     labels = [{name: t.tolist() for name, t in example.labels.items()}]
     fitted = train(taxel.open(tmp_path / "a.npz"), labels)
     assert fitted.fitted_levels == tuple(fitted.readout.encoder.levels)
-    assert any(line.startswith("levels: 0.0") and "of the training data" in line for line in fitted.lines())
+    assert any(line.startswith("levels: 0.0") and "from the training data" in line for line in fitted.lines())
     assert taxel.Readout.from_json(fitted.readout.to_json()).encoder == fitted.readout.encoder
     stated = train(taxel.open(tmp_path / "a.npz"), labels, TrainOptions("gait_insole", {"encoder.levels": [0.1, 0.3]}))
     assert stated.readout.encoder.levels == [0.1, 0.3]

@@ -347,7 +347,7 @@ def test_a_row_of_channels_is_told_how_it_is_laid_out_and_array_does_it(tmp_path
     values[100:200, 1:, 1:] = values[250:300, 1:, 1:] = 20.0
     np.save(tmp_path / "flat.npy", values.reshape(400, 12))
     (tmp_path / "flat.layout.toml").write_text("rate_hz = 1000\n")
-    taxel.detect.PlainRule("area", 3).save(tmp_path / "rule.json")
+    taxel.detect.PlainRule("local_load", 3).save(tmp_path / "rule.json")
     detect = ("detect", tmp_path / "flat.npy", "--readout", tmp_path / "rule.json", "--tare", "0.05")
     assert "1 x 12 channels without a pitch; give --array ROWSxCOLUMNS" in call(capsys, *detect)[2]
     assert "--array: 4 x 4 taxels; " in call(capsys, *detect, "--array", "4x4")[2]

@@ -142,10 +142,16 @@ def fa1(t, values, alpha=0.7, a=20.0, b=0.05, decay="sample", theta_0=None, larg
 
 
 def contact_area(t, frames, rest, floor=3.0, levels=(2, 4, 8, 16, 32)):
-    """Rises and falls of the number of loaded taxels with a loaded neighbour; `rest` is NaN where unknown."""
-    before, spikes = 0, []
+    """Rises and falls of the area of a grid or a single taxel; `rest` is NaN where unknown."""
+    before, spikes, loaded = 0, [], np.zeros((1, 1), bool)
     for at, frame in zip(t, frames, strict=True):
-        loaded = np.nan_to_num(frame - rest, nan=-np.inf) >= floor + TICK_SHIFT
+        above = np.nan_to_num(frame - rest, nan=-np.inf)
+        if single := above.size == 1:
+            # Its noise is 0: it is loaded from the floor on, until it is below half of that.
+            enough = max(floor, 1e-9)
+            loaded = above >= np.where(loaded, 0.5 * enough, enough)
+        else:
+            loaded = above >= floor + TICK_SHIFT
         wide = np.pad(loaded, 1)
         rows, columns = loaded.shape
         beside = sum(
@@ -154,7 +160,7 @@ def contact_area(t, frames, rest, floor=3.0, levels=(2, 4, 8, 16, 32)):
             for dx in (-1, 0, 1)
             if (dy, dx) != (0, 0)
         )
-        area = int((loaded & (beside > 0)).sum())
+        area = int((loaded & (single | (beside > 0))).sum())
         for k, level in enumerate(levels):
             if before < level <= area:
                 spikes.append((at, k, 1))

@@ -83,7 +83,7 @@ def test_a_noise_floor_of_0_is_of_whole_numbers_alone():
     encoder = ContactArea(noise_floor=0, levels=[2], tare=Tare.take(frames, stop_us=2000))
     assert len(encoder.encode(frames).times) == 1
     values[3] = 0.4
-    with refused("noise_floor is 0: 0 is only for whole numbers.* values in N need"):
+    with refused("noise_floor is 0: 0 is only for whole numbers.* for values in N, give the noise at rest"):
         encoder.encode(Frames(values, frames.t, unit="N"))
 
 

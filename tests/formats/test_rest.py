@@ -253,7 +253,7 @@ def test_a_recording_of_values_that_fall_in_which_nothing_is_detected_says_what_
         remarks, found = (json.loads(as_json)[name] for name in ("remarks", "detections"))
         assert bool(found) == finds
         if sign < 0:
-            assert remarks[0].startswith("rest: a quiet stretch")
+            assert remarks[0].startswith("rest: that of a quiet stretch")
             assert "write falls = true in a layout file" in remarks[0]
             assert remarks[0] in shown
         else:

@@ -190,7 +190,7 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
         (
             "recording,t_us,label\ntouches.npz,100000,a\ntouches.npz,500000,b\n",
             ["--window-ms", "450"],
-            "--window-ms is 450: ",
+            "begins 400 ms after line 2: the window must be at most 400 ms, or the trials must have stop_us",
         ),
         (GOOD.replace("100000,a,200000", "1e30,a,200000"), [], "line 2: t_us is '1e30', must be whole us"),
         (GOOD.replace("100000,a,200000", "100000,a,500001"), [], "line 3: begins before line 2 ends at 500001 us"),

@@ -160,7 +160,7 @@ def test_a_row_that_the_problem_does_not_have_is_one_clear_error():
     problem = refuted().problem_
     for row, said in (
         (("silence", 99, 5.0), "pattern 99: there are only 8"),
-        (("target", 0, 7), "pattern 0, target 7: the pattern has 1 targets"),
+        (("target", 0, 7), "pattern 0, target 7: the pattern has only 1 targets"),
         (("silence", 0, 1e6), "is outside the time that is trained"),
         (("noise", 0, 1.0), 'row of kind "noise"'),
         (("target", 0, 0.5), "target 0.5: must be a whole number"),

@@ -245,7 +245,7 @@ def test_taxel_live_says_which_taxels_its_tare_does_not_know(tmp_path: Path) -> 
         said = next(line for line in process.stderr if "the tare has only" in line)
         process.send_signal(signal.SIGINT)
         process.stderr.read()
-    assert said.startswith("taxel: the tare has only 1 of 16 taxels")
+    assert said.startswith("taxel: the tare has only the 1 of 16 taxels that changed")
 
 
 def test_taxel_live_refuses_a_tare_that_nobody_keeps(tmp_path: Path) -> None:

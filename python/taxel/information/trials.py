@@ -294,8 +294,8 @@ def _apart(trials: list[LabelledTrial], window_us: int) -> None:
             if trial.stop_us is None and apart < window_us:
                 raise refused(
                     "window_ms",
-                    f" is {to_ms(window_us):g}, but {after.name} begins {to_ms(apart):g} ms after {before}: window_ms "
-                    f"must be at most {to_ms(apart):g}, or the trials must have stop_us",
+                    f" is {to_ms(window_us):g}, but {after.name} begins {to_ms(apart):g} ms after {before}: the "
+                    f"window must be at most {to_ms(apart):g} ms, or the trials must have stop_us",
                 )
             if trial.stop_us is not None and after.start_us < trial.stop_us:
                 raise ProblemError(
