@@ -37,12 +37,12 @@ JSON: dict[str, Callable[[Path], Any]] = {
     "any": read_json,
 }
 BAD_TOML = {
-    "dots": ("a" + ".a" * 200_000 + " = 1", "line 1: a key of 200000 dots; must have at most 100"),
-    "quoted dots": ("\n'a'" + '."a"' * 101 + " = 1", "line 2: a key of 101 dots"),
-    "a table of dots": ("[a" + ".a" * 101 + "]", "line 1: a key of 101 dots"),
-    "numbers with dots": ("1" + ".1" * 101 + " = 1", "line 1: a key of 101 dots"),
-    "inline": ("b = {a" + ".a" * 101 + " = 1}", "line 1: a key of 101 dots"),
-    "behind a text": ('b = """\n\\"""\n"""\na' + ".a" * 101 + " = 1", "line 4: a key of 101 dots"),
+    "dots": ("a" + ".a" * 200_000 + " = 1", "line 1: a key with 200000 dots; must have at most 100"),
+    "quoted dots": ("\n'a'" + '."a"' * 101 + " = 1", "line 2: a key with 101 dots"),
+    "a table of dots": ("[a" + ".a" * 101 + "]", "line 1: a key with 101 dots"),
+    "numbers with dots": ("1" + ".1" * 101 + " = 1", "line 1: a key with 101 dots"),
+    "inline": ("b = {a" + ".a" * 101 + " = 1}", "line 1: a key with 101 dots"),
+    "behind a text": ('b = """\n\\"""\n"""\na' + ".a" * 101 + " = 1", "line 4: a key with 101 dots"),
     "lists": ("a = " + "[" * 100_000, "nested too deeply"),
     "closed lists": ("a = " + "[" * 70 + "]" * 70, "nested too deeply; must be at most 64"),
     "tables": ("a = " + "{b = " * 5000, "nested too deeply"),
@@ -121,7 +121,7 @@ def test_what_taxel_did_not_write_is_refused_before_it_is_parsed(
         "[" + "1," * 1000 + "1]": "not a JSON object: begins with '\\['",
         " \n\t7": "not a JSON object: begins with '7'",
         "": "not a JSON object: empty",
-        '{"a":[' + "1," * 42_000_000 + "1]}": r"claims \d+ bytes when unpacked; at most 2147483648 are read",
+        '{"a":[' + "1," * 42_000_000 + "1]}": r"states \d+ bytes when unpacked; at most 2147483648 are read",
     }.items():
         path.write_text(text)
         with refused(why, FormatError):
@@ -132,7 +132,7 @@ def test_a_setting_is_read_as_a_file_is() -> None:
     assert assignments(["a.b=[1.5, 2.5]", "c=plain text", "d='x'"]) == {"a.b": [1.5, 2.5], "c": "plain text", "d": "x"}
     with refused("--set a: nested too deeply", FormatError):
         assignments(["a=" + "[" * 70 + "]" * 70])
-    with refused("--set a, line 1: a key of 101 dots", FormatError):
+    with refused("--set a, line 1: a key with 101 dots", FormatError):
         assignments(["a={b" + ".b" * 101 + "=1}"])
     with refused("--set a: .* characters", FormatError):
         assignments(["a='" + "x" * BY_HAND + "'"])

@@ -114,7 +114,7 @@ def test_a_neuron_with_one_input_is_said_in_words(encoder, train: int, words: st
     weights[train] = 0.4
     neuron = taxel.Neuron(tau=1.0)
     readout = Readout(encoder, {"contact": (neuron, weights, 0.1)}, array=taxel.Array(4, 4), unit="counts")
-    assert _only_input(readout, "contact") == f"The neuron has one input, and is a threshold: it fires as {words}"
+    assert _only_input(readout, "contact") == f"The neuron has one input, and is a threshold: it fires when {words}"
     weights[0] = 0.3
     readout = Readout(encoder, {"contact": (neuron, weights, 0.1)}, array=taxel.Array(4, 4), unit="counts")
     assert _only_input(readout, "contact") == ""

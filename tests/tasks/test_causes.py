@@ -364,7 +364,7 @@ def test_what_happens_while_a_touch_lasts_is_no_label_of_another_recording(seed:
     (cause,) = Evidence([example], check_examples([example]), plan).causes({"slip": 15})
     assert (cause.kind, cause.labels, cause.mistakes) == ("label_name", ("slip",), 15)
     assert (
-        "are within touches, which onset, release fitwhere touches begin or end; no recipe detects what happens while a"
+        "are within touches; onset, release fit where touches begin or end; no recipe detects what happens while a"
         in cause.measured
     )
     # Where no label fits the touches, labels may be of another recording.

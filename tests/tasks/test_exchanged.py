@@ -52,7 +52,7 @@ def test_exchanged_labels_of_two_sources_are_named_first(tmp_path: Path, names: 
         f"{both} are exchanged, in the labels or in the recording: with the labels exchanged, 80 of 80 events are found"
     )
     for each in found.each:
-        assert [str(cause) for cause in each.outcome.causes] == [f"{said} found"]
+        assert [str(cause) for cause in each.outcome.causes] == [said]
     assert all("do not rely on this score" in text for text in found.unreliable)
     assert found.unreliable
 

@@ -43,7 +43,7 @@ def test_a_tare_that_takes_off_what_lies_there_is_advised_after_a_trial(tmp_path
     [cause] = said(tmp_path, rule, values, t, labels)
     assert (cause.kind, set(cause.labels)) == ("standing_load", {"contact", "lift"})
     assert "an object is on the sensor from beginning to end, at rows 5 to 6, columns 1 to 3 (up to 2" in cause.measured
-    assert "; tried with it: 40 found and 0 false, where " in cause.measured
+    assert "; tried with it: 40 found and 0 false, instead of " in cause.measured
     option, seconds = cause.option.split()
     assert (option, cause.arguments) == ("--tare", {"tare": float(seconds)})
     tared = DetectOptions(tare=cause.arguments["tare"])
