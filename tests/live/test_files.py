@@ -69,7 +69,7 @@ def test_a_second_recorder_does_not_take_the_file_of_a_running_one(tmp_path: Pat
             play(presses(2), port)
             wait_until(lambda: file.stat().st_size > 0)
         done = run("record", file, "--host", LOOPBACK, "--port", free_port(), "--overwrite", "--seconds", 0.1)
-        said = "is being recorded by another program; end that first, or choose another name file"
+        said = "is being recorded by another program; end that first, or name another file"
         assert (done.returncode, done.stderr) == (3, f"taxel: {file}: {said}\n")
         play(presses(2), port)
         time.sleep(0.3)
