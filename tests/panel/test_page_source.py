@@ -111,7 +111,7 @@ def test_what_arrives_is_shown_and_another_source_takes_the_place_of_the_first(t
         until(lambda: live.counters["frames"] > 40, "more frames arrive")
         live.end_recording()
         assert taxel.open(tmp_path / "mat.mcap").frames().array.shape == (4, 4)
-        with pytest.raises(taxel.ProblemError, match="must be 25 a frame"):
+        with pytest.raises(taxel.ProblemError, match="must be 25 per frame"):
             panel.read_source(f"serial:{line},array=5x5,frame_lines=4,columns=a:b:c:d,rate=50")
         assert panel.live is not None
         assert panel.live.array.shape == (4, 4)
