@@ -79,7 +79,9 @@ class Address(NamedTuple):
         )
         port = _PORT if match is None else int(match["port"] or _PORT)
         if match is None or not 1 <= port <= 65_535:
-            raise ProblemError(f"address {address!r}: must be zenoh:HOST:PORT/NAME, as zenoh:192.168.1.5:7447/left")
+            raise ProblemError(
+                f"address {address!r}: must be zenoh:HOST:PORT/NAME, for example zenoh:192.168.1.5:7447/left"
+            )
         return cls(match["host"], port, match["name"])
 
     @property
@@ -119,7 +121,7 @@ class Remote(RemoteBoard):
 
     >>> Remote("192.168.1.5")
     Traceback (most recent call last):
-    taxel.ProblemError: address '192.168.1.5': must be zenoh:HOST:PORT/NAME, as zenoh:192.168.1.5:7447/left
+    taxel.ProblemError: address '192.168.1.5': must be zenoh:HOST:PORT/NAME, for example zenoh:192.168.1.5:7447/left
 
     Notes
     -----

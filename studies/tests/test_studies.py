@@ -183,7 +183,7 @@ def test_the_command_prints_json(small, capsys):
     ("more", "message"),
     [
         (["--size", "huge"], "fig6.11: size is 'huge': must be one of 'full', 'toy'"),
-        (["--set", "kapa=1"], "fig6.11 has no parameter 'kapa': there are"),
+        (["--set", "kapa=1"], "fig6.11 has no parameter 'kapa': its parameters are"),
         (["--set", "kappa=wide"], "kappa is 'wide': must be a number, as 1.04"),
         (["--set", "kappa"], "--set kappa: must be KEY=VALUE"),
         (["--realisations", "0"], "realisations is 0"),
