@@ -53,7 +53,8 @@ def measured_floor(examples: Sequence[Example]) -> float | None:
 def floor_alone(examples: Sequence[Example], floor: float) -> float:
     """Return the noise floor of channels, each of which counts alone: by the noise before labels, if that is more.
 
-    Of those with a tare by the unit, which has the noise of half a second that is quiet: less than elsewhere, or none.
+    A tare by the unit has the noise of the quietest half second, which is less than elsewhere, or none. Other tares
+    have the noise of a longer rest, so `floor` is enough.
 
     Parameters
     ----------

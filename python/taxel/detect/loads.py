@@ -73,7 +73,7 @@ class Loads:
         self._edges: dict[tuple[str, float, float, int], tuple[FoundTimes, FoundTimes]] = {}
         self._ages: dict[float, FoundTimes] = {}
         if quantities is None:
-            # Of channels the local load is not known, and the area and total tell edges no better than the peak.
+            # Channels have no local load, and their area and total show edges no better than the peak.
             quantities = ("peak",) if lacks_neighbours(examples) else ("area", "total", "local_load", "peak")
             measured = dict.fromkeys(("area", *quantities))  # kinds are decided by the area
         else:

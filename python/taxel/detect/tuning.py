@@ -66,7 +66,7 @@ def tune(
     onset and at the end of a load; of channels those of the peak alone. Two labels are kinds where exactly two are
     nearer to onsets than to ends, or where there are only two: then thresholds of the area at each of `AGES_MS` are
     tried too, on a logarithmic scale, and thresholds of the duration as touches end, and hold for both where they are
-    better for both together. Of frames each counts once that holds at one of these ages.
+    better for both together. Each frame that holds at one of these ages counts once.
 
     Parameters
     ----------

@@ -25,8 +25,9 @@ parameters! {
     ///
     /// A touch begins when the area, the number of taxels that count for [`ContactArea`](super::ContactArea), rises
     /// above 0 and ends when it is 0 again. A channel, which has no neighbours, counts alone: from the noise floor on, or
-    /// from six times its noise in the tare if that is more, until it is below half of it. Trains: log(1 + duration, ms), then log(1 + the largest) of the touch of area,
-    /// total and peak, as of [`Moments`](super::Moments), and 1. A touch that has not ended gives nothing.
+    /// from six times its noise in the tare if that is more, until it is below half of it. Trains: log(1 + duration, ms),
+    /// then log(1 + the largest) of the touch of area, total and peak, as of [`Moments`](super::Moments), and 1. A touch
+    /// that has not ended gives nothing.
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct TouchEnds {
