@@ -280,9 +280,9 @@ def test_a_rest_that_moves_is_named_in_the_place_of_weak_touches(trained: Traine
     moved = taxel.Frames(frames.values + drift, frames.t, unit="counts", array=frames.array)
     lines = trained.told(capsys, tmp_path, moved, labels)
     count = taxel.Array(*trained.shape).taxels
-    taxels = f"{count} taxel{'s' * (count > 1)}"
+    taxels_have = "1 taxel has" if count == 1 else f"{count} taxels have"
     assert (
-        f"unlike the training: {taxels} have other readings at the end than at the beginning: "
+        f"unlike the training: {taxels_have} other readings at the end than at the beginning: "
         "a drift, or a load that stays" in lines
     )
     assert not any("times as strong" in line for line in lines)

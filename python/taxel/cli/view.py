@@ -63,13 +63,14 @@ def view(
     """
     console = Console(stderr=True, quiet=as_json)
     reading = _opening(files, calibration, recording)
-    with Panel(recording, host=panel_host, port=panel_port, opens=reading, options=files.opener) as panel:
+    shown = Panel(recording, host=panel_host, port=panel_port, opens=reading, options=files.opener)
+    # Ctrl-C is the end that is awaited from the moment on at which the address is known.
+    with shown as panel, contextlib.suppress(KeyboardInterrupt):
         if as_json:
             say(json.dumps({"url": panel.url, "token": panel.token}))
         announce(panel, opens, console)
         console.print("Ctrl-C ends")
-        with contextlib.suppress(KeyboardInterrupt):
-            threading.Event().wait(None if seconds is None else min(seconds, threading.TIMEOUT_MAX))
+        threading.Event().wait(None if seconds is None else min(seconds, threading.TIMEOUT_MAX))
 
 
 def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> Callable[[Path], list[Recording]] | None:

@@ -78,6 +78,8 @@ class _Measured:
     """... which they load at all."""
     reading: float
     """Reading of the most loaded taxel above rest, median over loads."""
+    stays: bool
+    """Whether a load lasts so long that the loads are no touches."""
 
     def are_touches(self, strength: float) -> NDArray[np.bool_]:
         """Return which loads are touches, if those of the training are so strong."""
@@ -107,7 +109,7 @@ def training_data(examples: Sequence[Example], found: Sequence[Detections]) -> d
     """
     sound = check_examples(examples)
     measured = [_measured(example) for example in examples]
-    known = [each for each in measured if each is not None]
+    known = [each for each in measured if each is not None and not each.stays]
     if len(known) < len(measured) or not known:
         return None
     shape = tuple(int(size) for size in np.max([each.loaded.shape for each in known], axis=0))
@@ -185,7 +187,7 @@ def unlike(readout: _Detector, example: Example, found: Detections) -> Unlike:
             f"{counted(count, 'taxel')} {'has' if count == 1 else 'have'} other readings at the end than at the "
             "beginning: a drift, or a load that stays"
         )
-    elif measured is not None:
+    elif measured is not None and not measured.stays:
         sensor += _of_touches(data, measured, found, noisier, is_counts=is_counts)
         # Much noise makes loads of its own.
         detections += _undetected(data, measured, found) if noisier < _MUCH_NOISE else []
@@ -269,7 +271,7 @@ def _within(mask: NDArray[np.bool_], shape: Sequence[int]) -> NDArray[np.bool_]:
 
 
 def _measured(given: Example) -> _Measured | None:
-    """Return what is measured in an example; None of spike trains, without frames or a rest, and where a load stays."""
+    """Return what is measured in an example; None of spike trains, and without frames or a rest."""
     try:
         (example,) = check_examples([given])
     except ProblemError:
@@ -283,16 +285,16 @@ def _measured(given: Example) -> _Measured | None:
     loads = Loads([example], [clock_of(given)], floor, reporting(None), sorted({quantity, _SUM}))
     begins, ends = (loads.off(edge, 0).t for edge in loads.edges(quantity, threshold, 1.0, 1))
     begin, end = _touches(begins, ends, int(source.t[-1]))
-    if (end - begin).max(initial=0) > _STAYS * (source.t[-1] - source.t[0]):
-        return None
+    stays = bool((end - begin).max(initial=0) > _STAYS * (source.t[-1] - source.t[0]))
     above, sums = _core.touched_above(floor), loads.changes(_SUM, 0)
     rises = _rises(source, above, sums, begin, end)
     begin, end, rises = begin[rises > 0.0], end[rises > 0.0], rises[rises > 0.0]
     values = tare.off(_touched(source, begin, end)).values
     share = (values >= above).mean(axis=0) if len(values) else np.zeros(source.array.shape)
     most = np.fmax.reduce(values, axis=(1, 2), initial=0.0)
+    peaks = largest(*sums, begin, end)
     return _Measured(
-        _noise(source), largest(*sums, begin, end), rises, begin, end, share >= _LOADED, share > 0.0, _usual(most)
+        _noise(source), peaks, rises, begin, end, share >= _LOADED, share > 0.0, _usual(most), stays=stays
     )
 
 
