@@ -103,7 +103,7 @@ def draw_board(browser: Any) -> None:
         # A press is shorter than the way of a screenshot: the page itself stops at it.
         page.wait_for_function(
             """(touched) => {
-                const pressed = parseInt(document.getElementById("force-area").textContent) > touched;
+                const pressed = parseInt(document.getElementById("area-now").textContent) > touched;
                 if (pressed) document.getElementById("play").click();
                 return pressed;
             }""",
