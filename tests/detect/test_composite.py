@@ -119,7 +119,7 @@ def test_inputs_are_given_by_label_too() -> None:
 @pytest.mark.parametrize(
     ("neuron", "more", "text"),
     [
-        ((Neuron(), [1.0] * 4, 0.0, ("b",)), {}, 'a: inputs: no encoder "b": there are area, change'),
+        ((Neuron(), [1.0] * 4, 0.0, ("b",)), {}, 'a: inputs: the composite has no encoder "b": its encoders are area, change'),
         ((Neuron(), [1.0] * 4, 0.0, ("area", "area")), {}, 'a: inputs: "area" comes twice'),
         ((Neuron(), [1.0] * 5, 0.0, ("area",)), {}, "a: 5 weights, but the encoder makes 4 trains"),
         ((Neuron(), [1.0] * 4), {}, "a: 4 weights, but the encoder makes 36 trains"),
@@ -134,7 +134,7 @@ def test_inputs_that_do_not_exist_are_refused(neuron: tuple, more: dict, text: s
 
 
 def test_one_encoder_has_no_inputs() -> None:
-    with refused("a: inputs are .*: the encoder is not a composite"):
+    with refused("a: inputs are .*: must be left out, because only a composite"):
         Readout(PARTS["area"], {"a": (Neuron(), [1.0] * 4, 0.0, ("area",))})
     for call in (
         composite(1).encoder_of,

@@ -29,7 +29,8 @@ pub(crate) fn to_detections((labels, t, known, slope, repaired): DetectionsIn<'_
     let repaired = slice("repaired", &repaired)?;
     for (name, len) in [("t", t.len()), ("known", known.len()), ("slope", slope.len()), ("repaired", repaired.len())] {
         if len != labels.len() {
-            let text = format!("detections: {name} has {len} entries, label has {}: they must be equal", labels.len());
+            let text =
+                format!("detections: {name} has {len} entries, label has {}: the numbers must be equal", labels.len());
             return Err(ProblemError::new_err(text));
         }
     }

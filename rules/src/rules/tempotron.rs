@@ -284,7 +284,7 @@ fn crossing(shape: &Shape, state: KernelSum, end: f64, threshold: f64) -> f64 {
 
 fn check_labelled(patterns: &[SpikeTrains], labels: &[bool]) -> Result<()> {
     if patterns.is_empty() {
-        return Err(problem!("patterns"; ": there is none, at least one is needed"));
+        return Err(problem!("patterns"; " is empty: must contain one pattern or more"));
     }
     if patterns.len() != labels.len() {
         return Err(problem!("labels"; ": {} for {} patterns, must be one per pattern", labels.len(), patterns.len()));

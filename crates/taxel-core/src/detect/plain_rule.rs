@@ -94,7 +94,7 @@ impl PlainRule {
             return Err(problem!("frames"; " is {}: must be from 1 to {MOST_FRAMES}", self.frames));
         }
         if (self.quantity == Quantity::Duration) != matches!(self.age_ms, Some(Age::Named(NamedAge::End))) {
-            return Err(problem!("age_ms"; " end and the quantity duration: must be given together"));
+            return Err(problem!("age_ms"; " \"end\" and the quantity \"duration\": must be given together"));
         }
         if let Some(age) = self.age_ms {
             if let Age::Ms(age) = age
@@ -121,7 +121,7 @@ impl PlainRule {
                 return Err(problem!("labels"; " are both {}: must differ", first.as_deref().unwrap_or_default()));
             }
             labels if labels.iter().flatten().any(|label| label.trim().is_empty()) => {
-                return Err(problem!("labels"; ": one is empty: must be a name, or left out"));
+                return Err(problem!("labels"; ": a label is empty: must be a name, or left out"));
             }
             _ => {}
         }
