@@ -114,7 +114,7 @@ def test_a_target_out_of_reach_is_refuted_by_one_row_and_said_so(time, after_spi
         assert proof.at_all
         assert said in proof.text
         assert f"pattern 0 at target 0 ({target:.0f} ms)" in str(proof)
-        assert "Impossible also without a margin" in proof.text
+        assert "Without a margin this is impossible too" in proof.text
     # An input at the target itself adds nothing there.
     cone = ConeX(neuron=Neuron(time=time), lb=-9, ub=9).fit([trains], [[20.0]])
     assert cone.certificate_.rows == [Row("target", 0, 0)]
@@ -151,7 +151,7 @@ def test_a_proof_that_needs_its_margin_says_so_and_a_smaller_margin_may_solve_it
             assert check_certificate(cone.problem_, proof, margin=False) == proof.at_all
             if not proof.at_all:
                 assert f"This is proven for silence {margin} mV below the threshold" in proof.text
-                assert "Impossible also without a margin" not in proof.text
+                assert "Without a margin this is impossible too" not in proof.text
     assert found[0.2] == "infeasible"
     assert found[1e-5] == "solved"
 
@@ -194,7 +194,7 @@ def test_the_same_inputs_asked_to_fire_and_to_be_silent_are_refuted_for_any_marg
         assert cone.certificate_.at_all
         said = str(cone.certificate_)
         assert "pattern 1 must fire" in said
-        assert "Impossible also without a margin" in said
+        assert "Without a margin this is impossible too" in said
         by_them_alone += "pattern 4, whose inputs are the same up to this time, must be silent" in said
         # With another input in time the problem is feasible, because the neuron can distinguish the patterns.
         apart = [*patterns[4]]

@@ -478,7 +478,7 @@ def test_max_seconds_ends_a_fit_with_the_best_so_far_and_a_warning(long_rows):
         ({"lb": [-1.0], "ub": [1.0, 1.0]}, "lb has 1 bounds, ub has 2"),
         ({"lb": []}, "bounds: the list is empty"),
         ({"ub": [1.0, float("inf")]}, r"ub\[1\] is inf: must be finite"),
-        ({"ub": "high"}, 'ub is "high": must be a number, or one per synapse'),
+        ({"ub": "high"}, 'ub is "high": must be a number of mV, or one number per synapse'),
         ({"engine": "steam"}, 'engine is "steam": must be "native" or "cone solver"'),
         ({"max_seconds": 0}, "max_seconds is 0 s: must be above 0"),
     ],

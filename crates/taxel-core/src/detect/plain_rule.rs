@@ -94,7 +94,7 @@ impl PlainRule {
             return Err(problem!("frames"; " is {}: must be from 1 to {MOST_FRAMES}", self.frames));
         }
         if (self.quantity == Quantity::Duration) != matches!(self.age_ms, Some(Age::Named(NamedAge::End))) {
-            return Err(problem!("age_ms"; " \"end\" and the quantity \"duration\": must be given together"));
+            return Err(problem!("age_ms"; " end and the quantity duration: must be given together"));
         }
         if let Some(age) = self.age_ms {
             if let Age::Ms(age) = age

@@ -50,7 +50,7 @@ fn parts_that_make_no_sense_are_refused_by_name() {
         (|r| r.noise_floor = f64::INFINITY, "noise_floor is inf"),
         (|r| r.labels = [None, None], "labels are both left out"),
         (|r| r.labels[1] = r.labels[0].clone(), "labels are both contact"),
-        (|r| r.labels[0] = Some(" ".to_owned()), "labels: one is empty"),
+        (|r| r.labels[0] = Some(" ".to_owned()), "labels: a label is empty"),
     ];
     for (spoil, expected) in cases {
         let mut spoilt = rule();
