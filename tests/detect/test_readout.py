@@ -255,7 +255,9 @@ def test_neurons_trained_otherwise_are_refused() -> None:
     first = (taxel.Neuron(), weights)
     with pytest.raises(taxel.ProblemError, match='b: trained for after_spike "reset", this readout is for'):
         Readout(area, {"a": first, "b": (taxel.Neuron(after_spike="reset"), weights)})
-    with pytest.raises(taxel.ProblemError, match='b: the neuron was trained for time "grid", but this readout is for time "continuous"'):
+    with pytest.raises(
+        taxel.ProblemError, match='b: the neuron was trained for time "grid", but this readout is for time "continuous"'
+    ):
         Readout(area, {"a": first, "b": (taxel.Neuron(time="grid"), weights)})
     with pytest.raises(taxel.ProblemError, match=r"c: ConeR.* is not fitted"):
         Readout(area, {"c": taxel.learn.ConeR()})

@@ -527,7 +527,9 @@ def test_bounds_for_another_number_of_trains_are_one_clear_error():
 
 
 def test_a_last_target_behind_the_horizon_is_one_clear_error():
-    with pytest.raises(ProblemError, match="pattern 0: the last target is at 60 ms; must not be after the horizon, 50 ms"):
+    with pytest.raises(
+        ProblemError, match="pattern 0: the last target is at 60 ms; must not be after the horizon, 50 ms"
+    ):
         ConeR(horizon=50.0).fit([lists([1.0])], [[60.0]])
 
 

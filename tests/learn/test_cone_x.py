@@ -428,7 +428,12 @@ def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
         ({"lb": 0.3, "ub": 0.2}, [lists([1.0])], [[5.0]], "0.3 to 0.2 mV|lb is 0.3 mV, above ub"),
         ({"lb": [0.0, 0.0, 0.0]}, [lists([1.0])], [[5.0]], "lb: 3"),
         ({"horizon": [9.0, 9.0]}, [lists([1.0])], [[5.0]], "horizon: 2 values"),
-        ({"horizon": 50.0}, [lists([1.0])], [[60.0]], "pattern 0: the last target is at 60 ms; must not be after the horizon, 50 ms"),
+        (
+            {"horizon": 50.0},
+            [lists([1.0])],
+            [[60.0]],
+            "pattern 0: the last target is at 60 ms; must not be after the horizon, 50 ms",
+        ),
     ],
 )
 def test_examples_that_make_no_sense_are_one_clear_error_each(options, patterns, targets, said):

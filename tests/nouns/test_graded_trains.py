@@ -43,7 +43,11 @@ def test_files_without_a_kind_are_signed_if_they_have_values(tmp_path: Path) -> 
     np.savez(tmp_path / "e.npz", **columns, kind="graded")
     assert SpikeTrains.load(tmp_path / "a.npz").kind == "unsigned"
     assert SpikeTrains.load(tmp_path / "b.npz").kind == "signed"
-    for name, text in (("c", "kind is 'wavy'"), ("d", r"values\[1\] is 0"), ("e", "graded trains need one value per spike")):
+    for name, text in (
+        ("c", "kind is 'wavy'"),
+        ("d", r"values\[1\] is 0"),
+        ("e", "graded trains need one value per spike"),
+    ):
         with pytest.raises(FormatError, match=text):
             SpikeTrains.load(tmp_path / f"{name}.npz")
 
