@@ -78,7 +78,7 @@ def test_a_mat_on_a_serial_line_is_chosen_seen_and_recorded(chromium: Any, tmp_p
         page.locator("#numbers-form").get_by_role("button", name="Connect", exact=True).click()
         shows(page, "pressure-top", "counts")
         shows(page, "where-info", f"serial:{line}")
-        shows(page, "registers-why", "A source of numbers has no registers")
+        shows(page, "registers-why", "A sensor that prints numbers has no registers")
         shows(page, "numbers-command", r"taxel live --panel --source serial:.*,array=16x12,frame_end=blank$")
         # A source that was begun elsewhere is in the field as a whole.
         page.evaluate("localStorage.clear()")

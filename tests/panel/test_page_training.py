@@ -96,7 +96,7 @@ def test_play_label_train_and_watch_the_new_readout(
         opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
     ):
         shows(page, "state-word", "^Replay$")
-        shows(page, "detections-none", "None in this recording")
+        shows(page, "detections-none", "No detections in this recording")
         press(page, "Space")
         at = clock(page)
         until(lambda: clock(page) > at + 0.05, "it plays")

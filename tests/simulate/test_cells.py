@@ -186,8 +186,8 @@ y_mm = 80
 motion.pressed = { depth_mm = 0.6, speed_mm_s = 50, hold_ms = 5 }
 """
 SAID = (
-    "bodies[0]: at its largest, its touch is 1.20 mm wide, less than 1.5 cells of 2.67 mm, so the computed force is too small; "
-    "cells_per_pitch = 4 is enough"
+    "bodies[0]: at its largest, its touch is 1.20 mm wide, less than 1.5 cells of 2.67 mm, "
+    "so the computed force is too small; cells_per_pitch = 4 is enough"
 )
 
 

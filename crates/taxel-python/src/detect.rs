@@ -92,7 +92,7 @@ pub fn score(
     let t = slice("t", &t)?;
     if t.len() != labels.len() {
         return Err(ProblemError::new_err(format!(
-            "truth: {} labels for {} times: must be equal",
+            "truth: {} labels for {} times: the numbers must be equal",
             labels.len(),
             t.len()
         )));

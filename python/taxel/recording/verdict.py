@@ -85,7 +85,8 @@ class Verdict(str):
       off by more than a second and a hundredth of the time.
     - ``bad_chunks``, ``large_chunks``, ``skipped_bytes``, ``torn_bytes``, ``repeated_in_file``, ``no_final_counts``:
       damage in the file; messages there twice are read twice.
-    - ``bytes_after_end`` ("bytes after the end of the recording not read"): something was appended, as by ``cat``: use `taxel.merge`.
+    - ``bytes_after_end`` ("bytes after the end of the recording not read"): something was appended, as by
+      ``cat``: use `taxel.merge`.
     - ``changed_since_recorded`` ("the content was changed after recording"): checksums differ.
     - ``no_summary`` ("the summary at the end is missing or damaged"): cut after all data; other programs may refuse the
       file.
