@@ -132,7 +132,7 @@ def test_play_label_train_and_watch_the_new_readout(
         shows(
             page,
             "train-next",
-            "^Its detections in this recording are listed below. Correct the labels and train again, ",
+            "^The readout's detections in this recording are listed below. Correct the labels and train again, ",
         )
         detects = page.locator("#train-detect").inner_text()
         assert "next: " not in page.locator("#train-text").inner_text()
