@@ -5,17 +5,17 @@ package taxel_registers;
   typedef struct packed {
     // Lines are driven in random order.
     logic random_lines;
-    // Each taxel is an FA-1 afferent (5.4.2): events are its spikes, intensities its integral; else changes.
+    // If set, each taxel is an FA-1 afferent (5.4.2): events are its spikes, intensities its integral. Otherwise events are changes.
     logic mechanoreceptor;
     // A falling edge ends a sample.
     logic invert_comparator;
-    // All events of a frame carry the time of its start.
+    // All events of a frame have the time at which the frame starts.
     logic frame_sync;
-    // Version of the wire protocol that the board uses (read: the manual has only one). The bits hold 1 less.
+    // Version of the wire protocol that the board uses (our reading: the manual has only one version). The bits hold 1 less.
     logic [1:0] wire_version;
-    // The values of a ball that rolls take the place of the comparators' (read: the manual has no such bit).
+    // The board sends the values of a simulated rolling ball instead of the comparators' values (our reading: the manual has no such bit).
     logic pattern;
-    // FA-1: increase of the threshold by a spike, T A of Table 5.3.
+    // FA-1: how much a spike raises the threshold (T A of Table 5.3).
     logic [15:0] threshold_jump;
     // Time from one driven line to the next.
     logic [31:0] line_period;
@@ -29,13 +29,13 @@ package taxel_registers;
     logic [15:0] ramp;
     // FA-1: theta_0, in ticks after the power law.
     logic [15:0] threshold_rest;
-    // FA-1: decrease of the threshold by a frame without a spike, B of Table 5.3.
+    // FA-1: how much a frame without a spike lowers the threshold (B of Table 5.3).
     logic [7:0] threshold_decay;
     // Largest difference that does not cause an event.
     logic [7:0] noise_floor;
-    // Number of driven lines (the register holds one less; the manual's field has 6 bits, read: 8). The bits hold 1 less.
+    // Number of driven lines (the register contains one less; the manual's field has 6 bits, our reading: 8). The bits hold 1 less.
     logic [7:0] lines;
-    // Recording: setting and clearing it sends a marker and switches the sync line.
+    // A recording is running: setting and clearing this bit sends a marker and switches the sync line.
     logic record;
   } registers_t;
 

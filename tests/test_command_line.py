@@ -79,7 +79,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             "tare: 0,5: no such file; seconds are a number with a point, for example 0.5",
         ),
         (("record", "--compression", "x", "a.mcap"), '--compression is "x": must be none, lz4 or zstd'),
-        (("record", "--host", "no such host", "a.mcap"), '--host is "no such host": must be an address or a name'),
+        (("record", "--host", "no such host", "a.mcap"), '--host is "no such host": must be an IP address or the name'),
         (("record", "--preset", "9 kHz", "a.mcap"), 'preset "9 kHz" is not known; presets: "5.2 kHz"'),
         (("record", "there.mcap"), "there.mcap: exists already; give --overwrite, or another name"),
         (("record", "--trials", "3", "a.mcap"), "--trials without --length"),

@@ -317,4 +317,4 @@ def test_a_rule_without_its_line_in_rust_is_named(copy: Path) -> None:
             add(copy, piece)
     done = tried(copy, RULE)
     assert done.returncode != 0
-    assert "echo: nothing of that name has parameters" in done.stdout + done.stderr
+    assert "echo: nothing with this name has parameters" in done.stdout + done.stderr

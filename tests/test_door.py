@@ -201,7 +201,7 @@ def test_columns_that_two_threads_share_are_one_clear_error():
     together(push)
     assert refused
     assert set(refused) == {
-        "columns: another thread is using them; give each thread separate Columns, or copies of the events"
+        "columns: another thread uses these Columns; give each thread separate Columns, or copies of the events"
     }
 
 

@@ -155,7 +155,7 @@ def _places(name: str, addresses: str | Sequence[str]) -> list[str]:
     for place in places:
         match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[\w.-]+):(\d{1,5})", place, re.ASCII)
         if not match or not 1 <= int(match[2]) <= 65_535:
-            raise ProblemError(f"{name} is {place!r}: must be HOST:PORT, as {PLACE}")
+            raise ProblemError(f"{name} is {place!r}: must be HOST:PORT, for example {PLACE}")
     return places
 
 
@@ -169,11 +169,11 @@ def _refused(place: str) -> None:
             tried.bind(address)
             tried.listen()
     except socket.gaierror:
-        raise DeviceError(f"listen {place}: no address of that name is known here") from None
+        raise DeviceError(f"listen {place}: the name of this host is not known here") from None
     except OSError as error:
         right = {
-            errno.EADDRINUSE: "another program listens there: end it, or use another port",
-            errno.EADDRNOTAVAIL: "it must be an address of this computer, or 0.0.0.0 for all of them",
+            errno.EADDRINUSE: "another program listens at this port: end that program, or use another port",
+            errno.EADDRNOTAVAIL: "must be an address of this computer, or 0.0.0.0 for all its addresses",
         }.get(error.errno or 0)
         why = (error.strerror or str(error)).lower()
         raise DeviceError(f"listen {place}: {why}" + (f"; {right}" if right else "")) from None

@@ -38,10 +38,10 @@ def bridge(
     ] = None,
     seconds: SecondsOption = None,
     clock_ahead: Annotated[
-        float, typer.Option(help="For tests: publish times that are ahead of this computer's clock by this, s.")
+        float, typer.Option(help="For tests: publish times that are so many seconds ahead of this computer's clock.")
     ] = 0.0,
     clock_drift: Annotated[
-        float, typer.Option(help="For tests: publish times of a clock that runs faster by this, parts per million.")
+        float, typer.Option(help="For tests: publish times of a clock that is so much faster, parts per million.")
     ] = 0.0,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the counts at the end as JSON, and nothing else.")
@@ -57,7 +57,7 @@ def bridge(
     Example: taxel bridge --port 5208 --name left --listen 192.168.1.5:7447
     """
     if options["readout"] is None and options["tare"] is not None:
-        raise ProblemError("--tare belongs to a readout: give --readout FILE")
+        raise ProblemError("--tare needs a readout: give --readout FILE too")
     console = Console(stderr=True, quiet=as_json)
     with (
         Live(**for_live(options)) as live,
@@ -101,13 +101,13 @@ def _announce(place: str, name: str, console: Console) -> None:
         loopback = host == "localhost"
     if not loopback:
         console.print(
-            f"warning: every computer that reaches {place} can receive the board, and the connection is not encrypted: "
-            "use it on a network that you trust, or through a tunnel",
+            f"warning: every computer that reaches {place} can receive the board's data, and the connection is not "
+            "encrypted: use the bridge in a network that you trust, or through a tunnel",
         )
     if host in ("0.0.0.0", "::"):
         # These stand for all addresses of this computer; other computers need one of them.
         place = f"HOST:{place.rpartition(':')[2]}"
-        name += ", HOST being this computer's name or address"
+        name += ", where HOST is this computer's name or address"
     console.print(f"receive it with --remote zenoh:{place}/{name}", highlight=False)
 
 

@@ -169,18 +169,18 @@ class Remote(RemoteBoard):
 
     def _why_unreachable(self) -> str:
         """Return why no bridge answers, as far as this computer can tell."""
-        begin = "begin taxel bridge on that computer, with --listen and an address that others reach"
+        begin = "start taxel bridge on that computer, with --listen and an address that other computers reach"
         try:
             with socket.create_connection((self.address.host.strip("[]"), self.address.port), timeout=_REACH_S):
-                return f"no board is published there; {begin}"
+                return f"publishes no board; {begin}"
         except socket.gaierror:
-            return "no computer of that name is known here; name it by its address"
+            return "the name of this computer is not known here; give its address"
         except TimeoutError:
-            return f"does not answer; is the address right, does a firewall let port {self.address.port} (TCP) through?"
+            return f"does not answer; is the address right, and does a firewall allow TCP port {self.address.port}?"
         except OSError as error:
             if error.errno == errno.ECONNREFUSED:
-                return f"that computer is reached, but no program listens at this port; {begin}"
-            return f"{(error.strerror or str(error)).lower()}; is the address right, are both on one network?"
+                return f"the computer answers, but no program listens at this port; {begin}"
+            return f"{(error.strerror or str(error)).lower()}; is the address right, and are both on one network?"
 
     def begin(self, feed: ParcelFeed) -> None:
         """Feed the pipeline of a `Live` from now on, which calls this."""
@@ -210,7 +210,7 @@ class Remote(RemoteBoard):
         """Begin another session: it must be of the same sensor, and the clocks are compared again."""
         about = dict(with_taxel_errors(self._zenoh.names, _ASK_S)).get(self.name)
         if about is not None and json.loads(about)["array"] != self._described:
-            raise DeviceError("another board is at this address now; make a new Remote")
+            raise DeviceError("another board is now at this address; make a new Remote")
         feed.begin_session()
         self._compare(feed, _AT_FIRST)
 

@@ -70,23 +70,23 @@ def test_the_sensor_and_its_registers_are_told(place):
 
 def test_nobody_there_and_the_wrong_name_are_said(place):
     with pytest.raises(
-        taxel.DeviceError, match=f"zenoh:{place}: that computer is reached, but no program listens at this port; begin"
+        taxel.DeviceError, match=f"zenoh:{place}: the computer answers, but no program listens at this port; begin"
     ):
         Remote(f"zenoh:{place}", timeout=0.2)
     with Live(0, host="127.0.0.1") as near, Bridge(near, name="left", listen=place):
         with pytest.raises(taxel.DeviceError, match="publishes left, not right"):
             Remote(f"zenoh:{place}/right", timeout=0.2)
         with pytest.raises(
-            taxel.DeviceError, match=f"listen {place}: address already in use; another program listens there"
+            taxel.DeviceError, match=f"listen {place}: address already in use; another program listens at this port"
         ):
             Bridge(near, name="again", listen=place)
-        with pytest.raises(taxel.DeviceError, match=r"listen nowhere\.invalid:7447: no address of that name"):
+        with pytest.raises(taxel.DeviceError, match=r"listen nowhere\.invalid:7447: the name of this host"):
             Bridge(near, listen="nowhere.invalid:7447")
-    with pytest.raises(taxel.DeviceError, match="no computer of that name is known here"):
+    with pytest.raises(taxel.DeviceError, match="the name of this computer is not known here"):
         Remote("zenoh:nowhere.invalid", timeout=0.2)
     with socket.create_server(("127.0.0.1", 0)) as other:
         there = other.getsockname()[1]
-        with pytest.raises(taxel.DeviceError, match="no board is published there; begin taxel bridge"):
+        with pytest.raises(taxel.DeviceError, match="publishes no board; start taxel bridge"):
             Remote(f"zenoh:127.0.0.1:{there}", timeout=0.2)
 
 

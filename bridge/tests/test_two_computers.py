@@ -167,7 +167,7 @@ def test_what_keeps_two_computers_apart_is_said_in_one_line(tmp_path, two):
         (
             far,
             [*record, f"zenoh:{BOARD}/left"],
-            "that computer is reached, but no program listens at this port; begin taxel bridge",
+            "the computer answers, but no program listens at this port; start taxel bridge",
         ),
         (far, [*record, "zenoh:10.77.0.9/left"], "is the address right"),
         (far, [*record, "zenoh:10.99.0.1/left"], "network is unreachable; is the address right"),

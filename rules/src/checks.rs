@@ -5,7 +5,7 @@ use taxel_core::{Result, SpikeKind, SpikeTrains, problem};
 /// Refuses graded trains, on behalf of `reader`, which reads no values.
 pub(crate) fn check_ungraded(pattern: &SpikeTrains, reader: &str) -> Result<()> {
     if pattern.kind == SpikeKind::Graded {
-        return Err(problem!("{reader} takes no graded trains: their spikes have values, and it does not read values"));
+        return Err(problem!("{reader} takes no graded trains: their spikes have values, which it does not read"));
     }
     Ok(())
 }
@@ -14,7 +14,7 @@ pub(crate) fn check_ungraded(pattern: &SpikeTrains, reader: &str) -> Result<()> 
 pub(crate) fn check_untargeted(pattern: &SpikeTrains) -> Result<()> {
     pattern.check()?;
     if pattern.kind == SpikeKind::Signed {
-        return Err(problem!("pattern: spikes are signed, split them into ON and OFF trains first"));
+        return Err(problem!("pattern: spikes are signed; split them into ON and OFF trains first"));
     }
     if pattern.is_empty() {
         return Err(problem!("pattern: has no train"));

@@ -164,7 +164,7 @@ def test_control_c_stops_it_promptly():
             {"branches": 9, "spread": 1.0, "delay_ms": 0.0, "nonlinearity": "relu"},
             'nonlinearity is "relu": must be "tanh" or "none"',
         ),
-        ({"thresholds": []}, "thresholds: must hold at least one"),
+        ({"thresholds": []}, "thresholds: must contain at least one"),
         ({"within_ms": 0.0}, "within_ms is 0 ms: must be above 0"),
     ],
 )

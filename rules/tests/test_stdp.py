@@ -139,9 +139,9 @@ def test_a_piece_of_the_past_or_of_other_trains_is_refused_and_nothing_is_taken(
     lists = noise(rng, 20, 1)
     stdp = STDP(threshold=5.0).partial_fit(SpikeTrains.from_lists(lists, start=0.0, stop=1000.0))
     weights = stdp.weights_.copy()
-    with pytest.raises(taxel.ProblemError, match="piece from 0 ms: must begin at 1000 ms or later"):
+    with pytest.raises(taxel.ProblemError, match="the piece begins at 0 ms: must begin at 1000 ms or later"):
         stdp.partial_fit(SpikeTrains.from_lists(lists, start=0.0, stop=1000.0))
-    with pytest.raises(taxel.ProblemError, match="piece of 2 trains: must be 20"):
+    with pytest.raises(taxel.ProblemError, match="the piece has 2 trains: must have 20"):
         stdp.partial_fit(SpikeTrains.from_lists([[], []], start=2000.0, stop=3000.0))
     assert np.array_equal(stdp.weights_, weights)
 

@@ -103,7 +103,7 @@ def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
 @pytest.mark.parametrize(
     ("patterns", "targets", "said"),
     [
-        ([], [], "patterns: there is none"),
+        ([], [], "patterns is empty"),
         ([lists([1.0])], [], "targets: 0 lists for 1 patterns"),
         ([lists([], [])], [[5.0]], "pattern 0: has no spike"),
         ([lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], "pattern 1: 2 trains, pattern 0 has 1"),

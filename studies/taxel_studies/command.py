@@ -26,25 +26,37 @@ app = App(no_args_is_help=True)
 Jobs = Annotated[int, typer.Option(help="Processes.")]
 Backend = Annotated[str, typer.Option(help="Who runs them: loky (processes here), dask or ray (a cluster).")]
 Scheduler = Annotated[
-    str | None, typer.Option(help="Address of a Dask or Ray cluster that runs already; else one starts here.")
+    str | None, typer.Option(help="Address of a running Dask or Ray cluster; otherwise a cluster starts here.")
 ]
-Report = Annotated[Path, typer.Option(help="Folder for the page, pictures and all results; resumes what is in it.")]
-Size = Annotated[str, typer.Option(help="full, or toy (shows that it runs); some studies have more.")]
-Realisations = Annotated[int | None, typer.Option(help="How many, instead of the size's.")]
+Report = Annotated[
+    Path,
+    typer.Option(
+        help="Folder for the page, pictures and all results. Results that it contains are not computed again."
+    ),
+]
+Size = Annotated[
+    str, typer.Option(help="full, or toy (a quick check that the study runs); some studies have more sizes.")
+]
+Realisations = Annotated[int | None, typer.Option(help="How many, instead of the number in the size.")]
 Changes = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=SET_HELP)]
 Data = Annotated[
     Path | None, typer.Option(help="Folder of recordings, for the studies that need some (or TAXEL_DATA names it).")
 ]
-Strict = Annotated[bool, typer.Option("--strict", help="A recording that cannot be read ends it; else it is left out.")]
+Strict = Annotated[
+    bool,
+    typer.Option(
+        "--strict", help="End the study at a recording that cannot be read. Otherwise the recording is left out."
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and no progress.")]
 
-Figures = Annotated[Path, typer.Option("--figures", help="Folder of the kept figures: of a checkout.")]
+Figures = Annotated[Path, typer.Option("--figures", help="Folder of the saved figures, in a checkout.")]
 Confirm = Annotated[
     bool,
     typer.Option(
         "--confirm",
-        help="Run it at size toy, and compare the result with the one kept beside its figure; exit code 1 where they "
-        "differ.",
+        help="Run the study at size toy, and compare the result with the result saved beside the figure; exit code 1 "
+        "if they differ.",
     ),
 ]
 
@@ -242,7 +254,7 @@ def tell(section: dict[str, Any]) -> None:
                 table.add_row(*row)
             console.print(table)
     for file, why in section["unread"].items():
-        say(f"could not be read, so left out: {file}: {why}")
+        say(f"left out, because it could not be read: {file}: {why}")
 
 
 @app.command(short_help=STUDIES["gait"])
@@ -250,7 +262,9 @@ def gait(
     size: Size = "full",
     test: Annotated[
         str | None,
-        typer.Option(help="Such a folder of other people: train on DATA, judge on TEST, instead of by folds."),
+        typer.Option(
+            help="A folder like DATA with other people: train on DATA and judge on TEST, instead of by folds."
+        ),
     ] = None,
     search: Annotated[
         str | None, typer.Option(help="listed points, or full: on plate also the 528 settings of 6.5.2 (hours).")
@@ -290,7 +304,7 @@ def gait(
 def _add_figure(figure: str, study: str, run: Callable[..., None]) -> None:
     @wraps(run)
     def one(**given: Any) -> None:
-        say(f"{figure} is held by the study {study}", err=True)
+        say(f"{figure} is a figure of the study {study}", err=True)
         run(**given)
 
     app.command(name=figure, help=f"The study {study}, which holds {figure}.", hidden=True)(one)
@@ -298,7 +312,7 @@ def _add_figure(figure: str, study: str, run: Callable[..., None]) -> None:
 
 def _add_drawing(figure: str, where: str) -> None:
     def one() -> None:
-        raise ProblemError(f"{figure} is no result but a drawing or a table of words: {where}")
+        raise ProblemError(f"{figure} is a drawing or a table of words, not a result: {where}")
 
     app.command(name=figure, help=f"No study: {where}.", hidden=True)(one)
 

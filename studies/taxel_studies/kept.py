@@ -35,7 +35,9 @@ def kept_figures(folder: Path) -> list[str]:
     """
     names = [name for name in STUDIES if (folder / f"{name}.json").exists()]
     if not names:
-        raise FormatError(f"{folder}: holds no kept figure; run this in a checkout, or name its folder by --figures")
+        raise FormatError(
+            f"{folder}: contains no saved figure; run this in a checkout, or give its folder of figures by --figures"
+        )
     return names
 
 
@@ -74,12 +76,14 @@ def confirm(name: str, folder: Path, *, data: Path | None = None, strict: bool =
     """
     file = folder / "toy" / f"{name}.json"
     if not file.exists():
-        raise ProblemError(f"{file}: no toy result of {name} is kept; docs/figures.py keeps one with a figure")
+        raise ProblemError(
+            f"{file}: contains no toy result of {name}; docs/figures.py saves a toy result with each figure"
+        )
     before, now = json.loads(file.read_text(encoding="utf-8")), toy_result(name, data, strict=strict)
     differences = [line for key in _COMPARED for line in _differences(before[key], now[key], key)]
     if differences:
         more = f" and {len(differences) - 3} more" if len(differences) > 3 else ""
-        raise ProblemError(f"{name}: its toy result is another one: {'; '.join(differences[:3])}{more}")
+        raise ProblemError(f"{name}: the toy result differs from the saved one: {'; '.join(differences[:3])}{more}")
 
 
 def keep_toy(name: str, folder: Path, *, data: Path | None = None) -> None:

@@ -119,7 +119,7 @@ class Results:
                 key = json.dumps([row["params"], row["seed"], row["code"]], sort_keys=True)
                 self._results[key], self._seconds[key] = row["result"], row["seconds"]
             except (ValueError, KeyError, TypeError):
-                raise ProblemError(f"{path}: holds a line that is no result of a study; name another folder") from None
+                raise ProblemError(f"{path}: a line is not a result of a study; give another folder") from None
 
     def __contains__(self, task: Task) -> bool:
         return task.key(self.code) in self._results
@@ -253,7 +253,7 @@ def _dask(jobs: int, scheduler: str | None) -> Iterator[None]:
         try:
             client = Client(scheduler, timeout="5s")  # type: ignore[no-untyped-call]
         except (OSError, ValueError) as error:
-            raise DeviceError(f"{scheduler}: no Dask scheduler answers there ({error})") from None
+            raise DeviceError(f"{scheduler}: no Dask scheduler answers at this address ({error})") from None
         with client:
             yield
         return

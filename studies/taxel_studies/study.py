@@ -189,7 +189,7 @@ class Study:
         """
         missing = [wanted for wanted in _REQUIRED if not hasattr(module, wanted)]
         if missing:
-            raise ProblemError(f"{module.__name__} is no study: it lacks {', '.join(missing)}")
+            raise ProblemError(f"{module.__name__} is not a study: it lacks {', '.join(missing)}")
         defined = {wanted.lower(): vars(module)[wanted] for wanted in _REQUIRED + _OPTIONAL if hasattr(module, wanted)}
         return cls(name, title, **defined)
 
@@ -336,8 +336,8 @@ class Study:
         missing = [name for name in self.data if data is None or not (data / name).is_dir()]
         if data is None or len(missing) == len(self.data):
             raise FormatError(
-                f"{data or self.name}: holds no recordings; name a folder with any of {', '.join(self.data)} by --data "
-                "(taxel study gait --help says where they can be had)"
+                f"{data or self.name}: contains no recordings; give a folder with any of {', '.join(self.data)} by "
+                "--data (taxel study gait --help says where you get them)"
             )
         return data
 
@@ -449,7 +449,7 @@ def read_section(folder: Path) -> Section | None:
         section: Section = json.loads(path.read_text(encoding="utf-8"))
         names = section["pictures"]
     except (ValueError, KeyError, TypeError):
-        raise FormatError(f"{path}: is no summary of a study; name another folder by --report") from None
+        raise FormatError(f"{path}: is not a summary of a study; give another folder by --report") from None
     section["images"] = [
         f"data:image/svg+xml;base64,{base64.b64encode((folder / name).read_bytes()).decode()}" for name in names
     ]

@@ -246,7 +246,7 @@ def test_a_damaged_course_is_refused_by_name(tmp_path, slanted):
     kept = KeptCourses(tmp_path)
     place = kept.add(slanted)
     place.write_bytes(place.read_bytes()[:1000])
-    with pytest.raises(FormatError, match="holds no course of an indentation"):
+    with pytest.raises(FormatError, match="is not a saved course of an indentation"):
         kept[slanted.indentation]
 
 

@@ -264,7 +264,7 @@ def test_nonsense_is_refused(data, tmp_path, changes, error, message):
 def test_a_folder_that_is_not_there_is_told(tmp_path):
     with pytest.raises(FileNotFoundError):
         study(tmp_path / "nothing", tmp_path)
-    with pytest.raises(FormatError, match="gait: holds no recordings; name a folder"):
+    with pytest.raises(FormatError, match="gait: contains no recordings; give a folder"):
         study(None, tmp_path)
 
 

@@ -88,9 +88,9 @@ def spoil(file: Path, change: Callable[[dict[str, Any]], Any]) -> None:
 
 def test_what_is_not_kept_is_refused(figure: Path) -> None:
     assert kept.kept_figures(figure) == ["fig6.1"]
-    with pytest.raises(FormatError, match="holds no kept figure"):
+    with pytest.raises(FormatError, match="contains no saved figure"):
         kept.kept_figures(figure / "report")
-    with pytest.raises(ProblemError, match=r"fig6\.2\.json: no toy result of fig6\.2 is kept"):
+    with pytest.raises(ProblemError, match=r"fig6\.2\.json: contains no toy result of fig6\.2"):
         kept.confirm("fig6.2", figure)
 
 
@@ -103,7 +103,7 @@ def test_a_toy_result_that_is_another_one_is_found_and_stays(figure: Path, part:
     assert file.read_text() == before
     spoil(file, lambda result: result[part].update({"spikes": [1.0]}))
     before = file.read_text()
-    with pytest.raises(ProblemError, match=r"fig6\.1: its toy result is another one"):
+    with pytest.raises(ProblemError, match=r"fig6\.1: the toy result differs from the saved one"):
         kept.confirm("fig6.1", figure)
     assert file.read_text() == before
 
@@ -118,7 +118,7 @@ def test_a_result_that_is_rounded_otherwise_is_the_same(figure: Path) -> None:
     spoil(figure / "toy" / "fig6.1.json", moved(1e-13))
     kept.confirm("fig6.1", figure)
     spoil(figure / "toy" / "fig6.1.json", moved(1e-7))
-    with pytest.raises(ProblemError, match="its toy result is another one"):
+    with pytest.raises(ProblemError, match="the toy result differs from the saved one"):
         kept.confirm("fig6.1", figure)
 
 

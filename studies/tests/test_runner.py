@@ -116,7 +116,7 @@ def test_a_line_cut_short_by_a_kill_is_dropped(tmp_path):
 
 def test_a_file_of_something_else_is_refused(tmp_path):
     (tmp_path / "r.jsonl").write_text('{"hello": 1}\n')
-    with pytest.raises(ProblemError, match="holds a line that is no result"):
+    with pytest.raises(ProblemError, match="a line is not a result"):
         Results(tmp_path / "r.jsonl", "code")
 
 
@@ -156,7 +156,7 @@ def test_a_dask_scheduler_that_is_not_there_is_told(tmp_path):
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     nobody = Workers(backend="dask", scheduler=f"tcp://127.0.0.1:{port}")
-    with pytest.raises(DeviceError, match="no Dask scheduler answers there"):
+    with pytest.raises(DeviceError, match="no Dask scheduler answers at this address"):
         run(square, tasks(1), Results(tmp_path / "r.jsonl", "code"), workers=nobody, quiet=True)
 
 

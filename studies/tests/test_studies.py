@@ -219,7 +219,7 @@ def test_a_name_that_is_no_study_is_refused(capsys):
 def test_a_folder_with_a_strange_summary_is_refused(tmp_path):
     (tmp_path / MADE_HERE[0]).mkdir()
     (tmp_path / MADE_HERE[0] / "summary.json").write_text("[]")
-    with pytest.raises(FormatError, match="is no summary of a study"):
+    with pytest.raises(FormatError, match="is not a summary of a study"):
         write_page(tmp_path)
 
 

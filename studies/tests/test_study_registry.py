@@ -62,7 +62,7 @@ def test_a_study_says_what_it_is(name: str) -> None:
 def test_a_module_that_is_no_study_is_refused_and_what_it_lacks_is_named() -> None:
     module = ModuleType("taxel_studies.half")
     vars(module).update(WHERE="ours", PARAMETERS={}, SIZES={}, tasks=list, realise=int, statements=list, draw=list)
-    with pytest.raises(ProblemError, match=r"taxel_studies\.half is no study: it lacks PROTOCOL, summarise"):
+    with pytest.raises(ProblemError, match=r"taxel_studies\.half is not a study: it lacks PROTOCOL, summarise"):
         Study.of("half", "half a study", module)
 
 
@@ -97,7 +97,7 @@ def test_a_figure_runs_the_study_that_holds_it_and_says_so(tmp_path: Path, capsy
         main(["study", "table6.1", "--size", "toy", "--report", str(tmp_path), "--json"])
     assert not ended.value.code
     output = capsys.readouterr()
-    assert output.err == "table6.1 is held by the study fig6.1\n"
+    assert output.err == "table6.1 is a figure of the study fig6.1\n"
     assert json.loads(output.out)["name"] == "fig6.1"
 
 

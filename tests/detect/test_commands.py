@@ -767,7 +767,7 @@ def test_a_damaged_recording_is_said_beside_its_detections(
             main([*map(str, words), "--array", f"{ARRAY.rows}x{ARRAY.columns}"])
         said = capsys.readouterr()
         assert ended.value.code in (0, None), said.err
-        assert ("damaged.lsa: " in said.err and "in the bytes that came" in said.err) == warned
+        assert ("damaged.lsa: " in said.err and "in the bytes that arrived" in said.err) == warned
         result, verdict = json.loads(said.out), taxel.open(tmp_path / f"{name}.lsa").verdict
         assert (result["verdict"], result["verdict_details"]) == (verdict, verdict.to_dict())
         # There is no damaged.lss.

@@ -119,7 +119,11 @@ def test_inputs_are_given_by_label_too() -> None:
 @pytest.mark.parametrize(
     ("neuron", "more", "text"),
     [
-        ((Neuron(), [1.0] * 4, 0.0, ("b",)), {}, 'a: inputs: no encoder "b": there are area, change'),
+        (
+            (Neuron(), [1.0] * 4, 0.0, ("b",)),
+            {},
+            'a: inputs: the composite has no encoder "b": its encoders are area, change',
+        ),
         ((Neuron(), [1.0] * 4, 0.0, ("area", "area")), {}, 'a: inputs: "area" comes twice'),
         ((Neuron(), [1.0] * 5, 0.0, ("area",)), {}, "a: 5 weights, but the encoder makes 4 trains"),
         ((Neuron(), [1.0] * 4), {}, "a: 4 weights, but the encoder makes 36 trains"),
@@ -134,7 +138,7 @@ def test_inputs_that_do_not_exist_are_refused(neuron: tuple, more: dict, text: s
 
 
 def test_one_encoder_has_no_inputs() -> None:
-    with refused("a: inputs are .*: the encoder is not a composite"):
+    with refused("a: inputs are .*: must be left out, because only a composite"):
         Readout(PARTS["area"], {"a": (Neuron(), [1.0] * 4, 0.0, ("area",))})
     for call in (
         composite(1).encoder_of,
@@ -284,7 +288,10 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
         ),
         ({"neurons": {"a": {"inputs": []}}}, "neurons.a: inputs is empty"),
         ({"neurons": {"a": {"inputs": ["moments"], "delay_ms": 3.0}}}, "neurons.a: delay_ms is 3, but .* 0, 4, 6"),
-        ({"neurons": {"a": {"delay_ms": 4.0, "search": [{"inputs": ["b"]}]}}}, "neurons.a.search: inputs: no encoder"),
+        (
+            {"neurons": {"a": {"delay_ms": 4.0, "search": [{"inputs": ["b"]}]}}},
+            "neurons.a.search: inputs: the composite has no encoder",
+        ),
         ({"encoders": {"area": {"name": "areas"}}}, "recipe: encoders.area: encoder areas: must be one of"),
         ({"encoders": {"area": 3}}, "recipe: encoders.area"),
         ({"encoders": 3}, "recipe: states no encoder"),

@@ -90,8 +90,8 @@ def test_a_file_with_ranges_that_make_no_sense_is_refused() -> None:
         ({"a": {"most": [1.0]}}, "a: seen: most has 1 entries for 2 weights"),
         ({"a": {"most": [1.0, -1.0]}}, r"a: seen: most\[1\] is -1"),
         ({"a": {"most": [1.0, 1.0], "least": [0.5, 0.0]}}, r"a: seen: least\[0\] is 0.5"),
-        ({"b": {"most": [1.0, 1.0]}}, "a: seen has no ranges"),
-        ({"a": {"most": [1.0, 1.0]}, "b": {"most": []}}, "seen: b is not among the neurons"),
+        ({"b": {"most": [1.0, 1.0]}}, "a: the ranges of the neuron's inputs are missing in seen"),
+        ({"a": {"most": [1.0, 1.0]}, "b": {"most": []}}, "seen: the readout has no neuron b"),
     ):
         parts = json.loads(readout.to_json()) | {"seen": wrong}
         with pytest.raises(taxel.FormatError, match=text):

@@ -133,7 +133,9 @@ def test_channels_have_plain_rules_by_peak_at_edges() -> None:
     frames = taxel.Frames(values, np.arange(400) * 1000, unit="N", array=line)
     tare = taxel.Tare.take(frames, stop_us=50_000)
     example = Example(frames, {"contact": [100_000, 250_000]}, tare)
-    with pytest.raises(taxel.ProblemError, match=r"a plain rule by local load needs neighbours on a grid; .* 1 x 4"):
+    with pytest.raises(
+        taxel.ProblemError, match=r"a plain rule by local load needs taxels that are neighbours on a grid; .* 1 x 4"
+    ):
         run(PlainRule("local_load", 2), frames, tare=tare)
     for rule in (PlainRule("area", 4), PlainRule("total", 70)):
         assert run(rule, frames, tare=tare).label.tolist() == ["contact", "lift"] * 2

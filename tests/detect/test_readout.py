@@ -255,7 +255,9 @@ def test_neurons_trained_otherwise_are_refused() -> None:
     first = (taxel.Neuron(), weights)
     with pytest.raises(taxel.ProblemError, match='b: trained for after_spike "reset", this readout is for'):
         Readout(area, {"a": first, "b": (taxel.Neuron(after_spike="reset"), weights)})
-    with pytest.raises(taxel.ProblemError, match='b: trained for time "grid", this readout is for time "continuous"'):
+    with pytest.raises(
+        taxel.ProblemError, match='b: the neuron was trained for time "grid", but this readout is for time "continuous"'
+    ):
         Readout(area, {"a": first, "b": (taxel.Neuron(time="grid"), weights)})
     with pytest.raises(taxel.ProblemError, match=r"c: ConeR.* is not fitted"):
         Readout(area, {"c": taxel.learn.ConeR()})
@@ -268,7 +270,7 @@ def test_neurons_trained_otherwise_are_refused() -> None:
         ({"neurons": {}}, "must be trained neurons by label"),
         ({"neurons": None}, "must be trained neurons by label"),
         ({"neurons": {3: (taxel.Neuron(), [1.0] * 6)}}, "label is 3"),
-        ({"neurons": {" ": (taxel.Neuron(), [1.0] * 6)}}, "without a name"),
+        ({"neurons": {" ": (taxel.Neuron(), [1.0] * 6)}}, "a neuron has no label"),
         ({"neurons": {"a": (taxel.Neuron(), [1.0] * 5)}}, "a: 5 weights, but the encoder makes 6 trains"),
         ({"neurons": {"a": (taxel.Neuron(), [math.nan] * 6)}}, "weights"),
         ({"neurons": {"a": (taxel.Neuron(), "heavy")}}, "a: weights"),
@@ -296,9 +298,9 @@ def test_files_that_are_no_readout_are_refused_by_name(readout: Readout, tmp_pat
         (b"\x80\xff", "not text in UTF-8"),
         (b"", "not a JSON object: empty"),
         (b"{}", 'the key "format" is missing'),
-        (json.dumps({**good, "version": 2}).encode(), "version 2, this taxel reads version 1 only"),
+        (json.dumps({**good, "version": 2}).encode(), "version is 2; this taxel reads only version 1"),
         (json.dumps({**good, "wings": 2}).encode(), 'readout: wings is not known: there is "encoder", "array"'),
-        (json.dumps({**good, "neurons": {}}).encode(), "without a neuron"),
+        (json.dumps({**good, "neurons": {}}).encode(), "has no neuron"),
         (json.dumps({**good, "time": "always"}).encode(), 'readout: time is "always": must be "continuous" or "grid"'),
         (readout.to_json()[:500].encode(), "not JSON"),
     ]

@@ -86,9 +86,9 @@ def test_the_order_in_which_parts_are_given_says_nothing() -> None:
         ({}, "parts is empty"),
         (None, "parts is None: must be encoders by name"),
         ({"a": 3}, r"parts\['a'\] is 3: must be a taxel.encode.Encoder"),
-        ({" ": FA1()}, "a part without a name"),
+        ({" ": FA1()}, "the name of a part is empty"),
         ({3: FA1()}, "a name in parts is 3"),
-        ({"a": Composite({"b": FA1()})}, "a is a composite itself"),
+        ({"a": Composite({"b": FA1()})}, "part a is a composite"),
     ],
 )
 def test_parts_that_make_no_sense_are_refused(parts: object, text: str) -> None:
@@ -102,7 +102,7 @@ def test_parts_that_make_no_sense_are_refused(parts: object, text: str) -> None:
         ({"area": {"name": "contact_area", "noise_floor": -1.0}}, "area: noise_floor is -1"),
         ({"area": {"name": "contact_area", "wings": 2}}, "area: wings is not known"),
         ({"area": {"name": "composed"}}, "area: encoder composed: must be one of"),
-        ({"area": {}}, "area: encoder without a name"),
+        ({"area": {}}, "area: encoder: the name is missing"),
         (3, "parts is 3"),
     ],
 )

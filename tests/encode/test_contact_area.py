@@ -91,7 +91,7 @@ def test_a_noise_floor_of_0_is_of_whole_numbers_alone():
     ("call", "said"),
     [
         (lambda: ContactArea(noise_floor=-1), "noise_floor is -1"),
-        (lambda: ContactArea(levels=[]), "levels: must hold"),
+        (lambda: ContactArea(levels=[]), "levels is empty: must contain"),
         (lambda: ContactArea(levels=[0, 2]), r"levels are \[0, 2\]"),
         (lambda: ContactArea(levels=[2, 2]), r"levels are \[2, 2\]"),
         (lambda: ContactArea(levels=[2.5]), r"levels\[0\] is 2.5: must be a whole number"),

@@ -85,6 +85,8 @@ def test_nonsense_gets_one_clear_line(call, said):
 
 
 def test_fa1_refuses_frames_that_do_not_come_at_its_period():
-    with pytest.raises(taxel.ProblemError, match=r"5 ms after the last: must come every 1 ms; give period_ms"):
+    with pytest.raises(
+        taxel.ProblemError, match=r"5 ms after the frame before: frames must come every 1 ms; give period_ms"
+    ):
         FA1().encode(frames_of([0, 1000, 6000], np.zeros((3, 1))))
     FA1(period_ms=0.192).encode(frames_of([0, 100, 300, 500, 700], np.zeros((5, 1))))

@@ -402,7 +402,7 @@ def test_a_long_silence_costs_no_time_once_nothing_can_come():
         (lambda: FA1().with_tare(5), "tare is 5"),
         (lambda: Encoder.from_json("{"), "encoder: not JSON"),
         (lambda: Encoder.from_json("[]"), r"encoder is \[\]: must be an object \(names and values\)"),
-        (lambda: Encoder.from_json("{}"), "without a name: must be one of change_events"),
+        (lambda: Encoder.from_json("{}"), "the name is missing: must be one of change_events"),
         (lambda: Encoder.from_json('{"name": "sa3"}'), "encoder sa3: must be one of"),
         (lambda: Encoder.from_json('{"name": "fa1", "tau": 5}'), 'tau is not known: there is "alpha", '),
         (lambda: Encoder.from_json('{"name": "level_crossing"}'), "levels is missing"),
@@ -438,7 +438,7 @@ def test_what_cannot_be_encoded_is_refused(encoder):
     refuses("times must ascend", frame, frame)
     refuses("begun for .* 3 x 4", Events([5], [0], [0], [1], array=Array(4, 4), intensity=[5]))
     refuses("begun for 3 x 4", Frames(np.zeros((1, 4, 4)), [0]))
-    refuses("Frames.held fills the missing", Frames(np.full((1, 3, 4), np.nan), [0], array=ARRAY))
+    refuses("Frames.held replaces missing", Frames(np.full((1, 3, 4), np.nan), [0], array=ARRAY))
     refuses("too far from 0", Events([2**62], [0], [0], [1], array=ARRAY, intensity=[5]))
     refuses("too far from 0", Frames(np.zeros((1, 3, 4)), [-(2**62)], array=ARRAY))
 

@@ -103,11 +103,11 @@ def test_renewals_go_on_over_a_gap_longer_than_the_window():
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: LevelCrossing([]), "levels: must hold"),
+        (lambda: LevelCrossing([]), "levels is empty: must contain"),
         (lambda: LevelCrossing(5.0), "levels is 5.0: must be a list"),
-        (lambda: LevelCrossing([1.0, 1.0]), "levels: 1 after 1, must ascend"),
+        (lambda: LevelCrossing([1.0, 1.0]), "levels: 1 comes after 1; must ascend"),
         (lambda: LevelCrossing([2.0, float("inf")]), r"levels\[1\] is inf"),
-        (lambda: LevelCrossing([1e300]), "levels hold"),
+        (lambda: LevelCrossing([1e300]), "levels contain"),
         (lambda: LevelCrossing([1.0], release_share=0), "release_share is 0"),
         (lambda: LevelCrossing([1.0], release_share=1.01), "release_share is 1.01"),
         (lambda: LevelCrossing([-1.0, 1.0], release_share=0.7), "use release_by"),

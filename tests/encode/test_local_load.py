@@ -296,7 +296,7 @@ def test_a_taxel_without_a_value_yet_does_not_hide_a_touch_beside_it():
         ({"local_ms": 50}, "local_ms"),
         ({"period_ms": 0}, "period_ms is 0"),
         ({"tare": "soon"}, "tare"),
-        ({"levels": (4, 4)}, r"levels\[1\]: must be above the one before"),
+        ({"levels": (4, 4)}, r"levels\[1\]: must be above the level before"),
         ({"levels": (0, 4)}, r"levels\[0\] is 0"),
         ({"release": 0}, "release is 0"),
         ({"release": 1.1}, r"release is 1\.1"),

@@ -109,8 +109,8 @@ def test_it_needs_a_tare_and_levels_that_ascend():
     frames = Frames(np.zeros((2, 1, 1)), [0, 1000])
     with refused("peak without a tare"):
         Peak().encode(frames)
-    with refused("must be above the one before"):
+    with refused("must be above the level before"):
         Peak(levels=[3.0, 3.0])
-    with refused("must hold one level or more"):
+    with refused("must contain one level or more"):
         Peak(levels=[])
     assert spikes_of(Peak(tare=Tare.take(frames)).encode(frames)) == []

@@ -117,7 +117,7 @@ def test_each_train_is_its_type_s_encoder_on_what_its_field_feels(pitch, masked)
         ({"fa2_field_mm2": 0.0}, Array(1, 1), "fa2_field_mm2 is 0: must be above 0"),
         ({"period_ms": 2.0}, Array(1, 1), "period_ms is 2 ms"),
         ({"seed": -1}, Array(1, 1), "seed"),
-        ({}, Array(1000, 1000, 100.0), "afferents, must be at most 1000000"),
+        ({}, Array(1000, 1000, 100.0), "afferents; must be at most 1000000"),
         ({}, None, "array is None"),
     ],
 )

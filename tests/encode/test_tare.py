@@ -93,7 +93,7 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
         (lambda: Tare.take(Events([0], [0], [0], [1], array=Array(1, 1))), "without intensities"),
         (
             lambda: Tare.take(Frames(np.full((2, 1, 1), np.nan), [0, 1])),
-            "Frames.held fills the missing ones",
+            "Frames.held replaces missing values",
         ),
         (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), "start must be before stop|nothing has arrived"),
         (Tare, "measure one by Tare.take"),

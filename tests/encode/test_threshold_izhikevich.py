@@ -88,7 +88,7 @@ def test_a_spike_after_a_short_gap_comes_late(published, latency):
     [
         (lambda: ThresholdIzhikevich([1.0], published="6.5.2"), 'published is "6.5.2": must be "3.4.3" or "6.5.1"'),
         (lambda: ThresholdIzhikevich([1.0], begin="now"), 'begin is "now": must be "settled" or "rest"'),
-        (lambda: ThresholdIzhikevich([3.0, 2.0]), "levels: 2 after 3"),
+        (lambda: ThresholdIzhikevich([3.0, 2.0]), "levels: 2 comes after 3"),
     ],
 )
 def test_nonsense_gets_one_clear_line(call, said):

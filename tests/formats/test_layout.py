@@ -566,7 +566,7 @@ def test_the_rate_on_the_command_line_opens_an_array_without_a_layout(tmp_path: 
 @pytest.mark.parametrize(
     ("encoder", "end"),
     [
-        ("fa1", "10 ms after the last: must come every 1 ms; give --set period_ms=VALUE"),
+        ("fa1", "10 ms after the frame before: frames must come every 1 ms; give --set period_ms=VALUE"),
         ("level_crossing", "--set levels is missing"),
     ],
 )

@@ -102,9 +102,9 @@ def test_a_certificate_that_was_touched_is_refused():
 def test_a_target_out_of_reach_is_refuted_by_one_row_and_said_so(time, after_spike):
     trains = SpikeTrains.from_lists([[20.0], [25.0], [80.0]], stop=120.0)
     for ub, target, said in (
-        (0.3, 10.0, "no input counts before it"),
-        (0.3, 30.0, "the greatest weights give"),
-        (5.0, 10.0, "no input counts before it"),
+        (0.3, 10.0, "no input before this time has an effect"),
+        (0.3, 30.0, "the largest allowed weights give"),
+        (5.0, 10.0, "no input before this time has an effect"),
     ):
         cone = ConeX(neuron=Neuron(time=time, after_spike=after_spike), lb=-ub, ub=ub).fit([trains], [[target]])
         assert cone.status_ == "infeasible"
@@ -113,15 +113,15 @@ def test_a_target_out_of_reach_is_refuted_by_one_row_and_said_so(time, after_spi
         assert check_certificate(cone.problem_, proof)
         assert proof.at_all
         assert said in proof.text
-        assert f"pattern 0 target 0 ({target:.0f} ms)" in str(proof)
-        assert "Impossible also without a margin" in proof.text
+        assert f"pattern 0 at target 0 ({target:.0f} ms)" in str(proof)
+        assert "Without a margin this is impossible too" in proof.text
     # An input at the target itself adds nothing there.
     cone = ConeX(neuron=Neuron(time=time), lb=-9, ub=9).fit([trains], [[20.0]])
     assert cone.certificate_.rows == [Row("target", 0, 0)]
     # Least weights that are too much are refuted by one row as well.
     many = SpikeTrains.from_lists([[20.0]] * 9, stop=120.0)
     cone = ConeX(neuron=Neuron(time=time), lb=0.5, ub=0.6).fit([many], [[35.0]])
-    assert "the least weights give" in cone.certificate_.text
+    assert "the smallest allowed weights give" in cone.certificate_.text
 
 
 def test_the_reading_names_the_patterns_targets_and_silences_that_conflict():
@@ -131,8 +131,8 @@ def test_the_reading_names_the_patterns_targets_and_silences_that_conflict():
     )
     assert cone.status_ == "infeasible"
     text = str(cone.certificate_)
-    assert "pattern 0 shall fire at target 0 (35 ms)" in text
-    assert "; pattern 1 shall be silent at 3" in text
+    assert "pattern 0 must fire at target 0 (35 ms)" in text
+    assert "; pattern 1 must be silent at 3" in text
     assert "pattern 2" not in text
     assert repr(cone.certificate_).startswith("<Certificate of ")
 
@@ -150,8 +150,8 @@ def test_a_proof_that_needs_its_margin_says_so_and_a_smaller_margin_may_solve_it
             assert check_certificate(cone.problem_, proof)
             assert check_certificate(cone.problem_, proof, margin=False) == proof.at_all
             if not proof.at_all:
-                assert f"This holds for silence {margin} mV below the threshold" in proof.text
-                assert "Impossible also without a margin" not in proof.text
+                assert f"This is proven for silence {margin} mV below the threshold" in proof.text
+                assert "Without a margin this is impossible too" not in proof.text
     assert found[0.2] == "infeasible"
     assert found[1e-5] == "solved"
 
@@ -161,15 +161,15 @@ def test_a_row_that_the_problem_does_not_have_is_one_clear_error():
     for row, said in (
         (("silence", 99, 5.0), "pattern 99: there are only 8"),
         (("target", 0, 7), "pattern 0, target 7: the pattern has only 1 targets"),
-        (("silence", 0, 1e6), "is outside the time that is trained"),
+        (("silence", 0, 1e6), "is outside the training's time"),
         (("noise", 0, 1.0), 'row of kind "noise"'),
         (("target", 0, 0.5), "target 0.5: must be a whole number"),
     ):
         with pytest.raises(ProblemError, match=said):
             problem.row(row)
-    with pytest.raises(ProblemError, match="a slope is asked for in continuous time only"):
+    with pytest.raises(ProblemError, match="a slope is required only in continuous time"):
         refuted(time="grid").problem_.slope(0, 0)
-    with pytest.raises(ProblemError, match="not a point of the grid"):
+    with pytest.raises(ProblemError, match="not on the grid"):
         refuted(time="grid").problem_.silence(0, 0.25)
 
 
@@ -193,15 +193,15 @@ def test_the_same_inputs_asked_to_fire_and_to_be_silent_are_refuted_for_any_marg
         assert check_certificate(cone.problem_, cone.certificate_, margin=False)
         assert cone.certificate_.at_all
         said = str(cone.certificate_)
-        assert "pattern 1 shall fire" in said
-        assert "Impossible also without a margin" in said
-        by_them_alone += "pattern 4, with the same inputs up to there, shall be silent" in said
+        assert "pattern 1 must fire" in said
+        assert "Without a margin this is impossible too" in said
+        by_them_alone += "pattern 4, whose inputs are the same up to this time, must be silent" in said
         # With another input in time the problem is feasible, because the neuron can distinguish the patterns.
         apart = [*patterns[4]]
         apart[3] = np.sort(np.append(apart[3], targets[1][0] - 6.0))
         patterns[4] = SpikeTrains.from_lists(apart, stop=patterns[4].stop)
         cone = made(ConeX, lb=-3, ub=3, **options).fit(patterns, targets)
-        assert cone.status_ != "infeasible" or "with the same inputs" not in str(cone.certificate_)
+        assert cone.status_ != "infeasible" or "whose inputs are the same" not in str(cone.certificate_)
     assert by_them_alone > 1
 
 

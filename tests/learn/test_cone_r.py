@@ -475,10 +475,10 @@ def test_max_seconds_ends_a_fit_with_the_best_so_far_and_a_warning(long_rows):
         ({"horizon": float("nan")}, "horizon is nan"),
         ({"tolerance": 0}, "tolerance is 0: must be from 1e-10 to 0.1"),
         ({"lb": [-1.0, 0.6], "ub": 0.5}, "bounds of synapse 1: 0.6 to 0.5 mV: lb must not be above ub"),
-        ({"lb": [-1.0], "ub": [1.0, 1.0]}, "lb holds 1 bounds, ub 2"),
-        ({"lb": []}, "bounds: there is none"),
+        ({"lb": [-1.0], "ub": [1.0, 1.0]}, "lb has 1 bounds, ub has 2"),
+        ({"lb": []}, "bounds: the list is empty"),
         ({"ub": [1.0, float("inf")]}, r"ub\[1\] is inf: must be finite"),
-        ({"ub": "high"}, 'ub is "high": must be a number, or one per synapse'),
+        ({"ub": "high"}, 'ub is "high": must be a number of mV, or one number per synapse'),
         ({"engine": "steam"}, 'engine is "steam": must be "native" or "cone solver"'),
         ({"max_seconds": 0}, "max_seconds is 0 s: must be above 0"),
     ],
@@ -491,7 +491,7 @@ def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
 @pytest.mark.parametrize(
     ("patterns", "targets", "said"),
     [
-        ([], [], "patterns: there is none"),
+        ([], [], "patterns is empty"),
         ([lists([1.0])], [], "targets: 0 lists for 1 patterns"),
         ([lists()], [[5.0]], "pattern 0: has no train"),
         ([lists([], [])], [[5.0]], "pattern 0: has no spike"),
@@ -501,7 +501,7 @@ def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
         (
             [lists([1.0])],
             [[30.0, 31.5]],
-            r"pattern 0, target 1 \(31.5 ms\): 1.5 ms after target 0, inside the refractory 3",
+            r"pattern 0, target 1 \(31.5 ms\): 1.5 ms after target 0; must be at least the refractory time, 3",
         ),
         ([lists([1.0])], [[130.0]], "pattern 0, target 0: 130 ms is outside the pattern's window 0 to 100"),
         ([lists([1.0])], [5.0], "targets of pattern 0 is 5: must be a list of times"),
@@ -527,7 +527,9 @@ def test_bounds_for_another_number_of_trains_are_one_clear_error():
 
 
 def test_a_last_target_behind_the_horizon_is_one_clear_error():
-    with pytest.raises(ProblemError, match="pattern 0: last target at 60 ms, the horizon is 50 ms"):
+    with pytest.raises(
+        ProblemError, match="pattern 0: the last target is at 60 ms; must not be after the horizon, 50 ms"
+    ):
         ConeR(horizon=50.0).fit([lists([1.0])], [[60.0]])
 
 

@@ -209,10 +209,10 @@ def test_an_option_that_is_not_known_is_refused(options, said):
     ("silence", "said"),
     [
         ([[(20.0, 10.0)]], "pattern 0, window 0 of silence: 20 to 10 ms, start must not be after stop"),
-        ([[(0.0, 5.0), (4.0, 9.0)]], "pattern 0, window 1 of silence: begins at 4 ms, before the end"),
+        ([[(0.0, 5.0), (4.0, 9.0)]], "pattern 0, window 1 of silence: begins at 4 ms, but the window before ends"),
         ([[(0.0, float("nan"))]], "pattern 0, window 0 of silence: 0 to NaN ms"),
         ([[(0.0, float("inf"))]], "pattern 0, window 0 of silence: 0 to inf ms"),
-        ([[(0.0, 5.0)], []], "silence: 2 lists for 1 patterns, must be one per pattern"),
+        ([[(0.0, 5.0)], []], "silence: 2 lists for 1 patterns; must be one per pattern"),
         ([], "silence: 0 lists for 1 patterns"),
         ([[0.0, 5.0]], r"silence of pattern 0 has shape \(2,\): must hold windows"),
         ([[(0.0, 5.0, 6.0)]], r"silence of pattern 0 has shape \(1, 3\)"),

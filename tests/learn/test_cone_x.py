@@ -333,7 +333,7 @@ def test_the_horizon_frees_what_lies_behind_it_in_each_pattern():
     ends = [float(t[-1]) + 5.0 for t in targets]
     whole, short = ConeX(lb=-1, ub=1).fit(patterns, targets), ConeX(lb=-1, ub=1, horizon=ends).fit(patterns, targets)
     assert short.objective_ <= whole.objective_
-    with pytest.raises(ProblemError, match="is outside the time that is trained"):
+    with pytest.raises(ProblemError, match="is outside the training's time"):
         short.problem_.silence(0, ends[0] + 1.0)
 
 
@@ -392,10 +392,10 @@ def test_progress_is_told_round_by_round():
         ({"lambdas": (1, 2, -3)}, r"lambdas\[2\] is -3"),
         ({"ub": float("inf")}, "ub is inf: must be finite"),
         ({"lb": [0.0, float("nan")]}, r"lb\[1\] is nan: must be finite"),
-        ({"lb": "low"}, 'lb is "low": must be a number, or one per synapse, mV'),
+        ({"lb": "low"}, 'lb is "low": must be a number of mV, or one number per synapse'),
         ({"margin": 0.0}, "margin is 0 mV: must be above 0 in continuous time"),
         ({"slope": -1.0}, "slope is -1 mV/ms"),
-        ({"slope": 0.1, "time": "grid"}, 'slope is 0.1 mV/ms: is only for time "continuous"'),
+        ({"slope": 0.1, "time": "grid"}, 'slope is 0.1 mV/ms: must be 0 or None with time "grid"'),
         ({"horizon": float("nan")}, "horizon is nan"),
         ({"tolerance": 0}, "tolerance is 0: must be from 1e-12 to 0.1"),
         ({"max_seconds": 0}, "max_seconds is 0 s: must be above 0"),
@@ -411,7 +411,7 @@ def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
 @pytest.mark.parametrize(
     ("options", "patterns", "targets", "said"),
     [
-        ({}, [], [], "patterns: there is none"),
+        ({}, [], [], "patterns is empty"),
         ({}, [lists([1.0])], [], "targets: 0 lists for 1 patterns"),
         ({}, [lists([], [])], [[5.0]], "pattern 0: has no spike"),
         ({}, [lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], "pattern 1: 2 trains, pattern 0 has 1"),
@@ -421,14 +421,19 @@ def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
             {},
             [lists([1.0])],
             [[30.0, 31.5]],
-            r"pattern 0, target 1 \(31.5 ms\): 1.5 ms after target 0, inside the refr",
+            r"pattern 0, target 1 \(31.5 ms\): 1.5 ms after target 0; must be at least the refr",
         ),
         ({}, [lists([1.0])], [[130.0]], "pattern 0, target 0: 130 ms is outside the pattern's window 0 to 100"),
         ({}, ["spikes"], [[5.0]], "pattern 0 is 'spikes': must be a taxel.SpikeTrains"),
         ({"lb": 0.3, "ub": 0.2}, [lists([1.0])], [[5.0]], "0.3 to 0.2 mV|lb is 0.3 mV, above ub"),
         ({"lb": [0.0, 0.0, 0.0]}, [lists([1.0])], [[5.0]], "lb: 3"),
         ({"horizon": [9.0, 9.0]}, [lists([1.0])], [[5.0]], "horizon: 2 values"),
-        ({"horizon": 50.0}, [lists([1.0])], [[60.0]], "pattern 0: last target at 60 ms, the horizon is 50 ms"),
+        (
+            {"horizon": 50.0},
+            [lists([1.0])],
+            [[60.0]],
+            "pattern 0: the last target is at 60 ms; must not be after the horizon, 50 ms",
+        ),
     ],
 )
 def test_examples_that_make_no_sense_are_one_clear_error_each(options, patterns, targets, said):

@@ -58,7 +58,7 @@ def outcome(seed):
     if cone.status_ == "infeasible":
         assert check_certificate(cone.problem_, cone.certificate_), where
         assert check_certificate(cone.problem_, cone.certificate_, margin=False) == cone.certificate_.at_all, where
-        assert ("Impossible also without a margin" in str(cone.certificate_)) == cone.certificate_.at_all, where
+        assert ("Without a margin this is impossible too" in str(cone.certificate_)) == cone.certificate_.at_all, where
     else:
         assert cone.status_ == "solved", f"{where}: {cone.gap_}, {cone.violation_}"
         assert cone.gap_ <= 1e-8, where

@@ -89,7 +89,11 @@ def test_a_pattern_that_makes_no_sense_is_named_and_leaves_the_window_as_it_was(
         same.partial_fit(pattern, targets)
         for bad, at, said in (
             (SpikeTrains.from_lists([[1.0]], stop=5.0), [2.0], f"pattern {k + 1}: 1 trains, pattern 0 has 20"),
-            (pattern, [30.0, 31.0], rf"pattern {k + 1}, target 1 \(31 ms\): 1 ms after target 0, inside the refr"),
+            (
+                pattern,
+                [30.0, 31.0],
+                rf"pattern {k + 1}, target 1 \(31 ms\): 1 ms after target 0; must be at least the refr",
+            ),
             (pattern, [float("nan")], f"pattern {k + 1}, target 0: time is NaN"),
             (SpikeTrains.from_lists([[]] * 20, stop=5.0), [2.0], f"pattern {k + 1}: has no spike"),
         ):

@@ -213,7 +213,7 @@ def test_what_is_undecided_at_the_least_margin_is_stopped_and_says_why():
     trains = SpikeTrains.from_lists([[10.0]], stop=60.0)
     cone = ConeX(lb=-3, ub=3).fit([trains], [[25.0]])
     assert cone.status_ == "stopped"
-    assert "the least margin that is tried" in cone.reason_
+    assert "the smallest margin that taxel tries" in cone.reason_
     assert cone.certificate_ is None
     assert np.isnan(cone.weights_).all()
     fixed = ConeX(lb=-3, ub=3, margin=1e-3).fit([trains], [[25.0]])
@@ -247,7 +247,7 @@ def test_a_pattern_without_a_spike_may_teach_silence_and_may_not_have_a_target(l
     beside = learner(lb=-1.0, ub=1.0).fit([*patterns, empty], [*targets, []])
     assert (alone.status_, beside.status_) == ("solved", "solved")
     assert beside.objective_ == pytest.approx(alone.objective_, rel=1e-6)
-    with pytest.raises(ProblemError, match="pattern 2: has no spike, so no weight can matter at its target"):
+    with pytest.raises(ProblemError, match="pattern 2: has no spike, so weights have no effect at its target"):
         learner().fit([*patterns, empty], [*targets, [5.0]])
 
 

@@ -120,5 +120,7 @@ def test_a_date_that_the_keys_do_not_expect_is_said(tmp_path: Path) -> None:
     file.write_text("2024-05-01T10:15:02,1,2\n2024-05-01T10:15:03,1,2\n")
     with pytest.raises(ProblemError, match=r"all with a date in column 1 \(.*\): add time=1:iso"):
         Live(sources=f"lines:{file},columns=at:a:b,array=1x2,leave_out=2", first_line_s=0.5)
-    with pytest.raises(ProblemError, match=r"state its unit, for example time=at:ms, or time=at:iso for dates"):
+    with pytest.raises(
+        ProblemError, match=r"the unit is missing; add it, for example time=at:ms, or time=at:iso for dates"
+    ):
         Live(sources=f"lines:{file},columns=at:a:b,array=1x2,time=at")

@@ -131,7 +131,7 @@ def test_a_port_that_another_program_has_opened_is_refused() -> None:
 @pytest.mark.parametrize(
     ("answer", "why"),
     [
-        (b"\xfe\x80\0\x1c" * 300, "bytes came that are not text: is its baud rate 9600?"),
+        (b"\xfe\x80\0\x1c" * 300, "bytes arrived that are not text: is the board's baud rate 9600?"),
         (b"x" * 3000, "is this the board's serial line?"),
         (b"ok REG4=0x0000008C", "is this the board's serial line?"),
         (b"ok REG5=0x0000008C\nok REG4=8C\nbad REG5 rule 1\n", "is this the board's serial line?"),

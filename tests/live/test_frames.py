@@ -114,7 +114,9 @@ def test_a_readout_detects_the_same_live_and_in_the_recording_beside_it(
     assert (frames.unit, recording.frame_us) == (unit, live.frame_us)
     assert summary.verdict.status == recording.verdict.status == "complete after arrival"
     assert summary.verdict == recording.verdict
-    assert recording.verdict == "nothing lost after arrival (lines without numbers cannot show what was lost before it)"
+    assert (
+        recording.verdict == "nothing lost after arrival (lines are not numbered, so losses before arrival are unknown)"
+    )
     expected = run(detector, recording)
     assert len(expected) >= 5
     assert [(d.label, d.t, d.known) for d in found] == [(d.label, d.t, d.known) for d in expected]
@@ -408,7 +410,7 @@ def test_where_nothing_arrives_there_is_no_empty_board(tmp_path: Path, capsys: p
 def test_all_sources_of_lines_may_be_silent_as_long(tmp_path: Path) -> None:
     with served("") as left, served("") as right:
         sources = [f"left=lines+tcp:{left},array=1x2,rate=100", f"right=lines+tcp:{right},array=1x2"]
-        with pytest.raises(taxel.ProblemError, match="no line came within 0 s"):
+        with pytest.raises(taxel.ProblemError, match="no line arrived within 0 s"):
             Live(sources=sources, record=tmp_path / "a.mcap", first_line_s=0.1)
 
 

@@ -264,7 +264,7 @@ def test_a_live_that_ended_says_its_summary_again_and_refuses_the_rest() -> None
         ("readout", "r.json", ProblemError, "readout is 'r.json': must be a taxel.Readout"),
         ("tare", 1.0, ProblemError, "tare without a readout"),
         ("record", 3, ProblemError, "record is 3: must be a path"),
-        ("record", "a.txt", ProblemError, "a.txt: a recording is named .mcap"),
+        ("record", "a.txt", ProblemError, "a.txt: the name of a recording must end with .mcap"),
         ("guard_frames", -1, ProblemError, "guard_frames is -1: must be 0 or more"),
         ("guard_frames", float("nan"), ProblemError, "guard_frames is nan"),
         ("say", 3, ProblemError, "say is 3"),
@@ -303,7 +303,7 @@ def test_the_largest_arrays_that_a_board_can_name_are_heard(rows: int, columns: 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ({"datagrams": []}, "one datagram or more"),
+        ({"datagrams": []}, "the number of datagrams"),
         ({"each": 0}, "each is 0"),
         ({"period_us": -1.0}, "period_us is -1"),
         ({"seconds": float("inf")}, "seconds is inf"),

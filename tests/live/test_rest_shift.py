@@ -59,7 +59,7 @@ def test_a_rest_that_shifted_in_a_gap_is_told_until_the_taxels_are_zeroed() -> N
         line = live.counters["rest_shift"]
         assert " s, the rest of 20 of 36 taxels differs from the tare by up to 3" in line
         assert line.endswith(
-            "with nothing on the sensor, click Zero all on the page, or start again with --tare SECONDS"
+            "remove everything from the sensor, then click Zero all on the page, or start again with --tare SECONDS"
         )
         time.sleep(0.5)
         zeroed = live.zero(*np.indices(SHAPE)[::-1].reshape(2, -1))

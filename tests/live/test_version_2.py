@@ -118,7 +118,7 @@ def test_raw_bytes_of_version_2_are_refused_and_nothing_is_left(tmp_path):
     path = tmp_path / "two.lsa"
     live = taxel.live.Live(0, host="127.0.0.1", record=path)
     emulate("{}:{}".format(*live.address), [Silence(20.0)], tare_ms=5.0, wire=2)
-    with pytest.raises(taxel.ProblemError, match=r"two\.lsa: a \.lsa holds wire version 1"):
+    with pytest.raises(taxel.ProblemError, match=r"two\.lsa: a \.lsa file contains only wire version 1"):
         live.stop()
     assert not path.exists()
     assert not path.with_suffix(".lss").exists()
@@ -126,7 +126,7 @@ def test_raw_bytes_of_version_2_are_refused_and_nothing_is_left(tmp_path):
     sent = board.frame(np.full(4096, 40, np.uint16))
     for data in (b"".join(sent), b"".join(len(d).to_bytes(2, "little") + d for d in sent)):
         path.write_bytes(data)
-        with pytest.raises(taxel.FormatError, match=r"wire version 2; a \.lsa holds version 1"):
+        with pytest.raises(taxel.FormatError, match=r"wire version 2; a \.lsa file contains only version 1"):
             _ = taxel.open(path).events
     with taxel.live.Live(0, host="127.0.0.1", record=tmp_path / "two.mcap") as live:
         taxel.live.send(sent, *live.address, seconds=0.01)

@@ -96,18 +96,18 @@ def test_what_is_zeroed_is_heard_anew_live_and_from_the_recording(tmp_path: Path
 
 def test_without_a_readout_it_is_kept_and_what_it_rested_at_before_is_unknown(tmp_path: Path) -> None:
     with Live(0, host=LOOPBACK, array=FOUR, record=tmp_path / "a.mcap") as live:
-        with pytest.raises(ProblemError, match="nothing came yet"):
+        with pytest.raises(ProblemError, match="nothing has arrived yet"):
             live.zero(1, 2)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
             link.sendto(wire.encode(Events([0], [1], [2], [True], array=FOUR, intensity=[70])), live.address)
         heard(live)
         (done,) = live.zero(1, 2)
         for wrong, said in [
-            ((0, 0), "taxel at row 0, column 0: no event so far"),
-            ((4, 0), "taxel at row 0, column 4: there is no such taxel in 4 x 4"),
+            ((0, 0), "taxel at row 0, column 0: its value is unknown, because it has sent no event"),
+            ((4, 0), "taxel at row 0, column 4: does not exist in this array of 4 x 4 taxels"),
             (([1, 1], [2]), "x has 2 columns, y 1 row: must be equally many"),
             ((-1, 0), "x: holds -1, must be a taxel's"),
-            (([1, 0], [2, 0]), "no event so far"),
+            (([1, 0], [2, 0]), "has sent no event so far"),
         ]:
             with pytest.raises(ProblemError, match=said):
                 live.zero(*wrong)
@@ -120,6 +120,6 @@ def test_what_raw_bytes_could_not_keep_is_refused(tmp_path: Path) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
             link.sendto(wire.encode(Events([0], [1], [2], [True], array=FOUR, intensity=[70])), live.address)
         heard(live)
-        with pytest.raises(ProblemError, match=r"a \.lsa cannot keep that a taxel was zeroed"):
+        with pytest.raises(ProblemError, match=r"a \.lsa file cannot contain the new rest of a taxel"):
             live.zero(1, 2)
         assert live.zeroed == ()

@@ -64,7 +64,7 @@ def test_patterns_use_their_widest_window_and_add_up_over_trains():
 
 def test_windows_that_make_no_sense_are_one_clear_error_each():
     for a, window, said in (
-        ([1.0], None, r"window: must be given, \(start, stop\) in ms"),
+        ([1.0], None, r"window: is missing; with lists of times, give the window as \(start, stop\) in ms"),
         ([1.0], (2.0, 5.0), "train a, spike 0: 1 ms is outside the window 2 to 5 ms"),
         ([1.0], (5.0, 2.0), "window is 5 to 2 ms"),
     ):

@@ -156,7 +156,10 @@ def test_arguments_that_make_no_sense_are_one_clear_error_each():
     trains = [[1.0], [2.0]]
     for call, said in (
         (lambda: pairwise("spike_sync", trains), "metric is 'spike_sync': must be one of 'victor_purpura'"),
-        (lambda: pairwise("van_rossum", trains, q=1.0), "q is not known: van_rossum takes tau, normalisation"),
+        (
+            lambda: pairwise("van_rossum", trains, q=1.0),
+            "q is not known: the parameters of van_rossum are tau, normalisation",
+        ),
         (lambda: pairwise("van_rossum", trains), "tau is missing"),
         (lambda: pairwise("van_rossum", [[1.0], [2.0, 1.0]], tau=1.0), r"train a\[1\], spike 1: 1 ms comes after 2 ms"),
         (lambda: pairwise("van_rossum", trains, [[np.inf]], tau=1.0), r"train b\[0\], spike 0: time is inf"),

@@ -87,7 +87,7 @@ def test_a_wrong_or_unknown_parameter_is_refused_in_the_table_s_words(name):
     for key, rules in described(name)["ranges"].items():
         with pytest.raises(ProblemError, match=rf"{key} is -1.*must be {rules['must_be']}"):
             getattr(metrics, name)(a, b, **{**given(name), key: -1.0})
-    with pytest.raises(ProblemError, match=f"nonsense is not known: {name} takes"):
+    with pytest.raises(ProblemError, match=f"nonsense is not known: the parameters of {name} are"):
         metrics.pairwise(name, [a, b], **given(name), nonsense=1)
     with pytest.raises(taxel.ProblemError, match="must be one of"):
         metrics.pairwise("nonsense", [a, b])

@@ -97,7 +97,7 @@ def test_on_and_off_trains_are_smoothed_apart_and_missing_taxels_do_not_count():
     lacking = Array(1, 2, pitch_mm=1.0, exists=np.array([[True, False]]))
     half = [x.select([0, 1]) for x in (on, silent)]
     assert van_rossum_spatial(*half, array=lacking) == pytest.approx(2.0)
-    with pytest.raises(ProblemError, match="a, train 1: spikes, but the array has no taxel there"):
+    with pytest.raises(ProblemError, match="a, train 1: has spikes, but the array has no taxel at this place"):
         van_rossum_spatial(SpikeTrains.from_lists([[], [1.0]]), half[1], array=lacking)
     with pytest.raises(ProblemError, match="a has 3 trains, the array 2 taxels"):
         van_rossum_spatial(on.select([0, 1, 2]), on.select([0, 1, 2]), array=one)

@@ -62,8 +62,8 @@ def test_a_dearer_move_never_makes_it_cheaper(a, b, q):
 
 def test_trains_and_q_that_make_no_sense_are_one_clear_error_each():
     for a, b, q, said in (
-        ([2.0, 1.0], [], 1.0, "train a, spike 1: 1 ms comes after 2 ms, times must ascend"),
-        ([], [float("nan")], 1.0, "train b, spike 0: time is NaN, must be finite"),
+        ([2.0, 1.0], [], 1.0, "train a, spike 1: 1 ms comes after 2 ms; times must ascend"),
+        ([], [float("nan")], 1.0, "train b, spike 0: time is NaN; must be finite"),
         ([1.0], [1.0], -1.0, "q is -1/ms: must be 0 or more"),
         ([1.0], [1.0], float("nan"), "q is nan: must be a number"),
         ([[1.0]], [1.0], 1.0, "a has 2 dimensions: must have one"),

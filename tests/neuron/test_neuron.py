@@ -274,12 +274,15 @@ def test_other_arguments_that_make_no_sense_are_one_clear_error_each():
     signed = SpikeTrains.from_lists([[1.0]], stop=10.0, values=[[-1.0]])
     for call, said in (
         (lambda: Neuron().run([1.0], "spikes"), "trains is a str: must be SpikeTrains"),
-        (lambda: Neuron().run([1.0], signed), "trains: spikes are signed, split them into ON and OFF trains first"),
+        (lambda: Neuron().run([1.0], signed), "trains: spikes are signed; split them into ON and OFF trains first"),
         (lambda: Neuron().potential([1.0], signed, [1.0]), "trains: spikes are signed"),
         (lambda: Neuron().run([1.0], trains, threshold=0), "threshold factor is 0: must be above 0"),
         (lambda: Neuron().run([1.0], trains, threshold="high"), "threshold is 'high': must be a number"),
         (lambda: Neuron().run([1.0], trains, threshold=float("nan")), "threshold is nan: must be a number"),
-        (lambda: Neuron().potential([1.0], trains, [2.0, 1.0]), r"times\[1\] is 1 ms, after 2 ms: times must ascend"),
+        (
+            lambda: Neuron().potential([1.0], trains, [2.0, 1.0]),
+            r"times\[1\] is 1 ms and comes after 2 ms: times must ascend",
+        ),
         (lambda: Neuron().potential([1.0], trains, [float("nan")]), r"times\[0\] is NaN: must be finite"),
         (lambda: Neuron().potential([1.0], trains, [1.0], spikes=[5.0, 3.0]), r"spikes\[1\] is 3 ms, after 5 ms"),
         (lambda: Neuron(tau=-1), "tau is -1 ms: must be above 0 and finite"),

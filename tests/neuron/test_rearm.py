@@ -196,7 +196,7 @@ def test_a_share_outside_its_range_is_refused(rearm: object) -> None:
 def test_who_cannot_have_it_refuses_it_by_name(tmp_path) -> None:
     with refused('rearm is 0.5 and time "continuous"'):
         Neuron(rearm=0.5)
-    with refused("rearm is 0.5: CONE-X"):
+    with refused("rearm is 0.5: must be None, because CONE-X"):
         ConeX(neuron=Neuron(time="grid", rearm=0.5))
     pytest.importorskip("nir")
     with refused("NIR: rearm of 'a' is 0.4"):

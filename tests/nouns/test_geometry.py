@@ -147,14 +147,20 @@ def test_without_a_pitch_a_grid_counts_in_columns_and_rows_and_channels_refuse()
         ),
         (
             lambda: _moments(Array(1, 4, name="foot"), displacement_mm=(1.0, 9.0)),
-            "moments needs neighbours on a grid; foot",
+            "moments needs taxels that are neighbours on a grid; foot",
         ),
         (
             lambda: _moments(Array(1, 4, name="foot"), area=(1.0, 9.0), graded=True, centre=True),
-            "moments needs neighbours on a grid; foot",
+            "moments needs taxels that are neighbours on a grid; foot",
         ),
-        (lambda: _encode(taxel.encode.ContactArea, Array(1, 4, name="foot")), "contact area needs neighbours"),
-        (lambda: _encode(taxel.encode.LocalLoad, Array(1, 4, name="foot")), "local load needs neighbours"),
+        (
+            lambda: _encode(taxel.encode.ContactArea, Array(1, 4, name="foot")),
+            "contact area needs taxels that are neighbours",
+        ),
+        (
+            lambda: _encode(taxel.encode.LocalLoad, Array(1, 4, name="foot")),
+            "local load needs taxels that are neighbours",
+        ),
         (lambda: taxel.simulate.Layer(array=Array(8, 8, name="mat")), "the pitch of mat is not known"),
         (lambda: taxel.simulate.Layer(array=Array(8, 8, (2.0, 3.0), name="mat")), "same pitch between rows"),
         (lambda: taxel.metrics.van_rossum_spatial(_trains(), _trains(), array=Array(2, 2, name="mat")), "pitch of mat"),

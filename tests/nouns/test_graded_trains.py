@@ -43,7 +43,11 @@ def test_files_without_a_kind_are_signed_if_they_have_values(tmp_path: Path) -> 
     np.savez(tmp_path / "e.npz", **columns, kind="graded")
     assert SpikeTrains.load(tmp_path / "a.npz").kind == "unsigned"
     assert SpikeTrains.load(tmp_path / "b.npz").kind == "signed"
-    for name, text in (("c", "kind is 'wavy'"), ("d", r"values\[1\] is 0"), ("e", "graded trains need values")):
+    for name, text in (
+        ("c", "kind is 'wavy'"),
+        ("d", r"values\[1\] is 0"),
+        ("e", "graded trains need one value per spike"),
+    ):
         with pytest.raises(FormatError, match=text):
             SpikeTrains.load(tmp_path / f"{name}.npz")
 
@@ -72,8 +76,8 @@ def test_nwb_files_and_neo_trains_without_a_kind_are_signed(tmp_path: Path) -> N
         ([1.0, -0.0], "graded", r"values\[1\] is 0"),
         ([1.0, 1e-60], "graded", r"values\[1\]"),
         ([1.0], "graded", "values: must be one per spike, 2"),
-        (None, "graded", "graded trains need values"),
-        (None, "signed", "signed trains need values"),
+        (None, "graded", "graded trains need one value per spike"),
+        (None, "signed", "signed trains need one value per spike"),
         ([1.0, 1.0], "unsigned", "unsigned trains have no values"),
         ([1.0, 1.0], "loud", "kind is 'loud': must be one of unsigned, signed, graded"),
         ([1.0, 1.0], 3, "kind is 3"),

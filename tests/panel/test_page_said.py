@@ -190,7 +190,7 @@ def test_detections_of_a_recording_are_in_order_and_the_time_stays_without_them(
         rows.nth(1).click()
         until(lambda: clock(page) == 2, "its frame")
         page.locator("#readout").select_option("")
-        shows(page, "detections-none", "^None in this recording")
+        shows(page, "detections-none", "^No detections in this recording")
         assert still(page) == 2
     readout.unlink()
 
@@ -210,8 +210,8 @@ def test_the_list_of_detections_says_which_readout_reads_and_of_which_sensor_eac
     }
     listing = {"type": "recordings", "folder": "", "files": [], "readouts": [readout.name]}
     for answer, said in (
-        ([], "^None yet: walk.readout.json reads this recording"),
-        ([{**message, "detections": []}, {"type": "done"}], "^None: walk.readout.json detected nothing"),
+        ([], "^No detections yet: walk.readout.json is reading this recording"),
+        ([{**message, "detections": []}, {"type": "done"}], "^walk.readout.json detected nothing"),
     ):
         with answered(chromium, recording, {"read_out": answer, "recordings": [listing]}) as page:
             page.locator("#readout").select_option(readout.name)
@@ -358,7 +358,7 @@ def test_what_lay_there_while_the_rest_was_taken_is_said_above_the_maps(chromium
         shows(
             page,
             "silence",
-            "^The rest was measured in a quiet time, but something pressed then on rows 2 to 4, columns 4",
+            "^Something pressed on the sensor while its rest was measured: rows 2 to 4, columns 4",
         )
         assert where in page.locator("#silence").inner_text()
 
@@ -419,7 +419,7 @@ def test_what_lay_there_is_said_of_events_in_the_same_words(
     assert bool(read[1].preload_at) is bool(load)
     with shown(chromium, tmp_path / "mat.mcap") as page:
         if load:
-            shows(page, "silence", r"^The rest was measured in a quiet time, but something pressed then on ")
-            assert page.locator("#silence").inner_text().endswith(f"something pressed then on {read[1].preload_at}.")
+            shows(page, "silence", r"^Something pressed on the sensor while its rest was measured ")
+            assert page.locator("#silence").inner_text().endswith(f"while its rest was measured: {read[1].preload_at}.")
         else:
             assert page.locator("#silence").is_hidden()

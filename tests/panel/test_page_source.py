@@ -73,12 +73,12 @@ def test_a_mat_on_a_serial_line_is_chosen_seen_and_recorded(chromium: Any, tmp_p
         shows(page, "numbers-why", "must be a serial port")
         source.fill(f"serial:{line}")
         page.locator("#numbers-look").click()
-        shows(page, "numbers-about", "16 lines of 12 numbers and an empty one: 16 x 12")
+        shows(page, "numbers-about", "16 lines of 12 numbers, then an empty line: 16 x 12")
         assert source.input_value() == f"serial:{line},array=16x12,frame_end=blank"
         page.locator("#numbers-form").get_by_role("button", name="Connect", exact=True).click()
         shows(page, "pressure-top", "counts")
         shows(page, "where-info", f"serial:{line}")
-        shows(page, "registers-why", "A source of numbers has no registers")
+        shows(page, "registers-why", "A sensor that prints numbers has no registers")
         shows(page, "numbers-command", r"taxel live --panel --source serial:.*,array=16x12,frame_end=blank$")
         # A source that was begun elsewhere is in the field as a whole.
         page.evaluate("localStorage.clear()")
@@ -148,7 +148,7 @@ def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chr
             shows(page, "state-word", r"^Recording trial1\.mcap$")
             page.wait_for_timeout(500)
             page.locator("#record").click()
-            shows(page, "record-last-verdict", r"no frame came for a second or more 1 time, \d+\.\d s in all")
+            shows(page, "record-last-verdict", r"no frame arrived for a second or more: 1 time, \d+\.\d s in all")
             shows(page, "state-word", "^Live$")
             connect.click()
             until(lambda: page.locator("#numbers-why").is_hidden(), "it is connected again")

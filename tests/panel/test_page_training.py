@@ -96,7 +96,7 @@ def test_play_label_train_and_watch_the_new_readout(
         opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
     ):
         shows(page, "state-word", "^Replay$")
-        shows(page, "detections-none", "None in this recording")
+        shows(page, "detections-none", "No detections in this recording")
         press(page, "Space")
         at = clock(page)
         until(lambda: clock(page) > at + 0.05, "it plays")
@@ -132,7 +132,7 @@ def test_play_label_train_and_watch_the_new_readout(
         shows(
             page,
             "train-next",
-            "^Its detections in this recording are listed below. Correct the labels and train again, ",
+            "^The readout's detections in this recording are listed below. Correct the labels and train again, ",
         )
         detects = page.locator("#train-detect").inner_text()
         assert "next: " not in page.locator("#train-text").inner_text()

@@ -192,7 +192,9 @@ def test_the_spikes_of_a_readout_are_made_with_the_tare_that_it_measured(tmp_pat
         say(live, *(word(4000, x, y, 50) for x in range(8) for y in range(8)))
         heard(live, 64)
         reason = page.ask("encode", encoder=by_name)["reason"]
-        assert reason == "encoder contact_area: the readout measures its tare; choose the encoder again after that"
+        assert (
+            reason == "encoder contact_area: the readout is still measuring its tare; choose the encoder again after it"
+        )
         say(live, *(word(600_000, x, 0, 50) for x in range(8)))
         while page.until("counters")["taring"]:
             pass

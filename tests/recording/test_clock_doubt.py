@@ -20,7 +20,7 @@ from taxel.live import Live
 
 from .making import HEADER
 
-CAUSE = "is impossible for a clock: either the sender paused or ran slower than its own clock"
+CAUSE = "is impossible for a clock. Either the sender paused or ran slower than its own clock"
 
 
 def recorded(path: Path, drift_ppm: float, delay_s: float) -> Path:

@@ -151,7 +151,7 @@ def test_a_chunk_that_says_it_unpacks_to_more_than_a_chunk_may_is_left_out_and_s
     say_size(path, 0, size)
     rec = taxel.open(path)
     assert rec.rebuilt["large_chunks"] == 1
-    assert "1 chunk skipped, stated to unpack to more than 64 MiB" in rec.verdict
+    assert "1 chunk skipped, because the stated unpacked size is above 64 MiB" in rec.verdict
 
 
 def packed(path: Path, count: int, **told: object) -> None:

@@ -265,7 +265,7 @@ def test_a_recording_gives_all_that_was_recorded(rec: taxel.Recording) -> None:
     assert rec.registers == taxel.wire.Registers.preset("5.2 kHz")
     assert [registers for _, registers in rec.register_changes] == [rec.registers]
     assert not rec.truncated
-    assert rec.verdict == "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)"
+    assert rec.verdict == "nothing lost after arrival (version 1 of the wire cannot show losses before arrival)"
     assert rec.counts["datagrams"] == rec.counts["received"] == 40
     assert rec.counts["missing_numbers"] == 0
     assert rec.counts["decoder"]["changes"] == 400
@@ -361,7 +361,7 @@ def test_losses_while_recording_are_in_the_verdict(tmp_path: Path) -> None:
     assert rec.counts["missing_numbers"] == 2
     assert rec.verdict == (
         "LOST: 2 messages dropped by the kernel, 2 datagrams dropped by taxel's queue; "
-        "in the bytes that came: 3 bytes skipped"
+        "in the bytes that arrived: 3 bytes skipped"
     )
 
 

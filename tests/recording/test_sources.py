@@ -96,7 +96,7 @@ def test_each_source_is_a_recording_that_holds_what_was_sent(several: tuple[Path
         np.testing.assert_array_equal(np.diff(events.t), np.diff(sent[name].t))
         assert (
             sources[name].verdict
-            == "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)"
+            == "nothing lost after arrival (version 1 of the wire cannot show losses before arrival)"
         )
         assert len(taxel.encode.ChangeEvents().encode(events)) == 16
     imu = sources["imu"]
@@ -204,14 +204,14 @@ def test_the_command_line_shows_and_writes_one_source(
     [
         ({"imu": "nowhere"}, "must be [NAME=]board:HOST:PORT, serial:PLACE, lines:PATH"),
         ({"imu": "given"}, "needs columns=A:B:C"),
-        ({"imu": "given,columns=a:a"}, "two of that name"),
+        ({"imu": "given,columns=a:a"}, "two columns have this name"),
         ({"imu": "given,columns=t_us"}, "holds no column of values"),
-        ({"board": "given,columns=a"}, "there are two of that name"),
+        ({"board": "given,columns=a"}, "two sources have this name"),
         ({"a b": "given,columns=a"}, "a name must have at most 64 letters, digits"),
         ({"imu": 3}, "source imu is 3"),
         (["imu"], 'source "imu": must be'),
         ({"imu": "given,columns=a,speed=3"}, 'has no option "speed"'),
-        ({"imu": "given,columns=a,rate=3"}, "rate is only for frames: state array=ROWSxCOLUMNS too"),
+        ({"imu": "given,columns=a,rate=3"}, "rate is only for frames: add array=ROWSxCOLUMNS"),
     ],
 )
 def test_a_source_that_is_none_is_refused_and_leaves_no_file(tmp_path: Path, sources: object, said: str) -> None:
@@ -222,9 +222,9 @@ def test_a_source_that_is_none_is_refused_and_leaves_no_file(tmp_path: Path, sou
 
 
 def test_a_source_needs_a_recording_that_can_hold_it_and_its_place(tmp_path: Path) -> None:
-    with pytest.raises(taxel.ProblemError, match="source imu without a recording"):
+    with pytest.raises(taxel.ProblemError, match="source imu: needs a recording"):
         Live(0, host=LOOPBACK, sources={"imu": "given,columns=a"})
-    with pytest.raises(taxel.ProblemError, match=r"only a \.mcap holds several sources"):
+    with pytest.raises(taxel.ProblemError, match=r"only a \.mcap file can contain several sources"):
         Live(0, host=LOOPBACK, record=tmp_path / "no.lsa", sources={"imu": "given,columns=a"})
     with pytest.raises(OSError, match="/no/such/line"):
         Live(0, host=LOOPBACK, record=tmp_path / "no.mcap", sources={"imu": "serial:/no/such/line,columns=a"})

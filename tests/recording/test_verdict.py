@@ -36,10 +36,10 @@ def test_a_verdict_says_what_became_of_a_file(tmp_path: Path) -> None:
     taxel.convert(tmp_path / "of.lsa", tmp_path / "back.mcap")
     (tmp_path / "noise.lsa").write_bytes(np.random.default_rng(3).integers(0, 256, 999, np.uint8).tobytes())
     verdicts = {path.name: taxel.open(path).verdict for path in sorted(tmp_path.glob("*.*")) if path.suffix != ".lss"}
-    assert "in the bytes that came" in verdicts["noise.lsa"]
+    assert "in the bytes that arrived" in verdicts["noise.lsa"]
     assert verdicts["noise.lsa"].startswith("not finished: noise.lss is missing")
     assert verdicts["back.mcap"] == "losses unknown: the .lsa does not record them"
-    assert verdicts["cut0.5.mcap"].startswith("not finished: what came last is missing")
+    assert verdicts["cut0.5.mcap"].startswith("not finished: the end of the recording is missing")
     assert "LOST in the file" in verdicts["spoilt.mcap"]
 
 

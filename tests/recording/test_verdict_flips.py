@@ -218,7 +218,7 @@ def test_of_a_chunk_without_its_index_and_without_the_end_of_the_file_not_all_is
     assert verdict is not None
     # The last counts tell of the notes.
     assert (verdict.status, verdict.lost) == ("lost", {"notes_lost_in_file": gone})
-    assert "what else the file held is unknown" in verdict
+    assert "further losses in the file are unknown" in verdict
     # The summary of a finished recording tells.
     verdict = assert_told(tmp_path / "b.mcap", data[:begin] + bytes(end - begin) + data[end:], of, "as finished")
     assert verdict is not None

@@ -279,7 +279,7 @@ def test_what_another_program_changed_in_a_finished_file_is_damage(change: str, 
         return
     assert anew.verdict.damaged.get("changed_since_recorded") == 1, anew.verdict.to_dict()
     assert anew.verdict.status in ("damaged", "lost")
-    assert "its content is not what was recorded" in anew.verdict
+    assert "the content was changed after recording" in anew.verdict
     if change == "its neighbour":
         assert anew.verdict.lost.get("lost_in_file", 0) > 0
     # A .h5 is written and opened in processes of their own.
@@ -800,7 +800,9 @@ def test_what_stands_behind_the_end_of_a_file_is_told(tmp_path: Path, appended: 
     assert recording.verdict.damaged == {"bytes_after_end": len(more)}
     assert recording.verdict.status == "damaged"
     bytes_ = "1 byte" if len(more) == 1 else f"{len(more)} bytes"
-    assert recording.verdict.startswith(f"damage in the file: {bytes_} after its end not read; while recording: ")
+    assert recording.verdict.startswith(
+        f"damage in the file: {bytes_} after the end of the recording not read; while recording: "
+    )
 
 
 def test_what_two_generations_of_a_file_lost_adds_up(tmp_path: Path) -> None:
@@ -831,11 +833,11 @@ def test_what_two_generations_of_a_file_lost_adds_up(tmp_path: Path) -> None:
 def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
     counts = {"received": 5, "recorded": 5, "missing": 0, "decoder": {"resets": 2}}
     verdict = Verdict._of({"counts": counts})
-    assert verdict == "nothing lost except what resets hide; 2 resets of the board"
+    assert verdict == "nothing lost, except unknown losses at resets; 2 resets of the board"
     assert verdict.status == "complete after arrival"
     assert Verdict._of({"counts": counts | {"decoder": {}}}) == "nothing lost"
     lost = Verdict._of({"counts": counts | {"missing": 3}})
-    assert lost == "LOST: 3 datagrams lost or damaged on the way, and what resets hide; 2 resets of the board"
+    assert lost == "LOST: 3 datagrams lost or damaged on the way, and unknown losses at resets; 2 resets of the board"
 
 
 def test_intact_datagrams_of_another_board_are_no_damaged_ones(tmp_path: Path) -> None:
@@ -887,7 +889,7 @@ def test_a_second_board_with_the_numbers_of_the_first_is_told(seed: int, tmp_pat
         assert verdict.noted.get("datagrams_repeated", 0) == len(again) - other
         assert at_least(verdict, "damaged")
         assert "nothing lost;" not in verdict
-    assert told.startswith("nothing lost except what another board sent; in the bytes that came: ")
+    assert told.startswith("nothing lost except datagrams of another board; in the bytes that arrived: ")
 
 
 def test_a_source_of_which_nothing_arrived_hides_no_loss_of_another() -> None:

@@ -154,5 +154,5 @@ def test_a_board_alone_and_in_a_play_read_through_the_circuit():
     assert len(plays[0].events) > 100
     assert plays[0].events == plays[1].events
     assert plays[0].events != plays[2].events
-    with pytest.raises(taxel.ProblemError, match=r"v_trans is 0.5: must be the sensor's, 1.3"):
+    with pytest.raises(taxel.ProblemError, match=r"v_trans is 0.5: must be 1.3, as in the sensor"):
         play(acts, seed=2, circuit=Circuit(readout=VirtualGround(v_trans=0.5)))

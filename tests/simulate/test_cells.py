@@ -92,7 +92,7 @@ def test_a_narrow_touch_has_its_force_from_as_many_cells_as_it_asks_for(touch, n
     one, said = pressed(shape, depth_mm, foam, 1)
     assert one < coarse * force
     assert len(said) == 1
-    enough = int(re.search(r"cells_per_pitch = (\d+) would do$", said[0])[1])
+    enough = int(re.search(r"cells_per_pitch = (\d+) is enough$", said[0])[1])
     few, none = pressed(shape, depth_mm, foam, enough)
     many, _ = pressed(shape, depth_mm, foam, 2 * enough)
     assert not none
@@ -186,8 +186,8 @@ y_mm = 80
 motion.pressed = { depth_mm = 0.6, speed_mm_s = 50, hold_ms = 5 }
 """
 SAID = (
-    "bodies[0]: its touch is 1.20 mm wide at its deepest, less than 1.5 cells of 2.67 mm: its force is too small; "
-    "cells_per_pitch = 4 would do"
+    "bodies[0]: at its largest, its touch is 1.20 mm wide, less than 1.5 cells of 2.67 mm, "
+    "so the computed force is too small; cells_per_pitch = 4 is enough"
 )
 
 

@@ -342,7 +342,7 @@ def test_the_ramp_turns_steep_where_a_taxel_moves_and_gentle_where_none_does():
         (lambda: Converter(ramp=200), "step_us is 0.75 us: must be 0.8667 or more"),
         (lambda: Converter().ticks([[np.nan]]), r"volts\[0, 0\] is nan: must be finite"),
         (lambda: Converter().ticks([[1.0, -1.1e6]]), "volts: must be from -1e"),
-        (lambda: Converter().trace([1.0]), "voltages: 1 of them, must be one per step, 4"),
+        (lambda: Converter().trace([1.0]), "voltages: 1 values; must be one per step, 4"),
         (lambda: Circuit(readout=Divider()), "readout"),
     ],
 )

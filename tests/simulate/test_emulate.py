@@ -387,7 +387,7 @@ def test_taxels_that_share_a_switch_pull_each_other_down(listener, switch_ohm):
 
 def test_a_circuit_that_is_not_the_sensor_s_is_refused():
     to, still = "127.0.0.1:9", taxel.Frames(np.ones((2, 64, 64)), [0, 1000], unit="ticks")
-    with pytest.raises(ProblemError, match=r"v_trans is 0.5: must be the sensor's, 1.3"):
+    with pytest.raises(ProblemError, match=r"v_trans is 0.5: must be 1.3, as in the sensor"):
         emulate(to, [Silence(60.0)], circuit=Circuit(readout=VirtualGround(v_trans=0.5)))
     with pytest.raises(ProblemError, match="circuit is 3"):
         emulate(to, Replay(still), circuit=3)

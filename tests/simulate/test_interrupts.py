@@ -107,5 +107,5 @@ def test_a_trace_that_would_not_end_is_refused(arguments: dict[str, float], word
 
 def test_more_forces_than_memory_holds_are_refused() -> None:
     """A day on one taxel, scanned in 3 us: 3e10 frames."""
-    with pytest.raises(taxel.SceneError, match=r"acts last .* frames: must be at most 200000000, split them"):
+    with pytest.raises(taxel.SceneError, match=r"acts last .* frames: must be at most 200000000; split the acts"):
         truth([Silence(86_400_000.0)] * 10)

@@ -129,7 +129,7 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
             r"bodies\[0\] has mass_g and material: must have only one of them",
         ),
         (("mass_g = 30", "mass_g = inf"), r"bodies\[0\].mass_g is inf: must be finite"),
-        (("mass_g = 30", "mass_g = 1e6"), r"scene.toml: the body bottoms out: 1000000.0 g"),
+        (("mass_g = 30", "mass_g = 1e6"), r"scene.toml: the body reaches the bottom of the foam: 1000000.0 g"),
         (
             ("rest_ms = 180", "rest_ms = 90"),
             r"scene.toml: the body is lifted 90 ms after it was let go, before it lands",

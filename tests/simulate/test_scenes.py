@@ -151,7 +151,7 @@ def test_frames_touch_from_the_empty_one_before_to_the_empty_one_after():
         (
             lambda: Scene.draw(1).body(motion=high(800)).replace(foam={"modulus_kpa": 5}).motion(),
             SceneError,
-            "bottoms out",
+            "reaches the bottom",
         ),
         (lambda: Scene.draw(1).motion(0), SceneError, "step"),
         (lambda: Scene.draw(1).motion("fast"), ProblemError, "step_us"),

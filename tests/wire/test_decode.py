@@ -223,7 +223,7 @@ def test_datagrams_one_behind_the_other_are_heard_each_by_itself(data, cuts):
     assert wire.decode(data, pairing="taxel", columns=room) == wire.decode(data, pairing="taxel")
     assert rows(heard) == [row for part in parts for row in rows(part)]
     assert heard.markers == tuple(marker for part in parts for marker in part.markers)
-    with pytest.raises(taxel.ProblemError, match="lengths: must be 0 or more each"):
+    with pytest.raises(taxel.ProblemError, match="lengths: each must be 0 or more"):
         wire.decode(data, lengths=[len(data) + 1])
     whole = wire.decode(data, pairing="taxel", lengths=[len(data)])
     assert whole == wire.decode(data, pairing="taxel")
@@ -263,7 +263,7 @@ def test_a_whole_recording_paired_by_taxel_keeps_its_markers():
         (lambda: wire.encode(b""), "events is b'': must be a taxel.Events"),
         (
             lambda: wire.encode(taxel.Events([0], [64], [0], [True], array=taxel.Array(1, 65))),
-            "event 0: row 0, column 64: version 1 of the wire holds rows and columns 0 to 63",
+            "event 0: row 0, column 64: version 1 of the wire has only rows and columns 0 to 63",
         ),
     ],
 )

@@ -81,17 +81,17 @@ def test_a_wrong_order_is_refused_half_way():
         ({"col_change_period": 76}, r"4 x step_period 0.76 us is longer than line_read 3.00 us \(rule 2\)"),
         (
             {"ramp": 161},
-            r"ramp 161 ticks leaves no 5 ticks of step_read 0.55 us = 165 ticks in which it falls \(rule 3\)",
+            r"ramp 161 ticks is too long for step_read 0.55 us = 165 ticks: the ramp must be at least 5 ticks shorter",
         ),
-        ({"step_read": 0.75, "ramp": 221}, r"ramp 221 ticks leaves no 5 ticks of step_read 0.75 us = 225 ticks"),
+        ({"step_read": 0.75, "ramp": 221}, r"ramp 221 ticks is too long for step_read 0.75 us = 225 ticks"),
         ({"ramp": 0}, r"ramp 0 does not fit: must be 1 to 65534 \(rule 4\)"),
         ({"lines": 65}, r"65 lines: the array has 64 columns to drive \(rule 4\)"),
         ({"lines": 257}, r"lines 257 does not fit: must be 1 to 256 \(rule 4\)"),
         (
             {"random_lines": True, "line_period": 10.23},
-            r"to drive any of 64 lines next takes up to 10.24 us, longer than line_period 10.23 us \(rule 5\)",
+            r"moving to any of 64 lines takes up to 10.24 us, longer than line_period 10.23 us \(rule 5\)",
         ),
-        ({"step_period": 0.73, "step_read": 0.53, "channels": 64}, r"wants 0.74 us \(rule 7\)"),
+        ({"step_period": 0.73, "step_read": 0.53, "channels": 64}, r"needs 0.74 us \(rule 7\)"),
         ({"array": taxel.Array(65, 64), "wire_version": 1}, r"choose version 2 \(rule 8\)"),
         ({"lines": 0}, r"lines 0 does not fit: must be 1 to 256 \(rule 4\)"),
         ({"noise_floor": 256}, r"noise_floor 256 does not fit: must be 0 to 255 \(rule 4\)"),
@@ -111,7 +111,7 @@ def test_what_is_hardly_meant_is_warned_of():
     shuffled = Registers(random_lines=True, lines=2, step_read=0.23, ramp=60)
     assert shuffled.warnings == ()
     (settling,) = shuffled.replace(step_read=0.24).warnings
-    assert settling.endswith("any of 2 lines settles in 0.52 us (rule 5)")
+    assert settling.endswith("with 2 lines, taxels need 0.52 us to settle (rule 5)")
     (floor,) = Registers(noise_floor=150).warnings
     assert floor.endswith("(rule 6)")
 

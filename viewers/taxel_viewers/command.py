@@ -32,7 +32,7 @@ def show(
         str,
         typer.Argument(
             metavar="ADDRESS|FILE",
-            help="The panel's address, in quotes, as taxel live --panel and taxel view print it; or a recording, which "
+            help="The panel's address, in quotes, as taxel live --panel and taxel view print it. Or a recording, which "
             "is played once.",
         ),
     ],
@@ -40,8 +40,8 @@ def show(
         str,
         typer.Argument(
             metavar="VIEWER",
-            help="rerun or rerun:HOST:PORT, a viewer that you have started; foxglove or foxglove:PORT, a server on "
-            "127.0.0.1 that Foxglove connects to.",
+            help="rerun or rerun:HOST:PORT: a viewer that you have started. foxglove or foxglove:PORT: a server on "
+            "127.0.0.1, to which Foxglove connects.",
         ),
     ],
     encoder: Annotated[str | None, typer.Option(help="Show the spikes of this encoder too.")] = None,
@@ -49,7 +49,8 @@ def show(
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=f"With --encoder: {SET_HELP}")
     ] = None,
     tare: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="With --encoder: rest of the taxels (Tare.save wrote it).")
+        Path | None,
+        typer.Option(metavar="FILE", help="With --encoder: the rest of the taxels, a file that Tare.save wrote."),
     ] = None,
     speed: Annotated[
         float, typer.Option(min=0.001, max=100.0, help="Playback speed of a recording; 0.1 is ten times slower.")
@@ -71,7 +72,7 @@ def show(
     from taxel_viewers.viewer import Viewer, Viewing  # noqa: PLC0415
 
     if encoder is None and (values or tare is not None):
-        raise ProblemError("--set and --tare without --encoder: give --encoder NAME")
+        raise ProblemError("--set and --tare need an encoder: give --encoder NAME")
     # The libraries' own messages are not for the user.
     os.environ.setdefault("RUST_LOG", "off")
     spikes: Encoder | None = None
@@ -99,7 +100,7 @@ def show(
         say(f"{shown.place}: " + (", ".join(f"{n:,} {_NAMES.get(w, w)}" for w, n in last.sent.items()) or "nothing"))
     if last.lost:
         parts = (f"{n} of {n + last.sent.get(w, 0)} {_NAMES.get(w, w)}" for w, n in last.lost.items())
-        why = last.trouble or "it was not connected, or too slow"
+        why = last.trouble or "the viewer was not connected, or too slow"
         say(f"taxel: {', '.join(parts)} were not shown in {shown.place}: {why}", err=True)
     if not shown.reads:
         # The clean-up of its library would wait for the viewer without end.

@@ -53,7 +53,7 @@ impl<'a, 'py, T: Element + 'a> FromPyObject<'a, 'py> for FilledArray<'py, T> {
 fn in_use(error: BorrowError) -> PyErr {
     match error {
         BorrowError::AlreadyBorrowed => ProblemError::new_err(
-            "columns: another thread is using them; give each thread separate Columns, or copies of the events",
+            "columns: another thread uses these Columns; give each thread separate Columns, or copies of the events",
         ),
         other => other.into(),
     }

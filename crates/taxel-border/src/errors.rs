@@ -107,16 +107,16 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     };
     let error = make(
         c"taxel.Error",
-        c"Anything that taxel refuses; its kinds are its subclasses.",
+        c"Every error of taxel; its subclasses are the kinds of errors.",
         &py.get_type::<PyException>(),
     )?;
     error.setattr("argument", py.None())?;
     error.setattr("hint", py.None())?;
-    make(c"taxel.FormatError", c"Bytes or files that do not hold what they should.", &error)?;
+    make(c"taxel.FormatError", c"Bytes or files with wrong content.", &error)?;
     let problem =
-        make(c"taxel.ProblemError", c"Arguments, spike trains or a learning problem that make no sense.", &error)?;
-    make(c"taxel.NotFittedError", c"A learner that was used before `fit`.", &problem)?;
-    make(c"taxel.DeviceError", c"The board, its registers or its commands.", &error)?;
-    make(c"taxel.SceneError", c"A simulated scene that cannot be played.", &error)?;
+        make(c"taxel.ProblemError", c"Arguments, spike trains or learning problems that are not valid.", &error)?;
+    make(c"taxel.NotFittedError", c"A learner was used before `fit`.", &problem)?;
+    make(c"taxel.DeviceError", c"An error of the board, of its registers or of its commands.", &error)?;
+    make(c"taxel.SceneError", c"A scene that cannot be simulated.", &error)?;
     Ok(())
 }

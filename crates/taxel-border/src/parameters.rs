@@ -37,7 +37,7 @@ pub fn checked<T: DeserializeOwned + Serialize>(
 /// The error of what has no parameters.
 #[must_use]
 pub fn unknown(name: &str) -> PyErr {
-    core(problem!("{name}: nothing of that name has parameters"))
+    core(problem!("{name}: nothing with this name has parameters"))
 }
 
 /// A value that Python gets as dictionaries, lists, numbers and strings: a file's document, or numbers by cause.

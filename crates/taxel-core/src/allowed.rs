@@ -233,7 +233,7 @@ pub fn is_weight(weight: f64) -> bool {
 /// `Problem`, naming the weight.
 pub fn one_weight_a_train(weights: &[f64], trains: usize) -> Result<()> {
     if weights.len() != trains {
-        return Err(problem!("weights"; ": {} for {trains} trains, must be one per train", weights.len()));
+        return Err(problem!("weights"; ": {} for {trains} trains; must be one per train", weights.len()));
     }
     weights
         .iter()

@@ -139,7 +139,7 @@ impl Array {
             above_0("pitch_mm", rows, "")?;
             above_0("pitch_mm", columns, "")?;
             if self.places.is_some() {
-                return Err(problem!("array {}: pitch_mm and places are both given: give one of them", self.name));
+                return Err(problem!("array {}: pitch_mm and places are both given: give only one of them", self.name));
             }
         }
         let of_each = |name: &str, entries: usize| {
@@ -295,7 +295,7 @@ impl Array {
             return Ok(());
         }
         Err(problem!(
-            "{subject} needs neighbours on a grid; {} has {} x {} channels without a pitch",
+            "{subject} needs taxels that are neighbours on a grid; {} has {} x {} channels without a pitch",
             self.name,
             self.rows,
             self.columns
@@ -381,7 +381,7 @@ mod tests {
                 .to_string()
                 .contains("skin needs distances in mm, but the pitch of foot")
         );
-        assert!(channels.check_neighbours("area").unwrap_err().to_string().contains("area needs neighbours"));
+        assert!(channels.check_neighbours("area").unwrap_err().to_string().contains("area needs taxels"));
         Array::new(1, 8, 5.0, "line").unwrap().check_neighbours("area").unwrap();
         Array::unmeasured(2, 8, "grid").check_neighbours("area").unwrap();
         let plate = Array { pitch_mm: Some(Pitch { rows: 7.62, columns: 5.08 }), ..Array::unmeasured(9, 9, "plate") };

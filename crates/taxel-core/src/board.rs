@@ -204,10 +204,12 @@ impl Board {
     /// board compares with the last sample.
     pub fn asynchronous(mut self) -> Result<Self> {
         if self.written.wire_version != 2 {
-            return Err(problem!("asynchronous"; ": wire_version is 1: must be 2, for stamps of 1 us"));
+            return Err(problem!("asynchronous"; ": wire_version is 1: must be 2, whose stamps count 1 us"));
         }
         if self.written.mechanoreceptor {
-            return Err(problem!("asynchronous"; ": mechanoreceptor is set: must not be, afferents are scanned"));
+            return Err(problem!(
+                "asynchronous"; ": mechanoreceptor is set: must not be set, because afferents are scanned"
+            ));
         }
         if self.previous == Previous::LastSample {
             return Err(problem!("asynchronous"; ": previous is last_sample: must be last_sent"));

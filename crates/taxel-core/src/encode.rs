@@ -161,7 +161,7 @@ impl Encoder {
         let name = match parameters.remove("name") {
             Some(Value::String(name)) => name,
             Some(other) => return Err(problem!("encoder {other}: must be one of {names}")),
-            None => return Err(problem!("encoder without a name: must be one of {names}")),
+            None => return Err(problem!("encoder: the name is missing: must be one of {names}")),
         };
         // Errors of an encoder inside of another would not name its parameters, so each part is also read by itself.
         if let (true, Some(Value::Object(parts))) = (name == "composite", parameters.get("parts")) {
@@ -285,7 +285,9 @@ impl Composite {
         for (n, name) in names.iter().enumerate() {
             if !self.parts.contains_key(name) {
                 let known: Vec<&str> = self.parts.keys().map(String::as_str).collect();
-                return Err(problem!("inputs"; ": no encoder {name:?}: there are {}", known.join(", ")));
+                return Err(problem!(
+                    "inputs"; ": the composite has no encoder {name:?}: its encoders are {}", known.join(", ")
+                ));
             }
             if names[..n].contains(name) {
                 return Err(problem!("inputs"; ": {name:?} comes twice"));
@@ -316,14 +318,14 @@ fn inputs(part: &Encoder, array: &Array) -> usize {
 impl Encoding for Composite {
     fn check(&self) -> Result<()> {
         if self.parts.is_empty() {
-            return Err(problem!("composite: parts is empty: must be encoders by name, one or more"));
+            return Err(problem!("composite: parts is empty: must contain one encoder or more, each with a name"));
         }
         for (name, part) in &self.parts {
             if name.trim().is_empty() {
-                return Err(problem!("composite: a part without a name: must have one"));
+                return Err(problem!("composite: the name of a part is empty"));
             }
             if matches!(part, Encoder::Composite(_)) {
-                return Err(problem!("composite: {name} is a composite itself: must be another encoder"));
+                return Err(problem!("composite: part {name} is a composite: must be another encoder"));
             }
             part.check().map_err(|error| error.in_part(name))?;
         }

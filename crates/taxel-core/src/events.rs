@@ -264,7 +264,7 @@ impl<'a> EventsView<'a> {
                 (latest, row) = (t, k);
             } else if latest.abs_diff(t) > FARTHEST_BACK_US.unsigned_abs() {
                 return Err(problem!(
-                    "event {k} at {t} us: is more than 0.1 s before event {row} at {latest} us; put them in order of \
+                    "event {k} at {t} us: is more than 0.1 s before event {row} at {latest} us; sort the events by \
                      time with Events.sorted()"
                 ));
             }
@@ -282,14 +282,14 @@ impl<'a> EventsView<'a> {
         let repaired = self.repaired.map_or(t, <[bool]>::len);
         for (name, len) in [("x", self.x.len()), ("y", self.y.len()), ("p", self.p.len()), ("repaired", repaired)] {
             if len != t {
-                return Err(problem!("events: {name} has {len} entries, t has {t}: they must be equal"));
+                return Err(problem!("events: {name} has {len} entries, t has {t}: the numbers must be equal"));
             }
         }
         if let Some(IntensitiesView { ticks, present }) = self.intensity
             && (ticks.len() != t || present.len() != t)
         {
             let ticks = ticks.len();
-            return Err(problem!("events: intensity has {ticks} entries, t has {t}: they must be equal"));
+            return Err(problem!("events: intensity has {ticks} entries, t has {t}: the numbers must be equal"));
         }
         let (columns, rows) = (self.array.columns, self.array.rows);
         for (k, (&x, &y)) in self.x.iter().zip(self.y).enumerate() {

@@ -156,7 +156,7 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
         });
         let wanted = chosen.map_or(array.len(), <[u32]>::len);
         if begins.len() != wanted {
-            return Err(problem!("{} values to begin with: must be {wanted}, one per taxel", begins.len()));
+            return Err(problem!("{} first values: must be {wanted}, one per taxel", begins.len()));
         }
         // Readers limit an array to 2^22 taxels, so an index fits in 32 bits.
         let slot = |taxel: usize| slots.as_ref().map_or(taxel as u32, |slots| slots[taxel]);

@@ -107,7 +107,7 @@ impl Metric {
         // checked here.
         let known: Vec<&str> = required.iter().copied().chain(defaults.keys().map(String::as_str)).collect();
         if let Some(unknown) = parameters.keys().find(|key| !known.contains(&key.as_str())) {
-            return Err(problem!(unknown.as_str(); " is not known: {name} takes {}", known.join(", ")));
+            return Err(problem!(unknown.as_str(); " is not known: the parameters of {name} are {}", known.join(", ")));
         }
         Self::read(name, parameters.into())
             .ok_or_else(|| problem!("metric {name}: cannot be read"))?

@@ -104,7 +104,7 @@ impl SpikeTrains {
         for s in spikes {
             let n = s.train as usize;
             if n >= trains {
-                return Err(problem!("spike at {} ms: train {n} of {trains}", s.t));
+                return Err(problem!("spike at {} ms: train is {n}, but there are only {trains} trains", s.t));
             }
             if !(start <= s.t && s.t <= stop) {
                 return Err(problem!("train {n}: spike at {} ms is outside the window {start} to {stop} ms", s.t));
@@ -297,11 +297,11 @@ pub fn check(
         let train = &times[ends[0]..ends[1]];
         for (k, &t) in train.iter().enumerate() {
             if !t.is_finite() {
-                return Err(problem!("train {n}, spike {k}: time is {t}, must be finite"));
+                return Err(problem!("train {n}, spike {k}: time is {t}; must be finite"));
             }
             if k > 0 && t < train[k - 1] {
                 return Err(problem!(
-                    "train {n}, spike {k}: {t} ms comes after {} ms, times must ascend",
+                    "train {n}, spike {k}: {t} ms comes after {} ms; times must ascend",
                     train[k - 1]
                 ));
             }
@@ -318,7 +318,7 @@ fn check_values(kind: SpikeKind, values: Option<&[f32]>, spikes: usize) -> Resul
     let Some(values) = values else {
         return match kind {
             SpikeKind::Unsigned => Ok(()),
-            SpikeKind::Signed | SpikeKind::Graded => Err(problem!("{} trains need values, one per spike", kind.name())),
+            SpikeKind::Signed | SpikeKind::Graded => Err(problem!("{} trains need one value per spike", kind.name())),
         };
     };
     if kind == SpikeKind::Unsigned {
@@ -333,7 +333,7 @@ fn check_values(kind: SpikeKind, values: Option<&[f32]>, spikes: usize) -> Resul
     if kind == SpikeKind::Graded
         && let Some(k) = values.iter().position(|&value| value == 0.0)
     {
-        return Err(problem!("values"; "[{k}] is 0: a graded value of 0 is not a spike, leave it out"));
+        return Err(problem!("values"; "[{k}] is 0: a graded value of 0 is not a spike; leave it out"));
     }
     Ok(())
 }

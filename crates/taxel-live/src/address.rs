@@ -15,7 +15,7 @@ use crate::Result;
 pub fn of_host(host: &str, port: u16) -> Result<SocketAddr> {
     let found: Vec<SocketAddr> = (host, port).to_socket_addrs().map_or_else(|_| vec![], Iterator::collect);
     let Some(first) = found.iter().find(|address| address.is_ipv4()).or(found.first()) else {
-        return Err(problem!("host"; " is {host:?}: must be an address or a name of a host").into());
+        return Err(problem!("host"; " is {host:?}: must be an IP address or the name of a host").into());
     };
     Ok(*first)
 }

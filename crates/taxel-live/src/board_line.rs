@@ -195,7 +195,7 @@ impl BoardLine {
     fn silence(&self, most: Duration, no_text: u64) -> Error {
         let why = match &self.place {
             SerialPlace::Port(_, baud) if no_text > 0 => {
-                format!("{no_text} bytes came that are not text: is its baud rate {baud}?")
+                format!("{no_text} bytes arrived that are not text: is the board's baud rate {baud}?")
             }
             _ => "is this the board's serial line?".to_owned(),
         };

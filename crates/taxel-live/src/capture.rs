@@ -56,7 +56,7 @@ const SENDERS_READ: u64 = 12;
 const AT_ONCE: usize = 4 * socket::LARGEST;
 
 /// What else may keep datagrams from a program of this system, to be added to why none arrived.
-pub const FIREWALL: &str = if cfg!(windows) { " (Windows' firewall may keep datagrams from Python)" } else { "" };
+pub const FIREWALL: &str = if cfg!(windows) { " (Windows' firewall may block datagrams to Python)" } else { "" };
 
 /// Where datagrams come from.
 #[derive(Debug, Clone, PartialEq, Eq)]

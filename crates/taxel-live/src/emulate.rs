@@ -174,7 +174,11 @@ impl Emulator {
     /// schedule does not ascend, or a fault, flaw, drift or reset makes no sense.
     pub fn open(board: Board, array: &Array, options: EmulatorOptions) -> Result<Self> {
         if let Some(k) = options.commands.windows(2).position(|w| w[1].0 < w[0].0) {
-            return Err(taxel_core::problem!("command {}: its frame is before that of command {k}", k + 1).into());
+            return Err(taxel_core::problem!(
+                "command {}: its frame must not be before the frame of command {k}",
+                k + 1
+            )
+            .into());
         }
         if let Some(interval_s) = options.reset_every_s.filter(|interval_s| !(1e-3..=1e9).contains(interval_s)) {
             return Err(taxel_core::problem!("reset_every_s"; " is {interval_s}: must be from 0.001 to 1e9").into());

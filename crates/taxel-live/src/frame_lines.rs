@@ -87,9 +87,11 @@ impl FrameLayout {
         if !fits {
             let several = match frame / n.max(1) {
                 several @ 2.. if self.end == FrameEnd::Lines(1) && several * n == frame => {
-                    format!(" (or add frame_lines={several}, or frame_end=blank where an empty line ends each frame)")
+                    format!(" (or add frame_lines={several}; or add frame_end=blank if an empty line ends each frame)")
                 }
-                0 => " (name a column of times, for example time=1:ms, and columns without values, for example leave_out=1)".to_owned(),
+                0 => " (state which column contains times, for example time=1:ms, and which columns are not readings, \
+                      for example leave_out=1)"
+                    .to_owned(),
                 _ => String::new(),
             };
             return Err(problem!(
@@ -104,7 +106,7 @@ impl FrameLayout {
             ));
         }
         if !(1.0..=3.6e9).contains(&self.frame_us) {
-            return Err(problem!("frames of {} us: must last from 1 us to an hour", self.frame_us));
+            return Err(problem!("a frame lasts {} us: must be from 1 us to an hour", self.frame_us));
         }
         Ok(())
     }

@@ -44,7 +44,10 @@ impl LinePlace {
                 };
                 match (SerialPlace::new(place, baud)?, stated) {
                     (SerialPlace::Tcp(..), Some(baud)) => {
-                        return Err(problem!("baud"; " is {baud}: {place} is a TCP port, which has none").into());
+                        return Err(problem!(
+                            "baud"; " is {baud}: must be left out, because {place} is a TCP port"
+                        )
+                        .into());
                     }
                     (place, _) => Self::Serial(place),
                 }

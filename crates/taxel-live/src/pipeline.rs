@@ -156,7 +156,13 @@ impl Live {
                     layout.assume_unit(unit);
                     PipelineInput::frames(&place, &layout, &opened)?
                 }
-                SourceKind::Numbers(..) => return Err(problem!("source {:?}: is not read out", text.text).into()),
+                SourceKind::Numbers(..) => {
+                    return Err(problem!(
+                        "source {:?}: contains no frames, so it cannot be shown or read by a readout",
+                        text.text
+                    )
+                    .into());
+                }
             });
         }
         let input = input.unwrap_or(PipelineInput::Board(options.address()?));
@@ -164,7 +170,7 @@ impl Live {
             match input.layout() {
                 None => readout.check_unit("ticks")?,
                 Some(layout) => readout.check_unit(&layout.unit).map_err(|error| {
-                    problem!("{error}; if they are in {}, state unit={0} in --source", unit.unwrap_or_default())
+                    problem!("{error}; if the values are in {}, add unit={0} in --source", unit.unwrap_or_default())
                 })?,
             }
         }
@@ -214,10 +220,14 @@ impl Live {
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         if options.record_later && options.record.is_some() {
-            return Err(problem!("record and record_later are both given: choose one of them").into());
+            return Err(problem!("record and record_later are both given: give only one of them").into());
         }
         if let (None, false, Some(source)) = (&options.record, options.record_later, others.texts.first()) {
-            return Err(problem!("source {} without a recording: nothing would save it", source.name()).into());
+            return Err(problem!(
+                "source {}: needs a recording, because taxel only saves this source; give record",
+                source.name()
+            )
+            .into());
         }
         let sources = others.open(options.first_line_wait(others.stop)?)?;
         Self::begin(input, options, sources, readout, sinks, None)
@@ -496,7 +506,7 @@ impl Live {
     /// cannot be created: then the one that runs goes on. What ended that one early, or `File` if its end cannot be written.
     pub fn record(&self, record: &Record) -> Result<Option<LiveSummary>> {
         if !self.shared.options.record_later {
-            return Err(problem!("record: this pipeline was not begun for recordings that begin later").into());
+            return Err(problem!("record: give record_later at the start to begin recordings later").into());
         }
         self.handle().record(record)
     }

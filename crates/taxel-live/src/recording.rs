@@ -210,7 +210,11 @@ impl Header {
             stream.check(&self.name)?;
             if self.array.len() != stream.values().count() {
                 let n = stream.values().count();
-                return Err(problem!("source {}: {n} columns of values, and {} taxels", self.name, self.array.len()));
+                return Err(problem!(
+                    "source {}: {n} columns of values for {} taxels; must be one per taxel",
+                    self.name,
+                    self.array.len()
+                ));
             }
         }
         if let Some(frames) = &self.frames {
@@ -223,13 +227,13 @@ impl Header {
         driven.check()?;
         self.registers.map_or(Ok(()), |registers| registers.check_fit(driven))?;
         if self.sources.len() >= limits::SOURCES {
-            return Err(problem!("{} sources; a file holds at most {}", self.sources.len() + 1, limits::SOURCES));
+            return Err(problem!("{} sources; a file can contain at most {}", self.sources.len() + 1, limits::SOURCES));
         }
         let mut names = vec![&self.name];
         for source in &self.sources {
             check_name(&source.name)?;
             if names.contains(&&source.name) {
-                return Err(problem!("source {:?}: there are two of that name", source.name));
+                return Err(problem!("source {:?}: two sources have this name", source.name));
             }
             names.push(&source.name);
             if !source.sources.is_empty() {

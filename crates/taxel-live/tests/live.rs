@@ -171,7 +171,7 @@ fn a_recording_holds_the_events_that_the_board_sent() {
     assert_eq!(summary.counters.decoding.events, expected.len() as u64);
     assert_eq!(recorded(&path).0, expected);
     let (text, status) = match ways::is_portable() {
-        true => ("losses unknown: the kernel does not count what it drops", RecordingStatus::Unknown),
+        true => ("losses unknown: the kernel does not count dropped datagrams", RecordingStatus::Unknown),
         false => (NOTHING_LOST, RecordingStatus::CompleteAfterArrival),
     };
     assert_eq!((summary.verdict.text.as_str(), summary.verdict.status), (text, status));

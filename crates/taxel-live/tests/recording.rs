@@ -258,7 +258,7 @@ fn wrong_files_are_refused_in_one_line() {
         (&b"\x1f\x8b\x08\x00\x00\x00\x00\x00"[..], "byte 0: starts with 1F 8B 08 00, not with the MCAP magic"),
         (&b""[..], "byte 0: the file ends inside the MCAP magic"),
         (&b"\x89MCAP0\r"[..], "byte 7: the file ends inside the MCAP magic"),
-        (&b"\x89MCAP0\r\n"[..], "without the header of a taxel recording"),
+        (&b"\x89MCAP0\r\n"[..], "is not a taxel recording"),
     ] {
         std::fs::write(&path, bytes).unwrap();
         let error = Reader::open(&path).unwrap_err().to_string();
@@ -320,7 +320,7 @@ fn the_verdict_states_what_was_lost_where() {
         assert!(verdict.contains(part), "{verdict}");
     }
     let damaged = RecordingCounts { decoder: [("skipped".to_owned(), 7), ("short".to_owned(), 0)].into(), ..sound };
-    assert_eq!(damaged.verdict().text, format!("{NOTHING_LOST}; in the bytes that came: 7 skipped"));
+    assert_eq!(damaged.verdict().text, format!("{NOTHING_LOST}; in the bytes that arrived: 7 skipped"));
 }
 
 #[test]
@@ -329,13 +329,13 @@ fn what_a_kernel_does_not_count_is_unknown_unless_the_board_numbers_what_it_send
     let uncounted = RecordingCounts { dropped_by_kernel: KernelDrops::UNKNOWN, ..sound.clone() };
     let verdict = uncounted.verdict();
     assert_eq!(verdict.status, RecordingStatus::Unknown);
-    assert_eq!(verdict.text, "losses unknown: the kernel does not count what it drops");
+    assert_eq!(verdict.text, "losses unknown: the kernel does not count dropped datagrams");
     let numbered = RecordingCounts { missing: Some(0), ..uncounted.clone() }.verdict();
     assert_eq!((numbered.status, numbered.text.as_str()), (RecordingStatus::Complete, "nothing lost"));
     let missing = RecordingCounts { missing: Some(5), dropped_by_queue: 2, recorded: 8, ..uncounted.clone() }.verdict();
     assert_eq!(missing.lost, [("dropped_by_queue".to_owned(), 2), ("lost_on_the_way_or_dropped".to_owned(), 3)].into());
     let dropped = RecordingCounts { dropped_by_queue: 1, recorded: 9, ..uncounted.clone() }.verdict();
-    assert_eq!(dropped.text, "LOST: 1 datagram dropped by taxel's queue, and what the kernel dropped uncounted");
+    assert_eq!(dropped.text, "LOST: 1 datagram dropped by taxel's queue, and unknown losses in the kernel");
     // A kernel of another computer that does not count is no better.
     let bridged = Bridged { dropped_by_kernel: KernelDrops::UNKNOWN, ..Bridged::default() };
     let verdict = RecordingCounts { bridged: Some(Box::new(bridged)), ..sound.clone() }.verdict();

@@ -202,8 +202,11 @@ fn bytes_of_another_baud_rate_and_a_line_without_an_end_are_no_answer() {
             let error = line.greeting(Stop::never()).unwrap_err().to_string();
             over.store(true, Ordering::Relaxed);
             let is_port = error.starts_with('/');
-            let why =
-                if is_port { "bytes came that are not text: is its baud rate 115200?" } else { "is this the board's" };
+            let why = if is_port {
+                "bytes arrived that are not text: is the board's baud rate 115200?"
+            } else {
+                "is this the board's"
+            };
             assert!(error.contains(why), "{error}");
         });
     });

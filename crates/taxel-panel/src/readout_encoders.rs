@@ -81,10 +81,11 @@ impl ViewEncoder {
             (Some(name), Some(encoder)) => {
                 Ok(Self { encoder: encoder.clone(), name: name.to_owned(), of_readout: true })
             }
-            (Some("composite"), None) => {
-                Err(problem!("encoder composite: needs a readout with several encoders; none reads the shown sensor")
-                    .into())
-            }
+            (Some("composite"), None) => Err(problem!(
+                "encoder composite: needs a readout with several encoders, but no such readout reads the shown \
+                     sensor"
+            )
+            .into()),
             _ => Ok(Encoder::from_json(&json!(request).to_string())?.into()),
         }
     }

@@ -136,7 +136,7 @@ fn check_restart(hub: &Hub) -> Answer {
         return Err("a recording runs: stop it first".into());
     }
     if hub.live().is_none() {
-        return Err("this panel shows recordings only: begin it with taxel live --panel".into());
+        return Err("this panel shows recordings only: start it by taxel live --panel".into());
     }
     Ok(())
 }
@@ -223,7 +223,7 @@ fn record(hub: &Arc<Hub>, request: RecordRequest) -> Answer {
         return Err(Refusal::of_field("advance", "needs an index and a length"));
     }
     if hub.live().is_none() {
-        return Err("no board is connected: nothing to record".into());
+        return Err("nothing to record: no board is connected".into());
     }
     let plan = RecordingPlan {
         name: name.0,

@@ -131,7 +131,7 @@ impl ClientSession {
                 }
                 incoming = self.connection.receive(), if self.pending.has_room() => match incoming? {
                     Incoming::Text(text) if text.len() > MOST_BYTES => {
-                        return Err(Closing::With(TOO_BIG, "a message of more than 4 MiB"));
+                        return Err(Closing::With(TOO_BIG, "a message has more than 4 MiB"));
                     }
                     Incoming::Text(text) => self.handle(&text).await?,
                     Incoming::SignOfLife => {}
@@ -240,7 +240,7 @@ impl ClientSession {
             _ => false,
         };
         if !is_id {
-            let refusal = Refusal::of_field("id", "must be a whole number or a text of 64 characters");
+            let refusal = Refusal::of_field("id", "must be a whole number or a text of at most 64 characters");
             return self.refuse(Value::Null, String::new(), refusal).await;
         }
         let Some(kind) = keys.get("type").and_then(Value::as_str).map(str::to_owned) else {

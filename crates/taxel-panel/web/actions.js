@@ -50,7 +50,7 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
   /** Sets the rest of the watched taxel to its held value, for the readout too. */
   const zero = () => {
     const { taxel } = maps;
-    if (!taxel) return notify("point at a taxel first: click a map, or use its arrow keys", true);
+    if (!taxel) return notify("choose a taxel first: click it on a map, or use the arrow keys on the map", true);
     server.request({ type: "zero", taxels: [taxel] }).then(() => notify(`zeroed row ${taxel[1]}, column ${taxel[0]}`), failed);
   };
   /** Sets the rest of all taxels to their medians of the last second: nothing may touch the sensor. */

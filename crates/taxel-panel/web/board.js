@@ -173,7 +173,7 @@ class Control {
     this.row.classList.toggle("refused", reason !== null);
     this.input.setAttribute("aria-invalid", String(reason !== null));
     this.reason.hidden = reason === null;
-    write(this.reason, reason === null ? "" : `${reason}. Escape: back to ${this.text(this.held)} ${this.unit.name === "flag" ? "" : this.unit.name}`.trim());
+    write(this.reason, reason === null ? "" : `${reason}. Press Escape to restore ${this.text(this.held)} ${this.unit.name === "flag" ? "" : this.unit.name}`.trim());
   }
 
   /** @param {boolean} disabled */
@@ -285,7 +285,7 @@ export class Board {
    * @param {number | null} frame_us
    */
   showRecorded(values, frame_us) {
-    write(part("registers-why", HTMLElement), values ? "The values of the registers during the recording." : "This recording holds no registers of a board.");
+    write(part("registers-why", HTMLElement), values ? "The values of the registers during the recording." : "This recording contains no registers of a board.");
     part("registers-held", HTMLElement).hidden = !values;
     if (values) this.show(values, frame_us, null, true, false);
   }
@@ -293,7 +293,7 @@ export class Board {
   /** @param {RegistersMessage} message */
   take(message) {
     part("registers-held", HTMLElement).hidden = !this.hasRegisters;
-    if (!this.hasRegisters) return write(part("registers-why", HTMLElement), "A source of numbers has no registers.");
+    if (!this.hasRegisters) return write(part("registers-why", HTMLElement), "A sensor that prints numbers has no registers.");
     const assumed = message.known || message.stated ? "" : "; the values below are those of a board at reset";
     write(part("registers-why", HTMLElement), this.writable ? "" : `No control line, so registers cannot be read or set${assumed}. Choose a port above.`);
     this.show(message.values, message.frame_us, message.preset, message.known, message.stated);

@@ -57,8 +57,8 @@ export class LabelConflict {
     const were = (/** @type {number} */ count) => (count === 1 ? "was" : "were");
     const lacks = missing.length ? `lacks ${counted(missing.length, "label")} that ${were(missing.length)} set on the page` : "";
     const again = returned.length ? `has ${counted(returned.length, "label")} again that ${were(returned.length)} deleted or changed on the page` : "";
-    const change = `Another program saved ${message.path}: it ${[lacks, again].filter(Boolean).join(", and ")}.`;
-    write(part("conflict-text", HTMLElement), `${change} Choose which version counts.${added.length ? " New labels of the file stay in both." : ""}`);
+    const change = `Another program saved ${message.path}: the file ${[lacks, again].filter(Boolean).join(", and ")}.`;
+    write(part("conflict-text", HTMLElement), `${change} Choose the version to keep.${added.length ? " New labels of the file stay in both." : ""}`);
     const line = (/** @type {string} */ acknowledged, /** @type {string} */ file, /** @type {string} */ kind) =>
       make("tr", { class: kind }, make("td", {}, acknowledged), make("td", {}, file));
     part("conflict-rows", HTMLElement).replaceChildren(

@@ -200,7 +200,7 @@ export class Connection {
     if (!this.source.input.value) this.source.at(source ?? this.source.before[0] ?? null);
     this.showSource();
     part("numbers-others", HTMLElement).hidden = !others.length;
-    write(part("numbers-others", HTMLElement), `Recorded only, not shown or read out here: ${others.join(", ")}.`);
+    write(part("numbers-others", HTMLElement), `Only recorded, not shown and without a readout: ${others.join(", ")}.`);
     part("control-drop", HTMLButtonElement).disabled = control === null;
     part("delta-intensity", HTMLInputElement).checked = delta_intensity ?? false;
     const stated = Object.entries(options ?? {}).filter(([, value]) => value !== null && String(value) !== "");
@@ -211,9 +211,9 @@ export class Connection {
   /** @param {Places} places */
   offer({ serial, addresses }) {
     const ports = serial.map((port) => ({ address: port.place, text: [port.place, described(port)].filter(Boolean).join(" · ") }));
-    this.line.offer([{ label: "Serial ports", choices: ports }], "no serial port found: type a place below");
+    this.line.offer([{ label: "Serial ports", choices: ports }], "no serial port found: type the port below");
     const sources = ports.map(({ address, text }) => ({ address: `serial:${address}`, text }));
-    this.source.offer([{ label: "Serial ports", choices: sources }], "no serial port found: type a source below");
+    this.source.offer([{ label: "Serial ports", choices: sources }], "no serial port found: type the source below");
     const port = hostAndPort(this.udp)[1] || 5208;
     const each = addresses.map(({ host, name }) => ({ address: `${host}:${port}`, text: `${host}:${port} · ${name}` }));
     const all = { address: `0.0.0.0:${port}`, text: `0.0.0.0:${port} · every address` };

@@ -14,7 +14,7 @@ const LOSSES = {
   damaged: "bytes that are not valid words",
   outside: "taxels outside the array",
   readout: "events dropped because the queue before the readout was full",
-  panel: "events missing only in this panel's curves and its view of the past",
+  panel: "events missing in this panel's curves and in its view of the past, but not in the recording",
 };
 
 /**
@@ -33,7 +33,7 @@ export function writeCounters(counters, drawn) {
   // The rate follows from the registers, so it says nothing of a board that is off.
   const arrives = counters.arrival.state === "arriving";
   put("frames", number(arrives ? counters.frames_per_s : null, integer));
-  entitle(part("frames", HTMLElement), "title", counters.frames_per_s === null ? "not known: give --rate-hz and --bits, or --preset, or connect the control line" : arrives ? "" : `nothing arrives; the registers say ${integer(counters.frames_per_s)}/s`);
+  entitle(part("frames", HTMLElement), "title", counters.frames_per_s === null ? "unknown: give --rate-hz and --bits, or --preset, or connect the control line" : arrives ? "" : `nothing arrives; the registers state ${integer(counters.frames_per_s)}/s`);
   // Events that only the panel lacks are in every recording and in the readout.
   const all = Object.entries(lost).reduce((sum, [stage, count]) => sum + (stage === "panel" ? 0 : count ?? 0), 0);
   // What the kernel does not count may be more.

@@ -125,7 +125,7 @@ export class Description {
   /** Writes what is stated, and reads the recording again. @param {Omit<DescribeRequest, "type" | "name">} stated */
   async write(stated) {
     const { name } = this;
-    if (stated.rate_hz !== undefined && this.labelled(name)) return this.refuse("the labels of this recording are frame numbers, which do not fit times in seconds: delete the labels first");
+    if (stated.rate_hz !== undefined && this.labelled(name)) return this.refuse("the labels of this recording are frame numbers, not times in seconds: delete the labels before you state a rate");
     if (!Object.keys(stated).length) return this.refuse("nothing to save: fill in a field first");
     try {
       await this.server.request({ type: "describe", name, ...stated });

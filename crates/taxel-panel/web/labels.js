@@ -235,7 +235,7 @@ export class Labels {
     this.offerName();
     this.conflict.show(this.file ? this.files.get(this.file) : undefined);
     write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
-    this.lane.dataset.hint = this.file ? "Labels: click here to add a label" : "Labels: open a recording or start one first";
+    this.lane.dataset.hint = this.file ? "Labels: click here to add a label" : "Labels: open or start a recording first";
     this.showPlace();
     part("train-line", HTMLElement).hidden = !labels.length;
     // Who has made labels knows how, and needs the room.
@@ -260,7 +260,7 @@ export class Labels {
   showPlace() {
     const table = this.file ? this.files.get(this.file) : undefined;
     const how = this.server.saves ? "Saving" : table?.labels.length ? "Saved" : "To be saved";
-    write(part("label-place", HTMLElement), table ? `${how} in ${table.path}` : "Open a recording or start one, then label its events.");
+    write(part("label-place", HTMLElement), table ? `${how} in ${table.path}` : "Open or start a recording, then label its events.");
   }
 
   /** The row of a label, made again only where it is another. @param {Label} label @returns {HTMLElement} */

@@ -293,7 +293,7 @@ function receive(message) {
     case "cut":
       return notify(`wrote ${message.name}${message.lost.length ? `; left out: ${message.lost.join(", ")}` : ""}`);
     case "loading":
-      return notify(message.share < 1 ? `${message.name}: ${Math.round(100 * message.share)} % read; its beginning is shown` : `${message.name} is read`);
+      return notify(message.share < 1 ? `${message.name}: ${Math.round(100 * message.share)} % read; the beginning is shown` : `${message.name} is read`);
     case "warning":
       return notify(message.text, true);
     case "refused":
@@ -464,9 +464,9 @@ function move(transport) {
 function showDetections(shown, labels) {
   const chosen = training.readout.value;
   const ofRecording = !chosen
-    ? "None in this recording: train on labels, or choose a readout."
-    : chosen === training.reads ? `None: ${chosen} detected nothing in this recording.` : `None yet: ${chosen} reads this recording.`;
-  const none = opened ? ofRecording : hello?.readout ? "None yet." : "No readout runs: start taxel live with one, or choose one here.";
+    ? "No detections in this recording: train on labels, or choose a readout."
+    : chosen === training.reads ? `${chosen} detected nothing in this recording.` : `No detections yet: ${chosen} is reading this recording.`;
+  const none = opened ? ofRecording : hello?.readout ? "None yet." : "No readout is running: start taxel live with a readout, or choose a readout here.";
   detections.show(shown, none, labels);
   marksDue = true;
 }
@@ -608,7 +608,7 @@ addEventListener("beforeunload", (event) => {
 });
 if (fragment.get("token")) server.open();
 else {
-  connection.why = "the address has no token: copy the whole line that taxel printed";
+  connection.why = "the token is missing in the address: copy the whole line that taxel printed";
   writeState();
   failed(new Error(connection.why));
 }

@@ -285,7 +285,7 @@ export class Maps {
 
   /** @returns {string} the taxel under the crosshair; of a board its traces, too */
   named() {
-    if (!this.taxel) return "none: click a map, or use its arrow keys";
+    if (!this.taxel) return "none: click a map, or use the arrow keys on a map";
     const [x, y] = this.taxel;
     return this.geometry.named(this.taxel) + (this.values.frames ? "" : ` · sense line ${y}, driven line ${x}`);
   }

@@ -65,7 +65,7 @@ export class Notes {
   /** Makes labels of all of them, or of none. */
   async use() {
     const { unused } = this;
-    if (unused.length > MOST_MARKS) return notify(`${unused.length} notes: at most ${MOST_MARKS} can become labels at a time`, true);
+    if (unused.length > MOST_MARKS) return notify(`${unused.length} notes: at most ${MOST_MARKS} notes can become labels at a time`, true);
     this.button.disabled = true;
     /** @type {Map<string, { label: string, source?: string, t_us: number[], replaces_us: number[] }>} */
     const groups = new Map();

@@ -44,7 +44,7 @@ export const MISSING = 0xffffffff;
  */
 export function readFrame(buffer) {
   const view = new DataView(buffer);
-  if (view.getUint32(0) !== 0x54584631) throw new Error("a frame that does not begin with TXF1");
+  if (view.getUint32(0) !== 0x54584631) throw new Error("the message's first bytes are not TXF1");
   const flags = view.getUint16(6, true);
   const t = view.getBigInt64(16, true);
   const watched = view.getUint32(40, true);

@@ -21,22 +21,22 @@
 /** @type {readonly Field[]} */
 export const FIELDS = [
   { name: "random_lines", manual: "use_rand_row", register: 0, low: 0, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "Lines are driven in random order." },
-  { name: "mechanoreceptor", manual: "comparator_mode", register: 0, low: 1, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "Each taxel is an FA-1 afferent (5.4.2): events are its spikes, intensities its integral; else changes." },
+  { name: "mechanoreceptor", manual: "comparator_mode", register: 0, low: 1, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "If set, each taxel is an FA-1 afferent (5.4.2): events are its spikes, intensities its integral. Otherwise events are changes." },
   { name: "invert_comparator", manual: "invert_comparator", register: 0, low: 2, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "A falling edge ends a sample." },
-  { name: "frame_sync", manual: "use_frame_sync", register: 0, low: 3, bits: 1, offset: 0, unit: "flag", default: true, least: 0, greatest: 1, text: "All events of a frame carry the time of its start." },
-  { name: "wire_version", manual: "wire_version", register: 0, low: 4, bits: 2, offset: 1, unit: "version", default: 1, least: 1, greatest: 2, text: "Version of the wire protocol that the board uses (read: the manual has only one)." },
-  { name: "pattern", manual: "pattern", register: 0, low: 6, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "The values of a ball that rolls take the place of the comparators' (read: the manual has no such bit)." },
-  { name: "threshold_jump", manual: "threshold_jump", register: 0, low: 16, bits: 16, offset: 0, unit: "1/256 theta_0", default: 0, least: 0, greatest: 65535, text: "FA-1: increase of the threshold by a spike, T A of Table 5.3." },
+  { name: "frame_sync", manual: "use_frame_sync", register: 0, low: 3, bits: 1, offset: 0, unit: "flag", default: true, least: 0, greatest: 1, text: "All events of a frame have the time at which the frame starts." },
+  { name: "wire_version", manual: "wire_version", register: 0, low: 4, bits: 2, offset: 1, unit: "version", default: 1, least: 1, greatest: 2, text: "Version of the wire protocol that the board uses (our reading: the manual has only one version)." },
+  { name: "pattern", manual: "pattern", register: 0, low: 6, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "The board sends the values of a simulated rolling ball instead of the comparators' values (our reading: the manual has no such bit)." },
+  { name: "threshold_jump", manual: "threshold_jump", register: 0, low: 16, bits: 16, offset: 0, unit: "1/256 theta_0", default: 0, least: 0, greatest: 65535, text: "FA-1: how much a spike raises the threshold (T A of Table 5.3)." },
   { name: "line_period", manual: "row_change_period", register: 1, low: 0, bits: 32, offset: 0, unit: "10 ns", default: 300, least: 1, greatest: 4294967295, text: "Time from one driven line to the next." },
   { name: "line_read", manual: "row_read_duration", register: 2, low: 0, bits: 32, offset: 0, unit: "10 ns", default: 300, least: 1, greatest: 4294967295, text: "Part of line_period in which the line is read." },
   { name: "step_period", manual: "col_change_period", register: 3, low: 0, bits: 16, offset: 0, unit: "10 ns", default: 75, least: 1, greatest: 65535, text: "Time from one multiplexer step to the next." },
   { name: "step_read", manual: "col_read_duration", register: 3, low: 16, bits: 16, offset: 0, unit: "10 ns", default: 55, least: 4, greatest: 65535, text: "Part of step_period in which the channels are read." },
   { name: "ramp", manual: "ramp_time", register: 4, low: 0, bits: 16, offset: 0, unit: "ticks", default: 150, least: 1, greatest: 65534, text: "Duration of the ramp." },
   { name: "threshold_rest", manual: "threshold_rest", register: 4, low: 16, bits: 16, offset: 0, unit: "1/1024", default: 0, least: 0, greatest: 65535, text: "FA-1: theta_0, in ticks after the power law." },
-  { name: "threshold_decay", manual: "threshold_decay", register: 5, low: 0, bits: 8, offset: 0, unit: "1/1024 theta_0", default: 0, least: 0, greatest: 255, text: "FA-1: decrease of the threshold by a frame without a spike, B of Table 5.3." },
+  { name: "threshold_decay", manual: "threshold_decay", register: 5, low: 0, bits: 8, offset: 0, unit: "1/1024 theta_0", default: 0, least: 0, greatest: 255, text: "FA-1: how much a frame without a spike lowers the threshold (B of Table 5.3)." },
   { name: "noise_floor", manual: "noise_floor", register: 5, low: 8, bits: 8, offset: 0, unit: "ticks", default: 3, least: 0, greatest: 255, text: "Largest difference that does not cause an event." },
-  { name: "lines", manual: "nrows", register: 5, low: 16, bits: 8, offset: 1, unit: "lines", default: 64, least: 1, greatest: 256, text: "Number of driven lines (the register holds one less; the manual's field has 6 bits, read: 8)." },
-  { name: "record", manual: "record", register: 7, low: 16, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "Recording: setting and clearing it sends a marker and switches the sync line." },
+  { name: "lines", manual: "nrows", register: 5, low: 16, bits: 8, offset: 1, unit: "lines", default: 64, least: 1, greatest: 256, text: "Number of driven lines (the register contains one less; the manual's field has 6 bits, our reading: 8)." },
+  { name: "record", manual: "record", register: 7, low: 16, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "A recording is running: setting and clearing this bit sends a marker and switches the sync line." },
   { name: "channels", manual: "channels", bits: 8, offset: 0, unit: "channels", default: 16, least: 0, greatest: 255, text: "Channels of the converter, 16 or 64: a property of the board, not a register." },
 ];
 
@@ -78,10 +78,10 @@ export function refused(v) {
   if (line_read > line_period) broken.push({ rule: 1, text: `line_read ${us(line_read)} us is longer than line_period ${us(line_period)} us (rule 1)` });
   if (step_read > step_period) broken.push({ rule: 1, text: `step_read ${us(step_read)} us is longer than step_period ${us(step_period)} us (rule 1)` });
   if (steps * step_period > line_read) broken.push({ rule: 2, text: `${steps} x step_period ${us(step_period)} us is longer than line_read ${us(line_read)} us (rule 2)` });
-  if (ramp + 5 > 3 * step_read) broken.push({ rule: 3, text: `ramp ${ramp} ticks leaves no 5 ticks of step_read ${us(step_read)} us = ${3 * step_read} ticks in which it falls (rule 3)` });
-  if (random_lines !== 0 && 16 * lines > line_period) broken.push({ rule: 5, text: `random_lines: to drive any of ${lines} lines next takes up to ${us(16 * lines)} us, longer than line_period ${us(line_period)} us (rule 5)` });
-  if (channels + 10 > step_period) broken.push({ rule: 7, text: `step_period ${us(step_period)} us is too short for ${channels} channels: the logic compares one a clock and wants ${us(channels + 10)} us (rule 7)` });
-  if (wire_version !== 2 && (driven_lines > 64 || sense_lines > 64)) broken.push({ rule: 8, text: `version 1 of the wire names 64 x 64 taxels, the array has ${sense_lines} x ${driven_lines}: choose version 2 (rule 8)` });
+  if (ramp + 5 > 3 * step_read) broken.push({ rule: 3, text: `ramp ${ramp} ticks is too long for step_read ${us(step_read)} us = ${3 * step_read} ticks: the ramp must be at least 5 ticks shorter (rule 3)` });
+  if (random_lines !== 0 && 16 * lines > line_period) broken.push({ rule: 5, text: `random_lines: moving to any of ${lines} lines takes up to ${us(16 * lines)} us, longer than line_period ${us(line_period)} us (rule 5)` });
+  if (channels + 10 > step_period) broken.push({ rule: 7, text: `step_period ${us(step_period)} us is too short for ${channels} channels: the logic compares one channel per clock and needs ${us(channels + 10)} us (rule 7)` });
+  if (wire_version !== 2 && (driven_lines > 64 || sense_lines > 64)) broken.push({ rule: 8, text: `version 1 of the wire can address only 64 x 64 taxels, but the array has ${sense_lines} x ${driven_lines}: choose version 2 (rule 8)` });
   return broken;
 }
 
@@ -94,8 +94,8 @@ export function warned(v) {
   /** @type {BrokenRule[]} */
   const broken = [];
   const { random_lines, step_period, step_read, ramp, noise_floor, lines } = v;
-  if (step_period - step_read < 20) broken.push({ rule: 5, text: `step_period ${us(step_period)} us leaves ${us(step_period - step_read)} us before step_read ${us(step_read)} us: taxels settle in ${us(20)} us (rule 5)` });
-  if (random_lines !== 0 && 16 * lines + 20 > step_period - step_read) broken.push({ rule: 5, text: `random_lines: ${us(step_period - step_read)} us before step_read: any of ${lines} lines settles in ${us(16 * lines + 20)} us (rule 5)` });
-  if (noise_floor >= ramp) broken.push({ rule: 6, text: `noise_floor ${noise_floor} ticks is not below ramp ${ramp} ticks: no event can ever come (rule 6)` });
+  if (step_period - step_read < 20) broken.push({ rule: 5, text: `step_period ${us(step_period)} us leaves only ${us(step_period - step_read)} us before step_read ${us(step_read)} us: taxels need ${us(20)} us to settle (rule 5)` });
+  if (random_lines !== 0 && 16 * lines + 20 > step_period - step_read) broken.push({ rule: 5, text: `random_lines: only ${us(step_period - step_read)} us are left before step_read: with ${lines} lines, taxels need ${us(16 * lines + 20)} us to settle (rule 5)` });
+  if (noise_floor >= ramp) broken.push({ rule: 6, text: `noise_floor ${noise_floor} ticks must be below ramp ${ramp} ticks: otherwise the board sends no events (rule 6)` });
   return broken;
 }

@@ -104,7 +104,7 @@ export class Server {
     if (this.socket?.readyState !== WebSocket.OPEN) return Promise.reject(new Error("no connection to the server"));
     const id = this.next++;
     const bytes = new Blob([JSON.stringify({ ...message, id })]).size;
-    if (bytes > this.mostBytes) return Promise.reject(new Error(`the request is too large: ${size(bytes)}; must be at most ${size(this.mostBytes)}`));
+    if (bytes > this.mostBytes) return Promise.reject(new Error(`the request has ${size(bytes)}; must have at most ${size(this.mostBytes)}`));
     return new Promise((done, refused) => {
       this.pending.set(id, { type: message.type, done, refused });
       this.send({ ...message, id });

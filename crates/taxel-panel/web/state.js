@@ -27,11 +27,11 @@ function silence(counters, address, isBoard, firewall) {
   if (arrival.state === "nothing") {
     const text = isBoard
       ? `Nothing has arrived at ${address} so far. Is the board on, and does it send to this address and port?${firewall}`
-      : `No frame has arrived from ${address} so far. Is it connected, and does it print lines of numbers?`;
+      : `No frame has arrived from ${address} so far. Is the sensor connected, and does it print lines of numbers?`;
     return elapsed_s < FIRST_WITHIN_S ? null : { word: "Nothing arrives", text };
   }
   if (arrival.state === "lost" && !isBoard) return { word: "Silent", text: `The line is silent: nothing has arrived from ${address} ${since}.` };
-  if (arrival.state === "lost") return { word: "Lost", text: `The board is lost: nothing has arrived ${since}, though it sent a heartbeat at least every ${short(arrival.heartbeat_us ?? 0)}.` };
+  if (arrival.state === "lost") return { word: "Lost", text: `The board is lost: nothing has arrived ${since}, although the board sends a heartbeat at least every ${short(arrival.heartbeat_us ?? 0)}.` };
   if (taring) return { word: "Tare", text: "Taking a tare: leave the sensor at rest." };
   return arrival.state === "quiet" ? { word: "Quiet", text: `Quiet: nothing has arrived ${since}.` } : null;
 }
@@ -59,7 +59,7 @@ function liveFall(hello, counters) {
 function preload(opened) {
   const sources = opened?.frames?.sources ?? [{ name: "", preload_at: opened?.preload_at ?? "" }];
   const loads = sources.filter((source) => source.preload_at).map(({ name, preload_at }) => (sources.length > 1 ? `${name}, ${preload_at}` : preload_at));
-  return loads.length ? `The rest was measured in a quiet time, but something pressed then on ${loads.join("; ")}.` : "";
+  return loads.length ? `Something pressed on the sensor while its rest was measured: ${loads.join("; ")}.` : "";
 }
 
 /** @param {Opened | null} opened @param {Hello | null} hello @returns {string} how many frames there are, and rows and columns of each sensor */

@@ -95,7 +95,7 @@ export class Training {
     const { t_us } = this.player;
     this.readout.value = readout;
     this.chosen();
-    if (readout) notify(`${readout} reads ${source ?? "the board: leave it at rest for the tare"}`);
+    if (readout) notify(`${readout} reads ${source ?? "the board: leave the sensor at rest for the tare"}`);
     /** @type {import("./messages.js").Request} */
     const request = readout ? { type: "read_out", readout } : source === null ? { type: "live" } : { type: "open", name: source };
     try {

@@ -164,7 +164,7 @@ export class View {
     write(part("cut-to-time", HTMLElement), seconds(to));
     const ready = this.source !== null && from !== null && to !== null;
     part("cut-write", HTMLButtonElement).disabled = !ready;
-    write(part("cut-why", HTMLElement), this.source === null ? "Open a recording first: a cut writes a part of it to a file." : "");
+    write(part("cut-why", HTMLElement), this.source === null ? "Open a recording first: a cut writes a part of a recording to a file." : "");
     const name = part("cut-name", HTMLInputElement);
     if (!name.value && this.source) name.value = this.source.replace(/(\.[^.]+)$/, "-cut$1");
   }

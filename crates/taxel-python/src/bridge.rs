@@ -25,7 +25,7 @@ impl ParcelFeed {
     /// The pipeline's end; it can be had once.
     pub(crate) fn receiver(&self) -> taxel_live::Result<Receiver> {
         let taken = self.receiver.lock().unwrap_or_else(PoisonError::into_inner).take();
-        taken.ok_or_else(|| problem!("feed: a pipeline receives from it already").into())
+        taken.ok_or_else(|| problem!("feed: a pipeline already receives from this feed").into())
     }
 }
 

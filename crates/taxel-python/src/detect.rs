@@ -29,7 +29,8 @@ pub(crate) fn to_detections((labels, t, known, slope, repaired): DetectionsIn<'_
     let repaired = slice("repaired", &repaired)?;
     for (name, len) in [("t", t.len()), ("known", known.len()), ("slope", slope.len()), ("repaired", repaired.len())] {
         if len != labels.len() {
-            let text = format!("detections: {name} has {len} entries, label has {}: they must be equal", labels.len());
+            let text =
+                format!("detections: {name} has {len} entries, label has {}: the numbers must be equal", labels.len());
             return Err(ProblemError::new_err(text));
         }
     }
@@ -91,7 +92,7 @@ pub fn score(
     let t = slice("t", &t)?;
     if t.len() != labels.len() {
         return Err(ProblemError::new_err(format!(
-            "truth: {} labels for {} times: must be equal",
+            "truth: {} labels for {} times: the numbers must be equal",
             labels.len(),
             t.len()
         )));

@@ -130,7 +130,7 @@ impl Live {
         let fed = feed.map(|feed| feed.receiver()).transpose().map_err(live)?;
         let pipeline = enter(py, |stop| Pipeline::open(options, fed, sinks, stop))?;
         Ok(Self {
-            pipeline: Threaded::new("live", "live: has been stopped; begin a new one", pipeline),
+            pipeline: Threaded::new("live", "live: has been stopped; begin a new Live", pipeline),
             summary: Mutex::default(),
         })
     }
@@ -276,7 +276,8 @@ impl Live {
     fn stop(&self, py: Python<'_>) -> PyResult<Ended> {
         self.pipeline.check()?;
         if IN_CALLBACK.get() {
-            let text = "live: `say` must not call `stop`, which would wait for `say`: call it from another thread";
+            let text = "live: `say` must not call `stop`, because `stop` waits for `say`: call `stop` from another \
+                        thread";
             return Err(ProblemError::new_err(text));
         }
         enter(py, |_| {

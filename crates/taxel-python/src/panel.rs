@@ -40,7 +40,7 @@ impl Panel {
             let options = PanelOptions { address, folder, open: opened, open_by_handler, control, registers_stated };
             Server::start(options, handle, handlers)
         })?;
-        Ok(Self(Threaded::new("panel", "panel: has been stopped; begin a new one", server)))
+        Ok(Self(Threaded::new("panel", "panel: has been stopped; begin a new Panel", server)))
     }
 
     /// Host and port on which it listens.

@@ -211,7 +211,7 @@ impl RecordingWriter {
         let header: Header = parsed("header", header)?;
         let options = WriterOptions { compression: compression.parse().map_err(core)?, overwrite };
         let writer = enter(py, |_| Writer::create(&path, &header, options))?;
-        let writer = Threaded::new("recording", "the recording is finished: begin a new one", writer);
+        let writer = Threaded::new("recording", "the recording is finished: begin a new recording", writer);
         Ok(Self { writer: Arc::new(writer), source: None })
     }
 

@@ -77,7 +77,9 @@ impl WireDecoder {
         let (data, lengths, room) = (slice("data", &data)?, slice("lengths", &lengths)?, to_room(&mut columns)?);
         let columns = self.0.enter(py, |decoder, stop| match decoder {
             VersionedDecoder::One(decoder) => decoder.fill_datagrams(data, lengths, room, stop),
-            VersionedDecoder::Two(..) => Err(problem!("lengths"; ": datagrams of version 2 have theirs before them")),
+            VersionedDecoder::Two(..) => Err(problem!(
+                "lengths"; ": must be left out for version 2, whose datagrams come with their lengths"
+            )),
         })?;
         Ok(from_filled(py, columns))
     }

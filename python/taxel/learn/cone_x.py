@@ -64,8 +64,8 @@ class Certificate:
     Examples
     --------
     >>> trains = SpikeTrains.from_lists([[50.0], [60.0]], stop=100.0)
-    >>> print(str(ConeX().fit([trains], [[40.0]]).certificate_)[:95])
-    no weights within the bounds fire at pattern 0 target 0 (40 ms): no input counts before it. Imp
+    >>> print(str(ConeX().fit([trains], [[40.0]]).certificate_)[:87])
+    with weights within the bounds, the neuron cannot fire in pattern 0 at target 0 (40 ms)
     """
 
     rows: list[Row]

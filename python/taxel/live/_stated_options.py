@@ -65,7 +65,7 @@ class StatedOptions:
         None,
         "Rest of the taxels: a saved tare, or the seconds at rest at the beginning, from which a fresh tare is taken.",
         metavar="FILE|SECONDS",
-        typed="A recording of them at rest (taxel cut) is a tare too.",
+        typed="A recording of the sensor at rest (taxel cut) can be used instead of a saved tare.",
     )
     record: str | os.PathLike[str] | None = option(None, "Record in a new file (.mcap or .lsa).")
     record_later: bool = option(

@@ -143,7 +143,7 @@ class Live:
     >>> live.stop().counters["wire"]["changes"] == sent["datagrams"]
     True
     >>> live
-    Live(ended; nothing lost after arrival (version 1 of the wire cannot show what was lost before it))
+    Live(ended; nothing lost after arrival (version 1 of the wire cannot show losses before arrival))
     """
 
     @with_fields_of(LiveOptions)

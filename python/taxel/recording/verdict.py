@@ -85,9 +85,10 @@ class Verdict(str):
       off by more than a second and a hundredth of the time.
     - ``bad_chunks``, ``large_chunks``, ``skipped_bytes``, ``torn_bytes``, ``repeated_in_file``, ``no_final_counts``:
       damage in the file; messages there twice are read twice.
-    - ``bytes_after_end`` ("bytes behind its end not read"): something was appended, as by ``cat``: use `taxel.merge`.
-    - ``changed_since_recorded`` ("what it holds is not what was recorded"): checksums differ.
-    - ``no_summary`` ("the summary at the end missing or damaged"): cut after all data; other programs may refuse the
+    - ``bytes_after_end`` ("bytes after the end of the recording not read"): something was appended, as by
+      ``cat``: use `taxel.merge`.
+    - ``changed_since_recorded`` ("the content was changed after recording"): checksums differ.
+    - ``no_summary`` ("the summary at the end is missing or damaged"): cut after all data; other programs may refuse the
       file.
 
     Causes in `noted`:
@@ -99,7 +100,7 @@ class Verdict(str):
     - ``bytes_of_unfinished_lines``: the beginning or the end did not arrive.
     - ``clock_began_anew`` ("restarts of its clock"), ``missing_values``: streams: back by more than a second, then
       times by arrival; ``nan``.
-    - ``silences`` ("no frame came for a second or more"), ``silent_ms``: of sources of frames;
+    - ``silences`` ("no frame arrived for a second or more"), ``silent_ms``: of sources of frames;
       ``silences_of_other_computer``, ``restarts_of_other_computer``: of a bridge.
     - ``gaps``, ``gaps_us``: number and sum.
 

@@ -89,7 +89,7 @@ impl EpochLearner {
         }
         all.extend(parameters);
         if let Some(missing) = required.iter().find(|name| !all.contains_key(**name)) {
-            return Err(problem!(*missing; ": its source does not give it, so it must be given"));
+            return Err(problem!(*missing; ": must be given, because the rule's publication does not state it"));
         }
         (source.arrange)(&mut all)?;
         let take = |all: &Map<String, Value>, names: &[&str]| -> Value {

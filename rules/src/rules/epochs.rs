@@ -219,7 +219,7 @@ impl Training {
         if let Some([low, high]) = self.initial
             && low > high
         {
-            return Err(problem!("initial"; " is {low} to {high} mV: must be two finite weights, the lower first"));
+            return Err(problem!("initial"; " is {low} to {high} mV: must be two finite weights, the smaller first"));
         }
         Ok(())
     }
@@ -238,7 +238,7 @@ impl Training {
         let eta = self
             .eta
             .or_else(|| rule.eta(trains, targets.iter().map(Vec::len).sum()))
-            .ok_or_else(|| problem!("eta"; ": no learning rate was published for this rule, give one"))?;
+            .ok_or_else(|| problem!("eta"; ": no learning rate was published for this rule; give one"))?;
         let mut weights = match start {
             Some(start) => {
                 one_weight_a_train(start, trains)?;
@@ -246,7 +246,7 @@ impl Training {
             }
             None => {
                 let [low, high] = self.initial.or_else(|| rule.initial(trains)).ok_or_else(
-                    || problem!("initial"; ": no first weights were published for this rule, give a range"),
+                    || problem!("initial"; ": no first weights were published for this rule; give a range"),
                 )?;
                 (0..trains).map(|_| low + (high - low) * random.random::<f64>()).collect()
             }
@@ -307,7 +307,7 @@ impl Training {
                 }
             }
             if weights.iter().any(|w| !w.is_finite()) {
-                return Err(problem!("eta"; " is {eta}: the weights grew beyond all bounds, take a smaller one"));
+                return Err(problem!("eta"; " is {eta}: the weights grew without limit; give a smaller eta"));
             }
         }
         let ended = if right.last() == Some(&1.0) { Ended::Right } else { Ended::Epochs };

@@ -52,7 +52,9 @@ impl Filt {
         self.check_ranges()?;
         let (tau, tau_q) = (neuron.tau, self.tau_q);
         let Current::Exponential { tau_s } = neuron.current else {
-            return Err(problem!("current is a double exponential: FILT is stated for an exponential one"));
+            return Err(problem!(
+                "current is a double exponential: must be a single exponential, for which FILT was published"
+            ));
         };
         let eps_0 = peak_factor(tau, tau_s);
         Ok(FiltRule { eps_0, tau, tau_s, tau_q, c_m: tau / (tau + tau_q), c_s: tau_s / (tau_s + tau_q) })

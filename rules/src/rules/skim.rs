@@ -115,7 +115,7 @@ impl Normal {
         let (m, r, z) = (self.columns, self.r(), self.z());
         let r = MatRef::from_row_major_slice(&r, m, m);
         let z = Mat::from_fn(m, 1, |j, _| z[j]);
-        let svd = r.thin_svd().map_err(|_| problem!("the rows of these patterns have no singular values"))?;
+        let svd = r.thin_svd().map_err(|_| problem!("the singular values of these patterns' rows cannot be computed"))?;
         let values = svd.S().column_vector();
         let least = f64::EPSILON * m as f64 * values.iter().copied().fold(0.0, f64::max);
         let mut along = svd.U().transpose() * &z;
@@ -331,11 +331,11 @@ impl BatchRule for Skim {
             return Err(problem!("tau_s"; " is {} ms: must be below tau, {} ms", self.tau_s(), self.tau));
         }
         if self.thresholds.is_empty() {
-            return Err(problem!("thresholds"; ": must hold at least one"));
+            return Err(problem!("thresholds"; ": must contain at least one"));
         }
         for (name, value) in [("spread", self.spread), ("delay_ms", self.delay_ms)] {
             if self.branches.is_some() && value.is_none() {
-                return Err(problem!(name; ": none was published for a layer of branches, give one"));
+                return Err(problem!(name; ": none was published for a layer of branches; give one"));
             }
         }
         Ok(())

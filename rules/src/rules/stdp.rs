@@ -147,11 +147,15 @@ impl StdpNeuron {
     /// then), `Interrupted` if the caller stops it (the weights learnt so far remain).
     pub fn push(&mut self, piece: &SpikeTrains, learn: bool, stop: Stop<'_>) -> Result<Vec<f64>> {
         if piece.len() != self.weights.len() {
-            return Err(problem!("piece of {} trains: must be {}, as before", piece.len(), self.weights.len()));
+            return Err(problem!(
+                "the piece has {} trains: must have {}, like the pieces before",
+                piece.len(),
+                self.weights.len()
+            ));
         }
         check_ungraded(piece, "stdp")?;
         if piece.start < self.now {
-            return Err(problem!("piece from {} ms: must begin at {} ms or later", piece.start, self.now));
+            return Err(problem!("the piece begins at {} ms: must begin at {} ms or later", piece.start, self.now));
         }
         let spikes = piece.by_time(stop)?;
         let mut out = vec![];

@@ -243,7 +243,7 @@ impl Tempotron {
                 }
             }
             if weights.iter().any(|w| !w.is_finite()) {
-                return Err(problem!("eta"; " is {eta}: the weights grew beyond all bounds, take a smaller one"));
+                return Err(problem!("eta"; " is {eta}: the weights grew without limit; give a smaller eta"));
             }
             let share = 1.0 - errors as f64 / patterns.len() as f64;
             if trained.right.iter().all(|&r| r <= share) {
@@ -284,15 +284,15 @@ fn crossing(shape: &Shape, state: KernelSum, end: f64, threshold: f64) -> f64 {
 
 fn check_labelled(patterns: &[SpikeTrains], labels: &[bool]) -> Result<()> {
     if patterns.is_empty() {
-        return Err(problem!("patterns"; ": there is none, at least one is needed"));
+        return Err(problem!("patterns"; " is empty: must contain one pattern or more"));
     }
     if patterns.len() != labels.len() {
-        return Err(problem!("labels"; ": {} for {} patterns, must be one per pattern", labels.len(), patterns.len()));
+        return Err(problem!("labels"; ": {} for {} patterns; must be one per pattern", labels.len(), patterns.len()));
     }
     for (p, pattern) in patterns.iter().enumerate() {
         taxel_core::learn::check_pattern(p, pattern)?;
         if labels[p] && pattern.times.is_empty() {
-            return Err(problem!("pattern {p}: has no spike, so no weight can make the neuron fire in it"));
+            return Err(problem!("pattern {p}: has no spike, so the neuron cannot fire"));
         }
         taxel_core::learn::check_trains(p, pattern, patterns[0].len())?;
     }

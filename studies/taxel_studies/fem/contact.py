@@ -101,7 +101,7 @@ class Contact:
         touching = pressure > 0
         near, segment, numbers, share = near[touching], segment[touching], numbers[touching], share[touching]
         if np.any((segment == 0) & (share < 0)) or np.any((segment == last) & (share > 1)):
-            raise ArithmeticError("the contact reaches the end of the arc")
+            raise ArithmeticError("the contact reaches the end of the half disc's arc; press less deep")
         q = x[numbers].reshape(len(near), 12)
         shifted = q + 1j * _STEP * np.vstack([np.zeros(12), np.eye(12)])[:, None]
         force, traction, place = self._element(shifted, near, segment, before)

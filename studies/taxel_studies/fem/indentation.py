@@ -237,7 +237,7 @@ class Course:
             raise
         except Exception as error:
             raise FormatError(
-                f"{path}: holds no course of an indentation ({error}); remove it, and run it again"
+                f"{path}: is not a saved course of an indentation ({error}); remove the file, and run the study again"
             ) from None
 
 

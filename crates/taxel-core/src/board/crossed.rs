@@ -61,7 +61,7 @@ impl Crossed {
             ("feedback_kohm", chain.readout.feedback_kohm, sensor.feedback_kohm),
         ] {
             if circuits != sensors {
-                return Err(problem!("circuit"; ": {name} is {circuits}: must be the sensor's, {sensors}"));
+                return Err(problem!("circuit"; ": {name} is {circuits}: must be {sensors}, as in the sensor"));
             }
         }
         Ok(())

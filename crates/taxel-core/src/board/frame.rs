@@ -46,7 +46,7 @@ impl Board {
         if let Some(accepted) = accepted
             && accepted.len() != self.array.len()
         {
-            return Err(problem!("accepted of {} taxels: the array has {}", accepted.len(), self.array.len()));
+            return Err(problem!("accepted has {} entries: the array has {} taxels", accepted.len(), self.array.len()));
         }
         self.link.offer(&mut self.counts, &mut sink);
         self.take_over(&mut sink);

@@ -18,7 +18,10 @@ pub fn session(registers: &Registers, tare_ms: f64, frames: u64) -> Result<Vec<(
     let mut commands = opening(registers, tare_ms)?;
     let start = commands.last().map_or(1, |(frame, _)| *frame);
     if frames < start + 2 {
-        return Err(problem!("{frames} frames: arming, a tare of {tare_ms} ms, start and stop need {}", start + 2));
+        return Err(problem!(
+            "{frames} frames are too few: arming, a tare of {tare_ms} ms, start and stop need {} or more",
+            start + 2
+        ));
     }
     commands.push((frames - 1, write(7, Registers { record: false, ..*registers })));
     Ok(commands)

@@ -102,7 +102,7 @@ impl Adaptive {
         self.check()?;
         let taxels = rows * columns;
         if taxels == 0 || !volts.len().is_multiple_of(taxels) {
-            return Err(problem!("volts"; ": {} of them, must be whole frames of {rows} x {columns}", volts.len()));
+            return Err(problem!("volts"; ": {} values; must be whole frames of {rows} x {columns}", volts.len()));
         }
         if !(period_us > 0.0 && period_us.is_finite()) {
             return Err(problem!("period_us"; " is {period_us} us: must be above 0"));
@@ -110,7 +110,9 @@ impl Adaptive {
         let frames = volts.len() / taxels;
         let end_us = frames.saturating_sub(1) as f64 * period_us;
         if end_us / (columns as f64 * self.with(self.steepest).line_us) * taxels as f64 > MOST {
-            return Err(problem!("volts last {end_us} us: more than {MOST} readings could come, split them"));
+            return Err(problem!(
+                "volts last {end_us} us, which can give more than {MOST} readings: split volts into shorter pieces"
+            ));
         }
         let mut out = Converted::default();
         let (mut ramp, mut t_us) = (self.gentlest, 0.0);

@@ -61,12 +61,14 @@ impl Converter {
         let least = self.wait_us + f64::from(self.ramp) / TICKS_A_US;
         // The board's own times are whole numbers of 10 ns: sums of them may be off in the last place.
         if step_us < least - 1e-9 {
-            return Err(problem!("step_us"; " is {step_us} us: must be {least:.4} or more, for wait_us and the ramp"));
+            return Err(problem!(
+                "step_us"; " is {step_us} us: must be {least:.4} or more, the length of wait_us and the ramp"
+            ));
         }
         let least = steps as f64 * step_us;
         if line_us < least - 1e-9 {
             return Err(problem!(
-                "line_us"; " is {line_us} us: must be {least} or more, for {steps} steps of {step_us} us"
+                "line_us"; " is {line_us} us: must be {least} or more, the length of {steps} steps of {step_us} us"
             ));
         }
         Ok(())
@@ -140,7 +142,7 @@ impl Converter {
     pub fn trace(&self, line_v: &[f64], every_us: f64, stop_us: f64) -> Result<Vec<Moment>> {
         self.check()?;
         if line_v.len() != self.steps {
-            return Err(problem!("voltages: {} of them, must be one per step, {}", line_v.len(), self.steps));
+            return Err(problem!("voltages: {} values; must be one per step, {}", line_v.len(), self.steps));
         }
         if let Some(k) = line_v.iter().position(|v| !v.is_finite()) {
             return Err(problem!("voltages[{k}] is {}: must be finite", line_v[k]));
@@ -153,7 +155,7 @@ impl Converter {
         let most_us = MOST_POINTS * self.step_us;
         if !(0.0..=most_us).contains(&stop_us) {
             return Err(problem!(
-                "stop_us"; " is {stop_us} us: must be from 0 to {most_us}, which are {MOST_POINTS:e} steps"
+                "stop_us"; " is {stop_us} us: must be from 0 to {most_us} ({MOST_POINTS:e} steps)"
             ));
         }
         let (ramp_us, half) = (f64::from(self.ramp) / TICKS_A_US, 0.5 * self.hysteresis_v);

@@ -165,7 +165,7 @@ impl Matrix {
 
 /// Why a network was not solved.
 pub(super) fn too_far_apart() -> crate::Error {
-    problem!("the network's conductances differ too much to be solved in float64")
+    problem!("the network's conductances differ too much for a solution in float64")
 }
 
 /// A matrix, factored.

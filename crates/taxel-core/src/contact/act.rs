@@ -38,7 +38,7 @@ impl FrameSequence {
     pub(super) fn count(&self, size: usize, frame_us: f64) -> Result<usize> {
         let count = self.values.len() / size;
         if count == 0 || self.values.len() != count * size {
-            return Err(Error::scene(format!("{} values: must be whole frames of {size}", self.values.len())));
+            return Err(Error::scene(format!("{} values: must be whole frames of {size} values", self.values.len())));
         }
         if let Some(value) = self.values.iter().find(|v| !(0.0..=1.0).contains(*v)) {
             return Err(Error::scene(format!("frame value {value}: must be a share of the ramp, 0 to 1")));
@@ -46,7 +46,7 @@ impl FrameSequence {
         if !(self.period_us.is_finite() && self.period_us >= frame_us) {
             let period = self.period_us;
             return Err(Error::scene(format!(
-                "frames of {period} us: must be {frame_us} (a frame of the board) or more"
+                "one frame every {period} us: must be {frame_us} us or more, the length of a frame of the board"
             )));
         }
         Ok(count)

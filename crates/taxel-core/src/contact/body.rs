@@ -243,7 +243,7 @@ impl Body {
         };
         if free && self.mass_g().is_none() {
             return Err(Error::scene(format!(
-                "{path}: mass_g is missing: a body that moves freely needs one{}",
+                "{path}: mass_g is missing: a body that moves freely needs mass_g{}",
                 if self.shape.volume_mm3().is_some() { ", or a material" } else { "" }
             )));
         }
@@ -260,7 +260,7 @@ impl Press {
         match (self.peak_n, self.depth_mm) {
             (Some(force), None) => within(path, "peak_n", force, "N", Range::ABOVE_0.at_most(2_000.0))?,
             (None, Some(depth)) => within(path, "depth_mm", depth, "mm", Range::ABOVE_0)?,
-            _ => return Err(Error::scene(format!("{path}: must have peak_n or depth_mm, and not both"))),
+            _ => return Err(Error::scene(format!("{path}: must have either peak_n or depth_mm"))),
         }
         within(path, "speed_mm_s", self.speed_mm_s, "mm/s", HAND)?;
         within(path, "hold_ms", self.hold_ms, "ms", WAIT)?;

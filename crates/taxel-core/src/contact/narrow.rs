@@ -55,11 +55,12 @@ impl fmt::Display for Narrow {
         let Self { body, width_mm, cell_mm, cells_per_pitch, most } = self;
         write!(
             f,
-            "bodies[{body}]: its touch is {width_mm:.2} mm wide at its deepest, less than {ACROSS} cells of {cell_mm:.2} mm"
+            "bodies[{body}]: at its largest, its touch is {width_mm:.2} mm wide, less than {ACROSS} cells of \
+             {cell_mm:.2} mm"
         )?;
-        write!(f, ": its force is too small; cells_per_pitch = {cells_per_pitch} would do")?;
+        write!(f, ", so the computed force is too small; cells_per_pitch = {cells_per_pitch} is enough")?;
         if cells_per_pitch > most {
-            write!(f, ", but {most} is the most: take a smaller array.pitch_mm")
+            write!(f, ", but the maximum is {most}: use a smaller array.pitch_mm")
         } else {
             Ok(())
         }

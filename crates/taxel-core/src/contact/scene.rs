@@ -70,8 +70,8 @@ const WIDENS: f64 = 0.1;
 
 pub(super) fn columns_take_one_ball() -> Error {
     Error::scene(format!(
-        "surface is \"columns\": must be \"layer\" for all but one sphere, thicker than the foam, that moves straight up and \
-         down on foam with poisson up to {WIDENS}"
+        "surface is \"columns\": must be \"layer\", except for a single sphere that is thicker than the foam and \
+         moves straight up and down, on foam with poisson up to {WIDENS}"
     ))
 }
 
@@ -94,7 +94,8 @@ impl Scene {
         let height = f64::from(array.rows - 1) * pitch_mm - 2.0 * MARGIN_MM;
         if width < 0.0 || height < 0.0 {
             return Err(Error::scene(format!(
-                "array of {} x {} taxels, {pitch_mm} mm apart: too small for scenes that keep {MARGIN_MM} mm from its edge",
+                "array of {} x {} taxels, {pitch_mm} mm apart: is too small; drawn scenes need a margin of \
+                 {MARGIN_MM} mm to its edges",
                 array.rows, array.columns
             )));
         }
@@ -161,7 +162,7 @@ impl Scene {
         within("scene", "slant_deg", self.slant_deg, "degrees", Range::within(0.0, 80.0))?;
         within("scene", "downhill_deg", self.downhill_deg, "degrees", Range::FINITE)?;
         if self.bodies.is_empty() {
-            return Err(Error::scene("scene: bodies is empty: must be one or more"));
+            return Err(Error::scene("scene: bodies is empty: must contain one body or more"));
         }
         for (n, body) in self.bodies.iter().enumerate() {
             let path = format!("bodies[{n}]");
@@ -174,7 +175,8 @@ impl Scene {
         if self.surface == Surface::Columns {
             if self.cells_per_pitch > 1 {
                 return Err(Error::scene(format!(
-                    "scene: cells_per_pitch is {}: must be 1 with surface \"columns\", which have no cells; use \"layer\"",
+                    "scene: cells_per_pitch is {}: must be 1 with surface \"columns\", which has no cells; or use \
+                     \"layer\"",
                     self.cells_per_pitch
                 )));
             }

@@ -72,7 +72,8 @@ impl BodyShape {
                 let columns = heights_mm.first().map_or(0, Vec::len);
                 if columns < 2 || heights_mm.len() < 2 || heights_mm.iter().any(|row| row.len() != columns) {
                     return Err(crate::Error::scene(format!(
-                        "{path}: heights_mm has {} rows, the first of {columns}: must be 2 or more rows of one length, 2 or more",
+                        "{path}: heights_mm has {} rows, and {columns} heights in the first row: must be 2 rows or \
+                         more, each with the same number of heights, 2 or more",
                         heights_mm.len()
                     )));
                 }

@@ -50,7 +50,7 @@ impl Prepared {
         match act {
             Act::Silence { ms } => {
                 if !(0.0..=86_400_000.0).contains(ms) {
-                    return Err(Error::scene(format!("silence of {ms} ms: must be 0 to a day")));
+                    return Err(Error::scene(format!("silence of {ms} ms: must be from 0 ms to a day")));
                 }
                 let part = ScenePart { frames: (us(*ms) / frame_us).round() as usize, kind: ScenePartKind::Silence };
                 Ok(Self { part, contacts: vec![], narrow: None })
@@ -60,7 +60,9 @@ impl Prepared {
                 let mut layer = Motion::layer(scene, array, stop)?;
                 let mut motion = Motion::compute_on(scene, array, layer.as_mut(), frame_us / GROUPS as f64, stop)?;
                 if motion.len() < 2 {
-                    return Err(Error::scene(format!("scene: shorter than a quarter of a frame, {frame_us} us")));
+                    return Err(Error::scene(format!(
+                        "scene: is shorter than a quarter of a frame; a frame lasts {frame_us} us"
+                    )));
                 }
                 let (contacts, narrow) = (std::mem::take(&mut motion.contacts), motion.narrow.take());
                 let frames = motion.len().div_ceil(GROUPS);
@@ -166,7 +168,9 @@ impl Stage {
     pub fn force_n(&self) -> Result<Vec<f32>> {
         if self.frames() > MOST_FORCES {
             let frames = self.frames();
-            return Err(Error::scene(format!("acts last {frames} frames: must be at most {MOST_FORCES}, split them")));
+            return Err(Error::scene(format!(
+                "acts last {frames} frames: must be at most {MOST_FORCES}; split the acts"
+            )));
         }
         let mut force = Vec::with_capacity(self.frames());
         for part in &self.parts {

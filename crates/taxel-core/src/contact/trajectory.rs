@@ -40,7 +40,7 @@ pub struct Track {
 
 /// The error of a scene that has more than [`MOST_STEPS`].
 pub(super) fn too_many(step_us: f64) -> Error {
-    Error::scene(format!("step is {step_us} us: must be longer, the scene has more than {MOST_STEPS} of them"))
+    Error::scene(format!("step is {step_us} us: must be longer, because the scene has more than {MOST_STEPS} steps"))
 }
 
 /// A body's state, and what of it has been recorded since the scene's start.
@@ -112,7 +112,8 @@ impl<'a> Trajectory<'a> {
                         if self.contacts.is_empty() {
                             let fall_ms = (2.0 * height_mm / GRAVITY).sqrt();
                             return Err(Error::scene(format!(
-                                "the body is lifted {rest_ms} ms after it was let go, before it lands: it falls for {fall_ms:.0} ms; rest_ms must be more"
+                                "the body is lifted {rest_ms} ms after it was let go, before it lands: it falls for \
+                                 {fall_ms:.0} ms; rest_ms must be larger"
                             )));
                         }
                         // If the body lies still by now, the hand ends this touch.
@@ -186,7 +187,8 @@ impl<'a> Trajectory<'a> {
             .find(|&k| !(is_inside(track.x_mm[k], array.columns) && is_inside(track.y_mm[k], array.rows)));
         match (off, self.contacts.first()) {
             (Some(k), Some(first)) => Err(Error::scene(format!(
-                "the body {does} off the array {:.0} ms after it was set down, at x {:.0} mm, y {:.0} mm; begin further in, or stop earlier (for_ms)",
+                "the body {does} off the array {:.0} ms after it was set down, at x {:.0} mm, y {:.0} mm; begin \
+                 further inside, or stop earlier (for_ms)",
                 1e-3 * (k as f64 * step_us - first.start_us),
                 track.x_mm[k],
                 track.y_mm[k]
@@ -200,7 +202,7 @@ impl<'a> Trajectory<'a> {
             return Ok(());
         }
         Err(Error::scene(format!(
-            "the body is to be pressed through all of the {} mm of foam; press it less, or use stiffer foam",
+            "the scene presses the body through all {} mm of the foam; press it less, or use stiffer foam",
             self.scene.foam.thickness_mm
         )))
     }
@@ -263,7 +265,8 @@ impl<'a> Trajectory<'a> {
             }
             if f64::from(self.now - began) * self.inner_ms > PATIENCE_MS {
                 return Err(Error::scene(format!(
-                    "the body comes to rest after {} impacts: it cannot be caught after {after}; drop it from higher or catch it earlier",
+                    "the body comes to rest after {} impacts, so it cannot be caught after {after} impacts; drop it \
+                     from higher, or catch it earlier",
                     self.contacts.len()
                 )));
             }
@@ -291,8 +294,8 @@ impl<'a> Trajectory<'a> {
         let depth = self.depth + dt * speed;
         if depth >= self.push.floor_mm() {
             return Err(Error::scene(format!(
-                "the body bottoms out: {:?} g at {:.2} m/s crush {} mm of foam at {} kPa; drop it from lower, or use \
-                 stiffer foam",
+                "the body reaches the bottom of the foam: {:?} g at {:.2} m/s are too much for {} mm of foam of {} \
+                 kPa; drop it from lower, or use stiffer foam",
                 (10.0 * mass).round() / 10.0,
                 speed,
                 self.scene.foam.thickness_mm,

@@ -201,10 +201,10 @@ impl Detector {
 pub(super) fn usual_distance(t: &[i64]) -> Result<f64> {
     let mut apart: Vec<u64> = t.windows(2).map(|w| w[1].abs_diff(w[0])).collect();
     if t.is_empty() {
-        return Err(problem!("there are no frames: nothing can be detected"));
+        return Err(problem!("there are no frames, so nothing can be detected"));
     }
     if apart.is_empty() {
-        return Err(problem!("one frame does not show how long a frame lasts: give frame_us"));
+        return Err(problem!("there is only one frame, which does not show how long a frame lasts: give frame_us"));
     }
     let middle = apart.len() / 2;
     Ok(*apart.select_nth_unstable(middle).1 as f64)

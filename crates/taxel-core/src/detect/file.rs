@@ -22,15 +22,15 @@ pub(super) fn parts(name: &str, text: &str, formats: &[&'static str]) -> Result<
     };
     let stated = object.remove("format");
     let Some(stated) = stated else {
-        return Err(format(format!("the key \"format\" is missing, must be {names}")));
+        return Err(format(format!("the key \"format\" is missing; must be {names}")));
     };
     let Some(&name) = formats.iter().find(|&&name| stated == name) else {
-        return Err(format(format!("format is {stated}, must be {names}")));
+        return Err(format(format!("format is {stated}; must be {names}")));
     };
     match object.remove("version") {
         Some(version) if version.as_u64() == Some(VERSION) => Ok((name, value)),
-        Some(version) => Err(format(format!("version {version}, this taxel reads version {VERSION} only"))),
-        None => Err(format(format!("states no version, must be {VERSION}"))),
+        Some(version) => Err(format(format!("version is {version}; this taxel reads only version {VERSION}"))),
+        None => Err(format(format!("the key \"version\" is missing; must be {VERSION}"))),
     }
 }
 

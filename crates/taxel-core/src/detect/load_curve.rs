@@ -109,9 +109,10 @@ impl LoadCurve {
     /// `Problem` for another quantity.
     pub fn at_age(&self, age_ms: f64) -> Result<Vec<Decision>> {
         if self.quantity != Quantity::Area {
-            return Err(
-                problem!("ages"; " need the quantity area, by which touches begin: this curve has another quantity"),
-            );
+            return Err(problem!(
+                "ages"; " need a curve of the quantity area, because touches begin by area: this curve has another \
+                         quantity"
+            ));
         }
         Ok(self.run(Limits::at_age(0, f64::INFINITY, age_ms), self.changes.iter()))
     }
@@ -124,9 +125,10 @@ impl LoadCurve {
     /// `Problem` for another quantity than the area.
     pub fn at_end(&self) -> Result<Vec<Decision>> {
         if self.quantity != Quantity::Area {
-            return Err(
-                problem!("ends"; " need the quantity area, by which touches end: this curve has another quantity"),
-            );
+            return Err(problem!(
+                "ends"; " need a curve of the quantity area, because touches end by area: this curve has another \
+                         quantity"
+            ));
         }
         Ok(self.run(Limits::at_end(f64::INFINITY), self.changes.iter()))
     }

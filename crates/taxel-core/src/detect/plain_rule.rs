@@ -121,7 +121,7 @@ impl PlainRule {
                 return Err(problem!("labels"; " are both {}: must differ", first.as_deref().unwrap_or_default()));
             }
             labels if labels.iter().flatten().any(|label| label.trim().is_empty()) => {
-                return Err(problem!("labels"; ": one is empty: must be a name, or left out"));
+                return Err(problem!("labels"; ": a label is empty: must be a name, or left out"));
             }
             _ => {}
         }

@@ -81,22 +81,25 @@ impl Readout {
         self.check_delays()?;
         self.training.as_ref().map_or(Ok(()), TrainingData::check)?;
         if self.neurons.is_empty() {
-            return Err(problem!("readout without a neuron: needs one or more"));
+            return Err(problem!("readout: has no neuron; must have one or more"));
         }
         for (label, cell) in &self.neurons {
             if label.trim().is_empty() {
-                return Err(problem!("a neuron without a name: must have a label"));
+                return Err(problem!("readout: a neuron has no label; must have one"));
             }
             cell.neuron.check().map_err(|error| error.in_part(label))?;
             self.encoder_of(cell).map_err(|error| error.in_part(label))?;
             if cell.neuron.time != self.time {
                 let (trained, expected) = (word(&cell.neuron.time), word(&self.time));
-                return Err(problem!("{label}: trained for time {trained}, this readout is for time {expected}"));
+                return Err(problem!(
+                    "{label}: the neuron was trained for time {trained}, but this readout is for time {expected}"
+                ));
             }
             if cell.neuron.after_spike != self.after_spike {
                 let (trained, expected) = (word(&cell.neuron.after_spike), word(&self.after_spike));
                 return Err(problem!(
-                    "{label}: trained for after_spike {trained}, this readout is for after_spike {expected}"
+                    "{label}: the neuron was trained for after_spike {trained}, but this readout is for after_spike \
+                     {expected}"
                 ));
             }
             if !(0.0..=LONGEST_DELAY_MS).contains(&cell.delay_ms) {
@@ -113,20 +116,21 @@ impl Readout {
                 None if self.seen.is_empty() => {}
                 None => {
                     return Err(problem!(
-                        "{label}: seen has no ranges of its inputs, although other neurons have them"
+                        "{label}: the ranges of the neuron's inputs are missing in seen, which has those of other \
+                         neurons"
                     ));
                 }
             }
         }
         match self.seen.keys().find(|&label| !self.neurons.contains_key(label)) {
-            Some(label) => Err(problem!("seen: {label} is not among the neurons")),
+            Some(label) => Err(problem!("seen: the readout has no neuron {label}")),
             None => Ok(()),
         }
     }
 
     fn check_delays(&self) -> Result<()> {
         if self.delays_ms.is_empty() {
-            return Err(problem!("delays_ms"; " is empty: must hold one delay or more"));
+            return Err(problem!("delays_ms"; " is empty: must contain one delay or more"));
         }
         for (k, &delay) in self.delays_ms.iter().enumerate() {
             if !(0.0..=LONGEST_DELAY_MS).contains(&delay) {
@@ -147,9 +151,9 @@ impl Readout {
                 let parts = encoder.parts_named(names)?.into_iter().map(|(name, part)| (name.to_owned(), part.clone()));
                 Ok(Cow::Owned(Encoder::Composite(Composite { parts: parts.collect() })))
             }
-            (_, names) => {
-                Err(problem!("inputs"; " are {names:?}: the encoder is not a composite, so it has no other inputs"))
-            }
+            (_, names) => Err(problem!(
+                "inputs"; " are {names:?}: must be left out, because only a composite encoder has inputs with names"
+            )),
         }
     }
 
@@ -187,7 +191,7 @@ impl Readout {
             && !sensor.fits(array)
         {
             let same_shape = (sensor.rows, sensor.columns) == (array.rows, array.columns);
-            let difference = if same_shape { ", but other taxels of it exist" } else { "" };
+            let difference = if same_shape { ", with other taxels missing" } else { "" };
             let error = problem!(
                 "an array of {} x {} taxels: the readout was trained on {} x {}{difference}",
                 array.rows,

@@ -49,7 +49,10 @@ impl Seen {
                 ));
             }
             if let Some(n) = values.iter().position(|value| !(value * sign >= 0.0 && value.is_finite())) {
-                return Err(problem!("seen: {name}[{n}] is {}: must be finite, with 0 in the range", values[n]));
+                return Err(problem!(
+                    "seen: {name}[{n}] is {}: must be finite, and the range must contain 0",
+                    values[n]
+                ));
             }
         }
         Ok(())

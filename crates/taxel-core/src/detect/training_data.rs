@@ -40,7 +40,7 @@ impl TrainingData {
         }
         let taxels = usize::from(self.shape[0]) * usize::from(self.shape[1]);
         if self.touched.len() != taxels || self.touched.bytes().any(|mark| !matches!(mark, b'0' | b'1')) {
-            return Err(problem!("training: touched must hold 0 or 1 for each of {taxels} taxels"));
+            return Err(problem!("training: touched must contain 0 or 1 for each of {taxels} taxels"));
         }
         Ok(())
     }

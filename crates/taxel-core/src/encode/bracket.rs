@@ -41,13 +41,13 @@ impl Bracket {
 /// Checks that levels ascend.
 pub(super) fn check_levels(levels: &[f64]) -> Result<()> {
     if levels.is_empty() {
-        return Err(problem!("levels"; ": must hold one level or more"));
+        return Err(problem!("levels"; " is empty: must contain one level or more"));
     }
     if let Some(level) = levels.iter().find(|l| !(l.is_finite() && l.abs() <= f64::from(f32::MAX))) {
-        return Err(problem!("levels"; " hold {level}: must be finite"));
+        return Err(problem!("levels"; " contain {level}: must be finite"));
     }
     match levels.windows(2).find(|w| w[1] as f32 <= w[0] as f32) {
-        Some(w) => Err(problem!("levels"; ": {} after {}, must ascend", w[1], w[0])),
+        Some(w) => Err(problem!("levels"; ": {} comes after {}; must ascend", w[1], w[0])),
         None => Ok(()),
     }
 }

@@ -36,8 +36,8 @@ wide! {
 
 /// The error for a frame that holds a value that is not finite; NaN is one that is missing.
 pub(super) fn not_finite(t: i64, value: f32) -> Error {
-    let filled = if value.is_nan() { "; Frames.held fills the missing ones with the last value before" } else { "" };
-    problem!("frame at {t} us holds {value}: values must be finite{filled}")
+    let filled = if value.is_nan() { "; Frames.held replaces missing values by the last value before" } else { "" };
+    problem!("frame at {t} us contains {value}: values must be finite{filled}")
 }
 
 /// The mapping between taxels and channels.
@@ -130,13 +130,13 @@ impl Channels {
         if (rows, columns) != (self.rows, self.columns) {
             let (name, wanted) = (&self.name, (self.rows, self.columns));
             return Err(problem!(
-                "events of {rows} x {columns} taxels: the encoder was begun for {name}, {} x {}",
+                "events of {rows} x {columns} taxels: this stream was begun for {name}, {} x {} taxels",
                 wanted.0,
                 wanted.1
             ));
         }
         if let Some(&t) = events.t.iter().find(|t| t.unsigned_abs() > FARTHEST) {
-            return Err(problem!("event at {t} us: is too far from 0"));
+            return Err(problem!("event at {t} us: the time is too far from 0"));
         }
         events.check()
     }

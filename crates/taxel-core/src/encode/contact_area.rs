@@ -39,7 +39,7 @@ impl Encoding for ContactArea {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.levels.is_empty() {
-            return Err(problem!("levels"; ": must hold one number of taxels or more"));
+            return Err(problem!("levels"; " is empty: must contain one number of taxels or more"));
         }
         if self.levels[0] == 0 || self.levels.windows(2).any(|w| w[1] <= w[0]) {
             return Err(problem!("levels"; " are {:?}: must ascend from 1 or more", self.levels));

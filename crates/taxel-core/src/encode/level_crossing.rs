@@ -109,7 +109,7 @@ impl Encoding for LevelCrossing {
         }
         if let Some(level) = self.tonic_level {
             if self.tonic_ms.is_none() {
-                return Err(problem!("tonic_level without tonic_ms: must come with the period tonic_ms"));
+                return Err(problem!("tonic_level is given without tonic_ms: give both"));
             }
             if !self.levels.contains(&level) {
                 return Err(problem!("tonic_level"; " is {level}: must be one of the levels {:?}", self.levels));

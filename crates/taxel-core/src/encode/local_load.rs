@@ -177,7 +177,7 @@ impl Encoding for LocalLoad {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if let Some(k) = self.levels.windows(2).position(|pair| pair[0] >= pair[1]) {
-            return Err(problem!("levels"; "[{}]: must be above the one before", k + 1));
+            return Err(problem!("levels"; "[{}]: must be above the level before", k + 1));
         }
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }

@@ -138,18 +138,18 @@ impl Encoding for Moments {
             }
         }
         if self.ages_ms.as_ref().is_some_and(Vec::is_empty) {
-            return Err(problem!("ages_ms"; " is empty: must hold one age or more, or be left out"));
+            return Err(problem!("ages_ms"; " is empty: must contain one age or more, or be left out"));
         }
         if let Some(k) = ages.windows(2).position(|pair| pair[0] >= pair[1]) {
-            return Err(problem!("ages_ms"; "[{}]: must be a us or more above the one before", k + 1));
+            return Err(problem!("ages_ms"; "[{}]: must be at least 1 us above the age before", k + 1));
         }
         if self.levels == 0 && !self.graded && ages.is_empty() {
             return Err(
-                problem!("levels"; " is 0, and neither graded nor ages_ms is given: choose one or more of them"),
+                problem!("levels"; " is 0, and neither graded nor ages_ms is given: give at least one of the three"),
             );
         }
         if self.centre && !self.graded {
-            return Err(problem!("centre"; " is given without graded: only graded spikes have it"));
+            return Err(problem!("centre"; " is given without graded: only graded spikes have a centre"));
         }
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }
@@ -236,7 +236,9 @@ impl Way {
             Some(Places { x, y, unit: Some(PlaceUnit::Mm), .. }) => {
                 Ok(Self::Places(x.iter().zip(y).map(|(&x, &y)| [x, y]).collect()))
             }
-            Some(_) => Err(problem!("displacement_mm"; " needs places in mm; those of {} are not", array.name)),
+            Some(_) => Err(problem!(
+                "displacement_mm"; " needs places in mm; the places of {} are in another unit", array.name
+            )),
             None => array.pitch("moments: displacement_mm").map(Self::Pitch),
         }
     }

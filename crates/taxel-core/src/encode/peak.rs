@@ -50,10 +50,10 @@ impl Encoding for Peak {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.levels.is_empty() {
-            return Err(problem!("levels"; ": must hold one level or more"));
+            return Err(problem!("levels"; " is empty: must contain one level or more"));
         }
         if let Some(k) = self.levels.windows(2).position(|pair| pair[0] >= pair[1]) {
-            return Err(problem!("levels"; "[{}]: must be above the one before", k + 1));
+            return Err(problem!("levels"; "[{}]: must be above the level before", k + 1));
         }
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }

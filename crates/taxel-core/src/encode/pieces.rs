@@ -43,7 +43,7 @@ impl Pieces {
         let (expected, received) = ((self.array.rows, self.array.columns), (frames.array.rows, frames.array.columns));
         if received != expected {
             return Err(problem!(
-                "frames of {} x {} taxels: the encoder was begun for {} x {}",
+                "frames of {} x {} taxels: this stream was begun for {} x {} taxels",
                 received.0,
                 received.1,
                 expected.0,

@@ -97,7 +97,9 @@ impl StreamInput {
         let Some(&first) = times.first() else { return Ok(None) };
         let (before, mut late) = match *self {
             StreamInput::Frames { .. } => {
-                return Err(problem!("event at {first} us: this stream was begun with frames"));
+                return Err(problem!(
+                    "event at {first} us: this stream was begun with frames, so it accepts only frames"
+                ));
             }
             StreamInput::Events { present, late } => (present, late),
             StreamInput::Unknown => (first, 0),
@@ -119,11 +121,13 @@ impl StreamInput {
     /// Advances the time by a frame.
     pub(super) fn frame(&mut self, t: i64) -> Result<()> {
         match *self {
-            StreamInput::Events { .. } => return Err(problem!("frame at {t} us: this stream was begun with events")),
-            StreamInput::Frames { open } if t < open => {
-                return Err(problem!("frame at {t} us: must be at {open} us or later, as times must ascend"));
+            StreamInput::Events { .. } => {
+                return Err(problem!("frame at {t} us: this stream was begun with events, so it accepts only events"));
             }
-            _ if t.unsigned_abs() > FARTHEST => return Err(problem!("frame at {t} us: is too far from 0")),
+            StreamInput::Frames { open } if t < open => {
+                return Err(problem!("frame at {t} us: must be at {open} us or later, because times must ascend"));
+            }
+            _ if t.unsigned_abs() > FARTHEST => return Err(problem!("frame at {t} us: the time is too far from 0")),
             _ => {}
         }
         *self = StreamInput::Frames { open: t + 1 };
@@ -332,8 +336,10 @@ impl<R: Rule> Stream for Sampled<R> {
         self.source.frame(t)?;
         if self.steady && self.begun && 2 * (t - self.last - self.period).abs() > self.period {
             let (since, period) = (ms(t - self.last), ms(self.period));
-            return Err(problem!("frame at {t} us, {since} ms after the last: must come every {period} ms")
-                .with_hint("period_ms", Hint::Give));
+            return Err(problem!(
+                "frame at {t} us, {since} ms after the frame before: frames must come every {period} ms"
+            )
+            .with_hint("period_ms", Hint::Give));
         }
         let (now, later) = (NextFrame::after(values), NextFrame::unknown());
         let (mut now, later) = if R::PREFETCHES { (later, now) } else { (now, later) };

@@ -145,7 +145,7 @@ impl Skin {
         if count > MOST {
             let (array, Pitch { rows, columns }) = (&array.name, pitch);
             return Err(problem!(
-                "skin on {array} of pitch {rows} x {columns} mm: {count} afferents, must be at most {MOST}"
+                "skin on {array} of pitch {rows} x {columns} mm: {count} afferents; must be at most {MOST}"
             ));
         }
         let (mut all, taxels) = (vec![], places(array));

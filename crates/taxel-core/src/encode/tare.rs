@@ -80,7 +80,7 @@ impl Tare {
         let (from, to) = (&self.array, array);
         if !from.fits(to) {
             let others =
-                if (from.rows, from.columns) == (to.rows, to.columns) { ", but other taxels of it exist" } else { "" };
+                if (from.rows, from.columns) == (to.rows, to.columns) { ", with other taxels missing" } else { "" };
             return Err(problem!(
                 "tare of {} x {} taxels: the array has {} x {}{others}",
                 from.rows,
@@ -173,12 +173,14 @@ impl Zeroing {
         let Self { x, y, rest, .. } = *self;
         if x >= array.columns || y >= array.rows || array.exists.as_ref().is_some_and(|e| !e[array.index(x, y)]) {
             let (rows, columns) = (array.rows, array.columns);
-            return Err(problem!("taxel at row {y}, column {x}: there is no such taxel in {rows} x {columns}"));
+            return Err(problem!(
+                "taxel at row {y}, column {x}: does not exist in this array of {rows} x {columns} taxels"
+            ));
         }
         if rest.is_finite() {
             Ok(())
         } else {
-            Err(problem!("taxel at row {y}, column {x}: its rest is {rest}, must be finite"))
+            Err(problem!("taxel at row {y}, column {x}: its rest is {rest}; must be finite"))
         }
     }
 }
@@ -253,7 +255,9 @@ impl TareBuilder {
         let (rows, columns) = (events.array.rows, events.array.columns);
         if (rows, columns) != (self.array.rows, self.array.columns) {
             let (own_rows, own_columns) = (self.array.rows, self.array.columns);
-            return Err(problem!("events of {rows} x {columns} taxels: the tare is of {own_rows} x {own_columns}"));
+            return Err(problem!(
+                "events of {rows} x {columns} taxels: the tare is for {own_rows} x {own_columns} taxels"
+            ));
         }
         events.check()?;
         let Some(intensity) = &events.intensity else {
@@ -306,7 +310,7 @@ impl TareBuilder {
             return Err(problem!("tare from {start} to {stop} us: start must be before stop"));
         }
         if stop < self.present {
-            return Err(problem!("tare to {stop} us: something arrived later, at {} us", self.present));
+            return Err(problem!("tare until {stop} us: must not end before the last value, at {} us", self.present));
         }
         for (integral, &held) in self.integrals.iter_mut().zip(self.held.values()) {
             integral.extend(stop, held);

@@ -37,7 +37,7 @@ pub(super) fn window(
         })
     };
     let Some((start, stop)) = asked.or_else(widest) else {
-        return Err(problem!("window"; ": must be given, (start, stop) in ms, as lists of times do not state it"));
+        return Err(problem!("window"; ": is missing; with lists of times, give the window as (start, stop) in ms"));
     };
     for side in sides() {
         for (p, n) in (0..side.count).flat_map(|p| (0..side.trains).map(move |n| (p, n))) {

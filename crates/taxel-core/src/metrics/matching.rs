@@ -73,7 +73,7 @@ pub fn in_order(found: &[i64], truth: &[i64], windows: &[i64], stop: Stop<'_>) -
     let cells: usize = low.iter().zip(&high).map(|(l, h)| h - l).fold(0, usize::saturating_add);
     if cells > MOST_PAIRS {
         return Err(problem!(
-            "{cells} pairs are within the windows; at most {MOST_PAIRS} can be matched: take a narrower window"
+            "{cells} pairs are within the windows; at most {MOST_PAIRS} can be matched: use a narrower window"
         ));
     }
 

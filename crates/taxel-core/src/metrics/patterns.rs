@@ -72,9 +72,9 @@ impl Patterns<'_> {
     fn fault(&self, p: usize, n: usize) -> crate::Error {
         let (train, name) = (self.train(p, n), self.train_name(p, n));
         if let Some(k) = train.iter().position(|t| !t.is_finite()) {
-            return problem!("{name}, spike {k}: time is {}, must be finite", train[k]);
+            return problem!("{name}, spike {k}: time is {}; must be finite", train[k]);
         }
         let k = train.windows(2).position(|w| w[1] < w[0]).unwrap_or(0);
-        problem!("{name}, spike {}: {} ms comes after {} ms, times must ascend", k + 1, train[k + 1], train[k])
+        problem!("{name}, spike {}: {} ms comes after {} ms; times must ascend", k + 1, train[k + 1], train[k])
     }
 }

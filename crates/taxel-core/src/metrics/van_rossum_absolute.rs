@@ -89,7 +89,7 @@ impl Exposure {
             && !(start.is_finite() && stop.is_finite() && start <= stop)
         {
             return Err(
-                problem!("window"; " is {start} to {stop} ms: must be finite, and its start not after its stop"),
+                problem!("window"; " is {start} to {stop} ms: must be finite, with start not after stop"),
             );
         }
         Ok(())

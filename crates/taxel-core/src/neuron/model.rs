@@ -113,19 +113,20 @@ impl Neuron {
         }
         if self.kernel == Kernel::Exponential && self.time == Time::Continuous {
             return Err(problem!(
-                "kernel"; " is \"exponential\" and time \"continuous\": its potential changes only in jumps, at inputs, so it crosses the \
-                 threshold only at inputs; take time \"grid\" or another kernel"
+                "kernel"; " is \"exponential\" and time \"continuous\": its potential changes only in jumps, at \
+                 inputs, so it crosses the threshold only at inputs; use time \"grid\" or another kernel"
             ));
         }
         if let (Some(rearm), Time::Continuous) = (self.rearm, self.time) {
             return Err(problem!(
-                "rearm"; " is {rearm} and time \"continuous\": the potential is compared with it at grid points only; take time \
-                 \"grid\""
+                "rearm"; " is {rearm} and time \"continuous\": the potential is compared with rearm only at grid \
+                 points; use time \"grid\""
             ));
         }
         if self.refractory == 0.0 && self.after_spike != AfterSpike::Reset {
             return Err(problem!(
-                "refractory"; " is 0 ms: must be above 0 unless after_spike is \"reset\", else the neuron fires without end"
+                "refractory"; " is 0 ms: must be above 0 unless after_spike is \"reset\"; otherwise the neuron fires \
+                 without end"
             ));
         }
         Ok(())

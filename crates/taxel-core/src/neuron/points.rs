@@ -130,7 +130,7 @@ pub fn check_points(points: f64, most: f64, step_ms: f64) -> Result<()> {
         return Ok(());
     }
     Err(problem!(
-        "step_ms"; " is {step_ms} ms: makes {points:.1e} grid points, more than the limit of {most:.0e}; take a larger step, or fewer or \
-         shorter patterns (times are in ms)"
+        "step_ms"; " is {step_ms} ms: makes {points:.1e} grid points, more than the limit of {most:.0e}; use a larger \
+         step, or fewer or shorter patterns (times are in ms)"
     ))
 }

@@ -44,9 +44,9 @@ impl Neuron {
         self.stream(&[], threshold, trains.start)?;
         if neurons.checked_mul(trains.len()) != Some(weights.len()) {
             let (count, inputs) = (weights.len(), trains.len());
-            return Err(
-                problem!("weights"; ": {count} for {neurons} neurons of {inputs} trains, must be one per neuron and train"),
-            );
+            return Err(problem!(
+                "weights"; ": {count} for {neurons} neurons of {inputs} trains; must be one per neuron and train"
+            ));
         }
         if self.time == Time::Grid {
             self.check_rows(self.points(trains.start, trains.stop))?;

@@ -99,7 +99,7 @@ impl Neuron {
             }
             if let Some(k) = list.windows(2).position(|w| w[1] < w[0]) {
                 return Err(problem!(
-                    name; "[{}] is {} ms, after {} ms: times must ascend",
+                    name; "[{}] is {} ms and comes after {} ms: times must ascend",
                     k + 1,
                     list[k + 1],
                     list[k]
@@ -112,7 +112,7 @@ impl Neuron {
     pub(super) fn check_inputs(&self, weights: &[f64], trains: &SpikeTrains) -> Result<()> {
         trains.check()?;
         if trains.kind == SpikeKind::Signed {
-            return Err(problem!("trains"; ": spikes are signed, split them into ON and OFF trains first"));
+            return Err(problem!("trains"; ": spikes are signed; split them into ON and OFF trains first"));
         }
         one_weight_a_train(weights, trains.len())
     }

@@ -47,10 +47,13 @@ impl NeuronStream {
     /// `Problem` if the spike is earlier than a previous one, or its train has no weight.
     pub fn push(&mut self, Spike { t, train, value }: Spike, out: &mut Vec<OutputSpike>) -> Result<()> {
         if t.is_nan() || t < self.now {
-            return Err(problem!("input spike at {t} ms: too late, the neuron is at {} ms already", self.now));
+            return Err(problem!("input spike at {t} ms: is too late; the neuron is already at {} ms", self.now));
         }
         let Some(&weight) = self.weights.get(train as usize) else {
-            return Err(problem!("input spike at {t} ms: no train {train}, there are only {}", self.weights.len()));
+            return Err(problem!(
+                "input spike at {t} ms: train {train} does not exist; there are {} trains",
+                self.weights.len()
+            ));
         };
         self.now = t;
         let value = f64::from(value);

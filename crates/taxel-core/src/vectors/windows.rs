@@ -31,7 +31,7 @@ impl Windows {
     /// Pointers to the windows of a row, checked to be within `from`.
     #[inline(always)]
     fn within(&self, row: usize, from: &[f32]) -> [*const f32; ROW] {
-        assert!(self.end <= from.len(), "windows must be within the values that they are read from");
+        assert!(self.end <= from.len(), "each window must be within the given values");
         // SAFETY: by `push`, every window ends at or before `end`, which the assertion shows to be
         // within `from`.
         self.starts[row].map(|start| unsafe { from.as_ptr().add(start as usize) })

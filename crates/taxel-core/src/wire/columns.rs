@@ -108,7 +108,7 @@ pub(in crate::wire) unsafe fn append(
         present: &mut intensity.present.spare_capacity_mut()[skip..skip + most],
     };
     let filled = fill(room, paired, &mut out.markers);
-    assert!(filled.rows <= most, "more rows than there was room for");
+    assert!(filled.rows <= most, "more rows than the columns have room for");
     let after = before + filled.rows;
     // SAFETY: the caller has written the first `rows` entries of t, x, y and p, which begin at `before`, and the capacity
     // was reserved above.
@@ -190,7 +190,7 @@ impl Table for Events {
             present: spare(present, valued),
         };
         let rows = fill(&mut room, 0, paired);
-        assert!(rows <= most, "more rows than there was room for");
+        assert!(rows <= most, "more rows than the columns have room for");
         // SAFETY: the caller guarantees that `fill` wrote this many entries after the end of each column, into reserved
         // capacity.
         unsafe {
@@ -273,7 +273,7 @@ impl Table for Laid<'_> {
             self.filled.paired = true;
         }
         let rows = fill(&mut self.room, before, self.filled.paired);
-        assert!(rows <= most, "more rows than there was room for");
+        assert!(rows <= most, "more rows than the columns have room for");
         self.filled.rows += rows;
         if repaired && rows > 0 {
             self.repaired.push(before..before + rows);

@@ -241,7 +241,7 @@ impl Registers {
         if matches!(self.channels, 16 | 64) {
             return Ok(());
         }
-        Err(Error::device(format!("{} channels: the converter has 16 or 64", self.channels)))
+        Err(Error::device(format!("{} channels: the converter has 16 or 64 channels", self.channels)))
     }
 
     /// The rules that refuse, in the order in which the board checks them; the first is that every value is in its
@@ -313,7 +313,7 @@ impl Registers {
             });
             match allowed {
                 Some(index) => left.remove(index),
-                None => return Err(Error::device("no order of writes leads there without a refusal")),
+                None => return Err(Error::device("the board refuses every order of writes to these values")),
             };
         }
         Ok(commands)

@@ -118,7 +118,7 @@ pub fn encode(events: EventsView<'_>) -> Result<Vec<u8>> {
         let (t, x, y, p) = (events.t[k], events.x[k], events.y[k], events.p[k]);
         if x > u16::from(COORDINATE) || y > u16::from(COORDINATE) {
             return Err(problem!(
-                "event {k}: row {y}, column {x}: version 1 of the wire holds rows and columns 0 to 63"
+                "event {k}: row {y}, column {x}: version 1 of the wire has only rows and columns 0 to 63"
             ));
         }
         while let Some(m) = markers.next_if(|m| m.t <= t) {

@@ -196,10 +196,10 @@ pub enum Refused {
     #[error("longer than 1400 bytes")]
     Long,
     /// The first byte or the version differs.
-    #[error("begins with another byte or version")]
+    #[error("has another first byte or version")]
     Foreign,
     /// The checksum does not match.
-    #[error("its checksum disagrees")]
+    #[error("has a wrong checksum")]
     Checksum,
 }
 
@@ -330,7 +330,8 @@ pub fn checked_stride(array: &Array) -> crate::Result<u8> {
     if u32::from(array.columns) << stride > 1 << 16 {
         let (rows, columns) = (array.rows, array.columns);
         return Err(problem!(
-            "array of {rows} x {columns} taxels: has more than 65536 positions (columns times rows, these up to a power of 2)"
+            "array of {rows} x {columns} taxels: has more than 65536 positions (columns times rows, with rows rounded \
+             up to a power of 2)"
         ));
     }
     Ok(stride)

@@ -124,7 +124,9 @@ impl Sender {
         stop: Stop<'_>,
     ) -> Result<()> {
         if datagrams.is_empty() || each == 0 {
-            return Err(problem!("send: needs one datagram or more, and one or more at a time").into());
+            return Err(
+                problem!("send: the number of datagrams, and how many are sent at a time, must be 1 or more").into()
+            );
         }
         for (name, value) in [("period_us", period_us), ("seconds", seconds)] {
             if !(0.0..=1e9).contains(&value) {

@@ -43,9 +43,9 @@ pub fn doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<String> {
     }
     (!wrong.is_empty()).then(|| {
         format!(
-            "{} is impossible for a clock: either the sender paused or ran slower than its own clock, as an emulator on a \
-             busy machine does (then its times are right, but they do not match this computer's clock), or its stamps were \
-             damaged",
+            "{} is impossible for a clock. Either the sender paused or ran slower than its own clock, for example an \
+             emulator on a busy machine: then its times are right, but they do not match this computer's clock. Or \
+             its stamps were damaged",
             wrong.join(" and ")
         )
     })

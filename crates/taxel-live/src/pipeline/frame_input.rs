@@ -101,7 +101,9 @@ impl FrameInput {
         let mut state = lock(&self.state);
         let InputState { frames, feed, message, .. } = &mut *state;
         if self.place.is_some() {
-            return Err(problem!("source {name:?}: reads lines, and takes no samples").into());
+            return Err(
+                problem!("source {name:?}: reads its own lines, so it accepts no values from the program").into()
+            );
         }
         if feed.is_over() {
             return Err(problem!("source {name:?}: has ended").into());

@@ -86,7 +86,7 @@ options! {
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
         #[serde(skip_serializing)]
         tare: Option<StatedTare> = None, "python" = "Tare | float | None", "metavar" = "FILE|SECONDS",
-            "typed" = "A recording of them at rest (taxel cut) is a tare too.";
+            "typed" = "A recording of the sensor at rest (taxel cut) can be used instead of a saved tare.";
         /// Record in a new file (.mcap or .lsa).
         ///
         /// `.mcap` holds all data, `.lsa` the raw bytes of the manual.
@@ -196,9 +196,10 @@ impl LiveOptions {
             let name = text.name();
             if texts[..k].iter().any(|earlier| earlier.name() == name) {
                 let text = &text.text;
-                return Err(
-                    problem!("source {text:?}: there are two named {name}; begin one with another NAME=").into()
-                );
+                return Err(problem!(
+                    "source {text:?}: two sources have the name {name}; begin one of them with another NAME="
+                )
+                .into());
             }
         }
         Ok(texts)

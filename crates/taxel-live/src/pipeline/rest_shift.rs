@@ -80,8 +80,9 @@ impl RestShift {
         #[allow(clippy::cast_precision_loss)]
         let gap_s = self.longest_ns as f64 / 1e9;
         Some(format!(
-            "after a gap of {gap_s:.1} s, the rest of {} of {} taxels differs from the tare by up to {farthest} {unit}, so that \
-             presses are missed: with nothing on the sensor, click Zero all on the page, or start again with --tare SECONDS",
+            "after a gap of {gap_s:.1} s, the rest of {} of {} taxels differs from the tare by up to {farthest} \
+             {unit}, so taxel misses presses: remove everything from the sensor, then click Zero all on the page, or \
+             start again with --tare SECONDS",
             shifted.len(),
             values.len()
         ))

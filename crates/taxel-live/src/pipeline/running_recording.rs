@@ -140,7 +140,7 @@ impl RunningRecording {
         match self.create_once()? {
             RecordingFile::Mcap(writer) => writer.track(name),
             RecordingFile::Track(_) | RecordingFile::Lsa(_) => {
-                Err(problem!("source {name}: only a .mcap holds several sources").into())
+                Err(problem!("source {name}: only a .mcap file can contain several sources").into())
             }
         }
     }
@@ -178,10 +178,14 @@ impl RunningRecording {
         let header = Header { sources, ..header };
         let (path, kind) = (&record.path, kind_of_name(&record.path)?);
         if !header.sources.is_empty() && kind != "mcap" {
-            return Err(problem!("{}: only a .mcap holds several sources", path.display()).into());
+            return Err(problem!("{}: only a .mcap file can contain several sources", path.display()).into());
         }
         if header.frames.is_some() && kind != "mcap" {
-            return Err(problem!("{}: a .lsa holds a board's bytes; record frames to a .mcap", path.display()).into());
+            return Err(problem!(
+                "{}: a .lsa file contains only a board's bytes; record frames to a .mcap file",
+                path.display()
+            )
+            .into());
         }
         header.check()?;
         let file = match kind {
@@ -316,8 +320,10 @@ impl RunningRecording {
         }
         self.refused.store(true, Ordering::Relaxed);
         let path = self.record.path.display();
-        Err(problem!("{path}: a .lsa holds wire version 1, and the board speaks version 2; record to a .mcap file")
-            .into())
+        Err(problem!(
+            "{path}: a .lsa file contains only wire version 1, but the board uses version 2; record to a .mcap file"
+        )
+        .into())
     }
 
     pub(super) fn board_change(&self, change: &BoardChange) -> Result<()> {
@@ -367,7 +373,7 @@ impl RunningRecording {
 
     pub(super) fn note(&self, board_us: Option<i64>, text: &str) -> Result<()> {
         if kind_of_name(&self.record.path)? == "lsa" {
-            return Err(problem!("a .lsa holds raw bytes and no notes: record to a .mcap file").into());
+            return Err(problem!("a .lsa file cannot contain notes: record to a .mcap file").into());
         }
         self.has_notes.store(true, Ordering::Relaxed);
         self.with_track(|track| track.note(now_ns(), board_us.and_then(|t| self.timed(t)), text))
@@ -376,7 +382,7 @@ impl RunningRecording {
     /// Writes a taxel's zeroing by a user.
     pub(super) fn zeroing(&self, zeroing: &Zeroing) -> Result<()> {
         if kind_of_name(&self.record.path)? == "lsa" {
-            return Err(problem!("a .lsa cannot keep that a taxel was zeroed: record to a .mcap file").into());
+            return Err(problem!("a .lsa file cannot contain the new rest of a taxel: record to a .mcap file").into());
         }
         let Some(t) = self.timed(zeroing.t) else { return Ok(()) };
         self.with_track(|track| track.zeroing(now_ns(), &Zeroing { t, ..*zeroing }))
@@ -439,7 +445,10 @@ fn kind_of_name(path: &Path) -> Result<&str> {
         Some(kind @ ("mcap" | "lsa")) => Ok(kind),
         _ => {
             let name = path.display();
-            Err(problem!("{name}: a recording is named .mcap (all that is known) or .lsa (raw bytes)").into())
+            Err(problem!(
+                "{name}: the name of a recording must end with .mcap (all data) or .lsa (only the board's bytes)"
+            )
+            .into())
         }
     }
 }
@@ -502,7 +511,7 @@ mod tests {
         let lost = losses(&now, Some(&begun));
         assert_eq!(lost.missing, Some(3));
         let verdict = lost.verdict();
-        assert!(verdict.text.ends_with("in the bytes that came: 25 bytes of version 1 refused"), "{}", verdict.text);
+        assert!(verdict.text.ends_with("in the bytes that arrived: 25 bytes of version 1 refused"), "{}", verdict.text);
         // What the queue dropped is missing among the board's numbers too.
         now.capture.dropped_by_queue += 2;
         let lost = losses(&now, Some(&begun)).verdict().lost;

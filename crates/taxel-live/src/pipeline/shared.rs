@@ -200,7 +200,7 @@ impl PipelineShared {
                 self.preview_around(board_us);
                 recording.note(board_us, text)
             }
-            None => Err(taxel_core::problem!("a note is kept in a recording: record to a .mcap file").into()),
+            None => Err(taxel_core::problem!("a note is saved only in a recording: record to a .mcap file").into()),
         }
     }
 

@@ -263,14 +263,14 @@ impl FromStr for SourceText {
                 (None, None) => None,
             };
             if source.unit.as_ref().is_some_and(String::is_empty) {
-                return Err(refused("unit is empty: must be that of the values, for example N or kPa".to_owned()));
+                return Err(refused("unit is empty: must be the unit of the values, for example N or kPa".to_owned()));
             }
             if let Some(rate_hz) = source.rate_hz.filter(|rate_hz| !(1e6 / 3.6e9..=1e6).contains(rate_hz)) {
                 return Err(refused(format!("rate is {rate_hz} Hz: must be from 1 per hour to 1000000")));
             }
         }
         match options.keys().next() {
-            Some(key) => Err(refused(format!("has no option {key:?}; there are {OPTIONS}"))),
+            Some(key) => Err(refused(format!("has no option {key:?}; the options are {OPTIONS}"))),
             None => Ok(source),
         }
     }
@@ -372,7 +372,7 @@ impl SourceText {
             (self.rate_hz.is_some(), "rate"),
         ] {
             if is_stated {
-                return Err(problem!("{key} is only for frames: state array=ROWSxCOLUMNS too").into());
+                return Err(problem!("{key} is only for frames: add array=ROWSxCOLUMNS").into());
             }
         }
         let stream = StreamColumns::of_columns(first.columns);
@@ -384,9 +384,7 @@ impl SourceText {
             [] => {}
             [column] => return Ok(of_dates(column)),
             _ => {
-                return Err(
-                    problem!("dates in several columns are only for frames: state array=ROWSxCOLUMNS too").into()
-                );
+                return Err(problem!("dates in several columns are only for frames: add array=ROWSxCOLUMNS").into());
             }
         }
         Ok(match &self.time {
@@ -398,7 +396,7 @@ impl SourceText {
             }
             Some(StatedTime::Dates(column)) => of_dates(index_of("time", column, &stream.columns)?),
             Some(StatedTime::Sum(..)) => {
-                return Err(problem!("time=A+B is only for frames: state array=ROWSxCOLUMNS too").into());
+                return Err(problem!("time=A+B is only for frames: add array=ROWSxCOLUMNS").into());
             }
         })
     }
@@ -438,7 +436,11 @@ impl SourceText {
         let is_value = |field: &usize| !left.contains(field) && time.iter().all(|(clock, _)| clock != field);
         let values: Vec<usize> = (0..columns.len()).filter(is_value).collect();
         if values.is_empty() {
-            return Err(problem!("a line of {} columns has no values beside its time", columns.len()).into());
+            return Err(problem!(
+                "a line of {} columns has no column of values, only its time and columns that are left out",
+                columns.len()
+            )
+            .into());
         }
         let array = self.array_for(values.len(), end, readout_array)?;
         let is_named = self.columns.is_some() || !columns.iter().enumerate().all(|(k, name)| *name == numbered(k));
@@ -515,8 +517,8 @@ impl SourceText {
                 let field = index_of("time", column, columns)?;
                 let Some(unit_us) = unit_us.or_else(|| clock_unit_us(&columns[field])) else {
                     return Err(problem!(
-                        "time={column}: state its unit, for example time={column}:ms, or time={column}:{DATES} for \
-                         dates"
+                        "time={column}: the unit is missing; add it, for example time={column}:ms, or \
+                         time={column}:{DATES} for dates"
                     ));
                 };
                 vec![(field, unit_us)]
@@ -538,13 +540,13 @@ impl SourceText {
             return Ok(array.clone());
         }
         let FrameEnd::Lines(lines) = end else {
-            return Err(problem!("frame_end=blank: state array=ROWSxCOLUMNS too").into());
+            return Err(problem!("frame_end=blank: add array=ROWSxCOLUMNS").into());
         };
         if let Some(array) = readout_array.filter(|array| array.len() == values * lines) {
             // Its name is that of the recording that the readout was trained on.
             return Ok(Array { name: self.name(), ..array.clone() });
         }
-        let side = |n: usize| u16::try_from(n).map_err(|_| problem!("a line has {n} values: at most 65535"));
+        let side = |n: usize| u16::try_from(n).map_err(|_| problem!("a line has {n} values: must be at most 65535"));
         let (rows, columns) = (side(lines)?, side(values)?);
         Ok(Array::unmeasured(rows, columns, &self.name()))
     }
@@ -569,7 +571,7 @@ fn index_of(key: &str, column: &str, columns: &[String]) -> taxel_core::Result<u
     match column.parse::<usize>() {
         Ok(number) if (1..=columns.len()).contains(&number) => Ok(number - 1),
         Ok(_) => Err(problem!("{key}={column}: a line has {} columns", columns.len())),
-        Err(_) => Err(problem!("{key}={column}: no column has this name, of {}", columns.join(", "))),
+        Err(_) => Err(problem!("{key}={column}: no column has this name; the columns are {}", columns.join(", "))),
     }
 }
 
@@ -610,7 +612,7 @@ impl OpenedLines {
         while self.reader.came_ns == 0 && !self.has_ended {
             if begun.elapsed() >= wait.most {
                 let seconds = begun.elapsed().as_secs();
-                return Err(problem!("{}: no line came within {seconds} s", self.reader.place()).into());
+                return Err(problem!("{}: no line arrived within {seconds} s", self.reader.place()).into());
             }
             wait.stop.check()?;
             self.fill()?;
@@ -744,14 +746,14 @@ impl OpenedLines {
         let garbage: u64 = garbage.iter().map(|line| line.bytes).sum();
         let came = match (&texts[..], frames) {
             ([], _) => match left_out.in_no_line + left_out.unfinished + garbage {
-                0 => format!("no line came {within}"),
-                bytes => format!("no line of numbers in the {bytes} bytes that came {within}"),
+                0 => format!("no line arrived {within}"),
+                bytes => format!("{bytes} bytes arrived {within}, but no line of numbers"),
             },
             (_, 0) => {
                 let lines = if texts.len() == 1 { "1 line".to_owned() } else { format!("{} lines", texts.len()) };
-                format!("{lines} came {within}, {}", unread(&texts, &source.leave_out, fields))
+                format!("{lines} arrived {within}, {}", unread(&texts, &source.leave_out, fields))
             }
-            _ => format!("1 frame came {within}, which shows no rate: add rate=HZ"),
+            _ => format!("only 1 frame arrived {within}, so the rate is unknown: add rate=HZ"),
         };
         problem!("{}: {came}", self.reader.place()).into()
     }
@@ -794,7 +796,7 @@ fn unread(texts: &[&str], leave_out: &[String], fields: Option<usize>) -> String
     };
     if fields == Some(width + 1) && alike.iter().all(|text| text.ends_with([';', ','])) {
         let left: Vec<String> = leave_out.iter().cloned().chain([(width + 1).to_string()]).collect();
-        return format!("the last of {} columns is empty: add leave_out={}", width + 1, left.join(":"));
+        return format!("but the last of {} columns is empty: add leave_out={}", width + 1, left.join(":"));
     }
     if let Some(&cut) = shared.iter().find(|&&k| first[k].trim_matches(['\'', '"']) == "...") {
         let column = cut + 1;
@@ -808,13 +810,13 @@ fn unread(texts: &[&str], leave_out: &[String], fields: Option<usize>) -> String
     }
     match (&shared[..], fields) {
         ([], Some(fields)) if first.iter().all(|cell| number(cell).is_some()) && first.len() != fields => {
-            format!("the first with {} columns: must be {fields}", first.len())
+            format!("but the first has {} columns: must be {fields}", first.len())
         }
         ([], Some(_)) if first.iter().all(|cell| number(cell).is_some()) => {
-            "and no whole frame: are frame_lines= or frame_end= right?".to_owned()
+            "but no whole frame: are frame_lines= or frame_end= right?".to_owned()
         }
         (all, _) if all.is_empty() || all.len() == first.len() => {
-            format!("the first {:?}: none is of numbers", shown(alike[0]))
+            format!("but no line contains only numbers; the first is {:?}", shown(alike[0]))
         }
         (several, _) => {
             let column = if several.len() == 1 { "a text in column" } else { "texts in columns" };
@@ -922,7 +924,7 @@ mod tests {
         assert!(matches!(error, Error::Core(taxel_core::Error::Interrupted)), "{error}");
         let none = FirstLineWait { most: Duration::ZERO, ..FirstLineWait::default() };
         let error = opened("silent", "", "array=2x3", none).unwrap_err();
-        assert!(error.to_string().contains("no line came within 0 s"), "{error}");
+        assert!(error.to_string().contains("no line arrived within 0 s"), "{error}");
     }
 
     #[test]
@@ -943,11 +945,12 @@ mod tests {
         for (keys, said) in [
             ("array=7x8,frame_lines=8,rate=9", "must be rows of 8: is it array=8x7?"),
             ("array=7x8,frame_end=blank,rate=9", "must be rows of 8: is it array=8x7?"),
-            ("array=8x7,rate=9", "must be 56 per frame (or add frame_lines=8, or frame_end=blank"),
+            ("array=8x7,rate=9", "must be 56 per frame (or add frame_lines=8; or add frame_end=blank"),
             ("array=8x9,rate=9", "must be 72 per frame"),
             (
                 "array=2x3,rate=9",
-                "lines have 7 values: must be 6 per frame (name a column of times, for example time=1:ms, and",
+                "lines have 7 values: must be 6 per frame (state which column contains times, for example time=1:ms, \
+                 and",
             ),
         ] {
             let error = opened("rows", &frames, keys, FirstLineWait::default()).unwrap_err().to_string();
@@ -994,10 +997,10 @@ mod tests {
                 vec!["ros2: command not found"],
                 vec![],
                 None,
-                "the first \"ros2: command not found\": none is of numbers",
+                "but no line contains only numbers; the first is \"ros2: command not found\"",
             ),
-            (vec!["1,2", "1,2"], vec![], Some(5), "the first with 2 columns: must be 5"),
-            (vec!["1,2", "1,2"], vec![], Some(2), "and no whole frame: are frame_lines= or frame_end= right?"),
+            (vec!["1,2", "1,2"], vec![], Some(5), "but the first has 2 columns: must be 5"),
+            (vec!["1,2", "1,2"], vec![], Some(2), "but no whole frame: are frame_lines= or frame_end= right?"),
             (
                 vec!["InsoleLab", "1;a;2", "2;b;3"],
                 vec![],

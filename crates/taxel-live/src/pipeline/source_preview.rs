@@ -61,7 +61,7 @@ impl SourcePreview {
     /// `Core(Problem)` if it is no source of lines, `Socket` or `File` if it cannot be opened or read.
     pub fn read(source: &SourceText, most: Duration) -> Result<Self> {
         let SourcePlace::Lines(place) = &source.place else {
-            return Err(problem!("source {:?}: sends no lines that could be shown", source.text).into());
+            return Err(problem!("source {:?}: sends no lines, so nothing can be shown", source.text).into());
         };
         let mut reader = LineReader::open(place)?;
         let is_serial = matches!(place, LinePlace::Serial(_));
@@ -88,8 +88,8 @@ fn guess(lines: &[PreviewLine], array_is_stated: bool) -> (String, String) {
     let text = lines.iter().filter(|line| line.numbers.is_none() && !line.is_empty).count();
     let Some(width) = usual(numbers.iter().map(|(line, _)| line.len())) else {
         let reason = match text {
-            0 => "Nothing arrived: is it connected, and on?",
-            _ => "No line of numbers arrived: another speed?",
+            0 => "Nothing arrived: is the sensor connected and switched on?",
+            _ => "No line of numbers arrived: is the baud rate right?",
         };
         return (String::new(), reason.to_owned());
     };
@@ -104,7 +104,7 @@ fn guess(lines: &[PreviewLine], array_is_stated: bool) -> (String, String) {
     let complete = groups.get(1..groups.len().saturating_sub(1)).unwrap_or_default();
     if let Some(rows) = usual(complete.iter().copied().filter(|&rows| rows > 0)) {
         let keys = format!("array={rows}x{width},frame_end=blank");
-        return (keys, format!("{rows} lines of {width} numbers and an empty one: {rows} x {width}{beside}"));
+        return (keys, format!("{rows} lines of {width} numbers, then an empty line: {rows} x {width}{beside}"));
     }
     let are_dated = lines.iter().filter(|line| line.numbers.is_some()).all(|line| line.is_dated);
     let by_arrival = || clock_unit(&usual_lines).filter(|_| is_square(width - 1) || !is_square(width));

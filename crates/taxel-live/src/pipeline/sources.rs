@@ -64,7 +64,7 @@ impl NumberStream {
         if !self.stream.fits(values) {
             let columns = self.stream.columns.join(", ");
             let (name, n) = (&self.part.name, values.len());
-            return Err(problem!("source {name}: {n} values; its columns are {columns}").into());
+            return Err(problem!("source {name}: {n} values; must be one per column: {columns}").into());
         }
         let faults = |faults: &mut StreamFaults| faults.line(&self.stream, values, arrived_ns);
         self.record(faults, |track, number| track.sample(arrived_ns, number, values))

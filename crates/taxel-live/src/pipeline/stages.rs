@@ -290,11 +290,11 @@ impl Stages {
         let array = &self.shared.options.array;
         let published = self.shared.published();
         if published.counters.readout.taring {
-            return Err(problem!("a tare is being taken: zero taxels when that is done").into());
+            return Err(problem!("a tare is being measured: zero taxels after it").into());
         }
         let now = published.counters.board.offset.map(|offset| offset.board_us(now_ns()));
         let Some(t) = published.counters.board.board_us.max(self.readout.announced_until()).max(now) else {
-            return Err(problem!("nothing came yet: no taxel can be zeroed").into());
+            return Err(problem!("nothing has arrived yet, so no taxel can be zeroed").into());
         };
         let mut zeroings = vec![];
         for &(x, y) in taxels {
@@ -302,7 +302,10 @@ impl Stages {
             zeroing.check(array)?;
             let taxel = array.index(x, y);
             let Some(rest) = self.source.rest_now(taxel) else {
-                return Err(problem!("taxel at row {y}, column {x}: no event so far, so its value is unknown").into());
+                return Err(problem!(
+                    "taxel at row {y}, column {x}: its value is unknown, because it has sent no event so far"
+                )
+                .into());
             };
             zeroing.rest = rest;
             let tared = published.rest.get(taxel).copied().flatten();

@@ -37,7 +37,7 @@ impl FrameProperties {
         }
         if !self.columns.is_empty() && self.columns.len() != usize::from(columns) {
             let n = self.columns.len();
-            return Err(problem!("source {name}: {n} names of columns for {columns} columns"));
+            return Err(problem!("source {name}: {n} names for {columns} columns; must be one per column"));
         }
         if let Some(frame_us) = self.frame_us.filter(|frame_us| !(1.0..=3.6e9).contains(frame_us)) {
             return Err(problem!("source {name}: frame_us"; " is {frame_us}: must be from 1 to 3600000000 us"));

@@ -58,7 +58,10 @@ pub(super) fn too_large(path: &Path, text: &str) -> Error {
 /// Refuses more bytes in memory than a caller allows.
 pub(super) fn in_memory(path: &Path, subject: &str, size: u64, most: u64) -> Result<()> {
     if size > most {
-        return Err(too_large(path, &format!("{subject} of {size} bytes or more, unpacked; at most {most} are read")));
+        return Err(too_large(
+            path,
+            &format!("{subject} of {size} bytes or more when unpacked; at most {most} are read"),
+        ));
     }
     Ok(())
 }

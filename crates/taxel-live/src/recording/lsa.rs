@@ -167,7 +167,7 @@ pub fn decode_lsa(
     file.take(length).read_to_end(&mut bytes).map_err(Error::file(path))?;
     if wire::v2::begins(&bytes) {
         let name = path.display();
-        let reason = "begins with a datagram of wire version 2; a .lsa holds version 1";
+        let reason = "begins with a datagram of wire version 2; a .lsa file contains only version 1";
         return Err(taxel_core::Error::format(format!("{name}: {reason}: record version 2 to a .mcap file")).into());
     }
     let mut decoder = Decoder::new(array.clone()).pairing(pairing).differences(differences);

@@ -172,7 +172,7 @@ impl Reader {
         let Some(header) = blocks.header()?.or(end).or(begin) else {
             return Err(Error::format(
                 path,
-                "an MCAP file without the header of a taxel recording (metadata record \"taxel\")",
+                "is not a taxel recording: the header (metadata record \"taxel\") of this MCAP file is missing",
             ));
         };
         header.check().map_err(|error| Error::format(path, &format!("header: {error}")))?;
@@ -194,7 +194,7 @@ impl Reader {
         let Some(source) = self.sources().position(|known| known == name) else {
             let known: Vec<&str> = self.sources().collect();
             let path = self.blocks.path.display();
-            return Err(problem!("{path}: holds no source {name:?}; there are {}", known.join(", ")).into());
+            return Err(problem!("{path}: has no source {name:?}; the sources are {}", known.join(", ")).into());
         };
         let ending = match &self.ending {
             Some(FileEnding::Finished { .. }) if source != 0 => {
@@ -379,8 +379,8 @@ impl Reader {
                                 wrong = Some(limits::too_large(
                                     &self.blocks.path,
                                     &format!(
-                                        "the datagrams up to byte {} unpack to {in_datagrams} bytes; at most {most} are read \
-                                         (100 times the file and 64 MiB)",
+                                        "the datagrams up to byte {} unpack to {in_datagrams} bytes; at most {most} \
+                                         are read (100 times the file and 64 MiB)",
                                         block.offset
                                     ),
                                 ));

@@ -121,7 +121,7 @@ impl Writer {
     pub fn track(&self, name: &str) -> Result<SourceWriter> {
         let mut sources = std::iter::once(&self.header).chain(&self.header.sources).enumerate();
         let Some((k, source)) = sources.find(|(_, source)| source.name == name) else {
-            return Err(problem!("source {name:?}: the recording has none of that name").into());
+            return Err(problem!("source {name:?}: the recording has no source with this name").into());
         };
         Ok(SourceWriter::new(Arc::clone(&self.track.queue), k, source))
     }
@@ -277,12 +277,16 @@ impl SourceWriter {
     pub fn datagrams(&self, arrived_ns: &[i64], number: &[u64], offsets: &[i64], bytes: &[u8]) -> Result<()> {
         if number.len() != arrived_ns.len() || offsets.len() != arrived_ns.len() + 1 {
             let n = arrived_ns.len();
-            return Err(problem!("{n} arrival times need {n} arrival numbers and {} offsets of bytes", n + 1).into());
+            return Err(problem!(
+                "{n} arrival times: must come with {n} numbers of arrival, and with {} offsets into bytes",
+                n + 1
+            )
+            .into());
         }
         for (k, two) in offsets.windows(2).enumerate() {
             let range = usize::try_from(two[0]).ok().zip(usize::try_from(two[1]).ok());
             let Some(datagram) = range.and_then(|(from, to)| bytes.get(from..to)) else {
-                return Err(problem!("datagram {k}: bytes {} to {} are not there", two[0], two[1]).into());
+                return Err(problem!("datagram {k}: bytes {} to {} are outside the given bytes", two[0], two[1]).into());
             };
             self.datagram_at_most(arrived_ns[k], number[k], datagram, BULK_BYTES)?;
         }
@@ -324,7 +328,7 @@ impl SourceWriter {
     pub fn zeroing(&self, at_ns: i64, zeroing: &Zeroing) -> Result<()> {
         let Zeroing { t, x, y, rest, before } = *zeroing;
         let before_text = before.map_or_else(|| "unknown".to_owned(), |before| format!("{before:.1}"));
-        let text = format!("zeroed row {y}, column {x}: its rest was {before_text}, is now {rest:.1} ticks");
+        let text = format!("zeroed row {y}, column {x}: its rest was {before_text} and is now {rest:.1} ticks");
         let mut note = log(at_ns, Some(t), &text);
         note["zeroed"] = json!({ "x": x, "y": y, "rest": rest, "before": before });
         self.grey_scale().zero(usize::from(y) * self.columns + usize::from(x), rest);

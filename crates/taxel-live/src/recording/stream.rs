@@ -63,7 +63,7 @@ impl StreamColumns {
                 return refused(format!("column {column:?}: a name must not be empty, and must not contain a comma"));
             }
             if self.columns[..k].contains(column) {
-                return refused(format!("column {column:?}: there are two of that name"));
+                return refused(format!("column {column:?}: two columns have this name"));
             }
         }
         if let Some(time) = self.time.as_ref().filter(|time| !self.columns.contains(time)) {

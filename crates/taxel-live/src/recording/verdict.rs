@@ -19,12 +19,12 @@ use crate::bridged::Bridged;
 use crate::kernel_drops::KernelDrops;
 
 /// The wording of version 1 when nothing was dropped between the socket and the file.
-pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)";
+pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show losses before arrival)";
 /// The same for a stream of numbers, and for frames of them.
-const NO_LINE_LOST: &str = "nothing lost after arrival (lines without numbers cannot show what was lost before it)";
+const NO_LINE_LOST: &str = "nothing lost after arrival (lines are not numbered, so losses before arrival are unknown)";
 
 /// The wording where a kernel does not count what it drops, and the board does not number what it sends.
-const UNCOUNTED: &str = "losses unknown: the kernel does not count what it drops";
+const UNCOUNTED: &str = "losses unknown: the kernel does not count dropped datagrams";
 
 /// The wording where the record with the final counts is damaged.
 const NO_END: &str = "the final counts are damaged: losses since the last intact counts are unknown";
@@ -291,10 +291,14 @@ impl Verdict {
             (
                 missing - behind,
                 "lost_on_the_way_or_dropped",
-                "datagrams lost or damaged on the way or dropped by a kernel that does not count them",
+                "datagrams lost or damaged on the way or dropped uncounted by a kernel",
             )
         } else if unclear {
-            (missing, "lost_on_the_way_or_dropped", "datagrams lost or damaged on the way or among those dropped")
+            (
+                missing,
+                "lost_on_the_way_or_dropped",
+                "datagrams lost or damaged on the way or already counted as dropped",
+            )
         } else {
             (missing.saturating_sub(behind), "lost_on_the_way", "datagrams lost or damaged on the way")
         };
@@ -324,20 +328,20 @@ impl Verdict {
         let hidden = counts.missing.is_some() && !knows;
         let mut pieces = vec![if !words.is_empty() {
             let but = match (hidden, knows || counted_by_kernel) {
-                (true, true) => ", and what resets hide",
-                (true, false) => ", and what resets hide or the kernel dropped uncounted",
+                (true, true) => ", and unknown losses at resets",
+                (true, false) => ", and unknown losses at resets and in the kernel",
                 (false, true) => "",
-                (false, false) => ", and what the kernel dropped uncounted",
+                (false, false) => ", and unknown losses in the kernel",
             };
             format!("LOST: {}{but}", words.join(", "))
         } else if knows && of_board(OTHER_BOARD) > 0 {
-            "nothing lost except what another board sent".to_owned()
+            "nothing lost except datagrams of another board".to_owned()
         } else if knows {
             "nothing lost".to_owned()
         } else if hidden && counted_by_kernel {
-            "nothing lost except what resets hide".to_owned()
+            "nothing lost, except unknown losses at resets".to_owned()
         } else if hidden {
-            "nothing lost except what resets hide or the kernel dropped uncounted".to_owned()
+            "nothing lost, except unknown losses at resets and in the kernel".to_owned()
         } else if !counted_by_kernel {
             UNCOUNTED.to_owned()
         } else {
@@ -366,7 +370,7 @@ impl Verdict {
             let tenths = silent_ms.div_ceil(100);
             let times = counted(silences, "time");
             let all = format!("{}.{} s in all", tenths / 10, tenths % 10);
-            pieces.push(format!("no frame came for a second or more {times}, {all}"));
+            pieces.push(format!("no frame arrived for a second or more: {times}, {all}"));
         }
         if bridged.silences > 0 || bridged.restarts > 0 {
             verdict.noted.insert("silences_of_other_computer".to_owned(), bridged.silences);
@@ -415,7 +419,7 @@ impl Verdict {
             self.status = self.status.max(RecordingStatus::Damaged);
         }
         let words: Vec<String> = found().map(|(cause, n)| numbered(*n, &cause.replace('_', " "))).collect();
-        (!words.is_empty()).then(|| format!("in the bytes that came: {}", words.join(", ")))
+        (!words.is_empty()).then(|| format!("in the bytes that arrived: {}", words.join(", ")))
     }
 
     /// The verdict where times after this one are doubtful too, if any, us.

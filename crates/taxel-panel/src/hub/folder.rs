@@ -93,7 +93,7 @@ impl Folder {
         // A link may lead out of the folder.
         match path.canonicalize() {
             Ok(real) if !real.starts_with(&self.path) => {
-                Err(problem!("{name}: is outside the folder {}", self.path.display()).into())
+                Err(problem!("{name}: must be in the folder {}", self.path.display()).into())
             }
             _ => Ok(path),
         }

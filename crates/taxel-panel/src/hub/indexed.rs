@@ -74,7 +74,7 @@ impl Indexed {
             1 => format!("{:.3} s", beyond as f64 / 1e6),
             us => format!("{} frames", beyond / us),
         };
-        Err(format!("a label {far} {end} of {name}: must be within the recording"))
+        Err(format!("a label is {far} {end} of {name}: must be within the recording"))
     }
 
     /// The `overview` message.

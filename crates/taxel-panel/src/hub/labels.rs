@@ -72,7 +72,7 @@ pub(crate) type NumberedEdit = (Option<u64>, LabelEdit);
 
 fn index_of(labels: &[Label], id: u64) -> Result<usize, String> {
     labels.iter().position(|label| label.label_id == id && !label.row.is_removal()).ok_or_else(|| {
-        format!("label_id: there is no label {id}; it was deleted or changed, perhaps by another client or program")
+        format!("label_id: label {id} does not exist; it was deleted or changed, perhaps by another client or program")
     })
 }
 

@@ -109,7 +109,10 @@ impl RecordingIndex {
             }
             _ => {
                 let name = path.display();
-                return Err(problem!("{name}: the panel shows .mcap and .lsa; taxel convert makes a .mcap").into());
+                return Err(problem!(
+                    "{name}: the panel shows only .mcap and .lsa files; taxel convert makes a .mcap file"
+                )
+                .into());
             }
         };
         let header_array = header.array.clone();

@@ -59,7 +59,7 @@ impl<'de, const MOST: usize> Deserialize<'de> for Text<MOST> {
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrMore<T> {
     fn deserialize<D: Deserializer<'de>>(values: D) -> Result<Self, D::Error> {
         let values = Vec::deserialize(values)?;
-        if values.is_empty() { Err(D::Error::custom("must hold one or more")) } else { Ok(Self(values)) }
+        if values.is_empty() { Err(D::Error::custom("must contain one or more")) } else { Ok(Self(values)) }
     }
 }
 

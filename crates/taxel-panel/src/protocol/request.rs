@@ -295,7 +295,7 @@ mod tests {
                 Some("how"),
                 "how: unknown variant `soon`, expected `now` or `lowest`",
             ),
-            (json!({ "type": "zero", "taxels": [] }), Some("taxels"), "taxels: must hold one or more"),
+            (json!({ "type": "zero", "taxels": [] }), Some("taxels"), "taxels: must contain one or more"),
             (
                 json!({ "type": "watch", "taxel": [1, 2, 3] }),
                 Some("taxel"),

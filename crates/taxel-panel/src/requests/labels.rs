@@ -87,7 +87,7 @@ pub(crate) fn marks(shown: Option<&OpenRecording>, labels: Vec<MarkedTimes>) -> 
     let mut changes = vec![];
     for MarkedTimes { label, t_us: OneOrMore(times), source, replaces_us } in labels {
         if replaces_us.as_ref().is_some_and(|replaced| replaced.0.len() != times.len()) {
-            return Err(Refusal::of_field("replaces_us", "must have one time for each of t_us"));
+            return Err(Refusal::of_field("replaces_us", "must have one time for each time in t_us"));
         }
         if changes.len() + times.len() > MOST_MARKS {
             return Err(Refusal::of_field("labels", format!("must be at most {MOST_MARKS} labels at a time")));
@@ -104,7 +104,7 @@ pub(crate) fn marks(shown: Option<&OpenRecording>, labels: Vec<MarkedTimes>) -> 
 /// The recording that is shown or being recorded, and one us of its file in the view.
 fn recording_of(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<(String, i64)> {
     let name = shown.map(|shown| shown.name.clone()).or_else(|| hub.recorder.file());
-    let name = name.ok_or("a label belongs to a recording: open one, or record")?;
+    let name = name.ok_or("a label needs a recording: open a recording, or start one")?;
     Ok((name, shown.map_or(1, |shown| shown.indexed.us())))
 }
 
@@ -190,7 +190,8 @@ fn take(hub: &Hub, name: &str, us: i64, read: LabelTable) {
 /// Takes back the last change of labels that a client made in the recording that is shown or being recorded.
 pub(crate) async fn undo(hub: &Hub, history: &LabelHistory, shown: Option<&OpenRecording>) -> Answer {
     let (name, us) = recording_of(hub, shown)?;
-    let change = history.take_last(&name).ok_or("nothing to undo: no label was changed here in this window")?;
+    let change =
+        history.take_last(&name).ok_or("nothing to undo: no label of this recording was changed in this window")?;
     let table = hub.folder.file(&file_of(&name))?;
     let _turn = hub.labels.turn(&name).await;
     let recording = name.clone();
@@ -212,7 +213,10 @@ pub(crate) async fn settle(
     let table = hub.folder.file(&file_of(&name))?;
     let _turn = hub.labels.turn(&name).await;
     let conflict = hub.labels.conflict(&name, id).ok_or_else(|| {
-        Refusal::of_field("conflict_id", "this conflict is settled, or the file has changed since: look at it again")
+        Refusal::of_field(
+            "conflict_id",
+            "this conflict was already settled, or the file has changed since: check both versions again",
+        )
     })?;
     let recording = name.clone();
     let read = hub.ask(move |handlers| handlers.labels.settle(&table, &recording, us, &conflict, restore)).await?;

@@ -103,7 +103,10 @@ async fn read_whole(hub: Arc<Hub>, name: String, key: (PathBuf, Option<String>),
         }
         Err(error) => {
             hub.folder.forget(&key);
-            hub.clients.send_message(&Message::warning(format!("{}; only its beginning is shown", words(&error))));
+            hub.clients.send_message(&Message::warning(format!(
+                "{}; only the beginning of the recording is shown",
+                words(&error)
+            )));
         }
     }
 }

@@ -32,7 +32,7 @@ pub(crate) fn start(hub: &Arc<Hub>, plan: RecordingPlan) -> Result<(), String> {
     let file = plan.file();
     let path = hub.folder.file(&file).map_err(|error| error.to_string())?;
     if path.exists() {
-        return Err(format!("{file}: exists already; name another, or another index"));
+        return Err(format!("{file}: exists already; choose another name or index"));
     }
     hub.recorder.plan(plan)?;
     tokio::spawn(run(Arc::clone(hub)));
@@ -118,7 +118,7 @@ async fn run(hub: Arc<Hub>) {
 
 /// Makes one recording; returns its verdict.
 async fn record(hub: &Arc<Hub>, plan: &RecordingPlan) -> Result<String, String> {
-    let live = hub.live().ok_or("no board is connected: nothing to record")?;
+    let live = hub.live().ok_or("nothing to record: no board is connected")?;
     let path = hub.folder.file(&plan.file()).map_err(|error| error.to_string())?;
     let record = Record { path, compression: Compression::None, overwrite: false };
     let failed = || "failed within taxel; please report it".to_owned();

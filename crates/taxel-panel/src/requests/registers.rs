@@ -11,7 +11,8 @@ use crate::hub::Hub;
 use crate::hub::presets;
 use crate::protocol::refusal::{Answer, Refusal};
 
-const NOT_CONNECTED: &str = "the board's serial line is not connected: give --control, or connect it here";
+const NOT_CONNECTED: &str = "the board's serial line is not connected: give --control to taxel live, or connect the \
+                             line here";
 
 /// The registers in the order in which all of them are written.
 const ALL: [u8; 6] = [1, 2, 3, 4, 0, 5];
@@ -96,12 +97,11 @@ pub(crate) async fn set(hub: &Hub, values: &Map<String, Value>) -> Answer {
             Value::Bool(flag) => Some(u32::from(*flag)),
             value => value.as_u64().and_then(|n| u32::try_from(n).ok()),
         };
-        let number = number.ok_or_else(|| {
-            Refusal::of_field(name, "must be a whole number of 0 or more, in the register's own unit")
-        })?;
+        let number = number
+            .ok_or_else(|| Refusal::of_field(name, "must be a whole number, 0 or more, in the unit of the register"))?;
         match name.as_str() {
-            "record" => return Err(Refusal::of_field(name, "is written by record and stop")),
-            "channels" => return Err(Refusal::of_field(name, "is the board's build")),
+            "record" => return Err(Refusal::of_field(name, "is written when a recording starts or stops")),
+            "channels" => return Err(Refusal::of_field(name, "is a property of the board")),
             _ => wanted.push((name.clone(), number)),
         }
     }
@@ -193,7 +193,7 @@ pub(crate) async fn delete_preset(hub: &Hub, name: &str) -> Answer {
     read_presets(hub).await?;
     if hub.presets().presets.remove(name).is_none() {
         let built_in = PRESETS.iter().any(|preset| preset.name == name);
-        let why = if built_in { "is built in" } else { "is not a preset of yours" };
+        let why = if built_in { "is built in" } else { "is not one of your presets" };
         return Err(Refusal::of_field("name", format!("{name} {why}")));
     }
     write_presets(hub, turn).await

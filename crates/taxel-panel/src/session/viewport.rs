@@ -369,9 +369,10 @@ impl Viewport {
         };
         if stream.is_err() && encoder.of_readout && live.is_some_and(|live| live.measures_tare()) {
             let name = encoder.name;
-            return Err(
-                problem!("encoder {name}: the readout measures its tare; choose the encoder again after that").into()
-            );
+            return Err(problem!(
+                "encoder {name}: the readout is still measuring its tare; choose the encoder again after it"
+            )
+            .into());
         }
         stream?;
         (self.options.encoder, self.requested_encoder) = (Some(encoder), Some(request));
@@ -457,7 +458,7 @@ impl Viewport {
         let t = self.t().ok_or("nothing is shown yet")?;
         if matches!(self.position, Position::Following) {
             // Playing the live source from now on would be a delay of zero, which is following.
-            return Err("the view already follows the newest data: seek first".into());
+            return Err("the view already follows the newest data: go to an earlier time first".into());
         }
         let (first, last) = self.index()?.range().unwrap_or((t, t));
         let at_end = t >= last && self.recording.is_some();
@@ -504,7 +505,7 @@ impl Viewport {
 
     pub(super) fn follow_request(&mut self) -> Answer {
         if self.live.is_none() {
-            return Err("this panel shows recordings only: begin it with taxel live --panel".into());
+            return Err("this panel shows recordings only: start it by taxel live --panel".into());
         }
         self.follow();
         Ok(())

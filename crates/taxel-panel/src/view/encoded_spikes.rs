@@ -109,7 +109,7 @@ impl EncodedSpikes {
         since: Option<i64>,
     ) -> Result<Self> {
         if frames.numbered() {
-            let text = "spikes need times, but these frames have only frame numbers: state their rate";
+            let text = "spikes need times, but these frames have only numbers: state the frame rate";
             return Err(problem!("{text}").with_hint("rate_hz", Hint::Give).into());
         }
         let sensors = frames.sensors();

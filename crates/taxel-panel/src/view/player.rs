@@ -68,7 +68,8 @@ impl Player {
     /// As [`KeyframeIndex::open`] and [`ChangeReader::read`]; `Core(Problem)` where the encoder does not fit the array, or
     /// the frames.
     pub fn open(index: Arc<dyn KeyframeIndex>, t: i64, options: ViewOptions) -> Result<Self> {
-        let (first, last) = index.range().ok_or_else(|| problem!("nothing to show: it holds no events"))?;
+        let (first, last) =
+            index.range().ok_or_else(|| problem!("nothing to show: the recording contains no events"))?;
         let t = t.clamp(first, last);
         let span = SPAN * options.column_us;
         let stored = !options.is_narrow() && (index.time_columns().is_some() || options.all_columns.is_some());

@@ -423,7 +423,7 @@ fn to_index(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<FrameIndex> {
         let known = |&rest: &f64| if rest.is_nan() { f64::NO_REST } else { rest };
         let rest = FrameRest {
             source: RestSource::named(&rest.source)
-                .ok_or_else(|| ProblemError::new_err(format!("source {name}: rest {:?} is none", rest.source)))?,
+                .ok_or_else(|| ProblemError::new_err(format!("source {name}: rest {:?} is not known", rest.source)))?,
             values: rests.iter().map(known).collect(),
             ticks_by_unit: rest.ticks_by_unit,
             loaded_from: rest.loaded_from,

@@ -54,8 +54,8 @@ pub fn check_cells(foam: &Foam, array: &Array, cells_per_pitch: u16) -> Result<(
     let most = most_cells(foam, array)?;
     if cells_per_pitch > most {
         return Err(Error::scene(format!(
-            "scene: cells_per_pitch is {cells_per_pitch}: must be {most} or less on {} x {} taxels and {} mm of foam, where \
-             more would make more than {LARGEST} cells",
+            "scene: cells_per_pitch is {cells_per_pitch}: must be {most} or less on {} x {} taxels and {} mm of foam \
+             (at most {LARGEST} cells in all)",
             array.rows, array.columns, foam.thickness_mm
         )));
     }

@@ -135,7 +135,7 @@ fn a_press_reaches_its_force() {
 fn what_cannot_be_played_is_said() {
     let soft = Foam { modulus_kpa: 5.0, ..Foam::default() };
     let text = play(&dropped(soft, 30.0, 400.0, 2), QUARTER_US).unwrap_err().to_string();
-    assert!(text.contains("bottoms out"), "{text}");
+    assert!(text.contains("reaches the bottom"), "{text}");
     let tired = Foam { damping_s_m: 5.0, ..Foam::default() };
     let text = play(&dropped(tired, 30.0, 100.0, 9), QUARTER_US).unwrap_err().to_string();
     assert!(text.contains("comes to rest"), "{text}");
@@ -177,7 +177,7 @@ fn a_course_that_leads_off_the_array_and_a_lift_before_the_landing_are_said() {
     assert!(text.contains("lifted 150 ms after") && text.contains("falls for 156 ms"), "{text}");
     let heavy = body(BodyShape::Sphere { radius_mm: 20.0 }, 1e300, Move::Dropped { height_mm: 50.0, ending: early });
     let text = play(&alone(Surface::Columns, Foam::default(), heavy), QUARTER_US).unwrap_err().to_string();
-    assert!(text.contains("the body bottoms out: 1e300 g"), "{text}");
+    assert!(text.contains("the body reaches the bottom of the foam: 1e300 g"), "{text}");
 }
 
 fn ball(motion: Move) -> Body {
@@ -305,7 +305,7 @@ fn a_touch_that_is_too_narrow_is_told_how_many_cells_would_do() {
     let press = Press { peak_n: None, depth_mm: Some(0.05), speed_mm_s: 50.0, hold_ms: 2.0, wait_ms: 0.0 };
     let shape = BodyShape::Edge { slope_deg: 45.0, length_mm: 20.0, axis_deg: 0.0 };
     let mut scene = alone(Surface::Layer, undamped(), body(shape, 36.0, Move::Pressed(press)));
-    assert!(play(&scene, 200.0).unwrap().narrow.unwrap().to_string().contains("16 is the most"));
+    assert!(play(&scene, 200.0).unwrap().narrow.unwrap().to_string().contains("the maximum is 16"));
     scene.bodies[0].shape = BodyShape::Sphere { radius_mm: 60.0 };
     assert_eq!(play(&scene, 200.0).unwrap().narrow, None);
 }

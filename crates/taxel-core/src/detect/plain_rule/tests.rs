@@ -26,9 +26,9 @@ fn a_file_gives_every_number_back_and_names_its_kind() {
     assert_eq!(PlainRule::from_json(&text).unwrap(), rule);
     assert_eq!(Detector::from_json(&text).unwrap(), rule.into());
     let other = Readout::from_json(&text).unwrap_err().to_string();
-    assert_eq!(other, "readout: format is \"taxel plain rule\", must be \"taxel readout\"");
+    assert_eq!(other, "readout: format is \"taxel plain rule\"; must be \"taxel readout\"");
     let neither = Detector::from_json(&text.replace("plain rule", "song")).unwrap_err().to_string();
-    assert_eq!(neither, "readout: format is \"taxel song\", must be \"taxel readout\" or \"taxel plain rule\"");
+    assert_eq!(neither, "readout: format is \"taxel song\"; must be \"taxel readout\" or \"taxel plain rule\"");
 }
 
 /// Makes one part of a rule invalid.
@@ -50,7 +50,7 @@ fn parts_that_make_no_sense_are_refused_by_name() {
         (|r| r.noise_floor = f64::INFINITY, "noise_floor is inf"),
         (|r| r.labels = [None, None], "labels are both left out"),
         (|r| r.labels[1] = r.labels[0].clone(), "labels are both contact"),
-        (|r| r.labels[0] = Some(" ".to_owned()), "labels: one is empty"),
+        (|r| r.labels[0] = Some(" ".to_owned()), "labels: a label is empty"),
     ];
     for (spoil, expected) in cases {
         let mut spoilt = rule();

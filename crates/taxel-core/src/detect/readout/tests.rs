@@ -60,10 +60,10 @@ fn files_that_are_no_readout_are_refused_by_name() {
     let cases = [
         ("", "readout: not JSON"),
         ("[]", "readout: not a JSON object"),
-        ("{}", "readout: the key \"format\" is missing, must be \"taxel readout\""),
-        (&good.replace("taxel readout", "other"), "readout: format is \"other\", must be \"taxel readout\""),
-        (&good.replace("\"version\": 1,", ""), "readout: states no version, must be 1"),
-        (&good.replace("\"version\": 1,", "\"version\": 2,"), "readout: version 2, this taxel reads version 1 only"),
+        ("{}", "readout: the key \"format\" is missing; must be \"taxel readout\""),
+        (&good.replace("taxel readout", "other"), "readout: format is \"other\"; must be \"taxel readout\""),
+        (&good.replace("\"version\": 1,", ""), "readout: the key \"version\" is missing; must be 1"),
+        (&good.replace("\"version\": 1,", "\"version\": 2,"), "readout: version is 2; this taxel reads only version 1"),
         (&good.replace("\"run_threshold\"", "\"threshold\""), "readout: threshold is not known: there is"),
         (&good.replace("\"neurons\"", "\"neuron\""), "readout: neuron is not known (did you mean neurons?): there is"),
         (&good.replace("contact_area", "contact_are"), "readout: encoder contact_are: must be one of"),
@@ -91,7 +91,7 @@ fn a_readout_refuses_neurons_that_were_trained_otherwise() {
     assert_eq!(message, "lift: trained for after_spike \"reset\", this readout is for after_spike \"keep\"");
     let mut other = readout();
     other.neurons.get_mut("lift").unwrap().neuron.time = Time::Continuous;
-    assert!(other.check().unwrap_err().to_string().starts_with("lift: trained for time \"continuous\""));
+    assert!(other.check().unwrap_err().to_string().starts_with("lift: the neuron was trained for time \"continuous\""));
     let mut other = readout();
     other.neurons.clear();
     assert!(other.check().is_err());
@@ -218,9 +218,9 @@ fn only_a_taxel_that_exists_is_zeroed() {
     let z = Zeroing { t: 0, x: 0, y: 0, rest: 1.0, before: None };
     assert!(z.check(&array).is_ok());
     for (wrong, message) in [
-        (Zeroing { x: 1, y: 1, ..z }, "taxel at row 1, column 1: there is no such taxel in 2 x 2"),
-        (Zeroing { x: 2, ..z }, "taxel at row 0, column 2: there is no such taxel in 2 x 2"),
-        (Zeroing { rest: f64::NAN, ..z }, "taxel at row 0, column 0: its rest is NaN, must be finite"),
+        (Zeroing { x: 1, y: 1, ..z }, "taxel at row 1, column 1: does not exist in this array of 2 x 2 taxels"),
+        (Zeroing { x: 2, ..z }, "taxel at row 0, column 2: does not exist in this array of 2 x 2 taxels"),
+        (Zeroing { rest: f64::NAN, ..z }, "taxel at row 0, column 0: its rest is NaN; must be finite"),
     ] {
         assert_eq!(wrong.check(&array).unwrap_err().to_string(), message);
     }

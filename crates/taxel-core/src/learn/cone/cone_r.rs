@@ -65,9 +65,9 @@ impl ConeR {
     pub fn check(&self) -> Result<()> {
         self.neuron.check()?;
         if self.neuron.time != Time::Grid {
-            return Err(
-                problem!("time"; " is \"continuous\": must be \"grid\", because equation 6.13 is a sum over grid points"),
-            );
+            return Err(problem!(
+                "time"; " is \"continuous\": must be \"grid\", because equation 6.13 is a sum over grid points"
+            ));
         }
         self.check_ranges()?;
         if self.lambdas.iter().sum::<f64>() == 0.0 {
@@ -181,7 +181,7 @@ impl ConeRProblem {
         check_examples(neuron, patterns, targets)?;
         if silence.len() != patterns.len() {
             let (lists, count) = (silence.len(), patterns.len());
-            return Err(problem!("silence"; ": {lists} lists for {count} patterns, must be one per pattern"));
+            return Err(problem!("silence"; ": {lists} lists for {count} patterns; must be one per pattern"));
         }
         for (p, windows) in silence.iter().enumerate() {
             check_silence(p, windows.as_deref())?;
@@ -379,12 +379,12 @@ impl ConeRProblem {
         let mut shares = vec![0.0; all];
         for (&row, &share) in multipliers.rows.iter().zip(&multipliers.values) {
             let Some(entry) = shares.get_mut(row) else {
-                return Err(problem!("start"; ": a multiplier of row {row}, but there are only {all} rows"));
+                return Err(problem!("start"; ": has a multiplier of row {row}, but there are only {all} rows"));
             };
             let low = if row < silent { 0.0 } else { objective.kink_of_c().1 };
             if !(low <= share && share <= low + 1.0) {
                 return Err(problem!(
-                    "start"; ": the multiplier of row {row} is {share}, must be from {low} to {}",
+                    "start"; ": the multiplier of row {row} is {share}; must be from {low} to {}",
                     low + 1.0
                 ));
             }
@@ -402,7 +402,9 @@ impl ConeRProblem {
         if same {
             Ok(())
         } else {
-            Err(problem!("neuron, delta_t_ms, margin and horizon are in the rows: prepare the rows again"))
+            Err(problem!(
+                "the rows were prepared for another neuron, delta_t_ms, margin or horizon: prepare the rows again"
+            ))
         }
     }
 

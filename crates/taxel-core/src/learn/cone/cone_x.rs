@@ -68,7 +68,7 @@ parameters! {
 
 /// The end of silence, ms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "must be a number, or one per pattern, ms")]
+#[serde(untagged, expecting = "must be a number of ms, or one number per pattern")]
 pub enum Horizon {
     /// The same in all patterns.
     All(f64),
@@ -96,9 +96,10 @@ impl Horizon {
 
     fn check(&self, patterns: usize) -> Result<()> {
         match self {
-            Self::Each(values) if values.len() != patterns => {
-                Err(problem!("horizon"; ": {} values, must be one, or one per pattern, {patterns}", values.len()))
-            }
+            Self::Each(values) if values.len() != patterns => Err(problem!(
+                "horizon"; ": {} values; must be one number for all patterns, or one per pattern, {patterns}",
+                values.len()
+            )),
             _ => Ok(()),
         }
     }
@@ -114,7 +115,8 @@ impl ConeX {
         self.neuron.check()?;
         if let Some(rearm) = self.neuron.rearm {
             return Err(problem!(
-                "rearm"; " is {rearm}: CONE-X asks for silence at every point, whether the neuron is armed or not; must be None"
+                "rearm"; " is {rearm}: must be None, because CONE-X requires silence at every point, also where a \
+                 neuron is not rearmed"
             ));
         }
         self.check_ranges()?;
@@ -122,13 +124,14 @@ impl ConeX {
         let Margin { height, slope } = self.margin();
         for (name, value, unit) in [("margin", height, "mV"), ("slope", slope, "mV/ms")] {
             if value == 0.0 && self.neuron.time == Time::Continuous {
-                return Err(problem!(name; " is 0 {unit}: must be above 0 in continuous time (1e-6 will do)"));
+                return Err(problem!(name; " is 0 {unit}: must be above 0 in continuous time, for example 1e-6"));
             }
         }
         if slope > 0.0 && self.neuron.time == Time::Grid {
-            return Err(
-                problem!("slope"; " is {slope} mV/ms: is only for time \"continuous\", because on the grid nothing tapers"),
-            );
+            return Err(problem!(
+                "slope"; " is {slope} mV/ms: must be 0 or None with time \"grid\"; only time \"continuous\" uses \
+                          the slope"
+            ));
         }
         Ok(())
     }
@@ -157,8 +160,8 @@ impl ConeX {
 }
 
 /// Reasons for a search that ended early.
-const ASKED: &str = "asked to stop, by max_seconds or Ctrl-C";
-const UNDECIDED: &str = "rows that differ by no more than rounding are neither met nor refuted";
+const ASKED: &str = "stopped by max_seconds or Ctrl-C";
+const UNDECIDED: &str = "rounding errors are too large to decide whether some rows can be met";
 
 /// A fit of CONE-X.
 #[derive(Debug, Clone, PartialEq)]
@@ -344,8 +347,8 @@ impl ConeXProblem {
         let Margin { height, slope } = found.asked.times(self.unit());
         let proof = found.certificate.as_ref().map_or("", |proof| proof.text.as_str());
         let reason = format!(
-            "no weights keep silence {height:.1e} mV below the threshold and come up to targets by {slope:.1e} mV/ms, the \
-             least margin that is tried; whether any do with a smaller margin is not known ({proof})"
+            "no weights keep silence {height:.1e} mV below the threshold and reach the targets with a slope of \
+             {slope:.1e} mV/ms, the smallest margin that taxel tries; weights for a smaller margin may exist ({proof})"
         );
         ConeXFit {
             fit: Fit { status: Status::Stopped, gap: f64::INFINITY, ..found.fit.clone() },

@@ -197,7 +197,7 @@ impl Working {
         let mut multipliers = Multipliers { equalities: vec![0.0; self.targets.len()], inequalities: vec![] };
         for &(row, multiplier) in start {
             if !multiplier.is_finite() {
-                return Err(problem!("start"; ": a multiplier is {multiplier}, must be finite"));
+                return Err(problem!("start"; ": a multiplier is {multiplier}; must be finite"));
             }
             match row {
                 Row::Target { .. } => {

@@ -299,7 +299,9 @@ fn solve_stoppable(
     stop.check()?;
     match solved {
         Ok(Ok((x, z))) if x.iter().chain(&z).all(|v| v.is_finite()) => Ok((x, z)),
-        Ok(Ok(_)) => Err(problem!("the cone solver gave no finite answer: are the parameters of a usual size?")),
+        Ok(Ok(_)) => Err(problem!(
+            "the cone solver found no finite solution: check that no parameter is extremely large or small"
+        )),
         Ok(Err(text)) => Err(problem!("the cone solver refuses the problem: {text}")),
         Err(panic) => std::panic::resume_unwind(panic),
     }

@@ -98,10 +98,14 @@ impl DualActiveSet {
     /// `Problem` if bounds are not numbers, cross, or differ in number.
     pub fn new(lower: &[f64], upper: &[f64]) -> Result<Self> {
         if lower.len() != upper.len() {
-            return Err(problem!("bounds: {} lower and {} upper ones", lower.len(), upper.len()));
+            return Err(problem!(
+                "bounds: {} lower and {} upper bounds; the numbers must be equal",
+                lower.len(),
+                upper.len()
+            ));
         }
         if let Some(n) = (0..lower.len()).find(|&n| lower[n].is_nan() || upper[n].is_nan() || lower[n] > upper[n]) {
-            return Err(problem!("bounds of weight {n}: {} to {}, must ascend", lower[n], upper[n]));
+            return Err(problem!("bounds of weight {n}: {} to {}; must ascend", lower[n], upper[n]));
         }
         // Strides are not powers of two, so that rows do not map to the same cache sets.
         let stride = lower.len().next_multiple_of(LANES);
@@ -194,7 +198,7 @@ impl DualActiveSet {
     pub fn start(&mut self, from: &Multipliers) -> Result<()> {
         if from.equalities.len() != self.equalities.len() {
             return Err(problem!(
-                "start"; ": {} multipliers of equalities, there are {}",
+                "start"; ": {} multipliers for {} equalities; must be one per equality",
                 from.equalities.len(),
                 self.equalities.len()
             ));
@@ -211,7 +215,7 @@ impl DualActiveSet {
                 return Err(problem!("start"; ": inequality {} is not in the working set", id.0));
             };
             if z.is_nan() || z < 0.0 {
-                return Err(problem!("start"; ": multiplier of inequality {} is {z}, must be 0 or more", id.0));
+                return Err(problem!("start"; ": multiplier of inequality {} is {z}; must be 0 or more", id.0));
             }
             if z > 0.0 {
                 wanted.push(slot);

@@ -7,7 +7,7 @@ use crate::{Result, problem};
 
 /// A lower or an upper bound on the weights, mV.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "must be a number, or one per synapse, mV")]
+#[serde(untagged, expecting = "must be a number of mV, or one number per synapse")]
 pub enum Bound {
     /// The same for all synapses.
     All(f64),
@@ -77,17 +77,19 @@ pub(crate) fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
     if let (Some(a), Some(b)) = (lb.len(), ub.len())
         && a != b
     {
-        return Err(problem!("lb"; " holds {a} bounds, ub {b}: must be one per synapse, or one for all"));
+        return Err(problem!("lb"; " has {a} bounds, ub has {b}: must be one per synapse, or one for all"));
     }
     let each = lb.len().or(ub.len());
     if each == Some(0) {
-        return Err(problem!("bounds: there is none, must be one per synapse, or one for all"));
+        return Err(problem!("bounds: the list is empty; must be one per synapse, or one for all"));
     }
     for n in 0..each.unwrap_or(1) {
         let (low, high) = (lb.at(n), ub.at(n));
         if !(is_weight(low) && is_weight(high) && low <= high) {
             let bounds = if each.is_some() { format!("bounds of synapse {n}:") } else { "bounds".to_owned() };
-            return Err(problem!("{bounds} {low} to {high} mV: lb must not be above ub, both within 1e100"));
+            return Err(problem!(
+                "{bounds} {low} to {high} mV: lb must not be above ub, and both must be within 1e100"
+            ));
         }
     }
     Ok(())
@@ -102,7 +104,7 @@ pub(crate) fn bounds_of(lb: &Bound, ub: &Bound, trains: usize) -> Result<Bounds>
     check_bounds(lb, ub)?;
     for (name, bound) in [("lb", lb), ("ub", ub)] {
         if let Some(count) = bound.len().filter(|&count| count != trains) {
-            return Err(problem!("{name}: {count} bounds for {trains} trains, must be one per train, or one for all"));
+            return Err(problem!("{name}: {count} bounds for {trains} trains; must be one per train, or one for all"));
         }
     }
     Ok(Bounds { lower: (0..trains).map(|n| lb.at(n)).collect(), upper: (0..trains).map(|n| ub.at(n)).collect() })

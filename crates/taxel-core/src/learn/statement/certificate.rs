@@ -111,34 +111,47 @@ fn explain(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: 
             let (least, most) = bounds.range(&stated.coefficients);
             let t = statement.time(*row);
             let why = if stated.coefficients.iter().all(|&a| a == 0.0) {
-                "no input counts before it".to_owned()
+                "no input before this time has an effect".to_owned()
             } else if most < stated.limit {
-                format!("the greatest weights give {} mV there, but the threshold is {} mV", mv(most), mv(stated.limit))
+                format!(
+                    "the largest allowed weights give {} mV at this time, but the threshold is {} mV",
+                    mv(most),
+                    mv(stated.limit)
+                )
             } else {
-                format!("the least weights give {} mV there, but the threshold is {} mV", mv(least), mv(stated.limit))
+                format!(
+                    "the smallest allowed weights give {} mV at this time, but the threshold is {} mV",
+                    mv(least),
+                    mv(stated.limit)
+                )
             };
-            format!("no weights within the bounds fire at pattern {pattern} target {target} ({} ms): {why}", short(t))
+            format!(
+                "with weights within the bounds, the neuron cannot fire in pattern {pattern} at target {target} ({} \
+                 ms): {why}",
+                short(t)
+            )
         }
         [(Row::Target { pattern, target }, fires), (Row::Silence { pattern: silent, t }, rests)]
             if -fires == *rests && statement.is_same_before(*t, *pattern, *silent) =>
         {
             format!(
-                "pattern {pattern} shall fire at target {target} ({} ms), where pattern {silent}, with the same inputs up to \
-                 there, shall be silent",
+                "pattern {pattern} must fire at target {target} ({} ms), but pattern {silent}, whose inputs are the \
+                 same up to this time, must be silent",
                 short(*t)
             )
         }
-        _ => format!("no weights within the bounds meet these together: {}", list(statement, rows)?),
+        _ => format!("no weights within the bounds can do all of this: {}", list(statement, rows)?),
     };
     let Margin { height, slope } = statement.margin.times(statement.unit);
     if at_all {
-        text += ". Impossible also without a margin";
+        text += ". Without a margin this is impossible too";
     } else if slope > 0.0 {
         text += &format!(
-            ". This holds for silence {height} mV below the threshold, coming up to targets by {slope} mV/ms or more"
+            ". This is proven for silence {height} mV below the threshold and a slope of {slope} mV/ms or more at \
+             targets"
         );
     } else {
-        text += &format!(". This holds for silence {height} mV below the threshold");
+        text += &format!(". This is proven for silence {height} mV below the threshold");
     }
     Ok(text)
 }
@@ -165,7 +178,7 @@ fn list(statement: &Statement, rows: &[(Row, f64)]) -> Result<String> {
                     .entry(pattern)
                     .or_default()
                     .0
-                    .push(format!("come up to target {target} ({} ms) from below", short(t)));
+                    .push(format!("reach target {target} ({} ms) from below", short(t)));
             }
             Row::Silence { pattern, t } => by_pattern.entry(pattern).or_default().1.push(t),
         }
@@ -177,10 +190,10 @@ fn list(statement: &Statement, rows: &[(Row, f64)]) -> Result<String> {
             let times: Vec<String> = silent.iter().map(|&t| short(t)).collect();
             asked.push(format!("be silent at {} ms", times.join(", ")));
         }
-        parts.push(format!("pattern {pattern} shall {}", asked.join(", ")));
+        parts.push(format!("pattern {pattern} must {}", asked.join(", ")));
     }
     let more = rows.len().saturating_sub(NAMED);
-    Ok(if more > 0 { format!("{}; and {more} rows that weigh less", parts.join("; ")) } else { parts.join("; ") })
+    Ok(if more > 0 { format!("{}; and {more} rows of less weight", parts.join("; ")) } else { parts.join("; ") })
 }
 
 fn short(x: f64) -> String {

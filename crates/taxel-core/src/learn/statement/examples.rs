@@ -11,11 +11,11 @@ use crate::{Result, SpikeKind, SpikeTrains, problem};
 /// `Problem`, naming pattern and target.
 pub fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<f64>]) -> Result<()> {
     if patterns.is_empty() {
-        return Err(problem!("patterns"; ": there is none, at least one is needed"));
+        return Err(problem!("patterns"; " is empty: must contain one pattern or more"));
     }
     if patterns.len() != targets.len() {
         return Err(problem!(
-            "targets"; ": {} lists for {} patterns, must be one per pattern (an empty one teaches silence)",
+            "targets"; ": {} lists for {} patterns; must be one per pattern (an empty list teaches silence)",
             targets.len(),
             patterns.len()
         ));
@@ -34,7 +34,7 @@ pub fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<
 /// `Problem` where none has one.
 pub fn check_some_target(targets: &[Vec<f64>]) -> Result<()> {
     if targets.iter().all(Vec::is_empty) {
-        return Err(problem!("targets"; ": no pattern has one, so there is nothing to learn"));
+        return Err(problem!("targets"; ": no pattern has a target, so there is nothing to learn"));
     }
     Ok(())
 }
@@ -43,11 +43,11 @@ pub fn check_some_target(targets: &[Vec<f64>]) -> Result<()> {
 pub(crate) fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<()> {
     check_pattern(p, pattern)?;
     if pattern.times.is_empty() && !targets.is_empty() {
-        return Err(problem!("pattern {p}: has no spike, so no weight can matter at its target"));
+        return Err(problem!("pattern {p}: has no spike, so weights have no effect at its target"));
     }
     for (k, &t) in targets.iter().enumerate() {
         if !t.is_finite() {
-            return Err(problem!("pattern {p}, target {k}: time is {t}, must be finite"));
+            return Err(problem!("pattern {p}, target {k}: time is {t}; must be finite"));
         }
         if t < pattern.start || t > pattern.stop {
             return Err(problem!(
@@ -62,13 +62,14 @@ pub(crate) fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, ta
         let since = t - targets[k - 1];
         if since <= 0.0 {
             return Err(problem!(
-                "pattern {p}, target {k}: {t} ms comes after {} ms, targets must ascend",
+                "pattern {p}, target {k}: {t} ms comes after {} ms; targets must ascend",
                 targets[k - 1]
             ));
         }
         if since <= neuron.refractory {
             return Err(problem!(
-                "pattern {p}, target {k} ({t} ms): {since} ms after target {}, inside the refractory {} ms",
+                "pattern {p}, target {k} ({t} ms): {since} ms after target {}; must be at least the refractory time, \
+                 {} ms",
                 k - 1,
                 neuron.refractory
             ));
@@ -83,13 +84,14 @@ pub(crate) fn check_silence(p: usize, windows: Option<&[[f64; 2]]>) -> Result<()
     for (k, &[start, stop]) in windows.unwrap_or_default().iter().enumerate() {
         if !(start.is_finite() && stop.is_finite() && start <= stop) {
             return Err(problem!(
-                "pattern {p}, window {k} of silence: {start} to {stop} ms, start must not be after stop, and both must be finite"
+                "pattern {p}, window {k} of silence: {start} to {stop} ms; start must not be after stop, and both \
+                 must be finite"
             ));
         }
         if start < before {
             return Err(problem!(
-                "pattern {p}, window {k} of silence: begins at {start} ms, before the end of the window before, {before} \
-                 ms; windows must ascend"
+                "pattern {p}, window {k} of silence: begins at {start} ms, but the window before ends at {before} ms; \
+                 windows must ascend"
             ));
         }
         before = stop;
@@ -108,7 +110,7 @@ pub fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
         return Err(problem!("pattern {p}: has no train"));
     }
     if pattern.kind == SpikeKind::Signed {
-        return Err(problem!("pattern {p}: spikes are signed, split them into ON and OFF trains first"));
+        return Err(problem!("pattern {p}: spikes are signed; split them into ON and OFF trains first"));
     }
     Ok(())
 }

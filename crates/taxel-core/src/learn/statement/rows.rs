@@ -145,10 +145,13 @@ pub(crate) fn end_of(
     let last = targets.last();
     let Some(end) = horizon else { return Ok(last.map_or(pattern.stop, |last| pattern.stop.max(last + neuron.tau))) };
     if let Some(last) = last.filter(|last| **last > end) {
-        return Err(problem!("pattern {p}: last target at {last} ms, the horizon is {end} ms"));
+        return Err(problem!("pattern {p}: the last target is at {last} ms; must not be after the horizon, {end} ms"));
     }
     if end < pattern.start {
-        return Err(problem!("pattern {p}: starts at {} ms, the horizon is {end} ms", pattern.start));
+        return Err(problem!(
+            "pattern {p}: starts at {} ms; must not start after the horizon, {end} ms",
+            pattern.start
+        ));
     }
     Ok(end)
 }
@@ -295,7 +298,7 @@ impl Statement {
             Row::Slope { pattern, target } => {
                 if self.neuron.time == Time::Grid {
                     return Err(problem!(
-                        "pattern {pattern}, target {target}: a slope is asked for in continuous time only"
+                        "pattern {pattern}, target {target}: a slope is required only in continuous time"
                     ));
                 }
                 let (example, t) = self.target(pattern, target)?;
@@ -384,11 +387,11 @@ impl Statement {
         let Example { start, end, .. } = example;
         let last = if self.neuron.time == Time::Grid { end + rounding_ms(*end) } else { *end };
         if !(*start <= t && t <= last) {
-            return Err(problem!("pattern {pattern}: {t} ms is outside the time that is trained, {start} to {end} ms"));
+            return Err(problem!("pattern {pattern}: {t} ms is outside the training's time, {start} to {end} ms"));
         }
         if self.neuron.time == Time::Grid && !self.is_point(example, t) {
             return Err(problem!(
-                "pattern {pattern}: {t} ms is not a point of the grid, {start} + k {} ms",
+                "pattern {pattern}: {t} ms is not on the grid, whose points are {start} ms + k x {} ms",
                 self.neuron.step_ms
             ));
         }

@@ -54,7 +54,7 @@ impl Decoder {
         const PIECE: usize = 1 << 14;
         let total = lengths.iter().try_fold(0, |sum: usize, &n| sum.checked_add(usize::try_from(n).ok()?));
         if total != Some(bytes.len()) {
-            return Err(problem!("lengths"; ": must be 0 or more each, and {} bytes together", bytes.len()));
+            return Err(problem!("lengths"; ": each must be 0 or more, and their sum {} bytes", bytes.len()));
         }
         self.check_room(&room, bytes.len())?;
         let (mut done, mut markers, mut rest) = (Filled { rows: 0, paired: false }, vec![], bytes);
@@ -75,7 +75,7 @@ impl Decoder {
     fn check_room(&self, room: &Room<'_>, bytes: usize) -> Result<()> {
         let most = self.most_rows(bytes);
         if room.len() < most {
-            return Err(problem!("columns have room for {} rows: {bytes} bytes may need {most}", room.len()));
+            return Err(problem!("columns have room for {} rows: {bytes} bytes may need {most} rows", room.len()));
         }
         Ok(())
     }

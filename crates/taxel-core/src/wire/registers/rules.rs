@@ -47,7 +47,7 @@ pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<
         return Some((
             3,
             format!(
-                "ramp {} ticks leaves no 5 ticks of step_read {} us = {} ticks in which it falls (rule 3)",
+                "ramp {} ticks is too long for step_read {} us = {} ticks: the ramp must be at least 5 ticks shorter (rule 3)",
                 ramp,
                 us(step_read),
                 3 * step_read
@@ -58,7 +58,7 @@ pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<
         return Some((
             5,
             format!(
-                "random_lines: to drive any of {} lines next takes up to {} us, longer than line_period {} us (rule 5)",
+                "random_lines: moving to any of {} lines takes up to {} us, longer than line_period {} us (rule 5)",
                 lines,
                 us(16 * lines),
                 us(line_period)
@@ -69,7 +69,7 @@ pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<
         return Some((
             7,
             format!(
-                "step_period {} us is too short for {} channels: the logic compares one a clock and wants {} us (rule 7)",
+                "step_period {} us is too short for {} channels: the logic compares one channel per clock and needs {} us (rule 7)",
                 us(step_period),
                 channels,
                 us(channels + 10)
@@ -80,7 +80,7 @@ pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<
         return Some((
             8,
             format!(
-                "version 1 of the wire names 64 x 64 taxels, the array has {} x {}: choose version 2 (rule 8)",
+                "version 1 of the wire can address only 64 x 64 taxels, but the array has {} x {}: choose version 2 (rule 8)",
                 sense_lines, driven_lines
             ),
         ));
@@ -101,7 +101,7 @@ pub(super) fn warnings(registers: &Registers) -> Vec<(u8, String)> {
         warnings.push((
             5,
             format!(
-                "step_period {} us leaves {} us before step_read {} us: taxels settle in {} us (rule 5)",
+                "step_period {} us leaves only {} us before step_read {} us: taxels need {} us to settle (rule 5)",
                 us(step_period),
                 us(step_period - step_read),
                 us(step_read),
@@ -110,21 +110,16 @@ pub(super) fn warnings(registers: &Registers) -> Vec<(u8, String)> {
         ));
     }
     if random_lines != 0 && 16 * lines + 20 > step_period - step_read {
-        warnings.push((
-            5,
-            format!(
-                "random_lines: {} us before step_read: any of {} lines settles in {} us (rule 5)",
-                us(step_period - step_read),
-                lines,
-                us(16 * lines + 20)
-            ),
-        ));
+        warnings.push((5, format!(
+            "random_lines: only {} us are left before step_read: with {} lines, taxels need {} us to settle (rule 5)",
+            us(step_period - step_read), lines, us(16 * lines + 20)
+        )));
     }
     if noise_floor >= ramp {
         warnings.push((
             6,
             format!(
-                "noise_floor {} ticks is not below ramp {} ticks: no event can ever come (rule 6)",
+                "noise_floor {} ticks must be below ramp {} ticks: otherwise the board sends no events (rule 6)",
                 noise_floor, ramp
             ),
         ));

@@ -9,20 +9,20 @@ pub struct Registers {
     /// Lines are driven in random order.
     #[serde(alias = "use_rand_row")]
     pub random_lines: bool,
-    /// Each taxel is an FA-1 afferent (5.4.2): events are its spikes, intensities its integral; else changes.
+    /// If set, each taxel is an FA-1 afferent (5.4.2): events are its spikes, intensities its integral. Otherwise events are changes.
     #[serde(alias = "comparator_mode")]
     pub mechanoreceptor: bool,
     /// A falling edge ends a sample.
     pub invert_comparator: bool,
-    /// All events of a frame carry the time of its start.
+    /// All events of a frame have the time at which the frame starts.
     #[serde(alias = "use_frame_sync")]
     pub frame_sync: bool,
-    /// Version of the wire protocol that the board uses (read: the manual has only one).
+    /// Version of the wire protocol that the board uses (our reading: the manual has only one version).
     pub wire_version: u8,
-    /// The values of a ball that rolls take the place of the comparators' (read: the manual has no such bit).
+    /// The board sends the values of a simulated rolling ball instead of the comparators' values (our reading: the manual has no such bit).
     #[serde(default)]
     pub pattern: bool,
-    /// FA-1: increase of the threshold by a spike, T A of Table 5.3. In units of 1/256 theta_0.
+    /// FA-1: how much a spike raises the threshold (T A of Table 5.3). In units of 1/256 theta_0.
     pub threshold_jump: u16,
     /// Time from one driven line to the next. In units of 10 ns.
     #[serde(alias = "row_change_period")]
@@ -41,13 +41,13 @@ pub struct Registers {
     pub ramp: u16,
     /// FA-1: theta_0, in ticks after the power law. In units of 1/1024.
     pub threshold_rest: u16,
-    /// FA-1: decrease of the threshold by a frame without a spike, B of Table 5.3. In units of 1/1024 theta_0.
+    /// FA-1: how much a frame without a spike lowers the threshold (B of Table 5.3). In units of 1/1024 theta_0.
     pub threshold_decay: u8,
     /// Largest difference that does not cause an event. In units of ticks.
     pub noise_floor: u8,
-    /// Number of driven lines (the register holds one less; the manual's field has 6 bits, read: 8).
+    /// Number of driven lines (the register contains one less; the manual's field has 6 bits, our reading: 8).
     pub lines: u16,
-    /// Recording: setting and clearing it sends a marker and switches the sync line.
+    /// A recording is running: setting and clearing this bit sends a marker and switches the sync line.
     pub record: bool,
     /// Channels of the converter, 16 or 64: a property of the board, not a register.
     pub channels: u8,

@@ -107,7 +107,8 @@ fn every_rule_refuses_with_its_numbers_and_keeps_the_old_value() {
             4,
             161,
             3,
-            "ramp 161 ticks leaves no 5 ticks of step_read 0.55 us = 165 ticks in which it falls (rule 3); the board keeps ramp 150 ticks",
+            "ramp 161 ticks is too long for step_read 0.55 us = 165 ticks: the ramp must be at least 5 ticks shorter \
+             (rule 3); the board keeps ramp 150 ticks",
         ),
         (
             3,
@@ -120,7 +121,8 @@ fn every_rule_refuses_with_its_numbers_and_keeps_the_old_value() {
             0,
             1,
             5,
-            "random_lines: to drive any of 64 lines next takes up to 10.24 us, longer than line_period 3.00 us (rule 5); the board keeps REG0=0x00000008",
+            "random_lines: moving to any of 64 lines takes up to 10.24 us, longer than line_period 3.00 us (rule 5); \
+             the board keeps REG0=0x00000008",
         ),
         (7, 1, 4, "REG7=0x00000001 sets reserved bits: they must be 0 (rule 4)"),
         (6, 9, 4, "REG6=0x00000009 sets reserved bits: they must be 0 (rule 4)"),
@@ -156,14 +158,14 @@ fn a_board_of_any_size_resets_to_registers_that_keep_the_rules() {
     let version_1 = Registers { wire_version: 1, ..Registers::at_reset(&large, 64) };
     assert!(version_1.check(&large).unwrap_err().to_string().ends_with("choose version 2 (rule 8)"));
     let hasty = Registers { step_period: 73, step_read: 53, ..Registers::preset("20.8 kHz").unwrap() };
-    assert!(hasty.check(&thesis()).unwrap_err().to_string().ends_with("wants 0.74 us (rule 7)"));
+    assert!(hasty.check(&thesis()).unwrap_err().to_string().ends_with("needs 0.74 us (rule 7)"));
 }
 
 #[test]
 fn what_is_hardly_meant_is_warned_of() {
     let mut registers = Registers::default();
     registers.set("step_read", 56, &thesis()).unwrap();
-    assert!(registers.warnings()[0].contains("leaves 0.19 us") && registers.warnings()[0].ends_with("(rule 5)"));
+    assert!(registers.warnings()[0].contains("leaves only 0.19 us") && registers.warnings()[0].ends_with("(rule 5)"));
     let mut registers = Registers::default();
     registers.set("noise_floor", 150, &thesis()).unwrap();
     assert!(registers.warnings()[0].ends_with("(rule 6)"));

@@ -406,7 +406,7 @@ impl Decoder {
 pub(in crate::wire::v2) fn check_room(room: Room<'_>, bytes: usize) -> Result<Room<'_>> {
     let most = stream_rows(bytes);
     if room.len() < most {
-        return Err(problem!("columns have room for {} rows: {bytes} bytes may need {most}", room.len()));
+        return Err(problem!("columns have room for {} rows: {bytes} bytes may need {most} rows", room.len()));
     }
     Ok(room)
 }

@@ -45,7 +45,7 @@ pub fn encode(events: EventsView<'_>, held: Option<&[u16]>, promised: bool) -> R
     let fits = |origin: i64| first >= origin && last.abs_diff(origin) < 1 << BASE_BITS;
     let origin_us = if fits(0) { 0 } else { first };
     if !fits(origin_us) {
-        return Err(problem!("times from {first} to {last} us: a file of datagrams holds at most 8.9 years"));
+        return Err(problem!("times from {first} to {last} us: a file of datagrams can contain at most 8.9 years"));
     }
     let mut writer = Writing::new(events, held, origin_us)?;
     // The earliest time from each event on; the last entry belongs to the end.

@@ -266,7 +266,7 @@ fn layout(kind: BodyKind) -> Result<Layout> {
         BodyKind::Changes | BodyKind::Small | BodyKind::Large => kind.layout(),
         _ => None,
     }
-    .ok_or_else(|| problem!("events are sent as changes, small or large ones"))
+    .ok_or_else(|| problem!("events can be sent only as changes, small changes or large changes"))
 }
 
 /// Number of words for a gap and its event.

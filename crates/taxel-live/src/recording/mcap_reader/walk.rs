@@ -93,7 +93,7 @@ impl<'a> FileWalk<'a> {
             let n = start.len();
             return Err(Error::format(
                 self.path,
-                &format!("byte {n}: the file ends inside the MCAP magic, it holds nothing"),
+                &format!("byte {n}: the file ends inside the MCAP magic (its first 8 bytes), so it contains nothing"),
             ));
         }
         let hex: Vec<String> = start.iter().take(4).map(|b| format!("{b:02X}")).collect();
@@ -195,7 +195,7 @@ impl<'a> FileWalk<'a> {
                     self.unpacked += size;
                     let most = limits::most_unpacked(self.length, self.memory);
                     if self.unpacked > most {
-                        let claim = format!("the chunks up to byte {at} say that they unpack to {}", self.unpacked);
+                        let claim = format!("the chunks up to byte {at} state an unpacked size of {}", self.unpacked);
                         let right = "(1000 times the file and 256 MiB)";
                         return Err(limits::too_large(
                             self.path,

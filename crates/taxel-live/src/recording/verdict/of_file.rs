@@ -45,9 +45,11 @@ impl Verdict {
             }
             ending => {
                 let why = match ending {
-                    Some(FileEnding::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
+                    Some(FileEnding::Stopped(why)) => {
+                        format!("stopped by an error ({why}): the end of the recording is missing")
+                    }
                     _ if rebuilt.no_end => NO_END.to_owned(),
-                    _ => "not finished: what came last is missing".to_owned(),
+                    _ => "not finished: the end of the recording is missing".to_owned(),
                 };
                 let counts = so_far.filter(|counts| counts.received > 0 || counts.decoder.values().any(|n| *n > 0));
                 no_counts = counts.is_none() && converted.is_none();
@@ -76,7 +78,10 @@ impl Verdict {
             (
                 rebuilt.large_chunks,
                 "large_chunks",
-                format!("{} skipped, stated to unpack to more than 64 MiB", counted(rebuilt.large_chunks, "chunk")),
+                format!(
+                    "{} skipped, because the stated unpacked size is above 64 MiB",
+                    counted(rebuilt.large_chunks, "chunk")
+                ),
             ),
             (bad_chunks, "bad_chunks", format!("{} skipped", counted(bad_chunks, "bad chunk"))),
             (
@@ -92,11 +97,11 @@ impl Verdict {
             (
                 rebuilt.bytes_after_end,
                 "bytes_after_end",
-                format!("{} after its end not read", counted(rebuilt.bytes_after_end, "byte")),
+                format!("{} after the end of the recording not read", counted(rebuilt.bytes_after_end, "byte")),
             ),
-            (changed.into(), "changed_since_recorded", "its content is not what was recorded".to_owned()),
+            (changed.into(), "changed_since_recorded", "the content was changed after recording".to_owned()),
             (repeated, "repeated_in_file", format!("{} there twice", counted(repeated, "message"))),
-            (rebuilt.no_summary.into(), "no_summary", "the summary at the end missing or damaged".to_owned()),
+            (rebuilt.no_summary.into(), "no_summary", "the summary at the end is missing or damaged".to_owned()),
         ] {
             if n > 0 {
                 // What it was converted from may have been damaged too.
@@ -116,7 +121,7 @@ impl Verdict {
         }
         let lost_here = !lost.is_empty();
         if unknown {
-            bad.push("what else the file held is unknown".to_owned());
+            bad.push("further losses in the file are unknown".to_owned());
         }
         let has_end = why.is_none() || rebuilt.no_end;
         if (why.is_some() || lost_here) && verdict.status == RecordingStatus::NothingArrived {

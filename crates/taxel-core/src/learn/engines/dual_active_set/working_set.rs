@@ -16,7 +16,7 @@ impl DualActiveSet {
             return Err(problem!("row: {} coefficients for {} weights", coefficients.len(), self.lower.len()));
         }
         if !(limit.is_finite() && coefficients.iter().all(|a| a.is_finite())) {
-            return Err(problem!("row: holds a coefficient or limit that is not finite"));
+            return Err(problem!("row: a coefficient or the limit is not finite"));
         }
         let length = dot(coefficients, coefficients).sqrt();
         let length = if length > 0.0 { length } else { 1.0 };
