@@ -20,7 +20,7 @@ from taxel._base.number_text import float_of
 from taxel._core import FormatError
 from taxel.formats import text
 from taxel.formats.layout import ISO, UNITS_US, advice
-from taxel.recording.readers.foreign import ARRAYS, arrays_of, list_arrays, shapes_of
+from taxel.recording.readers.foreign import ARRAYS, arrays_of, facts_of, list_arrays, shapes_of
 
 #: A column is one of times, if its name does not say so, if it ascends for so many lines.
 _ASCENDS = 20
@@ -45,8 +45,8 @@ _COUNTS = re.compile(
 _NUMBERED = re.compile(r"[^\W\d]{0,12}[ _\-\[(.]*\d+[\])]?", re.UNICODE)
 #: A unit of a force, a pressure or a voltage ...
 _FORCE_UNIT = r"([mk]?N|kgf?|gf?|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmHg|[mµu]?V)"
-#: ... that ends a column's name: Heel [N], toe (kPa).
-_UNIT_IN_NAME = re.compile(rf"[\[(]{_FORCE_UNIT}[\])]$")
+#: ... that ends a column's name: Heel [N], toe (kPa), thumb_mN, mV.
+_UNIT_IN_NAME = re.compile(rf"(?:[\[(]{_FORCE_UNIT}[\])]|(?:^|(?<=_)){_FORCE_UNIT})$")
 #: ... that a line above a table states: Einheit;kPa, Unit of pressure: N/cm2, Druck [kPa], Force in N, or only [kPa].
 _UNIT_ABOVE = re.compile(
     r"(?:\b(?i:(?:mess|druck|kraft)?einheit(?:en)?|units?)\b(?:[^:;=\t,\[(]*[:;=\t,\[(])?"
@@ -58,6 +58,12 @@ _IN_BRACKETS = re.compile(r"[\[(]\s*([^\s\d\[\]()]{1,8})\s*[\])]$")
 #: What the names of two feet or hands begin with.
 _SIDE = re.compile(r"(left|right|links|rechts|l|r)(?![^\W\d_])", re.IGNORECASE)
 _SIDES = ({"left", "right"}, {"links", "rechts"}, {"l", "r"})
+#: Names under which a file of arrays states its rate, Hz, and its unit.
+_RATE = re.compile(
+    r"(?i:(?:(?:sampling|samples?|frame|scan)[ _-]?)?(?:rate|freq|frequency)|fs|fps|hz)(?i:[ _-]?[\[(]?hz[\])]?)?"
+)
+_UNITS = re.compile(r"(?i:(?:[a-z]+[ _-])?units?)")
+_FACTS = re.compile(f"{_RATE.pattern}|{_UNITS.pattern}")
 _NO_RATE = "# rate_hz = 100  # frames per second: the file does not state it, and without it frames are numbered"
 _NO_UNIT = '# unit = "kPa"  # of the readings: the file does not state it, and without it they are counts'
 #: Names of the columns of events in the orders that programs write without names.
@@ -137,10 +143,28 @@ def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> 
     times = []
     if time is not None:
         times = [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time].ravel(), count)]
+    facts = facts_of(path, name, _FACTS)
     data = [f"array = {_quote(name)}"] * bool(name) + ['frames = "last"'] * is_last + times
     # An array of frames x rows x columns says its size, and others of the folder may have another.
-    size = [_NO_UNIT] if len(shape) == 2 else _size(shape[0], ())
-    return [*size, *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
+    size = [] if len(shape) == 2 else _size(shape[0], ())
+    rate = [_stated_rate(facts)] if time is None else []
+    return [*size, _stated_unit(facts), *rate, *(["[data]", *data] if data else [])]
+
+
+def _stated_rate(facts: Mapping[str, float | str]) -> str:
+    """Return the line of the rate that a file states, or that it states none."""
+    for name, value in facts.items():
+        if _RATE.fullmatch(name) and not isinstance(value, str) and 1e-9 <= value <= 1e6:
+            return f"rate_hz = {value:.10g}  # {name} of the file"
+    return _NO_RATE
+
+
+def _stated_unit(facts: Mapping[str, float | str]) -> str:
+    """Return the line of the unit that a file states, or that it states none."""
+    for name, value in facts.items():
+        if _UNITS.fullmatch(name) and isinstance(value, str) and re.fullmatch(f"{_FORCE_UNIT}|counts", value):
+            return f"unit = {_quote(value)}  # {name} of the file"
+    return _NO_UNIT
 
 
 @dataclass(frozen=True)
@@ -232,7 +256,7 @@ class _TextTable:
         if self.units:
             return self.units[column].strip("[]()")
         within = _UNIT_IN_NAME.search(self.names[column]) if self.names else None
-        return within[1] if within else ""
+        return (within[1] or within[2]) if within else ""
 
     def of_time(self, column: int, longer: float) -> list[str]:
         """Return the lines that say which column holds the times; the file is `longer` than what was read of it."""
