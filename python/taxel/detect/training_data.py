@@ -79,7 +79,7 @@ class _Measured:
     reading: float
     """Reading of the most loaded taxel above rest, median over loads."""
     stays: bool
-    """Whether a load lasts so long that the loads are no touches."""
+    """Whether a load lasts so long that the loads are not touches."""
 
     def are_touches(self, strength: float) -> NDArray[np.bool_]:
         """Return which loads are touches, if those of the training are so strong."""
