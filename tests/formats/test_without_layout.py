@@ -95,6 +95,26 @@ def test_the_rate_and_the_unit_that_a_file_of_arrays_states_are_those_of_the_lay
     assert recording.frames().unit == "mmHg"
 
 
+@pytest.mark.parametrize(
+    ("above", "rows", "hz"),
+    [
+        ("# rate 120 Hz\n# rows 2 columns 6\n", 2, 120),
+        ("Abtastrate: 0,12 kHz\nZeilen;2\nSpalten;6\n", 2, 120),
+        ("Sampling rate [Hz] = 120\nsensor 3 x 4 of 5 x 5 mm\n", 3, 120),
+        # Several rates, and a size of other taxels, state nothing.
+        ("rate 120 Hz\nfs 60\nrows 5 columns 6\n", None, None),
+    ],
+)
+def test_the_rate_and_the_size_that_lines_above_a_table_state_are_those_of_the_layout(
+    tmp_path: Path, above: str, rows: int | None, hz: int | None
+) -> None:
+    place = tmp_path / "step.txt"
+    place.write_text(above + ("\t".join(["1.5"] * 12) + "\n") * 30)
+    lines = layout_said_of(place).splitlines()
+    assert (f"rows = {rows}" in lines) == (rows is not None)
+    assert (f"rate_hz = {hz}  # stated above the table" in lines) == (hz is not None)
+
+
 @pytest.mark.parametrize("name", ["mV", "Fz_mV", "Fz [mV]"])
 def test_the_unit_in_the_name_of_a_column_is_that_of_the_layout(tmp_path: Path, name: str) -> None:
     place = tmp_path / "tap.csv"
