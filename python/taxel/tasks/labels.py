@@ -116,7 +116,11 @@ def sources_without(
     """
     if not isinstance(source, str | os.PathLike):
         return {}
-    rows = (note for each in recordings for note in each.notes) if source == "notes" else _opened(Path(source), recordings).rows
+    rows = (
+        (note for each in recordings for note in each.notes)
+        if source == "notes"
+        else _opened(Path(source), recordings).rows
+    )
     titles = {each.label: {each.title, each.name} for each in recordings if each.label}
     of_sources = {row.text for row in rows if row.source or any(row.recording in names for names in titles.values())}
     without = {}
@@ -172,12 +176,20 @@ def of_other_sources(
 
 
 def _opened(path: Path, recordings: Sequence[Recording]) -> Labels:
-    """Open a table of labels; where no recording is of a side or has several sources, as of a plate, sides are none."""
+    """Open a table of labels; on grids of no side, such as plates, which have both feet, sides are no sources."""
     table = Labels(path)
-    named = {row.source for row in table.rows} - {""}
-    of_a_side = any({recording.side, recording.label} & _SIDES for recording in recordings)
-    several = len({(recording.path, trial_name(recording)) for recording in recordings}) < len(recordings)
-    return table if of_a_side or several or not named <= _SIDES else table._without_sources()
+    sides = {row.source for row in table.rows} - {""}
+    files = {(recording.path, trial_name(recording)) for recording in recordings}
+    of_both = all(
+        recording.array._has_neighbours and not {recording.side, recording.label} & _SIDES for recording in recordings
+    )
+    if not sides or not sides <= _SIDES or not of_both or len(files) < len(recordings):
+        return table
+    warn(
+        f"{path}: labels of {' and '.join(sorted(sides))} count alike, because no recording states its side "
+        "(side in a layout file)"
+    )
+    return table._without_sources()
 
 
 def _tables(source: GivenLabels, recording: Path, recordings: Sequence[Recording]) -> list[Labels]:
@@ -294,7 +306,8 @@ def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]
         if not (row.source in _SIDES and sources & _SIDES):
             there = ", ".join(sorted(sources))
             raise refused(
-                argument, f" is {table.path}: {row.text} at {row.t} us is of source {row.source}; there is {there}"
+                argument,
+                f" is {table.path}: {row.text} at {row.t} us names the source {row.source}; the recording has {there}",
             )
         left_out[row.source] += 1
     for side, count in left_out.items():
