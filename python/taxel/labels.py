@@ -7,7 +7,8 @@ import io
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -130,6 +131,12 @@ class Labels:
         rows = _rows(table)
         self.path, self.rows = file, tuple(row for row in rows if row.text)
         self.removed = tuple(row for row in rows if not row.text)
+
+    def _without_sources(self) -> Labels:
+        """Return the labels as those of all sources of their recordings."""
+        labels = copy(self)
+        labels.rows = tuple(replace(row, source="") for row in self.rows)
+        return labels
 
     @property
     def recordings(self) -> tuple[str, ...]:

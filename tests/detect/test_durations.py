@@ -74,13 +74,32 @@ def test_on_channels_each_counts_alone(count: int, hz: int, unit: str) -> None:
 
 def test_the_floor_of_channels_without_a_measured_rest_is_by_the_noise_before_labels() -> None:
     learnt = on_channels(1, 1, 20, 10, unit="N")
-    assert floor_alone([learnt], 0.1) == 0.1
+    assert floor_alone([learnt], 0.1, kinds=2) == 0.1
     for values in (learnt.source.values, np.maximum(learnt.source.values, 0.0)):
         frames = Frames(values, learnt.source.t, unit="N", array=learnt.source.array)
         of_unit = Example(frames, learnt.labels, by_unit(frames))
-        assert floor_alone([of_unit], 0.1) == pytest.approx(6.0, rel=0.25)
-        assert floor_alone([of_unit], 30.0) == 30.0
-        assert floor_alone([of_unit._replace(labels={})], 0.1) == 0.1
+        assert floor_alone([of_unit], 0.1, kinds=2) == pytest.approx(6.0, rel=0.25)
+        assert floor_alone([of_unit], 30.0, kinds=2) == 30.0
+        assert floor_alone([of_unit._replace(labels={})], 0.1, kinds=2) == 0.1
+
+
+def test_one_kind_of_touch_has_a_floor_of_its_strength_so_that_a_drift_is_no_touch() -> None:
+    rng = np.random.default_rng(1)
+    begins = 1000 + np.cumsum(rng.integers(700, 1500, 30))
+
+    def taps(drift: float) -> Example:
+        values = 4.0 + rng.normal(0.0, 0.3, begins[-1] + 1000) + np.linspace(0.0, drift, begins[-1] + 1000)
+        for begin in begins:
+            values[begin : begin + 60] += rng.uniform(60.0, 100.0) * np.sin(np.linspace(0.0, np.pi, 60))
+        frames = Frames(values[:, None, None], 1000 * np.arange(len(values)), unit="V")
+        return Example(frames, {"tap": 1000 * begins}, Tare.take(frames, stop_us=1_000_000))
+
+    train, drifted = taps(0.0), taps(1.6)
+    recipe = recipes.fitting(train.source, ["tap"])
+    readout = fit([train], Recipe.load(recipe, labels=["tap"], noise_floor=measured_floor([train])))
+    found = run(readout, drifted.source, tare=drifted.tare)
+    result = score(found, drifted.labels, 50.0)
+    assert (result.missed, result.false) == (0, 0)
 
 
 def trained(seed: int = 1) -> Readout:

@@ -566,7 +566,7 @@ def test_labels_of_two_topics_are_each_of_their_source(names: dict[str, str], tm
     left, right = references(str(table), opened)
     assert [(left["touch"] - us).tolist(), (right["touch"] - us).tolist()] == [[20_000, 70_000], [30_000]]
     table.write_text(table.read_text() + "pick"[: 4 * (names["left"][0] != ",")] + f",/grip/thumb,touch,{us}\n")
-    with pytest.raises(ProblemError, match="is of source grip_thumb; there is grip_left, grip_right"):
+    with pytest.raises(ProblemError, match="names the source grip_thumb; the recording has grip_left, grip_right"):
         references(str(table), opened)
     table.write_text(f"label,t_us\ntouch,{us + 20_000}\n")
     assert [one["touch"].tolist() for one in references(str(table), opened)] == [[us + 20_000]] * 2

@@ -70,6 +70,58 @@ def test_arrays_without_a_layout_print_the_one_that_reads_them(
         assert taxel.open(place).frames().t.tolist() == [0, 100_000, 200_000]
 
 
+@pytest.mark.parametrize("ending", [".npz", ".h5", "in group.h5"])
+@pytest.mark.parametrize(
+    ("rate", "unit"), [("fs", "unit"), ("Sampling Rate [Hz]", "Units"), ("frame_rate_hz", "pressure_unit")]
+)
+def test_the_rate_and_the_unit_that_a_file_of_arrays_states_are_those_of_the_layout(
+    tmp_path: Path, ending: str, rate: str, unit: str
+) -> None:
+    import h5py
+
+    place = tmp_path / f"a{ending}"
+    if ending == ".npz":
+        np.savez(place, **{"palm": VALUES, rate: 12.5, unit: "mmHg", "gain": 3.0})
+    else:
+        with h5py.File(place, "w") as h5:
+            palm = h5.create_dataset("run1/palm", data=VALUES)
+            (h5["run1"] if "group" in ending else h5).attrs[rate] = np.float32(12.5)
+            palm.attrs[unit] = np.bytes_("mmHg") if "group" in ending else "mmHg"
+            # Farther ones do not count, nor do lists and other things.
+            h5.attrs.update({unit: "N", "gain": 3.0, "fps": [1.0, 2.0], "rate": "fast"})
+    place.with_suffix(".layout.toml").write_text(layout_said_of(place))
+    recording = taxel.open(place)
+    assert recording.frames().t.tolist() == [0, 80_000, 160_000]
+    assert recording.frames().unit == "mmHg"
+
+
+@pytest.mark.parametrize(
+    ("above", "rows", "hz"),
+    [
+        ("# rate 120 Hz\n# rows 2 columns 6\n", 2, 120),
+        ("Abtastrate: 0,12 kHz\nZeilen;2\nSpalten;6\n", 2, 120),
+        ("Sampling rate [Hz] = 120\nsensor 3 x 4 of 5 x 5 mm\n", 3, 120),
+        # Several rates, and a size of other taxels, state nothing.
+        ("rate 120 Hz\nfs 60\nrows 5 columns 6\n", None, None),
+    ],
+)
+def test_the_rate_and_the_size_that_lines_above_a_table_state_are_those_of_the_layout(
+    tmp_path: Path, above: str, rows: int | None, hz: int | None
+) -> None:
+    place = tmp_path / "step.txt"
+    place.write_text(above + ("\t".join(["1.5"] * 12) + "\n") * 30)
+    lines = layout_said_of(place).splitlines()
+    assert (f"rows = {rows}" in lines) == (rows is not None)
+    assert (f"rate_hz = {hz}  # stated above the table" in lines) == (hz is not None)
+
+
+@pytest.mark.parametrize("name", ["mV", "Fz_mV", "Fz [mV]"])
+def test_the_unit_in_the_name_of_a_column_is_that_of_the_layout(tmp_path: Path, name: str) -> None:
+    place = tmp_path / "tap.csv"
+    place.write_text(f"t_s,{name}\n" + "".join(f"{k / 1000},{4 + k % 3}\n" for k in range(30)))
+    assert 'unit = "mV"' in layout_said_of(place).splitlines()
+
+
 @pytest.mark.parametrize("separator", [",", ";", "\t", " "])
 @pytest.mark.parametrize("mark", ["6.5", "", "NaN", "NA", "nan"])
 @pytest.mark.parametrize("head", ["", "of a hand\n\n"])

@@ -292,7 +292,7 @@ def test_labels_of_a_source_that_is_not_there_are_refused(tmp_path: Path, capsys
     labels = tmp_path / "labels.csv"
     code, _, said = call(capsys, "train", tmp_path / "a.mcap", "--labels", labels, "-o", tmp_path / "r.json")
     assert code == 2
-    assert "heel at 10000 us is of source left; there is board" in said
+    assert "heel at 10000 us names the source left; the recording has board" in said
 
 
 def test_a_side_that_a_layout_states_names_the_source_of_labels(tmp_path: Path) -> None:

@@ -119,7 +119,7 @@ def test_numbers_of_every_kind_come_from_the_child_as_they_are(tmp_path: Path) -
         h5.attrs["taxel"] = 1
         h5.attrs["name"] = "none"
     with H5File(tmp_path / "a.h5") as file:
-        assert [file.attribute(name) for name in ("taxel", "name", "other")] == [1, "", None]
+        assert [file.attribute(name) for name in ("taxel", "name", "other")] == [1, "none", None]
         for name, values in {**sets, "packed": sets["large"]}.items():
             read = file.numbers(name)
             assert (read.dtype, read.shape) == (values.dtype, values.shape)

@@ -302,3 +302,12 @@ def test_a_key_on_a_terminal_is_a_note_of_the_recording(tmp_path: Path) -> None:
     os.close(master)
     os.close(slave)
     assert [n.text for n in taxel.open(path).notes] == ["h", "t", "mark"]
+
+
+def test_labels_that_two_sensors_share_are_there_once(tmp_path: Path) -> None:
+    for name, times in (("left", (200, 400)), ("right", (200, 500))):
+        taxel.convert(taxel.Frames(np.ones((9, 1, 2)), 100 * np.arange(9), unit="N"), tmp_path / f"{name}.npz")
+        rows = "".join(f"{t},contact\n" for t in times)
+        (tmp_path / f"{name}.notes.csv").write_text(f"t_us,label\n{rows}")
+    both = taxel.merge([taxel.open(tmp_path / f"{name}.npz") for name in ("left", "right")], beside=True)
+    assert [note.t for note in both.notes if note.text == "contact"] == [200, 400, 500]

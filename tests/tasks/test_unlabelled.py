@@ -128,3 +128,23 @@ def test_an_example_is_left_out_of_what_is_not_known_of_it(tmp_path: Path) -> No
 
 def known_detections() -> taxel.Detections:
     return taxel.Detections(["contact"], [1000], [1000])
+
+
+def test_the_feet_of_a_plate_s_labels_are_no_sources(tmp_path: Path) -> None:
+    values = np.zeros((60, 4, 4))
+    values[20:40, 1:3, 1:3] = 50.0
+    for name in ("a", "b"):
+        taxel.convert(taxel.Frames(values, 10_000 * np.arange(60), unit="kPa"), tmp_path / f"{name}.npz")
+    table = tmp_path / "labels.csv"
+    table.write_text("Trial;Foot;Event;Time_s\na;R;contact;0,2\na;L;contact;0,3\nb;L;contact;0,2\n")
+    opened = taxel.open_all(tmp_path)
+    with pytest.warns(UserWarning, match="labels of left and right count alike, because no recording states its side"):
+        events = taxel.tasks.labels.references(table, opened)
+    assert [each["contact"].tolist() for each in events] == [
+        [200_000, 300_000],
+        [200_000],
+    ]
+    rule = taxel.detect.PlainRule("area", 2, noise_floor=10.0, unit="kPa", labels=("contact", "lift"))
+    found = taxel.tasks.detect(rule, opened, table)
+    assert found.score is not None
+    assert (found.score.events, found.unlabelled) == (3, {"lift": ()})

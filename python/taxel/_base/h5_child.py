@@ -31,6 +31,8 @@ LISTED, SHARE = 1 << 24, 64
 MEMORY = 192 << 20
 #: Bytes of the texts of a data set: 64 MiB; and how often a text that the file holds may be in memory on its way.
 TEXT, COPIES = 1 << 26, 4
+#: Characters of the longest text of an attribute that is read.
+WORD = 40
 #: Bytes that the parent lets this process have where the process cannot limit itself (`taxel._base.windows_job`).
 JOB_MEMORY = 1 << 30
 
@@ -60,7 +62,10 @@ def main() -> None:
             send(listed=True)
             for order in orders():
                 if "attribute" in order:
-                    send(done=listing.attribute(order["attribute"]))
+                    send(done=listing.attribute(order["of"], order["attribute"]))
+                    continue
+                if "attributes" in order:
+                    send(done=listing.attributes(order["attributes"]))
                     continue
                 data = h5py.Dataset(listing.opened(order["name"]))
                 if order["text"]:
@@ -160,13 +165,28 @@ class Listing:
         if self.size > LISTED:
             raise Refused(f"the paths up to here have more than {LISTED} bytes, {SHARE} added for each", name)
 
-    def attribute(self, name: str) -> int | str | None:
-        """Return an attribute of the root: a whole number, "" for another value, None where there is none."""
-        if name not in self.h5.attrs:
+    def attributes(self, of: str) -> list[str]:
+        """Return the names of the attributes of an entry."""
+        names = list(self.h5[of].attrs)
+        for name in names:
+            self.count(name)
+        return names
+
+    def attribute(self, of: str, name: str) -> int | float | str | None:
+        """Return an attribute: a number, a short text, "" for another value, None if it is missing."""
+        attributes = self.h5[of].attrs
+        if name not in attributes:
             return None
-        about = self.h5.attrs.get_id(name)
-        is_one = about.shape in ((), (1,)) and dtype_of(about, self.h5py)[1:2] in ("i", "u")
-        return int(self.h5.attrs[name].item()) if is_one else ""
+        about = attributes.get_id(name)
+        kind = dtype_of(about, self.h5py)
+        if about.shape not in ((), (1,)) or not (kind == "text" or kind[1:2] in ("i", "u", "f")):
+            return ""
+        value = attributes[name]
+        value = value if isinstance(value, str | bytes) else value.item()
+        if isinstance(value, int | float):
+            return value
+        word = value.decode(errors="replace") if isinstance(value, bytes) else value
+        return word if len(word) <= WORD else ""
 
     def entries(self) -> None:
         """Send groups and data sets by their paths; those that only a soft link names after all others."""

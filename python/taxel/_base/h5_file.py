@@ -83,16 +83,27 @@ class H5File(ReadingChild):
             self.close()
             raise
 
-    def attribute(self, name: str) -> int | str | None:
-        """Return an attribute of the root: a whole number, "" for any other value, None where there is none.
+    def attribute(self, name: str, of: str = "/") -> int | float | str | None:
+        """Return an attribute of an entry or the root: a number, a short text, "" if it is another value, or None.
 
         Raises
         ------
         FormatError : the attribute is damaged
         """
-        self._order({"attribute": name})
-        value: int | str | None = self._answer()["done"]
+        self._order({"attribute": name, "of": of})
+        value: int | float | str | None = self._answer()["done"]
         return value
+
+    def attributes(self, of: str = "/") -> list[str]:
+        """Return the names of the attributes of an entry or the root.
+
+        Raises
+        ------
+        FormatError : damage
+        """
+        self._order({"attributes": of})
+        names: list[str] = self._answer()["done"]
+        return names
 
     def text(self, name: str, most: int = DESCRIPTION) -> str:
         """Return a data set that is one text of at most so many bytes.

@@ -182,7 +182,7 @@ def _counting_alone(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
     """Return a recipe for channels, whose noise alone must not load them."""
     assert isinstance(recipe.encoder, Composite)
     parts = {
-        name: copy(part).set_params(noise_floor=floor_alone(examples, part.noise_floor))
+        name: copy(part).set_params(noise_floor=floor_alone(examples, part.noise_floor, kinds=len(recipe.neurons)))
         if isinstance(part, Moments | TouchEnds)
         else part
         for name, part in recipe.encoder.parts.items()

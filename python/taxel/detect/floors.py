@@ -11,9 +11,12 @@ from taxel.detect.examples import Example
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording.analysis.rest import BY_UNIT, NOISE_FLOOR, SHARE, TIMES_NOISE
+from taxel.tare import Tare
 
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01
+#: That of channels with one kind of touch, which is unlike no other: a drift of several times a small noise is no touch.
+_SHARE_OF_ONE_KIND = 0.03
 #: The third quartile of normal noise is so many standard deviations above its median.
 _THIRD_QUARTILE = 0.6745
 #: The noise of channels is looked at until so long before each label, for so long, us, if there are so many frames.
@@ -43,14 +46,18 @@ def measured_floor(examples: Sequence[Example]) -> float | None:
             return None
         if example.tare is None or np.isnan(example.tare.noise).all() or not len(source):
             continue
-        above = np.fmax.reduce(source.values, axis=0, initial=-np.inf) - example.tare.rest
-        known = np.isfinite(above) & np.isfinite(example.tare.noise)
-        reach = float(np.quantile(above[known], SHARE))
-        floors.append(max(floor_at_rest(example.tare.noise[known]), _SHARE_OF_RANGE * reach))
+        noise = example.tare.noise[np.isfinite(example.tare.noise)]
+        floors.append(max(floor_at_rest(noise), _SHARE_OF_RANGE * _reach(source, example.tare)))
     return float(f"{max(floors):.3g}") if max(floors, default=0.0) > 0.0 else None
 
 
-def floor_alone(examples: Sequence[Example], floor: float) -> float:
+def _reach(frames: Frames, tare: Tare) -> float:
+    """Return the largest value above rest that 90 % of the taxels have at most."""
+    above = np.fmax.reduce(frames.values, axis=0, initial=-np.inf) - tare.rest
+    return float(np.quantile(above[np.isfinite(above) & np.isfinite(tare.noise)], SHARE))
+
+
+def floor_alone(examples: Sequence[Example], floor: float, *, kinds: int) -> float:
     """Return the noise floor of channels, each of which counts alone: by the noise before labels, if that is more.
 
     A tare by the unit has the noise of the quietest half second, which is less than elsewhere, or none. Other tares
@@ -61,18 +68,24 @@ def floor_alone(examples: Sequence[Example], floor: float) -> float:
     examples : sequence of Example, checked
     floor : float, in the sensor's unit
         As of `measured_floor`, or stated.
+    kinds : int
+        How many kinds of touch there are; of one, the floor is three hundredths of the largest value above rest at least.
     """
-    noises = []
+    noises, floors = [], [floor]
     for example in examples:
         source = example.source
-        if not isinstance(source, Frames) or example.tare is None or example.tare.note != BY_UNIT:
+        if not isinstance(source, Frames) or example.tare is None or not len(source):
+            continue
+        if kinds == 1:
+            floors.append(_SHARE_OF_ONE_KIND * _reach(source, example.tare))
+        if example.tare.note != BY_UNIT:
             continue
         for t in np.concatenate([*example.labels.values(), np.empty(0, np.int64)]).tolist():
             values = source.between(t - _BEFORE_US - _LOOK_US, t - _BEFORE_US).values
             if len(values) >= _LEAST_FRAMES:
                 middle, above = np.nanquantile(values, (0.5, 0.75), axis=0)
                 noises.append(float(np.nanmedian(above - middle)) / _THIRD_QUARTILE)
-    return max(floor, float(f"{TIMES_NOISE * np.median(noises or [0.0]):.3g}"))
+    return float(f"{max(*floors, TIMES_NOISE * float(np.median(noises or [0.0]))):.3g}")
 
 
 def floor_of(examples: Sequence[Example]) -> float:

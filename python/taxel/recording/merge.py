@@ -216,7 +216,8 @@ class _Merging:
         label, t, when, slope, repaired = ([row[k] for row in found] for k in range(5))
         return sections.Marks(
             board_changes=known(self.agreed(changes, (), "the changes of the board")),
-            notes=known(tuple(sorted(notes, key=lambda note: (note.t is None, note.t or 0)))),
+            # Recordings of two sensors may have the same labels.
+            notes=known(tuple(sorted(dict.fromkeys(notes), key=lambda note: (note.t is None, note.t or 0)))),
             detections=known(Detections._of(label, t, when, slope, repaired=repaired)),
             zeroings=known(self.zeroings()),
         )

@@ -54,7 +54,7 @@ def references(
             notes = counted(sum(note.t is not None for note in outside.notes), "note")
             raise ProblemError(f"{outside.title}: has {notes}, none within {_span(outside)}")
         return noted
-    table = Labels(source)
+    table = _opened(Path(source), recordings)
     # The sources of one file are one recording.
     count = len({(recording.path, trial_name(recording)) for recording in recordings})
     if count > 1 and any(not row.recording for row in table.rows):
@@ -116,7 +116,11 @@ def sources_without(
     """
     if not isinstance(source, str | os.PathLike):
         return {}
-    rows = (note for each in recordings for note in each.notes) if source == "notes" else Labels(source).rows
+    rows = (
+        (note for each in recordings for note in each.notes)
+        if source == "notes"
+        else _opened(Path(source), recordings).rows
+    )
     titles = {each.label: {each.title, each.name} for each in recordings if each.label}
     of_sources = {row.text for row in rows if row.source or any(row.recording in names for names in titles.values())}
     without = {}
@@ -160,7 +164,7 @@ def of_other_sources(
         labels = {source_name(recordings[k]): events[k] or {} for k in beside_it if recordings[k] is not recording}
         names = {name for k in beside_it for name in (recordings[k].label, recordings[k].side)} | {""}
         clock_of = partial(getattr, recording, "clock")
-        for table in _tables(source, recording.path):
+        for table in _tables(source, recording.path, recordings):
             rows = [row for row in table.rows if row.recording in {table.named(*file), ""}]
             for name in sorted({row.source for row in rows} - names):
                 with collected():  # what these warn of concerns the labels of this source too
@@ -171,12 +175,29 @@ def of_other_sources(
     return found
 
 
-def _tables(source: GivenLabels, recording: Path) -> list[Labels]:
+def _opened(path: Path, recordings: Sequence[Recording]) -> Labels:
+    """Open a table of labels; on grids of no side, such as plates, which have both feet, sides are no sources."""
+    table = Labels(path)
+    sides = {row.source for row in table.rows} - {""}
+    files = {(recording.path, trial_name(recording)) for recording in recordings}
+    of_both = all(
+        recording.array._has_neighbours and not {recording.side, recording.label} & _SIDES for recording in recordings
+    )
+    if not sides or not sides <= _SIDES or not of_both or len(files) < len(recordings):
+        return table
+    warn(
+        f"{path}: labels of {' and '.join(sorted(sides))} count alike, because no recording states its side "
+        "(side in a layout file)"
+    )
+    return table._without_sources()
+
+
+def _tables(source: GivenLabels, recording: Path, recordings: Sequence[Recording]) -> list[Labels]:
     """Return the table of labels that a recording has, if any."""
     if not isinstance(source, str | os.PathLike):
         return []
     table = beside(recording) if source == "notes" else Path(source)
-    return [Labels(table)] if table.is_file() else []
+    return [_opened(table, recordings)] if table.is_file() else []
 
 
 def _mapped(
@@ -285,7 +306,8 @@ def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]
         if not (row.source in _SIDES and sources & _SIDES):
             there = ", ".join(sorted(sources))
             raise refused(
-                argument, f" is {table.path}: {row.text} at {row.t} us is of source {row.source}; there is {there}"
+                argument,
+                f" is {table.path}: {row.text} at {row.t} us names the source {row.source}; the recording has {there}",
             )
         left_out[row.source] += 1
     for side, count in left_out.items():

@@ -78,8 +78,8 @@ def fitting(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool 
     labels : sequence of str
         What is to be learnt. Contact, lift and kinds of touch have one recipe whatever the unit; steps, as "foot_off",
         no labels, and of channels a contact or one kind alone have that of the unit. Where there is none, contact and
-        foot off of a grid have that of touches, if each is of one label, and so have those of channels; all else that
-        of channels.
+        foot off of a grid have that of touches, if each is of one label, and so have those of channels, and one kind of
+        them; all else that of channels.
     rests : bool
         Whether the rest of its taxels is known, from which touches of channels are distinguished.
 
@@ -94,6 +94,8 @@ def fitting(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool 
     ('gait_insole', 'gait_channel')
     >>> [fitting(Frames([[[0.0] * 6] * rows], [0], unit="V"), ["soft", "hard"]) for rows in (1, 6)]
     ['touch', 'touch']
+    >>> [fitting(Frames([[[0.0]]], [0], unit=unit), ["tap"]) for unit in ("V", "N")]
+    ['touch', 'gait_insole']
     """
     return chosen(source, labels, rests=rests)[0]
 
@@ -116,14 +118,14 @@ def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool =
     known, steps = False, None
     if array.taxels < 2 or not array._has_neighbours:
         sensor = counted(array.taxels, "channel" if array.is_channels else "taxel")
-        # A contact without its lift may be that of a step, and so may one label that no recipe knows.
+        # A contact without its lift may be that of a step, and so may one label that no recipe knows, in a unit of steps.
         kinds = {_listed(recipes[grids], label) for label in labels} if grids is not None else set()
         ends = [] if grids is None else [_own(recipes[grids], label) for label in labels]
         if "lift" in kinds and None not in kinds:
             return str(grids), f"{' and '.join(labels)} on {sensor}"
         others = [label for label, end in zip(labels, ends, strict=False) if end is None]
         of_steps = (_is_of_step(label) or _is_known(recipes, label) for label in others)
-        if rests and others and len(labels) > 1 and not any(of_steps):
+        if rests and others and (len(labels) > 1 or source.unit not in recipe_for) and not any(of_steps):
             return str(grids), f"kinds of touch on {sensor}"
         if rests and ends and None not in ends and len(set(ends)) == len(ends):
             steps = str(grids), f"{' and '.join(labels)} on {sensor}"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -214,6 +216,28 @@ def _left_out_of(path: Path) -> dict[str, str]:
         return {}
     with H5File(path) as h5:
         return h5.left_out
+
+
+def facts_of(path: Path, array: str, named: re.Pattern[str]) -> dict[str, float | str]:
+    """Return the single numbers and short texts of some names that a file states beside an array of frames.
+
+    In a .h5 they are attributes of the array, of its groups and of the file, nearest first, or data sets.
+    """
+    if path.suffix.lower() == ".npy":
+        return {}
+    names = [name for name, shape in shapes_of(path).items() if math.prod(shape) == 1 and named.fullmatch(name)]
+    found: dict[str, Any] = {}
+    if _is_hdf5(path):
+        with H5File(path) as h5:
+            groups = [array.rsplit("/", k)[0] for k in range(array.count("/") + 1)]
+            for of in (*groups, "/"):
+                for name in h5.attributes(of):
+                    if named.fullmatch(name) and name not in found:
+                        found[name] = h5.attribute(name, of)
+    with contextlib.suppress(FormatError):
+        found = {**arrays_of(path, names), **found} if names else found
+    facts = {name: value.item() if isinstance(value, np.ndarray) else value for name, value in found.items()}
+    return {name: value for name, value in facts.items() if isinstance(value, float | int | str)}
 
 
 def arrays_of(path: Path, names: Sequence[str], frames: str | None = None) -> dict[str, NDArray[Any]]:

@@ -61,7 +61,7 @@ def read_h5(path: Path, array: Array | None) -> RecordedSource:
                 f"taxel.formats.trials read files of other programs"
             )
         if version != VERSION:
-            number = "not a whole number" if isinstance(version, str) else version
+            number = version if isinstance(version, int) else "not a whole number"
             raise FormatError(f"{path}: its attribute taxel is {number}; this version of taxel reads {VERSION}")
         names = chosen(path, {name: entry.shape for name, entry in h5.entries.items()})
         h5.check_size(names, DTYPES)

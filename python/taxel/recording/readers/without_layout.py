@@ -20,7 +20,7 @@ from taxel._base.number_text import float_of
 from taxel._core import FormatError
 from taxel.formats import text
 from taxel.formats.layout import ISO, UNITS_US, advice
-from taxel.recording.readers.foreign import ARRAYS, arrays_of, list_arrays, shapes_of
+from taxel.recording.readers.foreign import ARRAYS, arrays_of, facts_of, list_arrays, shapes_of
 
 #: A column is one of times, if its name does not say so, if it ascends for so many lines.
 _ASCENDS = 20
@@ -45,19 +45,34 @@ _COUNTS = re.compile(
 _NUMBERED = re.compile(r"[^\W\d]{0,12}[ _\-\[(.]*\d+[\])]?", re.UNICODE)
 #: A unit of a force, a pressure or a voltage ...
 _FORCE_UNIT = r"([mk]?N|kgf?|gf?|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmHg|[mµu]?V)"
-#: ... that ends a column's name: Heel [N], toe (kPa).
-_UNIT_IN_NAME = re.compile(rf"[\[(]{_FORCE_UNIT}[\])]$")
+#: ... that ends a column's name: Heel [N], toe (kPa), thumb_mN, mV.
+_UNIT_IN_NAME = re.compile(rf"(?:[\[(]{_FORCE_UNIT}[\])]|(?:^|(?<=_)){_FORCE_UNIT})$")
 #: ... that a line above a table states: Einheit;kPa, Unit of pressure: N/cm2, Druck [kPa], Force in N, or only [kPa].
 _UNIT_ABOVE = re.compile(
     r"(?:\b(?i:(?:mess|druck|kraft)?einheit(?:en)?|units?)\b(?:[^:;=\t,\[(]*[:;=\t,\[(])?"
     r"|\b(?i:druck|kraft|pressure|force)\b[^\[(\d]*?(?:[:;=\t,\[(]|\bin\b)|^\W*[\[(])"
     rf"[ \t\"':;=,\[(]*{_FORCE_UNIT}(?![\w/²])"
 )
+#: What lines above a table state of its rate: rate 120 Hz, Abtastrate: 0,5 kHz, fs = 50 ...
+_RATE_ABOVE = re.compile(
+    r"(?i:\b(?:(?:sampling|sample|frame|scan)?[ _-]?(?:rate|frequency)|abtastrate|(?:abtast|mess)?frequenz|fs|fps)\b"
+    r"[^\d\n]{0,12}?(\d+(?:[.,]\d+)?)[ \t]*(khz)?)"
+)
+#: ... and of its rows and columns: rows 24 columns 40, Zeilen: 24; or 24 x 40.
+_ROWS_ABOVE = re.compile(r"\b(?:rows?|zeilen)\b\W{0,4}(\d+)", re.IGNORECASE)
+_COLUMNS_ABOVE = re.compile(r"\b(?:columns?|cols?|spalten)\b\W{0,4}(\d+)", re.IGNORECASE)
+_GRID_ABOVE = re.compile(r"\b(\d+) ?[xX×] ?(\d+)\b")
 #: What ends a column's name in brackets: its unit, of which there may be others, as Battery [%].
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\s\d\[\]()]{1,8})\s*[\])]$")
 #: What the names of two feet or hands begin with.
 _SIDE = re.compile(r"(left|right|links|rechts|l|r)(?![^\W\d_])", re.IGNORECASE)
 _SIDES = ({"left", "right"}, {"links", "rechts"}, {"l", "r"})
+#: Names under which a file of arrays states its rate, Hz, and its unit.
+_RATE = re.compile(
+    r"(?i:(?:(?:sampling|samples?|frame|scan)[ _-]?)?(?:rate|freq|frequency)|fs|fps|hz)(?i:[ _-]?[\[(]?hz[\])]?)?"
+)
+_UNITS = re.compile(r"(?i:(?:[a-z]+[ _-])?units?)")
+_FACTS = re.compile(f"{_RATE.pattern}|{_UNITS.pattern}")
 _NO_RATE = "# rate_hz = 100  # frames per second: the file does not state it, and without it frames are numbered"
 _NO_UNIT = '# unit = "kPa"  # of the readings: the file does not state it, and without it they are counts'
 #: Names of the columns of events in the orders that programs write without names.
@@ -137,10 +152,28 @@ def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> 
     times = []
     if time is not None:
         times = [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time].ravel(), count)]
+    facts = facts_of(path, name, _FACTS)
     data = [f"array = {_quote(name)}"] * bool(name) + ['frames = "last"'] * is_last + times
     # An array of frames x rows x columns says its size, and others of the folder may have another.
-    size = [_NO_UNIT] if len(shape) == 2 else _size(shape[0], ())
-    return [*size, *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
+    size = [] if len(shape) == 2 else _size(shape[0], ())
+    rate = [_stated_rate(facts)] if time is None else []
+    return [*size, _stated_unit(facts), *rate, *(["[data]", *data] if data else [])]
+
+
+def _stated_rate(facts: Mapping[str, float | str]) -> str:
+    """Return the line of the rate that a file states, or that it states none."""
+    for name, value in facts.items():
+        if _RATE.fullmatch(name) and not isinstance(value, str) and 1e-9 <= value <= 1e6:
+            return f"rate_hz = {value:.10g}  # {name} of the file"
+    return _NO_RATE
+
+
+def _stated_unit(facts: Mapping[str, float | str]) -> str:
+    """Return the line of the unit that a file states, or that it states none."""
+    for name, value in facts.items():
+        if _UNITS.fullmatch(name) and isinstance(value, str) and re.fullmatch(f"{_FORCE_UNIT}|counts", value):
+            return f"unit = {_quote(value)}  # {name} of the file"
+    return _NO_UNIT
 
 
 @dataclass(frozen=True)
@@ -155,8 +188,8 @@ class _TextTable:
     body: Sequence[Sequence[str]]
     #: Which columns hold numbers; the others hold texts.
     numeric: Sequence[bool]
-    #: The unit that the lines above state, "" if none does.
-    unit_above: str
+    #: The lines above, which may state the unit, the rate and the size.
+    above: Sequence[str]
     #: Lines a frame, if empty lines are between frames, else 1.
     between_empty: int
 
@@ -189,11 +222,40 @@ class _TextTable:
             # Read as numbers they would be a frame.
             names, skipped = [""] * columns, fit.numbers[first - 1] + 1
         between = _between_empty(fit.numbers[first:])
-        above = {found[1] for line in fit.lines[:skipped] if (found := _UNIT_ABOVE.search(line))}
-        unit_above = above.pop() if len(above) == 1 else ""
         return cls(
-            separator, fit.decimal, skipped, names[:columns], units, body, numeric[:columns], unit_above, between
+            separator,
+            fit.decimal,
+            skipped,
+            names[:columns],
+            units,
+            body,
+            numeric[:columns],
+            fit.lines[:skipped],
+            between,
         )
+
+    @property
+    def unit_above(self) -> str:
+        """The unit that the lines above state, "" if none or several."""
+        units = {found[1] for line in self.above if (found := _UNIT_ABOVE.search(line))}
+        return units.pop() if len(units) == 1 else ""
+
+    @property
+    def rate_above(self) -> float | None:
+        """The rate that the lines above state, Hz; None if none or several."""
+        stated = {found.groups() for line in self.above if (found := _RATE_ABOVE.search(line))}
+        rates = [
+            float(rate.replace(",", ".")) * (1000.0 if (unit or "").lower() == "khz" else 1.0) for rate, unit in stated
+        ]
+        return rates[0] if len(rates) == 1 and rates[0] > 0.0 else None
+
+    def size_above(self, taxels: int) -> tuple[int, int] | None:
+        """Return the rows and columns that the lines above state, if they have so many taxels."""
+        text = "\n".join(self.above)
+        sizes = [(int(rows), int(columns)) for rows, columns in _GRID_ABOVE.findall(text)]
+        rows, columns = _ROWS_ABOVE.search(text), _COLUMNS_ABOVE.search(text)
+        sizes += [(int(rows[1]), int(columns[1]))] if rows and columns else []
+        return next((size for size in sizes if size[0] * size[1] == taxels), None)
 
     def numbers(self, column: int) -> NDArray[np.float64]:
         return np.array([_number(row[column], self.decimal) for row in self.body])
@@ -232,7 +294,7 @@ class _TextTable:
         if self.units:
             return self.units[column].strip("[]()")
         within = _UNIT_IN_NAME.search(self.names[column]) if self.names else None
-        return within[1] if within else ""
+        return (within[1] or within[2]) if within else ""
 
     def of_time(self, column: int, longer: float) -> list[str]:
         """Return the lines that say which column holds the times; the file is `longer` than what was read of it."""
@@ -412,10 +474,14 @@ def _of_table(found: _TextTable, longer: float, begin: str) -> tuple[str, list[s
     unit = (
         [] if name is None else [f"unit = {_quote(name or found.unit_above)}" if name or found.unit_above else _NO_UNIT]
     )
-    rate = [_NO_RATE] if time is None else []
+    stated = found.rate_above
+    rate = (
+        [_NO_RATE if stated is None else f"rate_hz = {stated:.10g}  # stated above the table"] if time is None else []
+    )
     holds = f"a table of {counted(len(found.numeric), 'column')}" + f", {lines} lines per frame" * (lines > 1)
     names = [found.names[k] for k in taxels] if found.names else []
-    size = _size(len(taxels), names) if lines == 1 else [f"rows = {lines}", f"columns = {len(taxels)}"]
+    grid = found.size_above(len(taxels)) if lines == 1 else (lines, len(taxels))
+    size = _size(len(taxels), names) if grid is None else [f"rows = {grid[0]}", f"columns = {grid[1]}"]
     return holds, [*size, *unit, *rate, *(["[table]", *table] if table else [])]
 
 
