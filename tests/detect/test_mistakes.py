@@ -173,8 +173,9 @@ def test_what_differs_from_the_training_is_the_cause_where_labels_are_not(seed: 
         first, *_ = causes_of([make(seed)], 50.0, [noise])
         assert (first.kind, first.measured) == ("unlike_training", noise[0]), make
     for make, kind in ((late, "shifted_labels"), (gap, "gaps"), (no_releases, "unlabelled_loads")):
-        first, *_ = causes_of([make(seed)], 50.0, [noise])
+        first, *others = causes_of([make(seed)], 50.0, [noise])
         assert first.kind == kind
+        assert all(cause.measured and cause.mistakes for cause in others), "all is explained by the first"
 
 
 def test_of_far_too_many_detections_the_verdict_says_all() -> None:
@@ -417,6 +418,16 @@ def test_a_label_is_named_once_and_what_is_measured_of_nothing_is_no_advice() ->
         "2 missed in a; 2 missed in b; 2 missed in c",
     )
     assert str(replace(cause, advice="")) == cause.measured
+
+
+def test_what_was_measured_of_labels_with_one_advice_stands_behind_each() -> None:
+    ends = "; the score is then against the moved labels"
+    parts = [Cause("gaps", (label,), n, f"{n} of 9 are missed{ends}", "") for label, n in (("contact", 1), ("lift", 2))]
+    (cause,) = ordered([*parts, parts[0]])
+    assert (cause.labels, cause.mistakes) == (("contact", "lift"), 3)
+    assert cause.measured == f"contact: 1 of 9 are missed; lift: 2 of 9 are missed{ends}"
+    (same,) = ordered([replace(parts[0], labels=(label,)) for label in ("contact", "lift")])
+    assert (same.labels, same.mistakes, same.measured) == (("contact", "lift"), 2, parts[0].measured)
 
 
 @pytest.mark.parametrize("distance_ms", [0, 40, 55, 95, 105])

@@ -258,9 +258,11 @@ class Measured:
 
     def _unlike(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
         """Return in what the examples with most mistakes differ from the training."""
+        if not self._differs(left):  # what is in loads without a label is explained by then
+            return None
         members = [self._in_unlike(t) for t in left]
         places = np.unique(np.concatenate([_example_of(t)[here] for t, here in zip(left, members, strict=True)]))
-        measured = "; ".join(of_names([("", text) for k in places for text in self._differences[k] if text], 1))
+        measured = "; ".join(of_names([("", text) for k in places for text in self._differences[k]], 1))
         count = sum(int(here.sum()) for here in members)
         advice = "to train on recordings like these too"
         return Cause("unlike_training", (label,), count, measured, advice), left.without(*members)
