@@ -241,6 +241,21 @@ def misplaced_and_missed(seed: int) -> Outcome:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_labels_of_all_kinds_show_from_when_on_they_are_late(seed: int) -> None:
+    frames, truth = touched(seed, 30, hold_s=(0.3, 0.45))
+    t, kinds, late = truth["contact"], np.arange(30) % 3, np.arange(30) >= 15
+    labels = {name: t[kinds == k] + 150_000 * late[kinds == k] for k, name in enumerate(("tap", "pinch", "hold"))}
+    found = {name: t[kinds == k] for k, name in enumerate(labels)}
+    # The first late label is found by a second detection; of one kind too few are detected to tell a distance.
+    found["tap"] = np.sort(np.append(found["tap"], labels["tap"][5] - 20_000))
+    found["hold"] = np.delete(found["hold"], [2, 7, 9])
+    cause, *_ = causes_of([outcome(frames, labels, found)], 50.0)
+    begin_s = np.floor((t[15] + 150_000) / 1e5) / 10
+    assert (cause.kind, set(cause.labels)) == ("shifted_labels", {"tap", "pinch", "hold"})
+    assert cause.advice.startswith(f"to move the labels from {begin_s:.1f} s to the end 150 ms earlier"), cause
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_detection_at_the_first_frames_behind_a_gap_is_of_the_gap(seed: int) -> None:
     made = gap(seed)
     t = made.example.source.t
