@@ -143,15 +143,15 @@ SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
     "misplaced": (
         misplaced,
         "unlabelled_loads",
-        "6 of 6 false detections are in loads without a label",
+        "6 of 6 false detections are in such touches",
         "to label these",
     ),
     "gap": (gap, "gaps", "missed labels are where the recording has no frames, for example ", ""),
     "no releases": (
         no_releases,
         "unlabelled_loads",
-        "4 of 4 false detections are in loads without a label of release",
-        "to label these loads too",
+        "4 touches without a label of release are detected, about as strong as labelled ones",
+        "to label these touches too",
     ),
 }
 
@@ -253,6 +253,17 @@ def test_the_labels_of_all_kinds_show_from_when_on_they_are_late(seed: int) -> N
     begin_s = np.floor((t[15] + 150_000) / 1e5) / 10
     assert (cause.kind, set(cause.labels)) == ("shifted_labels", {"tap", "pinch", "hold"})
     assert cause.advice.startswith(f"to move the labels from {begin_s:.1f} s to the end 150 ms earlier"), cause
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_touches_without_a_label_are_counted_once_whatever_kinds_are_detected(seed: int) -> None:
+    frames, truth = touched(seed, 30)
+    t, kinds, without = truth["contact"], np.arange(30) % 2, np.isin(np.arange(30), [3, 8, 13, 18])
+    labels = {name: t[(kinds == k) & ~without] for k, name in enumerate(("tap", "pinch"))}
+    found = {name: np.sort(np.append(t[kinds == k], t[[3, 8]] + 5000)) for k, name in enumerate(labels)}
+    cause, *_ = causes_of([outcome(frames, labels, found)], 50.0)
+    assert (cause.kind, set(cause.labels), cause.mistakes) == ("unlabelled_loads", {"tap", "pinch"}, 8)
+    assert cause.measured.startswith("4 touches without a label of pinch, tap are detected, about as strong as ")
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

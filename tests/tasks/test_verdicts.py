@@ -220,7 +220,7 @@ def test_a_stretch_of_labels_missing_ones_and_those_of_nothing_are_named(
     assert f"contact, lift: what may help is to move the labels from {begin_s:.1f} s to the end 3" in line
     fewer = {label: np.sort(random.choice(t, 20, replace=False)) for label, t in labels.items()}
     [line] = trained.told(capsys, tmp_path, frames, fewer)
-    assert line.startswith("contact, lift: what may help is to label these loads too: 5 of 5 false detections are ")
+    assert line.startswith("contact, lift: what may help is to label these touches too: ")
     middles = labels["contact"] + (labels["lift"] - labels["contact"]) // 2
     more = labels | {"contact": np.sort(np.append(labels["contact"], middles[::5]))}
     [line] = trained.told(capsys, tmp_path, frames, more)

@@ -367,7 +367,7 @@ class Measured:
     def _groups(self, left: Mapping[str, _Times]) -> Iterator[list[_Shift]]:
         """Yield the shifts of names that are at one distance, those of most labels first.
 
-        A name of which too few are missed to tell a distance has that of others where most of them, or of what is false,
+        A name of which too few are missed to tell a distance has that of others, if most of its missed or of its false
         are at it.
         """
         shifts = [shift for label, times in left.items() if (shift := self._at_one_distance(label, times)) is not None]
@@ -515,31 +515,36 @@ class Measured:
         if not self._felt.are_known or (self._differs(left) and not sound):
             return None
         names = {name for example in self._examples for name in example.labels}
-        strong = self._felt.strong(label, names, left.false)
+        is_end = recipes.neuron_of("touch", label) == "lift"
+        same = [name for name in sorted(names) if (recipes.neuron_of("touch", name) == "lift") == is_end]
+        strong, _ = self._felt.unlabelled(label, names, left.false)
         unfelt = ~self._felt.felt_at(left.missed)[1]
         count, mistakes = int(strong.sum()), int(strong.sum()) + int(unfelt.sum())
         if 2 * mistakes <= left.total:
             return None
-        parts = []
+        touches, parts = "", []
         if count:
-            parts.append(
-                f"{count} of {counted(len(strong), 'false detection')} {are(count)} in loads without a label of "
-                f"{label} that are as strong as labelled loads"
+            # A touch of which several kinds are detected is one.
+            false = np.concatenate([self._wrong(name, is_missed=False) for name in same])
+            begins = np.unique(self._felt.unlabelled(label, names, false)[1])
+            touches = (
+                f"{counted(len(begins), 'touch', 'touches')} without a label of {', '.join(same)} {are(len(begins))} "
+                f"detected, about as strong as labelled ones, for example at {self._places(begins)}; "
             )
+            parts.append(f"{count} of {counted(len(strong), 'false detection')} {are(count)} in such touches")
         if n := int(unfelt.sum()):
+            example = f", for example at {self._places(left.missed[unfelt])}"
             parts.append(
                 f"{n} of {counted(len(unfelt), 'missed label')} {are(n)} more than {WINDOW_MS:.0f} ms from "
-                "where a load begins or ends"
+                f"where a load begins or ends{example * (not count)}"
             )
-        times = left.false[strong] if count else left.missed[unfelt]
-        measured = f"{', and '.join(parts)}, for example at {self._places(times)}"
         is_most = 2 * count >= left.total
         cause = Cause(
             "unlabelled_loads" if count else "unfelt_labels",
             (label,),
             mistakes,
-            measured,
-            "to label these loads too" * is_most,
+            f"{touches}{', and '.join(parts)}",
+            "to label these touches too" * is_most,
         )
         return cause, left.without(unfelt, strong)
 

@@ -293,9 +293,7 @@ def _measured(given: Example) -> _Measured | None:
     share = (values >= above).mean(axis=0) if len(values) else np.zeros(source.array.shape)
     most = np.fmax.reduce(values, axis=(1, 2), initial=0.0)
     peaks = largest(*sums, begin, end)
-    return _Measured(
-        _noise(source), peaks, rises, begin, end, share >= _LOADED, share > 0.0, _usual(most), stays=stays
-    )
+    return _Measured(_noise(source), peaks, rises, begin, end, share >= _LOADED, share > 0.0, _usual(most), stays=stays)
 
 
 def _rises(
