@@ -298,22 +298,23 @@ def test_what_may_help_is_named_where_many_are_missed_or_false(made, held, own, 
 
 def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
     readout, example = made
-    assert loaded_at_rest([example], ContactArea()) == 0
+    assert loaded_at_rest([example], ContactArea()).taxels == 0
     low = taxel.Tare.take(taxel.Frames(np.full((2, 8, 8), 50.0), [0, 1000], array=ARRAY))
     stale = example._replace(tare=low)
-    assert loaded_at_rest([example, stale], ContactArea()) == 64
-    assert loaded_at_rest([example, stale._replace(tare=None)], ContactArea()) == 0
-    assert loaded_at_rest([stale], LevelCrossing([10.0])) == 0
+    assert loaded_at_rest([example, stale], ContactArea()).taxels == 64
+    assert loaded_at_rest([example, stale._replace(tare=None)], ContactArea()).taxels == 0
+    assert loaded_at_rest([stale], LevelCrossing([10.0])).taxels == 0
     few = causes(readout, [example._replace(labels={"contact": [9000]})], scored(0, 1, 0), scored(0, 1, 0))[0]
     assert (few.advice, few.measured) == (
         "more labels",
         "there is 1; a score on held-out data needs at least 4, and five folds need 10",
     )
     (cause, *_) = causes(readout, [stale], scored(9, 1, 0), scored(9, 1, 0))
-    assert (cause.kind, cause.advice) == ("tare", "a tare of the time just before (--tare FILE)")
+    assert (cause.kind, cause.option) == ("tare", "--tare FILE.npz")
+    trial = r"tried with that of 0.000 to 0.190 s: 12 of 12 labels are where a load begins or ends, now 0"
     assert cause.measured == (
-        "64 taxels read above the tare while nothing touches them; to make this file, a .npz, run: "
-        "taxel cut RECORDING FILE --from S --to S"
+        f"64 taxels read above the tare while nothing touches them; {trial}; to make this file, run: "
+        "taxel cut 'example 0' FILE.npz --from 0.000 --to 0.190"
     )
 
 
@@ -333,5 +334,5 @@ def test_a_tare_that_drifts_away_is_noticed_at_the_end() -> None:
     values = np.full((1000, 8, 8), 60.0) + np.linspace(0, 8, 1000)[:, None, None]
     frames = taxel.Frames(values, np.arange(1000) * 10_000, unit="ticks", array=ARRAY)
     truth = {"contact": np.arange(1, 10) * 1_000_000}
-    assert loaded_at_rest([Example(frames, truth, tare())], recipe().encoder) == 64
-    assert loaded_at_rest([Example(frames, {"contact": truth["contact"][:4]}, tare())], recipe().encoder) == 0
+    assert loaded_at_rest([Example(frames, truth, tare())], recipe().encoder).taxels == 64
+    assert loaded_at_rest([Example(frames, {"contact": truth["contact"][:4]}, tare())], recipe().encoder).taxels == 0

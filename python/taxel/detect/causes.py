@@ -110,11 +110,13 @@ class Mistakes:
         self, evidence: Evidence, label: str, wrong: int, found: Sequence[Cause], where: Sequence[Cause]
     ) -> list[Cause]:
         """Return what else concerns a label, beside what was found, and where its mistakes are."""
-        where = [cause for cause in where if label in cause.labels]
-        causes = [*self._unlabelled_time(evidence.sound, label), *self._name(label, wrong), *where]
         known = [cause for cause in found if label in cause.labels]
+        # A load that stays holds all labels.
+        stays = any(cause.kind == "standing_load" for cause in known)
+        where = [c for c in where if label in c.labels and not (stays and c.kind == "overlapping_loads")]
+        causes = [*self._unlabelled_time(evidence.sound, label), *self._name(label, wrong), *where]
         # Labels are far from what is felt where a tare does not fit, and where a load is felt late, too.
-        unpaired = ("foreign_labels", "unfelt_labels", "tare")
+        unpaired = ("foreign_labels", "unfelt_labels", "tare", "standing_load")
         if not any(cause.kind in unpaired for cause in known) and label not in evidence.felt_apart:
             causes += self._unpaired(evidence.sound, label)
         explained = max(sum(c.mistakes for c in where), max((c.mistakes for c in (*known, *causes)), default=0))

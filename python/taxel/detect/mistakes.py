@@ -121,10 +121,9 @@ def causes_of(
 
 
 class Standing(NamedTuple):
-    """A load that stays, as of an object or a stuck taxel: what it is, and what helps, as of `Cause`."""
+    """A load that stays, as of an object or a stuck taxel: what it is, and the option that helps, as of `Cause`."""
 
     text: str
-    advice: str = ""
     option: str = ""
     arguments: Mapping[str, float] = {}
 
@@ -474,9 +473,9 @@ class Measured:
         if 2 * (count := int(inside.sum())) <= len(left.missed):
             return None
         if self._standing is not None:
-            text, advice, option, arguments = self._standing
+            text, option, arguments = self._standing
             measured = f"{text}; {count} of {len(inside)} missed of {label} {are(count)} while it stays"
-            cause = Cause("standing_load", (label,), count, measured, advice, option, arguments)
+            cause = by_option("standing_load", label, count, measured, option, **arguments)
             return cause, left.without(inside, np.zeros(len(left.false), np.bool_))
         # Loads that overlap have labels of their other edges too; without such labels a load holds a label too many.
         names = {name for example in self._examples for name in example.labels} - {label}

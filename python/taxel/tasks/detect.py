@@ -443,16 +443,16 @@ def _standing(
         return None
     text, quiet = f"an object is on the sensor from beginning to end, at {where}", of_quiet(source).quiet_us
     if quiet is None or quiet[0] > source.t[0]:
-        return Standing(text, "a region without it")
-    seconds = np.floor((quiet[1] - quiet[0]) / 1e4) / 100
-    tare = given_tare(float(seconds), recording)
-    found, _ = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=tare.stop_us)
+        return Standing(text)
+    seconds = float(np.floor((quiet[1] - quiet[0]) / 1e4) / 100)
+    with collected():  # nobody gave this tare
+        tare = given_tare(seconds, recording)
+        found, _ = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=tare.stop_us)
     tried = score(outcome.example._known(found), outcome.example.labels, options.window_ms)
     if 2 * tried.rank[0] > now.rank[0]:
-        return Standing(text, "a region without it")
+        return Standing(text)
     trial = f"{tried.found} found and {tried.false} false, instead of {now.found} found and {now.false} false"
-    text += f"; tried with it: {trial}"
-    return Standing(text, f"--tare {seconds:g}", f"--tare {seconds:g}", {"tare": float(seconds)})
+    return Standing(f"{text}; tried with it: {trial}", f"--tare {seconds:g}", {"tare": seconds})
 
 
 def _quiet(recording: Recording) -> Tare | None:
