@@ -28,7 +28,7 @@ from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording.analysis.rest import TIMES_NOISE, ZEROS_BEFORE, of_frames
-from taxel.spikes import SpikeTrains, to_ms, to_us
+from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
 
 #: Advice against labels that are elsewhere.
@@ -181,7 +181,7 @@ class Evidence:
             return Cause("tare", (), 0, measured, "a tare of a time without a touch (--tare FILE)", "--tare FILE")
         taxels, k, start_us, stop_us = self._loaded
         source = self.sound[k].source
-        if taxels < TOUCH or isinstance(source, SpikeTrains) or not self.felt.are_known:
+        if taxels < TOUCH or not isinstance(source, Events | Frames) or not self.felt.are_known:
             return None
         begin_us = beginning_us(source.t[:1])
         stretch = [f"{(t - begin_us) / 1e6:.3f}" for t in (max(start_us, int(source.t[0])), stop_us)]

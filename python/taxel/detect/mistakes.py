@@ -591,7 +591,7 @@ def _of_clock(cause: Callable[..., Cause], ms: float, measured: str, fits: str) 
         return cause(measured, advice, kind="shifted_training")
     measured += f": either these labels are {is_late} or the labels of the training were {was}"
     advice = f"to look where a load begins (taxel view); --shift-ms {shift_ms} moves these labels"
-    return cause(measured, advice, f"--shift-ms {shift_ms}")
+    return cause(measured, advice)
 
 
 def overlapping(label: str, count: int, labels: int, mistakes: int) -> Cause:

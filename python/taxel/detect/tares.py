@@ -108,7 +108,7 @@ def early_part(example: Example, share: float = _EARLY) -> Tare | None:
 
 
 class Loaded(NamedTuple):
-    """How many taxels read above the tare of an example while nothing touches it, and from when to when, us, they do."""
+    """How many taxels read above the tare of an example while nothing touches it, and from when to when, us."""
 
     taxels: int
     example: int = 0
@@ -121,8 +121,8 @@ def loaded_at_rest(examples: Sequence[Example], encoder: Encoder) -> Loaded:
 
     A taxel counts that does so 20 ms before each of the first four labels, or of the last four: at one of four such
     moments at least a touch is yet to begin, and noise is elsewhere each time. So it is a tare that does not fit from
-    the beginning, or one that the readings drifted away from, or a load that stays. If there are several examples, it is
-    the largest number. The time ends at the moment with the least load.
+    the beginning, or one that the readings drifted away from, or a load that stays. If there are several examples, it
+    is the largest number. The time ends at the moment with the least load.
     """
     return max((_loaded(k, example, encoder) for k, example in enumerate(examples)), default=Loaded(0))
 
