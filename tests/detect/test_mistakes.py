@@ -446,6 +446,13 @@ def test_a_label_is_named_once_and_what_is_measured_of_nothing_is_no_advice() ->
     assert str(replace(cause, advice="")) == cause.measured
 
 
+def test_what_no_trial_has_measured_is_said() -> None:
+    for kind, tried in (("overfitting", False), ("unlike_training", False), ("plain_rule", True), ("recipe", True)):
+        cause = Cause(kind, ("contact",), 3, "measured", "this")
+        assert str(cause) == "what may help is this: measured" + "; this was not tried" * (not tried)
+        assert str(replace(cause, advice="")) == "measured"
+
+
 def test_what_was_measured_of_labels_with_one_advice_stands_behind_each() -> None:
     ends = "; the score is then against the moved labels"
     parts = [Cause("gaps", (label,), n, f"{n} of 9 are missed{ends}", "") for label, n in (("contact", 1), ("lift", 2))]

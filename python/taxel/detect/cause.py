@@ -23,6 +23,9 @@ OF_DATA = (
     "standing_load", "foreign_labels", "tare", "begun_loaded", "gaps", "unlabelled_time", "unlabelled_loads",
 )  # fmt: skip
 
+#: Causes whose advice no trial has measured, nor does it undo a fault that was found.
+_UNTRIED = ("levels", "begun_loaded", "unlabelled_time", "unlike_training", "indistinct_kinds", "overfitting")
+
 
 @dataclass(frozen=True)
 class Cause:
@@ -65,10 +68,11 @@ class Cause:
     - ``unlabelled_source``: one source (a foot) has half the share found of another. A column ``source`` in the labels.
     - ``levels``: loads reach fewer than two levels, as in another unit. ``--set fit_levels=true``.
     - ``overlapping_loads`` (*): one load holds several labels of a name. A source or region for each load.
-    - ``standing_load`` (*): while these labels happen, an object is on the array, or a taxel is stuck. ``--tare``.
+    - ``standing_load`` (*): while these labels happen, an object is on the array, or a taxel is stuck. ``--tare``,
+      where a trial of it helps.
     - ``foreign_labels``: labels are more than 50 ms from any load, or all at the beginning. Labels of this recording;
       times in us.
-    - ``tare``: the tare contains a touch, or untouched taxels read above rest. ``--tare``.
+    - ``tare``: the tare contains a touch, or untouched taxels read above rest, and another was tried. ``--tare``.
     - ``begun_loaded``: labels are in the first two frames, already loaded. ``zeros_before_s`` in a layout file.
     - ``durations``, ``plain_rule``: a rule makes at most half the mistakes. ``--rule FILE`` writes it, for
       ``taxel detect --readout FILE``.
@@ -113,7 +117,8 @@ class Cause:
         mapping("arguments", self.arguments)
 
     def __str__(self) -> str:
-        return f"what may help is {self.advice}: {self.measured}" if self.advice else self.measured
+        untried = "; this was not tried" * (self.kind in _UNTRIED)
+        return f"what may help is {self.advice}: {self.measured}{untried}" if self.advice else self.measured
 
     def to_dict(self) -> dict[str, Any]:
         """Return the cause as plain values for JSON."""
