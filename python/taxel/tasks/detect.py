@@ -516,7 +516,7 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
     lines, source, tare = list(_of_gaps(recording, outcome)), recorded(recording, hold=False), outcome.example.tare
     if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
         # What else is measured is measured upside down.
-        return [*lines, f"rest: {quiet.text(recording.path)}"], Unlike()
+        return [*lines, f"rest: {quiet.text(recording.path, recording._turned)}"], Unlike()
     lines += _of_taxels(source)
     floors = noise_floors(readout)
     if tare is not None and floors and not isinstance(source, SpikeTrains):
