@@ -421,8 +421,8 @@ def _detected(
     if scored is not None and not scored.events:
         remarks.insert(
             0,
-            f"0 labels: {counted(scored.false, 'detection')} count as false, so this does not show whether they are "
-            "right",
+            f"0 labels: {counted(scored.false, 'detection')} {'counts' if scored.false == 1 else 'count'} as false, so "
+            "the score does not show whether detections are right",
         )
     stays = None if scored is None or not scored.rank[0] else _standing(readout, recording, felt, options)
     return _Found(Detected(recording, outcome, taken, tuple(remarks)), felt, differs.sensor, stays)
@@ -524,9 +524,8 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
         if count:
             lines.append(
                 f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that touches "
-                "may seem not to end, and other touches may be missed: take a tare between touches, at a time nearer "
-                "to them "
-                "(taxel cut RECORDING FILE --from S --to S, --tare FILE)"
+                "may seem not to end, and other touches may be missed: take a tare between later touches (taxel cut "
+                "RECORDING FILE --from S --to S, then --tare FILE)"
             )
     if tare is not None and isinstance(source, Frames) and (floor := measured_floor([outcome.example])) is not None:
         count = count_loaded(source, tare, floor)
