@@ -4,6 +4,8 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from test_ages import touched
 from test_readout import ARRAY, recipe, tare, touches
 
 import taxel
+from taxel.cli.train import _next as following_of
 from taxel.detect import Example, PlainRule, run, score
 from taxel.detect.cause import Cause
 from taxel.detect.causes import Mistakes, by_recipe
@@ -81,14 +84,15 @@ def test_the_last_lines_warn_of_labels_that_are_not_found_and_the_readout_is_wri
     recording, labels = recorded(tmp_path, 1, 6, late_us=7_000)
     arguments = ("train", recording, "--labels", labels, "--folds", folds, "--overwrite", "-o", tmp_path / "r.json")
     code, out, _ = call(capsys, *arguments, "--window-ms", 1)
-    said = f"do not rely on this readout: 0 of 6 {which} found, . false, no better than to detect nothing; what"
+    said = f"do not rely on this readout: 0 of 6 {which} found, . false, no better than to detect nothing"
     assert code == 0
     for line, label in zip(out.splitlines()[-2:], ("contact", "lift"), strict=True):
-        assert re.match(f"warning: {label}: {said} may help is .", line), line
+        assert re.fullmatch(f"warning: {label}: {said}", line), line
     assert taxel.Readout.load(tmp_path / "r.json").labels == ("contact", "lift")
     result = json.loads(call(capsys, *arguments, "--window-ms", 1, "--json")[1])
     assert [f"warning: {one}" for one in result["warnings"]] == out.splitlines()[-2:]
-    assert "; next: look where a load begins (taxel view); --shift-ms -7 moves these labels, then train again\n" in out
+    assert "contact, lift: what may help is to look where a load begins (taxel view); --shift-ms -7 moves these" in out
+    assert "; next: do what may help, then train again\n" in out
     request = {"recordings": [str(recording)], "labels": str(labels), "out": str(tmp_path / "p.json")}
     for window_ms, command in ((1, ""), (10, f"taxel detect RECORDING --readout {tmp_path / 'p.json'}")):
         options = {"options": {"folds": folds, "window_ms": window_ms}, "overwrite": True}
@@ -298,23 +302,43 @@ def test_what_may_help_is_named_where_many_are_missed_or_false(made, held, own, 
 
 def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
     readout, example = made
-    assert loaded_at_rest([example], ContactArea()) == 0
+    assert loaded_at_rest([example], ContactArea()).taxels == 0
     low = taxel.Tare.take(taxel.Frames(np.full((2, 8, 8), 50.0), [0, 1000], array=ARRAY))
     stale = example._replace(tare=low)
-    assert loaded_at_rest([example, stale], ContactArea()) == 64
-    assert loaded_at_rest([example, stale._replace(tare=None)], ContactArea()) == 0
-    assert loaded_at_rest([stale], LevelCrossing([10.0])) == 0
+    assert loaded_at_rest([example, stale], ContactArea()).taxels == 64
+    assert loaded_at_rest([example, stale._replace(tare=None)], ContactArea()).taxels == 0
+    assert loaded_at_rest([stale], LevelCrossing([10.0])).taxels == 0
     few = causes(readout, [example._replace(labels={"contact": [9000]})], scored(0, 1, 0), scored(0, 1, 0))[0]
     assert (few.advice, few.measured) == (
         "more labels",
         "there is 1; a score on held-out data needs at least 4, and five folds need 10",
     )
     (cause, *_) = causes(readout, [stale], scored(9, 1, 0), scored(9, 1, 0))
-    assert (cause.kind, cause.advice) == ("tare", "a tare of the time just before (--tare FILE)")
+    assert (cause.kind, cause.option) == ("tare", "--tare FILE.npz")
+    trial = r"tried with that of 0.000 to 0.190 s: 12 of 12 labels are where a load begins or ends, now 0"
     assert cause.measured == (
-        "64 taxels read above the tare while nothing touches them; to make this file, a .npz, run: "
-        "taxel cut RECORDING FILE --from S --to S"
+        f"64 taxels read above the tare while nothing touches them; {trial}; to make this file, run: "
+        "taxel cut 'example 0' FILE.npz --from 0.000 --to 0.190"
     )
+
+
+@pytest.mark.parametrize(
+    ("option", "rules", "following"),
+    [
+        ("--rule FILE", [], "train again with --rule FILE"),
+        ("--rule FILE", [Path("rule.json")], "taxel detect RECORDING --readout rule.json"),
+        ("--shift-ms -200", [Path("rule.json")], "train again with --shift-ms -200"),
+        ("", [], "do what may help, then train again"),
+    ],
+)
+def test_a_rule_that_is_advised_and_written_is_used_next(option: str, rules: list[Path], following: str) -> None:
+    advised = Cause("plain_rule", ("contact",), 5, "it leaves none", option or "to move labels", option)
+
+    def command(path: str, *, is_rule: bool = False) -> str:
+        return f"taxel detect RECORDING --readout {path}" if is_rule else ""
+
+    training: Any = SimpleNamespace(again=lambda: advised, command=command)
+    assert following_of(training, Path("r.json"), rules) == f"; next: {following}"
 
 
 @pytest.mark.parametrize(("left", "helps"), [((99, 1, 1), True), ((94, 6, 0), False)])
@@ -333,5 +357,5 @@ def test_a_tare_that_drifts_away_is_noticed_at_the_end() -> None:
     values = np.full((1000, 8, 8), 60.0) + np.linspace(0, 8, 1000)[:, None, None]
     frames = taxel.Frames(values, np.arange(1000) * 10_000, unit="ticks", array=ARRAY)
     truth = {"contact": np.arange(1, 10) * 1_000_000}
-    assert loaded_at_rest([Example(frames, truth, tare())], recipe().encoder) == 64
-    assert loaded_at_rest([Example(frames, {"contact": truth["contact"][:4]}, tare())], recipe().encoder) == 0
+    assert loaded_at_rest([Example(frames, truth, tare())], recipe().encoder).taxels == 64
+    assert loaded_at_rest([Example(frames, {"contact": truth["contact"][:4]}, tare())], recipe().encoder).taxels == 0

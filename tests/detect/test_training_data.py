@@ -158,3 +158,30 @@ def test_touches_far_weaker_than_those_of_the_training_are_none(
     assert "no load reaches 0.1 of the strength of the training's touches" in remarks(
         training, made(tmp_path, seed, strength=12.0)[0]
     )
+
+
+@pytest.fixture(scope="module")
+def of_channels(tmp_path_factory: pytest.TempPathFactory) -> taxel.tasks.Training:
+    path, labels = channels(tmp_path_factory.mktemp("channels"), 0)
+    return taxel.train(taxel.open(path), [labels], TrainOptions(folds=0))
+
+
+def channels(place: Path, seed: int, drift: float = 0.0) -> tuple[Path, dict[str, NDArray[np.int64]]]:
+    """Write touches on ten channels without places, of which one drifts by so much until the end."""
+    rng = np.random.default_rng(seed)
+    begins = 300 + np.cumsum(rng.integers(90, 130, 30))
+    values = 500.0 + 5.0 * rng.standard_normal((int(begins[-1]) + 200, 1, 10))
+    values[:, 0, 4] += drift * np.linspace(0, 1, len(values))
+    for begin in begins:
+        values[begin : begin + 40, 0] += rng.uniform(0, 1500, 10)
+    t = np.arange(len(values)) * round(1e6 / RATE)
+    frames = taxel.Frames(np.round(values), t, unit="counts", array=taxel.Array(1, 10))
+    taxel.convert(frames, place / f"{seed}.npz", overwrite=True)
+    return place / f"{seed}.npz", {"contact": t[begins], "lift": t[begins + 40]}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_single_channel_that_drifts_is_named(of_channels: taxel.tasks.Training, tmp_path: Path, seed: int) -> None:
+    assert "reads" not in remarks(of_channels, channels(tmp_path, seed)[0])
+    said = remarks(of_channels, channels(tmp_path, seed, drift=80.0)[0])
+    assert re.search(r"unlike the training: column 4, row 0 reads \d\d counts more at the end .* 1\d times its", said)

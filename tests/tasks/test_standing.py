@@ -61,3 +61,24 @@ def test_a_channel_that_sticks_is_no_two_loads(tmp_path: Path, seed: int) -> Non
     assert "standing_load" in [cause.kind for cause in causes]
     assert not any("source or region for each load" in cause.advice for cause in causes)
     assert any("reads 150 N from 6.0 s to the end" in cause.measured for cause in causes)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_another_tare_is_not_advised_where_somebody_stays_on_a_mattress(tmp_path: Path, seed: int) -> None:
+    random, rate = np.random.default_rng(seed), 10
+    turns = 100 + np.cumsum(random.integers(60, 120, 8))
+    values = np.abs(random.normal(0, 0.3, (int(turns[-1]) + 100, 16, 12)))
+    for begin, end in zip([0, *turns], [*turns, len(values)], strict=True):
+        left = int(random.integers(1, 5))
+        values[begin:end, 2:14, left : left + 6] += random.uniform(10, 40, (12, 6))
+    t = np.arange(len(values)) * (1_000_000 // rate)
+    frames = taxel.Frames(np.round(values), t, unit="mmHg", array=taxel.Array(16, 12))
+    taxel.convert(frames, tmp_path / "night.npz")
+    labels = [{"turn": t[turns].tolist()}]
+    training = taxel.train(taxel.open(tmp_path / "night.npz"), labels, taxel.tasks.TrainOptions(labels_as_given=True))
+    cause, *_ = training.causes
+    assert (cause.kind, cause.advice, cause.option) == ("standing_load", "", "")
+    assert "tare of such a time does not help (tried with that of " in cause.measured
+    assert not any("--tare" in line for line in (*training.lines(), *training.warnings))
+    found = detect(training.readout, taxel.open(tmp_path / "night.npz"), labels)
+    assert found.warnings == (), "a tare that was tried is not a given one"

@@ -157,7 +157,7 @@ def test_a_training_names_the_part_of_each_recording_whose_labels_are_off(tmp_pa
         assert f"of {folder / f'{seed}.npz'} from {begin_s:.1f} s to the end 2" in cause
     assert not any("the plain rule is better" in line for line in lines), "it learnt wrong labels"
     [last] = [line for line in lines if line.startswith("written to ")]
-    assert "; next: move the labels of " in last
+    assert "; next: do what may help, then train again" in last
     assert "taxel detect" not in last
 
 
@@ -165,15 +165,28 @@ def test_a_window_is_advised_only_with_what_a_trial_of_it_left() -> None:
     times = np.arange(1, 26) * 1_000_000
     late = taxel.Detections(["contact"] * 25, times + 80_000, times + 80_000)
     scores = {ms: taxel.detect.score(late, {"contact": times, "lift": []}, ms) for ms in (50.0, 60.0, 100.0)}
-    fact = "25 of 25 missed have a false detection 80 ms later"
+    fact = "25 of 25 missed labels have a false detection 80 ms later"
     cause = by_option("window", "contact", 50, fact, "--window-ms 80", window_ms=80.0)
     for trial_ms, advice in ((None, ""), (60.0, ""), (100.0, "--window-ms 80")):
-        tried = None if trial_ms is None else lambda _, ms=trial_ms: Judged((), scores[ms], "")
+        tried = None if trial_ms is None else lambda *_, ms=trial_ms: Judged((), scores[ms], "")
         mistakes = Mistakes(None, scores[50.0], scores[50.0], tried=tried)  # type: ignore[arg-type]
         [found] = mistakes._tried_windows([cause])
         assert (found.advice, found.option) == (advice, advice)
         trial = "; tried on the same folds: 0 missed, 0 false, while this training has 25 missed, 25 false"
         assert found.measured == fact + trial * bool(advice)
+
+
+def test_a_shift_in_a_wider_window_is_advised_only_with_what_a_trial_of_it_left() -> None:
+    times = np.arange(1, 26) * 1_000_000
+    late = taxel.Detections(["contact"] * 25, times + 80_000, times + 80_000)
+    scores = {ms: taxel.detect.score(late, {"contact": times, "lift": []}, ms) for ms in (50.0, 100.0)}
+    asked = {"shift_ms": -80.0, "window_ms": 110.0}
+    cause = by_option("shifted_labels", "contact", 50, "25 of 25 are", "--shift-ms -80 --window-ms 110", **asked)
+    for trial_ms in scores:
+        tried = lambda *how, ms=trial_ms: Judged((), scores[ms], str(how))  # noqa: E731
+        mistakes = Mistakes(None, scores[50.0], scores[50.0], tried=tried)  # type: ignore[arg-type]
+        left = "25 of 25 are; tried on the same folds: 0 missed, 0 false, while this training has 25 missed, 25 false"
+        assert [each.measured for each in mistakes._tried_shifts([cause])] == [left] * (trial_ms > 80.0)
 
 
 def test_few_spikes_are_no_news_where_a_cause_explains_them() -> None:
@@ -220,7 +233,7 @@ def test_a_stretch_of_labels_missing_ones_and_those_of_nothing_are_named(
     assert f"contact, lift: what may help is to move the labels from {begin_s:.1f} s to the end 3" in line
     fewer = {label: np.sort(random.choice(t, 20, replace=False)) for label, t in labels.items()}
     [line] = trained.told(capsys, tmp_path, frames, fewer)
-    assert line.startswith("contact, lift: what may help is to label these loads too: 5 of 5 false detections are ")
+    assert line.startswith("contact, lift: what may help is to label these touches too: ")
     middles = labels["contact"] + (labels["lift"] - labels["contact"]) // 2
     more = labels | {"contact": np.sort(np.append(labels["contact"], middles[::5]))}
     [line] = trained.told(capsys, tmp_path, frames, more)

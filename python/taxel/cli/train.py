@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -141,7 +141,7 @@ def train(
         written |= {} if report is None else {"report": str(report / "report.html")}
         say(json.dumps({"readout": str(out), **training.to_dict(), **written}))
     else:
-        say(*training.lines(), "", f"written to {out}{_next(training, out)}")
+        say(*training.lines(), "", f"written to {out}{_next(training, out, rules)}")
         say(*(f"plain rule of {' and '.join(each)}: written to {path}" for path, each in rules.items()))
         say(*(f"warning: {warning}" for warning in training.unreliable()))
     if report is not None:  # last, so that nothing is lost where it fails
@@ -216,9 +216,11 @@ def _of_label(path: Path, label: str) -> Path:
     return path.parent / f"{path.stem}.{name}{path.suffix}"
 
 
-def _next(training: Training, out: Path) -> str:
-    """Return what to do with a readout: detect by it, or train again as the advice for all its labels says; else ""."""
-    advice = training.again()
-    again = f"{advice[3:]}, then train again" if advice.startswith("to ") else f"train again with {advice}"
-    following = training.command(str(out)) or (again if advice else "")
+def _next(training: Training, out: Path, rules: Iterable[Path]) -> str:
+    """Return what to do next: detect by the readout, or by the rules that are advised instead; or train again."""
+    advised, following = training.again(), training.command(str(out))
+    if advised is not None:
+        following = f"train again with {advised.option}" if advised.option else "do what may help, then train again"
+        if advised.option == "--rule FILE" and rules:
+            following = "; ".join(training.command(str(path), is_rule=True) for path in rules)
     return f"; next: {following}" if following else ""

@@ -23,6 +23,9 @@ OF_DATA = (
     "standing_load", "foreign_labels", "tare", "begun_loaded", "gaps", "unlabelled_time", "unlabelled_loads",
 )  # fmt: skip
 
+#: Causes whose advice no trial has measured, nor does it undo a fault that was found.
+_UNTRIED = ("levels", "begun_loaded", "unlabelled_time", "unlike_training", "indistinct_kinds", "overfitting")
+
 
 @dataclass(frozen=True)
 class Cause:
@@ -65,10 +68,11 @@ class Cause:
     - ``unlabelled_source``: one source (a foot) has half the share found of another. A column ``source`` in the labels.
     - ``levels``: loads reach fewer than two levels, as in another unit. ``--set fit_levels=true``.
     - ``overlapping_loads`` (*): one load holds several labels of a name. A source or region for each load.
-    - ``standing_load`` (*): while these labels happen, an object is on the array, or a taxel is stuck. ``--tare``.
+    - ``standing_load`` (*): while these labels happen, an object is on the array, or a taxel is stuck. ``--tare``,
+      where a trial of it helps.
     - ``foreign_labels``: labels are more than 50 ms from any load, or all at the beginning. Labels of this recording;
       times in us.
-    - ``tare``: the tare contains a touch, or untouched taxels read above rest. ``--tare``.
+    - ``tare``: the tare contains a touch, or untouched taxels read above rest, and another was tried. ``--tare``.
     - ``begun_loaded``: labels are in the first two frames, already loaded. ``zeros_before_s`` in a layout file.
     - ``durations``, ``plain_rule``: a rule makes at most half the mistakes. ``--rule FILE`` writes it, for
       ``taxel detect --readout FILE``.
@@ -113,7 +117,8 @@ class Cause:
         mapping("arguments", self.arguments)
 
     def __str__(self) -> str:
-        return f"what may help is {self.advice}: {self.measured}" if self.advice else self.measured
+        untried = "; this was not tried" * (self.kind in _UNTRIED)
+        return f"what may help is {self.advice}: {self.measured}{untried}" if self.advice else self.measured
 
     def to_dict(self) -> dict[str, Any]:
         """Return the cause as plain values for JSON."""
@@ -134,16 +139,35 @@ def by_option(kind: str, label: str, mistakes: int, measured: str, option: str, 
 
 
 def ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
-    """Return causes with the same advice as one, those of most mistakes first."""
-    merged: dict[tuple[str, str], Cause] = {}
+    """Return causes with the same advice as one, those of most mistakes first.
+
+    What was measured of each of them follows its labels, unless it is the same of all.
+    """
+    alike: dict[tuple[str, str], dict[tuple[tuple[str, ...], str], Cause]] = {}
     for cause in causes:
-        before = merged.setdefault((cause.kind, cause.advice), cause)
-        if before is cause or (before.labels, before.measured) == (cause.labels, cause.measured):
-            continue
-        merged[cause.kind, cause.advice] = replace(
-            before,
-            labels=tuple(dict.fromkeys((*before.labels, *cause.labels))),
-            mistakes=before.mistakes + cause.mistakes,
-            measured="; ".join(dict.fromkeys((*before.measured.split("; "), *cause.measured.split("; ")))),
-        )
-    return tuple(sorted(merged.values(), key=lambda cause: (-cause.mistakes, KINDS.index(cause.kind))))
+        alike.setdefault((cause.kind, cause.advice), {}).setdefault((cause.labels, cause.measured), cause)
+    merged = []
+    for group in alike.values():
+        first, *_ = group.values()
+        labels = tuple(dict.fromkeys(label for cause in group.values() for label in cause.labels))
+        mistakes = sum(cause.mistakes for cause in group.values())
+        merged.append(replace(first, labels=labels, mistakes=mistakes, measured=_together(list(group.values()))))
+    return tuple(sorted(merged, key=lambda cause: (-cause.mistakes, KINDS.index(cause.kind))))
+
+
+def _together(causes: Sequence[Cause]) -> str:
+    """Return what was measured of causes: what is the same of all once, all else behind the labels that it is of."""
+    parts = [cause.measured.split("; ") for cause in causes]
+    same = [part for part in parts[0] if all(part in each for each in parts)]
+    own: dict[str, tuple[str, ...]] = {}
+    for cause, each in zip(causes, parts, strict=True):
+        text = "; ".join(part for part in each if part not in same)
+        own[text] = tuple(dict.fromkeys((*own.get(text, ()), *cause.labels)))
+    of_labels = {labels: [text for text in own if own[text] == labels] for labels in own.values()}
+    before = next((k for k, part in enumerate(parts[0]) if part not in same), len(same))
+    texts = [
+        f"{', '.join(labels)}: " * (len(of_labels) > 1) + text
+        for labels, each_text in of_labels.items()
+        if (text := "; ".join(filter(None, each_text)))
+    ]
+    return "; ".join([*same[:before], *texts, *same[before:]])

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.messages import counted, escaped
+from taxel._base.messages import are, counted, escaped
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.cause import Cause, by_option, ordered
@@ -54,8 +54,8 @@ class Mistakes:
     mistakes : sequence of Mistake
         What `scored` calls missed and false, with a window of ...
     window_ms : float, ms
-    tried : function of float (ms), optional
-        Scores the same training in another window, on the same folds.
+    tried : function of float, float (ms), optional
+        Scores the same training in another window, with labels moved by so much, on the same folds.
     """
 
     trained: Trained
@@ -66,7 +66,7 @@ class Mistakes:
     plain: PlainScore | None = None
     mistakes: Sequence[Mistake] = ()
     window_ms: float = WINDOW_MS
-    tried: Callable[[float], Judged] | None = None
+    tried: Callable[[float, float], Judged] | None = None
 
     def causes(self, evidence: Evidence) -> tuple[Cause, ...]:
         """Return the causes for the labels of which more than 5 % are missed or false, those of most mistakes first."""
@@ -89,7 +89,7 @@ class Mistakes:
         where = [] if beside is None or evidence.falls else beside.causes(wrong)
         late = [cause for label, count in wrong.items() for cause in self._felt_late(evidence, label, count)]
         where = late + [c for c in where if c.kind != "window" or all(c.labels != cause.labels for cause in late)]
-        shown = [cause for cause in evidence.causes(wrong) if not self._contradicts(cause)]
+        shown = self._tried_shifts([cause for cause in evidence.causes(wrong) if not self._contradicts(cause)])
         if not any(cause.kind in ("falling_values", "shifted_labels") for cause in shown):
             shown += _off_in_parts(evidence, each, wrong)
         where = self._tried_windows(where)
@@ -110,11 +110,13 @@ class Mistakes:
         self, evidence: Evidence, label: str, wrong: int, found: Sequence[Cause], where: Sequence[Cause]
     ) -> list[Cause]:
         """Return what else concerns a label, beside what was found, and where its mistakes are."""
-        where = [cause for cause in where if label in cause.labels]
-        causes = [*self._unlabelled_time(evidence.sound, label), *self._name(label, wrong), *where]
         known = [cause for cause in found if label in cause.labels]
+        # A load that stays holds all labels.
+        stays = any(cause.kind == "standing_load" for cause in known)
+        where = [c for c in where if label in c.labels and not (stays and c.kind == "overlapping_loads")]
+        causes = [*self._unlabelled_time(evidence.sound, label), *self._name(label, wrong), *where]
         # Labels are far from what is felt where a tare does not fit, and where a load is felt late, too.
-        unpaired = ("foreign_labels", "unfelt_labels", "tare")
+        unpaired = ("foreign_labels", "unfelt_labels", "tare", "standing_load")
         if not any(cause.kind in unpaired for cause in known) and label not in evidence.felt_apart:
             causes += self._unpaired(evidence.sound, label)
         explained = max(sum(c.mistakes for c in where), max((c.mistakes for c in (*known, *causes)), default=0))
@@ -185,8 +187,22 @@ class Mistakes:
         window_ms = max(
             (cause.arguments["window_ms"] for cause in where if cause.kind == "window" and cause.option), default=0.0
         )
-        tried = None if self.tried is None or not window_ms else self.tried(window_ms)
+        tried = None if self.tried is None or not window_ms else self.tried(window_ms, 0.0)
         return [self._with_trial(cause, window_ms, tried) if cause.kind == "window" else cause for cause in where]
+
+    def _tried_shifts(self, shown: Sequence[Cause]) -> list[Cause]:
+        """Return causes without shifts in a wider window, as of a hand, of which a trial leaves more mistakes."""
+        tried: dict[str, Judged] = {}
+        found = []
+        for cause in shown:
+            if cause.kind != "shifted_labels" or "window_ms" not in cause.arguments or self.tried is None:
+                found.append(cause)
+                continue
+            if cause.option not in tried:
+                tried[cause.option] = self.tried(cause.arguments["window_ms"], cause.arguments["shift_ms"])
+            if left := _left(cause.labels[0], self.scored, tried[cause.option].together):
+                found.append(replace(cause, measured=f"{cause.measured}; {left}"))
+        return found
 
     def _with_trial(self, cause: Cause, window_ms: float, tried: Judged | None) -> Cause:
         """Return that mistakes are beyond the window, with what neuron or rule left of them within a wider one."""
@@ -246,7 +262,8 @@ class Mistakes:
         alone = self.learnt[label]
         if 2 * alone.rank[0] <= wrong:
             measured = (
-                f"of the labels that it learnt, {alone.missed} are missed, and {alone.false} detections are false"
+                f"on the training data {alone.missed} of {counted(alone.events, 'label')} {are(alone.missed)} missed, "
+                f"and {counted(alone.false, 'detection')} {are(alone.false)} false"
             )
             yield Cause("overfitting", (label,), wrong, measured, "more labels")
             return

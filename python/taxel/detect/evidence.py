@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from shlex import quote
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from taxel._base.messages import are, counted
+from taxel._base.times import beginning_us
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS, Alignment
 from taxel.detect.cause import Cause, by_option, ordered
@@ -19,7 +21,7 @@ from taxel.detect.label_times import FeltLoads, Off, early
 from taxel.detect.levels import LEAST_LEVELS, loaded_levels
 from taxel.detect.mistakes import overlapping, stretch_of
 from taxel.detect.recipe import Recipe
-from taxel.detect.tares import TOUCH, held_by_tare, loaded_at_rest, quiet_s
+from taxel.detect.tares import TOUCH, Loaded, held_by_tare, loaded_at_rest, quiet_s
 from taxel.encode import LevelCrossing, ThresholdIzhikevich
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
@@ -27,17 +29,20 @@ from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording.analysis.rest import TIMES_NOISE, ZEROS_BEFORE, of_frames
 from taxel.spikes import to_ms, to_us
+from taxel.tare import Tare
 
 #: Advice against labels that are elsewhere.
 FOREIGN = "labels of this recording"
-#: What makes a tare's file of a recording.
-_MAKES_TARE = "taxel cut RECORDING FILE --from S --to S"
+#: What makes a tare's file of a recording from when to when, s.
+_MAKES_TARE = "taxel cut {} FILE.npz --from {} --to {}"
 #: Labels are a question before a training if at most this share of them is near anything that was felt ...
 _NEARLY_NONE = 0.1
 #: ... of so many or more, or if at least this share of them has one distance from it.
 _LEAST_LABELS, _NEARLY_ALL = 4, 0.9
 #: Labels of several names are moved together whose distances from what was felt differ by so many windows at most.
 _TOGETHER = 1.5
+#: Among so many loads a label many labels are where one begins by chance.
+_MOST_A_LABEL = 4
 #: Five folds need this many labels.
 FIVE_FOLDS = 10
 #: Windows of counts so many times as long are looked at for a weak burst.
@@ -95,7 +100,7 @@ class Evidence:
         for example in self.examples:
             source = recorded(example.source, hold=False)
             if isinstance(source, Frames) and (rest := of_frames(source)).falls:
-                layout, advice = rest.turning(getattr(example.source, "path", None))
+                layout, advice = rest.turning(*(getattr(example.source, name, None) for name in ("path", "_turned")))
                 turned = f" after {layout} inverted them" * bool(layout)
                 return advice, f"{example.name}: " * bool(example.name) + f"values fall from their rest{turned}"
         return "", ""
@@ -160,21 +165,48 @@ class Evidence:
         return texts[0] if texts and all(texts) else ""
 
     @cached_property
-    def _loaded(self) -> int:
-        """How many taxels read above their tare while nothing touches them."""
+    def _loaded(self) -> Loaded:
+        """How many taxels read above their tare while nothing touches them, and when."""
         return loaded_at_rest(self.examples, self.plan.encoder)
 
     @cached_property
-    def _of_tare(self) -> tuple[str, str, dict[str, Any]]:
-        """The fault of the tare, the option that helps, and its value in Python; empty where nothing is."""
+    def _of_tare(self) -> Cause | None:
+        """The fault of the tare, or a load that stays; None where nothing is."""
         held = held_by_tare(self.sound)
         if held >= TOUCH:
-            seconds = quiet_s(self.sound)
-            by = ("--tare FILE", {}) if seconds is None else (f"--tare {seconds:g}", {"tare": seconds})
-            return f"the tare contains a touch of {held} taxels", *by
-        if self._loaded >= TOUCH:
-            return f"{self._loaded} taxels read above the tare while nothing touches them", "--tare FILE", {}
-        return "", "", {}
+            measured, seconds = f"the tare contains a touch of {held} taxels", quiet_s(self.sound)
+            if seconds is not None:
+                return by_option("tare", "", 0, measured, f"--tare {seconds:g}", tare=seconds)
+            measured += f"; to make this file, a .npz, run: {_MAKES_TARE.format('RECORDING', 'S', 'S')}"
+            return Cause("tare", (), 0, measured, "a tare of a time without a touch (--tare FILE)", "--tare FILE")
+        taxels, k, start_us, stop_us = self._loaded
+        source = self.sound[k].source
+        if taxels < TOUCH or not isinstance(source, Events | Frames) or not self.felt.are_known:
+            return None
+        begin_us = beginning_us(source.t[:1])
+        stretch = [f"{(t - begin_us) / 1e6:.3f}" for t in (max(start_us, int(source.t[0])), stop_us)]
+        tare = Tare.take(source, start_us=start_us, stop_us=stop_us)
+        tried = FeltLoads([example._replace(tare=tare) for example in self.sound])
+        (now, total), then = self._at_edges(self.felt), self._at_edges(tried)[0]
+        where = f"{{}} of {counted(total, 'label')} {{}} where a load begins or ends"
+        trial = f"tried with that of {' to '.join(stretch)} s: {where.format(then, are(then))}, now {now}"
+        if 2 * (total - then) > total - now or tried.count > _MOST_A_LABEL * total:
+            measured = (
+                f"{taxels} taxels read above the tare while nothing touches them, and a tare of such a time does not "
+                f"help ({trial}); so a load stays there, and recipes detect only where loads begin and end"
+            )
+            return Cause("standing_load", (), 0, measured, "")
+        made = _MAKES_TARE.format(quote(self.sound[k].name), *stretch)
+        measured = (
+            f"{taxels} taxels read above the tare while nothing touches them; {trial}; to make this file, run: {made}"
+        )
+        return Cause("tare", (), 0, measured, "a tare of another time (--tare FILE.npz)", "--tare FILE.npz")
+
+    def _at_edges(self, felt: FeltLoads) -> tuple[int, int]:
+        """Return how many labels are where loads begin or end, and how many there are."""
+        counts = [felt.near(label) for label in self._counts]
+        _, at_edge, total = np.sum([each for each in counts if each is not None], axis=0).tolist()
+        return at_edge, total
 
     @cached_property
     def _near(self) -> dict[str, tuple[int, int, int]]:
@@ -231,7 +263,7 @@ class Evidence:
         fits = [name for name, (_, edges, count) in self._near.items() if name != label and 2 * edges > count]
         within = near - at_edge
         # A tare that does not fit lets touches seem to last.
-        if recipes.knows("touch", label) or not fits or 2 * within <= total or self._loaded >= TOUCH:
+        if recipes.knows("touch", label) or not fits or 2 * within <= total or self._loaded.taxels >= TOUCH:
             return
         measured = (
             f"{within} of {counted(total, 'label')} {are(within)} within touches; {', '.join(fits)} "
@@ -256,7 +288,7 @@ class Evidence:
             return
         _, at_edge, total = self._near.get(label, (0, 0, 0))
         # A tare that does not fit tells nothing.
-        if at_edge == total or self._loaded >= TOUCH or label in self.felt_apart:
+        if at_edge == total or self._loaded.taxels >= TOUCH or label in self.felt_apart:
             return
         away = total - at_edge
         if 2 * (count := int(self.felt.overlapped(label).sum())) > away:
@@ -335,11 +367,8 @@ class Evidence:
                 )
                 changes = {"fit_levels": True}
                 yield by_option("levels", label, wrong, measured, "--set fit_levels=true", changes=changes)
-        because, option, arguments = self._of_tare
-        if because:
-            advice = option if arguments else "a tare of the time just before (--tare FILE)"
-            measured = because + ("" if arguments else f"; to make this file, a .npz, run: {_MAKES_TARE}")
-            yield Cause("tare", (label,), wrong, measured, advice, option, arguments)
+        if self._of_tare is not None:
+            yield replace(self._of_tare, labels=(label,), mistakes=wrong)
         yield from self._begun_loaded(label, wrong)
 
     def _begun_loaded(self, label: str, wrong: int) -> Iterator[Cause]:

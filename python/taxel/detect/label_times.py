@@ -37,6 +37,8 @@ _HAND_MS, _HAND_SPREAD_MS, _DEVIATIONS, _STEP_MS = 500.0, 170.0, 3.0, 10.0
 #: A load changes after its label where it has changed in the middle part of the time until it is felt, looked at so
 #: often, of so many labels; what falls has fallen to that share.
 _MIDDLE, _LOOKS, _MOST, _FALLEN = (0.25, 0.75), 8, 0.85, 0.75
+#: A load is about as strong as others that has this share of the peak that they have at the median.
+_AS_STRONG = 0.3
 #: The standard deviation of normal values that have the median deviation of 1.
 _NORMAL = 1.4826
 #: Chance gives as many labels one distance with at most this probability.
@@ -177,25 +179,27 @@ class FeltLoads:
         after = np.append(ends, np.iinfo(np.int64).max)[np.searchsorted(ends, begins)]
         return begins, np.minimum(np.minimum(after, np.append(begins[1:], last[-1:])), last)
 
-    def strong(self, label: str, names: Iterable[str], times: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def unlabelled(
+        self, label: str, names: Iterable[str], times: NDArray[np.int64]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
         """Return which times are in or beside loads that are about as strong as those with a label, but have none.
 
-        Ends of loads have labels of names of an end anywhere in them, as they may be felt late, begins those of other
-        names beside them. A load is as strong that has half the peak that loads with a label have at the median.
+        And when the load of each of these times begins. Ends of loads have labels of names of an end anywhere in them,
+        as they may be felt late, begins those of other names beside them.
         """
         assert self._loads is not None
         begins, ends = self._spans(self._quantity)
         if not len(begins):
-            return np.zeros(len(times), np.bool_)
+            return np.zeros(len(times), np.bool_), np.empty(0, np.int64)
         reach, is_end = round(to_us(2 * WINDOW_MS)), recipes.neuron_of("touch", label) == "lift"
         same = [self.times(name) for name in names if (recipes.neuron_of("touch", name) == "lift") == is_end]
         until = (ends if is_end else begins) + reach
         has = np.diff(np.searchsorted(np.sort(np.concatenate(same)), [begins - reach, until]), axis=0)[0] > 0
         peaks = self._loads.largest("peak", begins, ends)
-        strong = ~has & (peaks >= 0.5 * np.median(peaks[has] if has.any() else np.inf))
+        strong = ~has & (peaks >= _AS_STRONG * np.median(peaks[has] if has.any() else np.inf))
         load = np.searchsorted(begins, times + reach, side="right") - 1
         inside: NDArray[np.bool_] = (load >= 0) & (ends[load] + reach >= times) & strong[load]
-        return inside
+        return inside, begins[load[inside]]
 
     @property
     def count(self) -> int:

@@ -121,10 +121,9 @@ def causes_of(
 
 
 class Standing(NamedTuple):
-    """A load that stays, as of an object or a stuck taxel: what it is, and what helps, as of `Cause`."""
+    """A load that stays, as of an object or a stuck taxel: what it is, and the option that helps, as of `Cause`."""
 
     text: str
-    advice: str = ""
     option: str = ""
     arguments: Mapping[str, float] = {}
 
@@ -213,8 +212,7 @@ class Measured:
             if (slow := self._slow(label, left[label])) is not None:
                 cause, left[label] = slow
                 found.append(cause)
-        shifts = [shift for label in wrong if (shift := self._at_one_distance(label, left[label])) is not None]
-        for group in self._groups(shifts):
+        for group in self._groups(left):
             is_near = abs(group[0].ms) <= 2 * self._window_ms
             # What rises slowly is felt late, and what falls slowly early: a clock is off by the same for both.
             if is_near and (len(group) == 1 or differ.intersection(shift.label for shift in group)):
@@ -258,9 +256,11 @@ class Measured:
 
     def _unlike(self, label: str, left: _Times) -> tuple[Cause, _Times] | None:
         """Return in what the examples with most mistakes differ from the training."""
+        if not self._differs(left):  # what is in loads without a label is explained by then
+            return None
         members = [self._in_unlike(t) for t in left]
         places = np.unique(np.concatenate([_example_of(t)[here] for t, here in zip(left, members, strict=True)]))
-        measured = "; ".join(of_names([("", text) for k in places for text in self._differences[k] if text], 1))
+        measured = "; ".join(of_names([("", text) for k in places for text in self._differences[k]], 1))
         count = sum(int(here.sum()) for here in members)
         advice = "to train on recordings like these too"
         return Cause("unlike_training", (label,), count, measured, advice), left.without(*members)
@@ -324,7 +324,7 @@ class Measured:
         here = later_ms <= later_ms[is_slow].max()
         count = int(here.sum())
         measured = (
-            f"{count} of {len(left.missed)} missed have a false detection "
+            f"{count} of {len(left.missed)} missed labels have a false detection "
             f"{ranged(later_ms[here].min(), later_ms[here].max())} ms later, because the load "
             f"{'falls' if falls else 'rises'} slowly: {label} is felt later there"
         )
@@ -345,7 +345,7 @@ class Measured:
         if least_ms * most_ms > 0:
             low, high = sorted(np.abs([pairs.errors_ms.min(), pairs.errors_ms.max()]))
             where = f"{ranged(low, high)} ms {'later' if least_ms > 0 else 'earlier'}"
-        measured = f"{pairs.found} of {len(left.missed)} missed have a false detection {where}"
+        measured = f"{pairs.found} of {len(left.missed)} missed labels have a false detection {where}"
         cause = by_option("window", label, mistakes, measured, f"--window-ms {window_ms:g}", window_ms=window_ms)
         detected, events = pairs.pairs.T
         return cause, left.without(_at(events, left.missed), _at(detected, left.false))
@@ -355,19 +355,34 @@ class Measured:
         alike = same_distance(left.missed, left.false, self._window_ms)
         if alike is None or 2 * int(alike.members.sum()) <= len(left.missed):
             return None
-        missed = left.missed[alike.members]
-        expected = missed - round(to_us(alike.ms))
-        detected = np.array([np.argmin(np.abs(left.false - t)) for t in expected])
-        is_near = np.abs(left.false[detected] - expected) <= to_us(WINDOW_MS)
-        false = left.false[np.unique(detected[is_near])]
-        return _Shift(label, alike.ms, missed, false, len(left.missed))
+        return self._at_distance(label, left, alike.ms, left.missed[alike.members])
 
-    def _groups(self, shifts: Sequence[_Shift]) -> Iterator[list[_Shift]]:
-        """Yield the shifts of names that are at one distance, those of most labels first."""
-        left = sorted(shifts, key=lambda shift: -len(shift.missed))
-        while left:
-            yield [shift for shift in left if abs(shift.ms - left[0].ms) <= _SAME_MS]
-            left = [shift for shift in left if abs(shift.ms - left[0].ms) > _SAME_MS]
+    def _at_distance(self, label: str, left: _Times, ms: float, missed: NDArray[np.int64]) -> _Shift:
+        """Return what is missed with the false detections that are so much before it."""
+        expected = missed - round(to_us(ms))
+        false = left.false[_near(left.false, expected)]
+        return _Shift(label, ms, missed, false, len(left.missed))
+
+    def _groups(self, left: Mapping[str, _Times]) -> Iterator[list[_Shift]]:
+        """Yield the shifts of names that are at one distance, those of most labels first.
+
+        A name of which too few are missed to tell a distance has that of others, if most of its missed or of its false
+        are at it.
+        """
+        shifts = [shift for label, times in left.items() if (shift := self._at_one_distance(label, times)) is not None]
+        shifts.sort(key=lambda shift: -len(shift.missed))
+        few = dict.fromkeys(left.keys() - {shift.label for shift in shifts})
+        while shifts:
+            ms = shifts[0].ms
+            group = [shift for shift in shifts if abs(shift.ms - ms) <= _SAME_MS]
+            for label in sorted(few):
+                missed, false = left[label]
+                at = missed[_near(missed - round(to_us(ms)), false)]
+                if len(at) >= _SEVERAL and 2 * len(at) > min(len(missed), len(false)):
+                    del few[label]
+                    group.append(self._at_distance(label, left[label], ms, at))
+            yield group
+            shifts = [shift for shift in shifts if abs(shift.ms - ms) > _SAME_MS]
 
     def _of_shift(self, group: Sequence[_Shift], *, is_near: bool) -> Cause | None:
         """Return the cause that labels of some names are at one distance from false detections, maybe near them."""
@@ -377,10 +392,13 @@ class Measured:
         ms = float(np.median([shift.ms for shift in group]))
         side = "earlier" if ms > 0 else "later"
         are_all = self._following(names, ms) >= _NEARLY_ALL * len(labels)
-        stretch = "" if are_all else stretch_of(labels, np.isin(labels, missed), self._examples)
+        telling, members = self._telling(names, ms)
+        stretch = "" if are_all else stretch_of(telling, members, self._examples)
         distance = f"{abs(ms):.0f} ms"
         count = len(missed)
-        measured = f"{count} of {sum(shift.total for shift in group)} missed have a false detection {distance} {side}"
+        measured = (
+            f"{count} of {sum(shift.total for shift in group)} missed labels have a false detection {distance} {side}"
+        )
 
         def cause(measured: str, advice: str, option: str = "", kind: str = "shifted_labels") -> Cause:
             arguments = {"shift_ms": float(-round(ms))} if option else {}
@@ -401,7 +419,9 @@ class Measured:
             names_fit = f"{', '.join(fits)} {'fits' if len(fits) == 1 else 'fit'}"
             return cause(f"{measured}, while {names_fit}: {', '.join(names)} {are(len(names))} felt {side} there", "")
         if not are_all and count < _STRETCH * len(labels):
-            where = [self._stretch_in(k, names, missed) for k in np.unique(_example_of(missed)).tolist()]
+            places = _example_of(telling)
+            each = [places == k for k in np.unique(_example_of(missed)).tolist()]
+            where = [stretch_of(telling[here], members[here], self._examples) for here in each]
             measured += f", the other {len(labels) - count} of {len(labels)} labels do not"
             more = f" and in {counted(len(where) - 1, 'other recording')} alike" if len(where) > 1 else ""
             shifted = (
@@ -414,19 +434,28 @@ class Measured:
 
     def _following(self, names: Sequence[str], ms: float) -> int:
         """Return how many labels of some names have a detection at this distance before them, found or missed."""
-        count, reach = 0, round(to_us(WINDOW_MS))
+        count = 0
         for name in names:
             false, expected = self._wrong(name, is_missed=False), self._wrong(name, is_missed=True) - round(to_us(ms))
-            beside = np.diff(np.searchsorted(false, [expected - reach, expected + reach]), axis=0)[0]
             near = np.abs(self._scores[name].errors_ms + ms) <= WINDOW_MS
-            count += int(np.count_nonzero(beside) + np.count_nonzero(near))
+            count += int(np.count_nonzero(_near(expected, false)) + np.count_nonzero(near))
         return count
 
-    def _stretch_in(self, k: int, names: Sequence[str], missed: NDArray[np.int64]) -> str:
-        """Return where the missed labels of an example are; "" if these are not a stretch."""
-        labels = np.sort(np.concatenate([self._labels(label) for label in names]))
-        here = labels[_example_of(labels) == k]
-        return stretch_of(here, np.isin(here, missed), self._examples)
+    def _telling(self, names: Sequence[str], ms: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return the labels of some names that tell whether they are at a distance, and which have a detection at it.
+
+        A label that is found tells that it is not, unless a false detection is there too; a missed one without tells
+        nothing.
+        """
+        times, members = [], []
+        for name in names:
+            labels, false = self._labels(name), self._wrong(name, is_missed=False)
+            at = _near(labels - round(to_us(ms)), false)
+            tells = at | ~np.isin(labels, self._wrong(name, is_missed=True))
+            times.append(labels[tells])
+            members.append(at[tells])
+        order = np.argsort(np.concatenate(times), kind="stable")
+        return np.concatenate(times)[order], np.concatenate(members)[order]
 
     def _fitting(self, labels: NDArray[np.int64], detections: NDArray[np.int64]) -> str:
         """Return whether the labels or the detections are where loads begin or end; "" where neither or both do."""
@@ -446,9 +475,11 @@ class Measured:
         if 2 * (count := int(inside.sum())) <= len(left.missed):
             return None
         if self._standing is not None:
-            text, advice, option, arguments = self._standing
-            measured = f"{text}; {count} of {len(inside)} missed of {label} {are(count)} while it stays"
-            cause = Cause("standing_load", (label,), count, measured, advice, option, arguments)
+            text, option, arguments = self._standing
+            measured = (
+                f"{text}; {count} of {counted(len(inside), 'missed label')} of {label} {are(count)} within that time"
+            )
+            cause = by_option("standing_load", label, count, measured, option, **arguments)
             return cause, left.without(inside, np.zeros(len(left.false), np.bool_))
         # Loads that overlap have labels of their other edges too; without such labels a load holds a label too many.
         names = {name for example in self._examples for name in example.labels} - {label}
@@ -487,31 +518,36 @@ class Measured:
         if not self._felt.are_known or (self._differs(left) and not sound):
             return None
         names = {name for example in self._examples for name in example.labels}
-        strong = self._felt.strong(label, names, left.false)
+        is_end = recipes.neuron_of("touch", label) == "lift"
+        same = [name for name in sorted(names) if (recipes.neuron_of("touch", name) == "lift") == is_end]
+        strong, _ = self._felt.unlabelled(label, names, left.false)
         unfelt = ~self._felt.felt_at(left.missed)[1]
         count, mistakes = int(strong.sum()), int(strong.sum()) + int(unfelt.sum())
         if 2 * mistakes <= left.total:
             return None
-        parts = []
+        touches, parts = "", []
         if count:
-            parts.append(
-                f"{count} of {counted(len(strong), 'false detection')} {are(count)} in loads without a label of "
-                f"{label} that are as strong as labelled loads"
+            # A touch of which several kinds are detected is one.
+            false = np.concatenate([self._wrong(name, is_missed=False) for name in same])
+            begins = np.unique(self._felt.unlabelled(label, names, false)[1])
+            touches = (
+                f"{counted(len(begins), 'touch', 'touches')} without a label of {', '.join(same)} {are(len(begins))} "
+                f"detected, about as strong as labelled ones, for example at {self._places(begins)}; "
             )
+            parts.append(f"{count} of {counted(len(strong), 'false detection')} {are(count)} in such touches")
         if n := int(unfelt.sum()):
+            example = f", for example at {self._places(left.missed[unfelt])}"
             parts.append(
                 f"{n} of {counted(len(unfelt), 'missed label')} {are(n)} more than {WINDOW_MS:.0f} ms from "
-                "where a load begins or ends"
+                f"where a load begins or ends{example * (not count)}"
             )
-        times = left.false[strong] if count else left.missed[unfelt]
-        measured = f"{', and '.join(parts)}, for example at {self._places(times)}"
         is_most = 2 * count >= left.total
         cause = Cause(
             "unlabelled_loads" if count else "unfelt_labels",
             (label,),
             mistakes,
-            measured,
-            "to label these loads too" * is_most,
+            f"{touches}{', and '.join(parts)}",
+            "to label these touches too" * is_most,
         )
         return cause, left.without(unfelt, strong)
 
@@ -559,7 +595,7 @@ def _of_clock(cause: Callable[..., Cause], ms: float, measured: str, fits: str) 
         return cause(measured, advice, kind="shifted_training")
     measured += f": either these labels are {is_late} or the labels of the training were {was}"
     advice = f"to look where a load begins (taxel view); --shift-ms {shift_ms} moves these labels"
-    return cause(measured, advice, f"--shift-ms {shift_ms}")
+    return cause(measured, advice)
 
 
 def overlapping(label: str, count: int, labels: int, mistakes: int) -> Cause:
@@ -639,6 +675,13 @@ def _of(example: Example, examples: Sequence[Example]) -> str:
         return ""
     is_of_one = len({each.group for each in examples}) == 1
     return f" of {example.name.removeprefix(example.group) if is_of_one else example.name}"
+
+
+def _near(times: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which times have one of the others, which ascend, within the distance of an alignment."""
+    reach = round(to_us(WINDOW_MS))
+    near: NDArray[np.bool_] = np.diff(np.searchsorted(others, [times - reach, times + reach]), axis=0)[0] > 0
+    return near
 
 
 def _at(places: NDArray[np.int64], times: NDArray[np.int64]) -> NDArray[np.bool_]:

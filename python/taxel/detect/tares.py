@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,8 @@ _SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, _EARLY)
 _TIMES_NOISE, _OF_FLOOR = 3.0, 6.0
 #: How long before a label the sensor is looked at, us: as long as a tare ends before the first label.
 _BEFORE_US = 20_000
+#: What may be the rest, until a moment without a touch, lasts so long, us, and so many frames.
+_STRETCH_US, _STRETCH_FRAMES = 500_000, 8
 #: How many labels at either end of a recording are looked at.
 _LABELS = 4
 #: Into so many parts a recording is divided to see a drift, at so many frames of each.
@@ -104,28 +107,41 @@ def early_part(example: Example, share: float = _EARLY) -> Tare | None:
         return None
 
 
-def loaded_at_rest(examples: Sequence[Example], encoder: Encoder) -> int:
+class Loaded(NamedTuple):
+    """How many taxels read above the tare of an example while nothing touches it, and from when to when, us."""
+
+    taxels: int
+    example: int = 0
+    start_us: int = 0
+    stop_us: int = 0
+
+
+def loaded_at_rest(examples: Sequence[Example], encoder: Encoder) -> Loaded:
     """Return how many taxels read above the tare of their example while nothing touches it; 0 without a tare.
 
     A taxel counts that does so 20 ms before each of the first four labels, or of the last four: at one of four such
     moments at least a touch is yet to begin, and noise is elsewhere each time. So it is a tare that does not fit from
-    the beginning, or one that the readings drifted away from. If there are several examples, it is the largest number.
+    the beginning, or one that the readings drifted away from, or a load that stays. If there are several examples, it
+    is the largest number. The time ends at the moment with the least load.
     """
-    return max((_loaded(example, encoder) for example in examples), default=0)
+    return max((_loaded(k, example, encoder) for k, example in enumerate(examples)), default=Loaded(0))
 
 
-def _loaded(example: Example, encoder: Encoder) -> int:
+def _loaded(k: int, example: Example, encoder: Encoder) -> Loaded:
     floors = [part.noise_floor for part in encoder._each() if hasattr(part, "noise_floor")]
     source = recorded(example.source)
     times = np.sort(np.concatenate([*example.labels.values(), np.empty(0, np.int64)])).astype(np.int64) - _BEFORE_US
     if example.tare is None or not floors or isinstance(source, SpikeTrains) or not len(times):
-        return 0
+        return Loaded(0)
     above = _core.touched_above(max(map(float, floors)))
-    least = [
-        np.min([example.tare.off(_at(source, int(t))).values for t in ends], axis=0)
-        for ends in (times[:_LABELS], times[-_LABELS:])
-    ]
-    return max(int(np.count_nonzero(values >= above)) for values in least)
+    found = []
+    for ends in (times[:_LABELS], times[-_LABELS:]):
+        values = np.array([example.tare.off(_at(source, int(t))).values for t in ends])
+        stop_us = int(ends[np.nansum(values, axis=(1, 2, 3)).argmin()])
+        before = max(0, int(np.searchsorted(source.t, stop_us)) - _STRETCH_FRAMES)
+        start_us = min(stop_us - _STRETCH_US, int(source.t[before]))
+        found.append(Loaded(int(np.count_nonzero(values.min(axis=0) >= above)), k, start_us, stop_us))
+    return max(found, key=lambda each: each.taxels)
 
 
 def _at(source: Events | Frames, t_us: int) -> Frames:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.messages import counted, three_digits
+from taxel._base.messages import are, counted, three_digits
 from taxel._base.progress import reporting
 from taxel._core import ProblemError
 from taxel.detect.detector import _Detector
@@ -52,6 +52,8 @@ _LEAST, _FEWER = 5, 0.2
 #: The last such part of a recording is compared with the first; a taxel has moved by so many times the noise, and by
 #: that share of what the most loaded taxel reads in a touch.
 _PARTS, _MOVED, _OF_TOUCH = 8, 5.0, 0.05
+#: A channel that counts alone has moved by so many times its own noise.
+_ALONE = 10.0
 #: Two detections are close at this part of the shortest time between labels; this share of close ones is a difference.
 _CLOSE, _MANY = 0.5, 0.05
 
@@ -187,10 +189,12 @@ def unlike(readout: _Detector, example: Example, found: Detections) -> Unlike:
             f"{counted(count, 'taxel')} {'has' if count == 1 else 'have'} other readings at the end than at the "
             "beginning: a drift, or a load that stays"
         )
-    elif measured is not None and not measured.stays:
-        sensor += _of_touches(data, measured, found, noisier, is_counts=is_counts)
-        # Much noise makes loads of its own.
-        detections += _undetected(data, measured, found) if noisier < _MUCH_NOISE else []
+    else:
+        sensor += _of_channels(source)
+        if measured is not None and not measured.stays:
+            sensor += _of_touches(data, measured, found, noisier, is_counts=is_counts)
+            # Much noise makes loads of its own.
+            detections += _undetected(data, measured, found) if noisier < _MUCH_NOISE else []
     return Unlike(sensor, [*detections, *_of_detections(data["apart_ms"], readout.labels, found)])
 
 
@@ -201,6 +205,20 @@ def _of_noise(noisier: float, *, is_counts: bool) -> Iterator[str]:
         yield f"{noisier**2:.2g} times as many events at rest as in the training"
     elif not is_counts and noisier >= _NOISIER:
         yield f"the noise at rest is {noisier:.2g} times as strong as in the training"
+
+
+def _of_channels(source: Events | Frames | SpikeTrains) -> Iterator[str]:
+    """Yield which channels, each of which counts alone, read more or less at the end by many times their noise."""
+    if not isinstance(source, Frames) or source.array._has_neighbours or len(source) < 2 * _FRAMES:
+        return
+    first, last = _ends(source)
+    noise, moved = np.sqrt(np.median(_squares(source), axis=0)), last - first
+    for y, x in np.argwhere((noise > 0) & (np.abs(moved) > _ALONE * noise)):
+        more = "more" if moved[y, x] > 0 else "less"
+        yield (
+            f"column {x}, row {y} reads {abs(moved[y, x]):.3g} {source.unit} {more} at the end than at the beginning, "
+            f"{abs(moved[y, x]) / noise[y, x]:.0f} times its noise: a drift, or a load that stays"
+        )
 
 
 def _of_touches(
@@ -233,7 +251,7 @@ def _of_touches(
         never = int(np.count_nonzero(touched & ~_within(measured.reached, shape)))
         if never >= max(1.0, _FEWER * np.count_nonzero(touched)):
             trained = counted(int(touched.sum()), "taxel")
-            yield f"{never} of {trained} that touches of the training loaded are never loaded"
+            yield f"{never} of {trained} that touches of the training loaded {are(never)} never loaded"
 
 
 def _undetected(data: Mapping[str, Any], measured: _Measured, found: Detections) -> Iterator[str]:
@@ -243,8 +261,8 @@ def _undetected(data: Mapping[str, Any], measured: _Measured, found: Detections)
     missing = touches - int(np.count_nonzero(measured.detected(found.t) & are_touches))
     if touches >= _LEAST and missing / touches >= 1.0 - data["detected"] + _FEWER:
         yield (
-            f"{missing} of {counted(touches, 'touch', 'touches')} have no detection, in the training "
-            f"{1.0 - data['detected']:.0%}"
+            f"{missing} of {counted(touches, 'touch', 'touches')} {'has' if missing == 1 else 'have'} no detection, in "
+            f"the training {1.0 - data['detected']:.0%}"
         )
 
 
@@ -293,9 +311,7 @@ def _measured(given: Example) -> _Measured | None:
     share = (values >= above).mean(axis=0) if len(values) else np.zeros(source.array.shape)
     most = np.fmax.reduce(values, axis=(1, 2), initial=0.0)
     peaks = largest(*sums, begin, end)
-    return _Measured(
-        _noise(source), peaks, rises, begin, end, share >= _LOADED, share > 0.0, _usual(most), stays=stays
-    )
+    return _Measured(_noise(source), peaks, rises, begin, end, share >= _LOADED, share > 0.0, _usual(most), stays=stays)
 
 
 def _rises(
@@ -342,22 +358,30 @@ def _moved(source: Events | Frames | SpikeTrains, noise: float, reading: float) 
     """Return how many taxels of frames read more or less at the end, against noise and touches; 0 if few do."""
     if not isinstance(source, Frames) or len(source) < 2 * _FRAMES or noise <= 0.0:
         return 0
+    first, last = _ends(source)
+    count = int(np.count_nonzero(np.abs(last - first) >= max(_MOVED * noise, _OF_TOUCH * reading)))
+    return count if count >= max(1.0, _FEWER * source.array.taxels) else 0
+
+
+def _ends(source: Frames) -> _Values:
+    """Return what each taxel reads at the beginning and at the end; NaN of one without a value there."""
     part = len(source) // _PARTS
     step = 1 + part * _PARTS // _LOOKS
     # Touches that come and go leave the lowest readings as they are.
     ends = np.stack([source.values[:part:step], source.values[-part::step]]).astype(np.float64)
-    read = ~np.isnan(ends).any(axis=(0, 1))
-    first, last = np.quantile(ends[:, :, read], 0.1, axis=1)
-    count = int(np.count_nonzero(np.abs(last - first) >= max(_MOVED * noise, _OF_TOUCH * reading)))
-    return count if count >= max(1.0, _FEWER * source.array.taxels) else 0
+    return np.asarray(np.quantile(ends, 0.1, axis=1))
+
+
+def _squares(source: Frames) -> _Values:
+    """Return the squared noise of each taxel in some stretches."""
+    begins = np.linspace(0, len(source) - _FRAMES, _STRETCHES).astype(np.int64)
+    values = (source.values[begin : begin + _FRAMES].astype(np.float64) for begin in begins)
+    # Of independent noise two neighbours in time differ by twice its variance.
+    return np.asarray(np.mean([np.diff(stretch, axis=0) ** 2 for stretch in values], axis=1) / 2.0)
 
 
 def _noise(source: Events | Frames) -> float:
     """Return the noise of a taxel of frames while nothing touches: that of the quiet stretches; of events 0."""
     if isinstance(source, Events) or len(source) < 2 * _FRAMES:
         return 0.0
-    begins = np.linspace(0, len(source) - _FRAMES, _STRETCHES).astype(np.int64)
-    values = (source.values[begin : begin + _FRAMES].astype(np.float64) for begin in begins)
-    # Of independent noise two neighbours in time differ by twice its variance.
-    squares = [float(np.nanmean(np.diff(stretch, axis=0) ** 2)) / 2.0 for stretch in values]
-    return float(np.sqrt(np.quantile(squares, _QUIET)))
+    return float(np.sqrt(np.quantile(np.nanmean(_squares(source), axis=(1, 2)), _QUIET)))

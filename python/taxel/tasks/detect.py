@@ -421,8 +421,8 @@ def _detected(
     if scored is not None and not scored.events:
         remarks.insert(
             0,
-            f"0 labels: {counted(scored.false, 'detection')} count as false, so this does not show whether they are "
-            "right",
+            f"0 labels: {counted(scored.false, 'detection')} {'counts' if scored.false == 1 else 'count'} as false, so "
+            "the score does not show whether detections are right",
         )
     stays = None if scored is None or not scored.rank[0] else _standing(readout, recording, felt, options)
     return _Found(Detected(recording, outcome, taken, tuple(remarks)), felt, differs.sensor, stays)
@@ -443,16 +443,16 @@ def _standing(
         return None
     text, quiet = f"an object is on the sensor from beginning to end, at {where}", of_quiet(source).quiet_us
     if quiet is None or quiet[0] > source.t[0]:
-        return Standing(text, "a region without it")
-    seconds = np.floor((quiet[1] - quiet[0]) / 1e4) / 100
-    tare = given_tare(float(seconds), recording)
-    found, _ = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=tare.stop_us)
+        return Standing(text)
+    seconds = float(np.floor((quiet[1] - quiet[0]) / 1e4) / 100)
+    with collected():  # nobody gave this tare
+        tare = given_tare(seconds, recording)
+        found, _ = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=tare.stop_us)
     tried = score(outcome.example._known(found), outcome.example.labels, options.window_ms)
     if 2 * tried.rank[0] > now.rank[0]:
-        return Standing(text, "a region without it")
+        return Standing(text)
     trial = f"{tried.found} found and {tried.false} false, instead of {now.found} found and {now.false} false"
-    text += f"; tried with it: {trial}"
-    return Standing(text, f"--tare {seconds:g}", f"--tare {seconds:g}", {"tare": float(seconds)})
+    return Standing(f"{text}; tried with it: {trial}", f"--tare {seconds:g}", {"tare": seconds})
 
 
 def _quiet(recording: Recording) -> Tare | None:
@@ -516,7 +516,7 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
     lines, source, tare = list(_of_gaps(recording, outcome)), recorded(recording, hold=False), outcome.example.tare
     if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
         # What else is measured is measured upside down.
-        return [*lines, f"rest: {quiet.text(recording.path)}"], Unlike()
+        return [*lines, f"rest: {quiet.text(recording.path, recording._turned)}"], Unlike()
     lines += _of_taxels(source)
     floors = noise_floors(readout)
     if tare is not None and floors and not isinstance(source, SpikeTrains):
@@ -524,9 +524,8 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
         if count:
             lines.append(
                 f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that touches "
-                "may seem not to end, and other touches may be missed: take a tare between touches, at a time nearer "
-                "to them "
-                "(taxel cut RECORDING FILE --from S --to S, --tare FILE)"
+                "may seem not to end, and other touches may be missed: take a tare between later touches (taxel cut "
+                "RECORDING FILE --from S --to S, then --tare FILE)"
             )
     if tare is not None and isinstance(source, Frames) and (floor := measured_floor([outcome.example])) is not None:
         count = count_loaded(source, tare, floor)

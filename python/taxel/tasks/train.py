@@ -236,14 +236,18 @@ class _Work:
         registers = self.opened[0].registers
         frame_us = None if registers is None else registers.frame_us
 
-        def judged(window_ms: float) -> Judged:
+        def judged(window_ms: float, shift_ms: float = 0.0) -> Judged:
             how: dict[str, Any] = {"search": search, "window_ms": window_ms, "frame_us": frame_us}
-            return judge(self.examples, given, count, **how, progress=self.update)
+            pairs = zip(self.examples, self.opened, strict=True)
+            examples = [each._replace(labels=moved(each.labels, recording, shift_ms)) for each, recording in pairs]
+            return judge(examples, given, count, **how, progress=self.update)
 
-        def tried(window_ms: float) -> Judged:
-            self.update(f"many are missed or false beyond the window, so that {window_ms:g} ms is tried too", 0, 0)
+        def tried(window_ms: float, shift_ms: float) -> Judged:
+            shift = f", with labels moved by {shift_ms:+g} ms," * bool(shift_ms)
+            window = f"a window of {window_ms:g} ms{shift}"
+            self.update(f"many labels are missed beyond the window, so that {window} is tried too", 0, 0)
             with collected():
-                return judged(window_ms)
+                return judged(window_ms, shift_ms)
 
         scored = None
         if count:

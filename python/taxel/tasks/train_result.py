@@ -243,7 +243,7 @@ class Training:
             lines += ["", *score_rows(zip(titles, self.scored.scores, strict=True))]
         return lines
 
-    def command(self, readout: str) -> str:
+    def command(self, readout: str, *, is_rule: bool = False) -> str:
         """Return the command that detects by the readout in a file, with the tare, if any, of the training.
 
         "" if the readout cannot be relied on.
@@ -252,18 +252,20 @@ class Training:
         ----------
         readout : str
             The file's name, as the command gives it.
+        is_rule : bool
+            Whether the file holds a plain rule that is better than the readout.
 
         Raises
         ------
         ProblemError : no text
         """
         readout = text("readout", readout)
-        if any(self.unreliable()):
+        if not is_rule and any(self.unreliable()):
             return ""
         tare = "FILE" if isinstance(self.options.tare, Tare) else self.options.tare
         if tare is None:
             tare = "" if _are_quiet(self.recordings) else self._beginning()
-        option = f" --tare {quote(str(tare))}" if tare and self.readout._needs_tare else ""
+        option = f" --tare {quote(str(tare))}" if tare and (is_rule or self.readout._needs_tare) else ""
         return f"taxel detect RECORDING --readout {quote(readout)}{option}"
 
     def _beginning(self) -> str:
@@ -386,22 +388,16 @@ class Training:
             yield f"{', '.join(cause.labels)}: {cause}"
 
     def unreliable(self) -> Iterator[str]:
-        """Yield the labels of which the readout misses most, or detects no more than one of nothing; what may help."""
-        for label, reason in self._unreliable().items():
-            first = next((cause for cause in self.causes if label in cause.labels), None)
-            yield reason + (f"; what may help is {first.advice}" if first is not None and first.advice else "")
-
-    def _unreliable(self) -> dict[str, str]:
+        """Yield the labels of which the readout misses most, or detects no more than one of nothing."""
         labels = "labels that it was trained on" if self.why else "held-out labels"
-        texts = {label: unreliable(label, self.scored.together[label], labels) for label in self.readout.labels}
-        return {label: text for label, text in texts.items() if text}
+        for label in self.readout.labels:
+            if text := unreliable(label, self.scored.together[label], labels):
+                yield text
 
-    def again(self) -> str:
-        """Return the first printed advice that concerns all labels of which the readout cannot be relied on, or ""."""
-        labels = set(self._unreliable())
-        return next(
-            (cause.advice for cause in self._first_causes() if cause.advice and labels.issubset(cause.labels)), ""
-        )
+    def again(self) -> Cause | None:
+        """Return the first cause with advice that concerns all labels of which the readout cannot be relied on."""
+        labels = {label for label in self.readout.labels if unreliable(label, self.scored.together[label], "")}
+        return next((c for c in self._first_causes() if labels and c.advice and labels.issubset(c.labels)), None)
 
     def _aligned(self) -> Iterator[str]:
         """Yield by how much labels were moved to what the sensor felt, and which found no pair."""
