@@ -93,7 +93,7 @@ def test_a_declared_shape_of_a_million_millions_is_refused(tmp_path: Path) -> No
         for name, kind in {"t": "<i8", "x": "<u2", "y": "<u2", "p": "|b1"}.items():
             archive.writestr(f"{name}.npy", described(kind, f"({10**12},)"))
     unreadable(path, "array t: states 8000000000000")
-    unreadable(npz(path, "t", described("<i8", "(400,)")), r"array t: .* 3200 bytes .* there are 0")
+    unreadable(npz(path, "t", described("<i8", "(400,)")), r"array t: .* 3200 bytes .* contains 0")
 
 
 def test_a_huge_text_in_a_description_is_refused(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ def main() -> None:
     # The errors that h5py raises on damage are not documented.
     except BaseException as error:
         if isinstance(error, MemoryError) or "memory allocation failed" in str(error):
-            send(refused=f"needs more than {most - begin} bytes of memory beside its values", entry="")
+            send(refused=f"needs more than {most - begin} bytes of memory in addition to its values", entry="")
         else:
             send(error=(str(error).splitlines() or [type(error).__name__])[0][:200])
 
@@ -158,7 +158,10 @@ class Listing:
         """Count a name; refuse more than may be listed."""
         self.size += len(name) + SHARE
         if self.size > LISTED:
-            raise Refused(f"the paths up to here have more than {LISTED} bytes, {SHARE} added for each", name)
+            raise Refused(
+                f"too many names in this file: their paths have more than {LISTED} bytes, with {SHARE} added for each",
+                name,
+            )
 
     def attribute(self, name: str) -> int | str | None:
         """Return an attribute of the root: a whole number, "" for another value, None where there is none."""
@@ -273,7 +276,7 @@ def packed_chunk(data: Any) -> tuple[int, ...]:
     if data.chunks is None or not data.id.get_create_plist().get_nfilters():
         return (1,) * len(data.shape)
     if (size := math.prod(data.chunks) * data.dtype.itemsize) > CHUNK:
-        raise Refused(f"has packed chunks of {size} bytes; at most {CHUNK} are read", data.name)
+        raise Refused(f"has compressed chunks of {size} bytes; at most {CHUNK} are read", data.name)
     return tuple(int(length) for length in data.chunks)
 
 
