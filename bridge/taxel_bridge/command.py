@@ -57,7 +57,7 @@ def bridge(
     Example: taxel bridge --port 5208 --name left --listen 192.168.1.5:7447
     """
     if options["readout"] is None and options["tare"] is not None:
-        raise ProblemError("--tare belongs to a readout: give --readout FILE")
+        raise ProblemError("--tare needs a readout: give --readout FILE")
     console = Console(stderr=True, quiet=as_json)
     with (
         Live(**for_live(options)) as live,

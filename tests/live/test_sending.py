@@ -33,8 +33,8 @@ KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "reported_us
         (
             12,
             np.full((2, 3), 0.5, np.float32),
-            "row 0, column 0 is 0.5; must be a whole number from 0 to 4095 (12 bits); scale readings to it first: "
-            "np.rint(readings / full * 4095), where full is the greatest of them",
+            "row 0, column 0 is 0.5; must be a whole number from 0 to 4095 (12 bits); scale the readings first: "
+            "np.rint(readings / full * 4095), where full is the greatest reading",
         ),
         (
             16,
@@ -264,7 +264,7 @@ def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:
             line = json.loads(other.recv(65_536))
             told = process.stderr.read()
     assert set(line) == KEYS
-    assert f"taxel: lines not sent to lines:{pipe}: 3 of 3: no reader" in told
+    assert f"taxel: 3 of 3 lines not sent to lines:{pipe}: no reader" in told
     assert process.returncode == 3
     said = subprocess.run(
         command("live", "--send", "lines+udp:127.0.0.1:9"), capture_output=True, text=True, check=False

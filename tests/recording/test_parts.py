@@ -246,12 +246,12 @@ def test_a_shell_counts_the_seconds_of_a_stretch_as_info_does(begin_us: int, tmp
     assert np.array_equal(taxel.open(tmp_path / "b.npz").frames().t, t[320:400])
     lasts = f"a.npz lasts from {first:g} to {first + 9.99:g} s"
     for ends, why in (
-        (("--from", first), "must cut something off"),
-        (("--from", first - 1, "--to", first + 10), "must cut something off"),
-        (("--from", first + 3, "--to", first + 3), "holds nothing there"),
-        (("--from", first + 3.001, "--to", first + 3.009), "holds nothing there"),
-        (("--from", first + 20), "must be at most its end"),
-        (("--to", first), "must be above its beginning"),
+        (("--from", first), "cuts nothing off"),
+        (("--from", first - 1, "--to", first + 10), "cuts nothing off"),
+        (("--from", first + 3, "--to", first + 3), "this part is empty"),
+        (("--from", first + 3.001, "--to", first + 3.009), "this part is empty"),
+        (("--from", first + 20), "must not be after its end"),
+        (("--to", first), "must be after its beginning"),
     ):
         said = run("cut", tmp_path / "a.npz", tmp_path / "c.npz", *ends)
         assert (said.returncode, said.stderr.count("\n")) == (2, 1)

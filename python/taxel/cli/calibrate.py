@@ -101,4 +101,4 @@ def calibrate(
     for number, (true, unit_of_load, value) in enumerate(calibration.loads, start=1):
         say(f"  load {number}: {true:g} {unit_of_load}, calibrated {value:.4g} {unit_of_load}")
     if calibration.loads and calibration.residual is None:
-        say("  no residual: there are no more loads than unknowns, so the fit is exact; more loads show how good it is")
+        say("  no residual: with this few loads the fit is exact; give more loads to see how good it is")

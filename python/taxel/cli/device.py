@@ -160,8 +160,8 @@ def check(
     place: Annotated[
         str | None,
         typer.Argument(
-            help="The serial port, or host:port. Without it, taxel checks only the pattern, if the board "
-            "sends it already."
+            help="The serial port, or host:port. Without it, taxel checks only the pattern, which the board "
+            "must send already."
         ),
     ] = None,
     port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port that the board sends to.")] = PORT,

@@ -73,7 +73,9 @@ class _EmulateArguments:
     ] = False
     noise_floor: Annotated[
         int | None,
-        typer.Option(min=0, max=255, help="With --pipe: a change above this makes an event. Default: 3."),
+        typer.Option(
+            min=0, max=255, help="With --pipe: a value that changes by more than this makes an event. Default: 3."
+        ),
     ] = None
     tare: Annotated[
         float | None,
@@ -162,7 +164,7 @@ def _check_options(typed: _EmulateArguments) -> None:
     if typed.scene is not None and (others or typed.rest):
         raise ProblemError("--scene: leave out --replay, --pipe and --rest")
     if others and (typed.scenes is not None or typed.labels is not None or typed.rest):
-        raise ProblemError("--scenes, --truth and --rest belong to scenes: leave them out with --replay or --pipe")
+        raise ProblemError("--scenes, --truth and --rest are for scenes: leave them out with --replay or --pipe")
     for name, value, needed, there in (
         ("--speed", typed.speed, "--replay", typed.replay is not None),
         ("--limit", typed.limit, "--replay", typed.replay is not None),
@@ -170,7 +172,7 @@ def _check_options(typed: _EmulateArguments) -> None:
         ("--baud", typed.baud, "--line", typed.line is not None),
     ):
         if value is not None and not there:
-            raise ProblemError(f"{name} without {needed}")
+            raise ProblemError(f"{name} needs {needed}: give both, or neither")
 
 
 def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:

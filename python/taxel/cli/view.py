@@ -32,7 +32,7 @@ def view(
     recording: Annotated[
         Path,
         typer.Argument(
-            help="A recording, a file of a sensor's maker, or a folder; the options then apply to each of its files. "
+            help="A recording, a file of a sensor's maker, or a folder, to each file of which the options apply. "
             "The page can open the other files of the folder."
         ),
     ],
