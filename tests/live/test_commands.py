@@ -139,7 +139,7 @@ def test_taxel_record_ends_with_the_boards_stop_marker(tmp_path: Path) -> None:
     assert process.returncode == 0
     first, *_, last = for_people.splitlines()
     assert first.startswith("listening on ")
-    assert last.endswith(" s: stop marked")
+    assert last.endswith(" s: the board marked a stop")
     assert summary["counters"]["markers"] >= 2
     assert summary["path"] == str(file)
 

@@ -275,7 +275,7 @@ def test_a_line_on_standard_input_is_a_note_of_the_recording(tmp_path: Path) -> 
     command = [sys.executable, "-m", "taxel", "record", path, "--port", "0", "--host", "127.0.0.1", "--seconds", "2"]
     lines = "heel\n\ntoe off\nlast"
     said = subprocess.run(command, input=lines, capture_output=True, text=True, check=False)
-    assert "a line on standard input writes a note" in said.stderr
+    assert "each line on standard input is saved as a note" in said.stderr
     assert [n.text for n in taxel.open(path).notes] == ["heel", "toe off", "last"]
 
 

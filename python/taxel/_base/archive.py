@@ -275,7 +275,7 @@ def _read(file: IO[bytes], dtype: DTypeLike | None, location: str) -> NDArray[An
         count = min(step, array.size - start)
         piece = np.frombuffer(file.read(count * stored.itemsize), stored)
         if len(piece) < count:
-            raise ValueError(f"ends after {start + len(piece)} of {array.size} values")
+            raise ValueError(f"the data end after {start + len(piece)} of {array.size} values")
         with np.errstate(over="ignore", invalid="ignore"):
             flat[start : start + count] = converted = piece.astype(dtype)
         if converted.dtype.kind != "f":

@@ -156,7 +156,7 @@ def bare(name: str, values: Any, unit: str | None = None) -> Any:
         level = list(chain.from_iterable(nested.values()))
         if not level:
             return values
-    raise refused(name, f" is {shown(values)}: must be nested less than {DEPTH} times")
+    raise refused(name, f" is {shown(values)}: must have fewer than {DEPTH} levels of nesting")
 
 
 def _refuse_masked(name: str, values: list[Any]) -> None:
@@ -462,7 +462,7 @@ def parameters(values: Mapping[str, object]) -> str:
             if left < 0:
                 raise refused(name, f" is {shown(value)}: must have at most {_MOST} entries")
             if depth == DEPTH:
-                raise ProblemError(f"{name[:_SHOWN]}...: must be nested less than {DEPTH} times")
+                raise ProblemError(f"{name[:_SHOWN]}...: must have fewer than {DEPTH} levels of nesting")
             if isinstance(value, Mapping):
                 return {
                     text(f"a name in {name}", key): plain(f"{name}.{key}", entry, depth + 1)

@@ -292,7 +292,7 @@ def send_numbers(data: Any) -> None:
 def send_texts(data: Any) -> None:
     """Send the texts of a data set in the order of its places, each in UTF-8, some at a time."""
     if (size := data.size * data.dtype.itemsize) > TEXT:
-        raise Refused(f"states {size} bytes of text; at most {TEXT} are read", data.name)
+        raise Refused(f"has {size} bytes of text; at most {TEXT} are read", data.name)
     packed_chunk(data)
     for block in blocks(data.shape, PIECE >> 10, (1,) * data.ndim):
         values = data.asstr()[block]

@@ -42,8 +42,8 @@ def _nothing(port: int, seconds: float) -> str:
         if address == HOST:
             if not up:
                 return (
-                    f"{begin}The interface {name} has {HOST}, to which the board of rtl/boards sends, but is down: is "
-                    "the cable plugged in?"
+                    f"{begin}The board of rtl/boards sends to {HOST}. The interface {name} has this address, but is "
+                    "down: is the cable plugged in?"
                 )
             slow = f" at {speed} Mbit/s, not at 1000" if 0 < speed < 1000 else ""
             return (
@@ -51,7 +51,8 @@ def _nothing(port: int, seconds: float) -> str:
                 "does a firewall let UDP in?"
             )
     return (
-        f"{begin}The board of rtl/boards sends to {HOST}, and no interface of this machine has that address ({there})"
+        f"{begin}The board of rtl/boards sends to {HOST}, but no interface of this machine has this address "
+        f"(found: {there})"
     )
 
 
@@ -193,7 +194,7 @@ class _Check:
         where = (
             f"; look at the comparators and the current of {quiet}, where all taxels stay at 0 or 1" if quiet else ""
         )
-        words = f"comparators had not returned when their ramp began, {counted(found.faults, 'time')}{where}"
+        words = f"comparators had not returned when their ramp began ({counted(found.faults, 'time')}){where}"
         self.tell(
             "comparators", found.faults == 0, words if found.faults else "all had returned when their ramps began"
         )

@@ -101,14 +101,13 @@ def _meaning(values: DecodedValues, at: int, frame: int, expected: int, array: A
         when = f"{counted(abs(k), 'frame')} {'later' if k > 0 else 'before'}"
         return (
             f"it is the value of this taxel {when}: frames do not last as long as the registers say, or a frame was "
-            f"left out"
+            "left out"
         )
     if (value ^ expected).bit_count() == 1:
         return "one bit differs: the link is disturbed, or its clock does not suit the PHY"
     return (
         "the pattern has no similar value: if the register pattern is off, it is a comparator's value; otherwise it "
-        "was "
-        "damaged"
+        "was damaged"
     )
 
 

@@ -91,7 +91,7 @@ class FileOptions:
     ] = None
     rate_hz: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Frames per second, for recordings whose frames have numbers and no times."),
+        typer.Option(metavar="HZ", help="Frames per second, for recordings whose frames have no times."),
     ] = None
     limit: Annotated[
         int | None,

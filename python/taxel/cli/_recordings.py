@@ -28,7 +28,7 @@ _REPORT_S = (0.5, 9.5, 20.0, 30.0)
 
 #: What every command that works on recordings reads.
 READ_HELP = ".mcap, .lsa, .npz, .csv or .h5, a ROS bag or a file of a sensor's maker"
-SET_HELP = "Set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
+SET_HELP = "Set a parameter to a value (TOML); a key with dots sets a nested parameter. May be repeated."
 
 ReportOption = Annotated[
     Path | None,

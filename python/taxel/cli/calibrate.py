@@ -60,8 +60,8 @@ def calibrate(
     each: Annotated[
         bool, typer.Option("--each", help="Fit a gain for each taxel (needs uniform kPa, or loads on single taxels).")
     ] = False,
-    exponent: Annotated[float | None, typer.Option(help="The exponent, if it is not to be fitted.")] = None,
-    tare: Annotated[str | None, tare_option("Default: the rest in a quiet stretch.")] = None,
+    exponent: Annotated[float | None, typer.Option(help="A fixed exponent, which is then not fitted.")] = None,
+    tare: Annotated[str | None, tare_option("Default: measured in a quiet part of the recording.")] = None,
     date: Annotated[
         str | None, typer.Option(help="Date of the calibration, for example 2026-11-21. Default: today.")
     ] = None,

@@ -27,7 +27,7 @@ def demo(
         bool, typer.Option("--no-clock", help="Simulate as fast as possible instead of in real time, without a socket.")
     ] = False,
     noise: Annotated[
-        float | None, typer.Option(help="Duration of the noise test, s. Default: 60, with --no-clock 120.")
+        float | None, typer.Option(help="Duration of the noise test, s. Default: 60, or 120 with --no-clock.")
     ] = None,
     readout: Annotated[
         Path | None, typer.Option(help="A readout to use instead of the one that comes with taxel.")

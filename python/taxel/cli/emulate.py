@@ -57,7 +57,7 @@ class _EmulateArguments:
     host: Annotated[str, typer.Option(help="The machine to send to, by name or address.")] = "127.0.0.1"
     scenes: Annotated[int | None, typer.Option(min=0, help="Number of scenes. Default: play until Ctrl-C.")] = None
     scene: Annotated[
-        Path | None, typer.Option(help="Play the scene of this .toml, repeatedly, instead of random ones.")
+        Path | None, typer.Option(help="Play the scene of this .toml, repeatedly, instead of random scenes.")
     ] = None
     seed: Annotated[int | None, typer.Option(max=TRAINING_SEED - 1, **about(EmulateOptions, "seed"))] = None
     replay: Annotated[Path | None, typer.Option(help="Play a recording instead of scenes.")] = None
@@ -82,7 +82,7 @@ class _EmulateArguments:
         typer.Option(
             min=0,
             max=60,
-            help="How long the noise floor is 0 before the start marker, s. Default: 0.05, or the scene's.",
+            help="How long the noise floor is 0 before the start marker, s. Default: as in the scene's file, or 0.05.",
         ),
     ] = None
     preset: Annotated[str | None, _option("preset")] = None

@@ -57,7 +57,7 @@ def info(
         Path | None,
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
-    tare: Annotated[str | None, tare_option("Default: the rest in a quiet stretch.")] = None,
+    tare: Annotated[str | None, tare_option("Default: measured in a quiet part of the recording.")] = None,
     each: Annotated[bool, typer.Option("--each", help="Print all facts about each recording of a folder.")] = False,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,

@@ -73,7 +73,7 @@ def information(
     draws: Annotated[
         int, typer.Option(help="Number of random phases of the sampling; the results are their means.")
     ] = 5,
-    folds: Annotated[int, typer.Option(help="Number of folds; groups are never split.")] = 10,
+    folds: Annotated[int, typer.Option(help="Number of folds; all trials of a group are in the same fold.")] = 10,
     shuffles: Annotated[int, typer.Option(help="Number of shuffles of the labels, for the test against zero.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the random phases, folds, taxels and bootstrap.")] = 0,
     report: Annotated[Path, typer.Option(help="The report to write, an .html with pictures.")] = Path(

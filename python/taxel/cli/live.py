@@ -80,7 +80,7 @@ class _LiveArguments:
     panel_host: PanelHostOption = "127.0.0.1"
     panel_port: PanelPortOption = 0
     folder: Annotated[
-        Path | None, typer.Option(help="With --panel: the folder of the recordings. Default: this folder.")
+        Path | None, typer.Option(help="With --panel: the folder of the recordings. Default: the current folder.")
     ] = None
     opens: OpenOption = False
 

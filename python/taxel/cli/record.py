@@ -215,7 +215,7 @@ def _watch(
             left = REDRAW_S if seconds is None else min(REDRAW_S, seconds - (before["seconds"] - began))
             live.next(left)
             for t, start in live.take_markers():
-                console.print(f"{t / 1e6:.4f} s: {'start' if start else 'stop'} marked")
+                console.print(f"{t / 1e6:.4f} s: the board marked a {'start' if start else 'stop'}")
                 if markers and not start:
                     return
             now = live.counters

@@ -415,7 +415,9 @@ class Live:
         columns, rows = (numbers(name, value, np.int64).reshape(-1) for name, value in (("x", x), ("y", y)))
         if len(columns) != len(rows):
             raise refused(
-                "x", f" has {counted(len(columns), 'column')}, but y has {counted(len(rows), 'row')}: must be as many"
+                "x",
+                f" has {counted(len(columns), 'column')}, but y has {counted(len(rows), 'row')}: must be as many rows "
+                "as columns",
             )
         for name, indices in (("x", columns), ("y", rows)):
             if len(indices) and (indices.min() < 0 or indices.max() > _MOST_INDEX):
