@@ -31,7 +31,7 @@ _FRAMES = re.compile(
     re.IGNORECASE,
 )
 #: What is to be done with numbers of frames, which may be those of a video and count from 0 or 1: taxel does not guess.
-_CONVERT = "write a column t_us = FRAME * 1000000 / RATE (frame 250 at 100 frames/s is at 2500000 us)"
+_CONVERT = "write t_us = FRAME * 1000000 / RATE (frame 250 at 100 frames/s is at 2500000 us)"
 _RIGHT = "must be label,t_us ..., or a column of texts and a column of times with its unit, for example label,time [s]"
 
 

@@ -131,7 +131,7 @@ def test_a_line_that_is_being_written_is_waited_for(table: Path, tables) -> None
     [
         (b"label,t_us\nheel,soon\n", "line 2: t_us is 'soon'"),
         (b"# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
-        (b'label,t_us\n"heel,1\n', "a quote opens"),
+        (b'label,t_us\n"heel,1\n', "a quote is opened"),
         (
             "label,t_us\nheel,1\n".encode("utf-16") + b"\0",
             r"csv, line 3, byte 38: not text in UTF-16 \(truncated data\); save it as UTF-8",

@@ -41,9 +41,9 @@ KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "reported_us
             np.full((2, 3), np.nan),
             "row 0, column 0 is nan; must be a whole number from 0 to 65535 (16 bits); scale",
         ),
-        (12, np.zeros((3, 2)), "of shape 3 x 2, must be 2 x 3 (rows x columns), or 6 row by row"),
-        (12, np.zeros(7, np.int64), "of shape 7, must be 2 x 3 (rows x columns), or 6 row by row"),
-        (12, 3, "of shape one number, must be 2 x 3"),
+        (12, np.zeros((3, 2)), "has shape 3 x 2; must be 2 x 3 (rows x columns), or 6 row by row"),
+        (12, np.zeros(7, np.int64), "has shape 7; must be 2 x 3 (rows x columns), or 6 row by row"),
+        (12, 3, "has shape one number; must be 2 x 3"),
     ],
 )
 def test_a_source_refuses_what_its_bits_and_taxels_cannot_hold_by_name(bits: int, frame: Any, said: str) -> None:

@@ -301,7 +301,7 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
         ("t_s,event\nnan,auf\n", "line 2: t_s is 'nan'; must be a number"),
         (
             "time,t_s,event\n1,1,auf\n",
-            "line 1: 'time' and 't_s' all hold times: rename the column with the times of the labels to t_us",
+            "line 1: 'time' and 't_s' all contain times: rename the column with the times of the labels to t_us",
         ),
         ("t_s,what,comment\n1,auf,late\n", "line 1: 'what' and 'comment' are texts; there are 't_s', 'what', "),
         ("t_s,value\n1,2\n", "line 1: no column 'label'; there are 't_s', 'value'; must be label,t_us"),
@@ -309,7 +309,7 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
             (
                 f"{name};Ereignis\n250;auf\n",
                 rf"line 1: no column 't_us'; there are .*; '{re.escape(name)}' contains numbers of frames, not times: "
-                r"write a column t_us = FRAME \* 1000000 / RATE \(frame 250 at 100 frames/s is at 2500000 us\); "
+                r"write t_us = FRAME \* 1000000 / RATE \(frame 250 at 100 frames/s is at 2500000 us\); "
                 r"must be",
             )
             for name in ("frame", "Frames", "frame_number", "Frame #", "frame nr.", "Bild", "Bildnummer", "sample_idx")

@@ -319,7 +319,7 @@ def test_what_would_take_more_memory_is_refused_with_both_sizes(tmp_path: Path) 
             file.numbers("x")
     with h5py.File(tmp_path / "text.h5", "w") as h5:
         h5.create_dataset("x", (), "S200000000")
-    with H5File(tmp_path / "text.h5") as file, refused("states 200000000 bytes of text; at most 67108864", FormatError):
+    with H5File(tmp_path / "text.h5") as file, refused("has 200000000 bytes of text; at most 67108864", FormatError):
         file.text("x")
 
 

@@ -98,7 +98,7 @@ def test_a_declared_shape_of_a_million_millions_is_refused(tmp_path: Path) -> No
 
 def test_a_huge_text_in_a_description_is_refused(tmp_path: Path) -> None:
     huge = described("<U500000000", "()")
-    unreadable(npz(tmp_path / "a.npz", "about", huge), "array about: states 2000000000 .* at most 134217728")
+    unreadable(npz(tmp_path / "a.npz", "about", huge), "array about: would have 2000000000 .* at most 134217728")
     unreadable(npz(tmp_path / "a.npz", "about", described("<U2000000000", "()")), "cannot be unpacked")
 
 
