@@ -291,7 +291,7 @@ def test_a_key_on_a_terminal_is_a_note_of_the_recording(tmp_path: Path) -> None:
         start_new_session=True,
     ) as process:
         assert process.stderr is not None
-        while b"a key writes a note" not in (said := process.stderr.readline()):
+        while b"press a key to write a note" not in (said := process.stderr.readline()):
             assert said, "it never said so"
         threading.Thread(target=process.stderr.read, daemon=True).start()
         # Another key's sequence is no note; two keys at once are two.
