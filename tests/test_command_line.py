@@ -69,9 +69,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("cut", "walk.npz", "-o", "b.npz", "--from", "40000000.5", "--to", "2"), "--from 40000000.5 --to 2: the part"),
         (("record", "--port", "0", "nowhere/a.mcap"), "nowhere: no such folder"),
         (("emulate", "--truth", "nowhere/x.csv"), "nowhere: no such folder"),
-        (("emulate", "--speed", "2"), "--speed without --replay"),
-        (("emulate", "--noise-floor", "2"), "--noise-floor without --pipe"),
-        (("emulate", "--baud", "9600"), "--baud without --line"),
+        (("emulate", "--speed", "2"), "--speed needs --replay"),
+        (("emulate", "--noise-floor", "2"), "--noise-floor needs --pipe"),
+        (("emulate", "--baud", "9600"), "--baud needs --line"),
         (("info", "nowhere/a.mcap"), "nowhere: no such folder"),
         (("info", "none.mcap"), "none.mcap: no such file or directory"),
         (
@@ -82,14 +82,14 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("record", "--host", "no such host", "a.mcap"), '--host is "no such host": must be an IP address or the name'),
         (("record", "--preset", "9 kHz", "a.mcap"), 'preset "9 kHz" is not known; presets: "5.2 kHz"'),
         (("record", "there.mcap"), "there.mcap: exists already; give --overwrite, or another name"),
-        (("record", "--trials", "3", "a.mcap"), "--trials without --length"),
+        (("record", "--trials", "3", "a.mcap"), "--trials needs --length"),
         (("record",), "FILE is missing; see taxel record --help"),
         (("convert", "walk.npz"), "TARGET is missing; see taxel convert --help"),
         (("cut", "walk.npz", "a.npz", "-o", "b.npz"), "OUT is given twice: a.npz and b.npz"),
         (
             ("live", "--readout", "a.json", "--readout=b.json"),
             "--readout is given twice: a.json and b.json; a command uses one readout: train one readout on the "
-            "labels of both, or record and run taxel detect with each",
+            "labels of both, or record the data and run taxel detect once with each",
         ),
         (("record", "a.mcap", "--bogus"), "No such option: --bogus"),
         (("bogus",), "No such command 'bogus'; see taxel --help"),
@@ -125,7 +125,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             ("live", "--readout", "touch.json", "--tare", "5000"),
             "--tare 5000: must be seconds from 1e-6 to 3600, or a file",
         ),
-        (("live", "--readout", "touch.json", "--save-tare", "a.json"), "--save-tare without a fresh tare"),
+        (("live", "--readout", "touch.json", "--save-tare", "a.json"), "--save-tare needs a fresh tare"),
         (("train", "walk.npz", "--labels", "labels.csv", "-o", "nowhere/x.json"), "nowhere: no such folder"),
         (
             ("train", "walk.npz", "--labels", "labels.csv", "-o", "there.json"),

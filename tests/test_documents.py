@@ -44,17 +44,17 @@ BAD_TOML = {
     "inline": ("b = {a" + ".a" * 101 + " = 1}", "line 1: a key with 101 dots"),
     "behind a text": ('b = """\n\\"""\n"""\na' + ".a" * 101 + " = 1", "line 4: a key with 101 dots"),
     "lists": ("a = " + "[" * 100_000, "nested too deeply"),
-    "closed lists": ("a = " + "[" * 70 + "]" * 70, "nested too deeply; must be at most 64"),
+    "closed lists": ("a = " + "[" * 70 + "]" * 70, "nested too deeply; must have at most 64"),
     "tables": ("a = " + "{b = " * 5000, "nested too deeply"),
     "digits": ("a = " + "9" * 5000, "not TOML: .*4300"),
-    "long": ("# " + "x" * BY_HAND, "more than 1048576 bytes|must be at most 1048576"),
+    "long": ("# " + "x" * BY_HAND, "more than 1048576 bytes|must have at most 1048576"),
     "twice": ("a = 1\na = 2", "not TOML"),
     "nothing": ("a = ", "not TOML"),
 }
 BAD_JSON = {
     "bare lists": ("[" * 100_000, "nested too deeply|not a JSON object: begins with '\\['"),
     "lists": ('{"a": ' + "[" * 100_000, "nested too deeply"),
-    "closed lists": ('{"a": ' + "[" * 70 + "]" * 70 + "}", "nested too deeply; must be at most 64"),
+    "closed lists": ('{"a": ' + "[" * 70 + "]" * 70 + "}", "nested too deeply; must have at most 64"),
     "objects": ('{"a": ' * 100_000, "nested too deeply"),
     "digits": ('{"a": ' + "9" * 5000 + "}", "not JSON: .*4300"),
     "nan": ('{"a": NaN}', "not JSON: NaN is not a number"),
@@ -121,7 +121,7 @@ def test_what_taxel_did_not_write_is_refused_before_it_is_parsed(
         "[" + "1," * 1000 + "1]": "not a JSON object: begins with '\\['",
         " \n\t7": "not a JSON object: begins with '7'",
         "": "not a JSON object: empty",
-        '{"a":[' + "1," * 42_000_000 + "1]}": r"states \d+ bytes when unpacked; at most 2147483648 are read",
+        '{"a":[' + "1," * 42_000_000 + "1]}": r"would have \d+ bytes when unpacked; at most 2147483648 are read",
     }.items():
         path.write_text(text)
         with refused(why, FormatError):

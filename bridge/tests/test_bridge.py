@@ -64,7 +64,7 @@ def test_the_sensor_and_its_registers_are_told(place):
         with Live(remote=remote) as far:
             assert far.array == array
             assert far.place == f"zenoh:{place}/palm"
-            with pytest.raises(taxel.ProblemError, match="no address of this computer"):
+            with pytest.raises(taxel.ProblemError, match="no address on this computer"):
                 _ = far.address
 
 

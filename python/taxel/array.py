@@ -55,7 +55,9 @@ class Places:
                 continue
             values = numbers(name, getattr(self, name), np.float64).copy()
             if values.ndim not in (1, 2) or values.shape != np.shape(self.x):
-                raise refused(name, f" has shape {values.shape}: must be one per taxel, like x: {np.shape(self.x)}")
+                raise refused(
+                    name, f" has shape {values.shape}: must be {np.shape(self.x)}, as for x: one value per taxel"
+                )
             object.__setattr__(self, name, frozen(values))
         if self.unit is not None:
             text("unit", self.unit, ("mm",))
@@ -193,7 +195,7 @@ class Array:
     def _given(cls, array: object) -> Array:
         """Return a given array; where it is two numbers, as a shape, the error shows how to make an array of them."""
         if isinstance(array, tuple | list) and len(array) == 2 and all(type(side) is int for side in array):
-            wanted = f"must be taxel.Array({array[0]}, {array[1]}), with as many rows and columns"
+            wanted = f"must be an array, for example taxel.Array({array[0]}, {array[1]})"
             raise refused("array", f" is {shown(array)}: {wanted}")
         return instance("array", array, cls)
 
@@ -280,7 +282,7 @@ class Array:
         try:
             return np.asarray(row * self.columns + column)
         except ValueError:
-            raise refused("x", f" has shape {column.shape}, y {row.shape}: must be equal") from None
+            raise refused("x", f" has shape {column.shape}, but y has {row.shape}: must be equal") from None
 
     def region(self, x: slice, y: slice) -> tuple[tuple[int, int], tuple[int, int]]:
         """Return first and last (exclusive) column and row of a rectangle of columns `x` and rows `y`.
@@ -426,11 +428,11 @@ class Array:
             return False
         spacing, spacing_of_array = self._apart(), array._apart()
         if spacing != spacing_of_array:
-            differ = f"{array.name} has its taxels {spacing_of_array}, {self.name} {spacing}"
+            differ = f"{array.name} has taxels {spacing_of_array}, but {self.name} has taxels {spacing}"
         elif array.name == self.name:
             differ = f"two sensors named {self.name} have their taxels at different places"
         else:
-            differ = f"{array.name} has its taxels at other places than {self.name}"
+            differ = f"{array.name} and {self.name} have their taxels at different places"
         warn(f"{subject}: {differ}", stacklevel=stacklevel + 1)
         return True
 

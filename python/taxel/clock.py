@@ -73,7 +73,7 @@ class Clock:
     def _lines(self) -> list[tuple[int, _core._ClockLine]]:
         lines = _core.clock_lines(self.board_us, self.arrived_ns)
         if not lines:
-            raise ProblemError("clock: no datagram holds a time, so no clocks can be compared")
+            raise ProblemError("clock: no datagram contains a time, so the clocks cannot be compared")
         return lines
 
     @cached_property
@@ -183,7 +183,7 @@ class Clock:
 
     def __repr__(self) -> str:
         if not len(self.board_us):
-            return "Clock(no datagram holds a time)"
+            return "Clock(no datagram contains a time)"
         late, count = np.percentile(self.delay_us, [50, 99]), len(self.board_us)
         drift = (
             f"drift {self.drift_ppm:+.1f} ppm"

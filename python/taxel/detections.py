@@ -373,7 +373,9 @@ class Detections(FrozenColumns):
         header = tuple(_RENAMED.get(name, name) for name in table.header)
         more: dict[str, list[int]] = {name: [] for name in (_REPORTED, _REPAIRED) if name in header}
         if header != (*_CSV, *more):
-            raise FormatError(f"{file}, line 1: {','.join(table.header) or 'nothing'}; must be {','.join(_CSV)}")
+            raise FormatError(
+                f"{file}, line 1: contains {','.join(table.header) or 'nothing'}; must be {','.join(_CSV)}"
+            )
         rows: list[tuple[str, int, int, float]] = []
         for line, row in table.rows:
             try:

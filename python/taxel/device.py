@@ -355,7 +355,9 @@ class Device:
             reported = thesis if thesis.shape == size else Array(*size, pitch_mm=thesis.pitch_mm)
             self.array = reported if checked is None else checked
             if self.array.shape != size:
-                raise DeviceError(f"{place}: the board has {size[0]} x {size[1]} taxels, the array {self.array!r}")
+                raise DeviceError(
+                    f"{place}: the board has {size[0]} x {size[1]} taxels, but the array is {self.array!r}"
+                )
         except BaseException:
             self.cable.close()
             raise
@@ -502,7 +504,7 @@ class Device:
         if now.replace(record=target.record) != target:
             wrong = [n for n, (a, b) in enumerate(zip(now.words, target.words, strict=True)) if a != b and n != 7]
             differing = ", ".join(f"REG{n} is 0x{now.words[n]:08X}, not 0x{target.words[n]:08X}" for n in wrong)
-            raise DeviceError(f"{self.cable.place}: the board holds other values than were written: {differing}")
+            raise DeviceError(f"{self.cable.place}: the board's registers differ from what was written: {differing}")
         self._set = target
         return now
 

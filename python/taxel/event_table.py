@@ -31,8 +31,8 @@ _FRAMES = re.compile(
     re.IGNORECASE,
 )
 #: What is to be done with numbers of frames, which may be those of a video and count from 0 or 1: taxel does not guess.
-_CONVERT = "write t_us = FRAME * 1000000 / RATE (frame 250 at 100 frames/s is at 2500000)"
-_RIGHT = "must be label,t_us ..., or a column of texts and times with their unit, for example label,time [s]"
+_CONVERT = "write t_us = FRAME * 1000000 / RATE (frame 250 at 100 frames/s is at 2500000 us)"
+_RIGHT = "must be label,t_us ..., or a column of texts and a column of times with its unit, for example label,time [s]"
 
 
 def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
@@ -115,12 +115,12 @@ def _time(table: HeaderTable) -> int:
     if times:
         names = " and ".join(shown(table.header[k]) for k in times)
         raise FormatError(
-            f"{table.location}, line 1: {names} all hold times: rename the column with the times of the labels to "
+            f"{table.location}, line 1: {names} all contain times: rename the column with the times of the labels to "
             "t_us, or remove the others"
         )
     missing = "t_us" if any(name.lower() in _LABELS for name in table.header) else "label"
     frames = next((name for name in table.header if _FRAMES.fullmatch(name)), None)
-    counts = "" if frames is None else f"; {shown(frames)} holds numbers of frames, not times: {_CONVERT}"
+    counts = "" if frames is None else f"; {shown(frames)} contains numbers of frames, not times: {_CONVERT}"
     raise FormatError(f"{table.location}, line 1: no column {missing!r}; there are {there}{counts}; {_RIGHT}")
 
 

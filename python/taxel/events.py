@@ -320,7 +320,7 @@ class Events(FrozenColumns):
         """
         for name in ("x", "y"):
             if len(self) and getattr(self, name).max() > 32_767:
-                raise refused(name, f" reaches {getattr(self, name).max()}: tonic's records hold 32767 at most")
+                raise refused(name, f" reaches {getattr(self, name).max()}: must be at most 32767 for tonic")
         records = np.empty(len(self), np.dtype([("x", "<i2"), ("y", "<i2"), ("t", "<i8"), ("p", "?")]))
         for name in ("x", "y", "t", "p"):
             records[name] = getattr(self, name)
@@ -355,7 +355,9 @@ class Events(FrozenColumns):
         ProblemError : an event before time 0, which faery's unsigned time cannot hold
         """
         if len(self) and self.t.min() < 0:
-            raise ProblemError(f"event {int(self.t.argmin())}: t is {int(self.t.min())} us, faery's times start at 0")
+            raise ProblemError(
+                f"event {int(self.t.argmin())}: t is {int(self.t.min())} us, but faery's times start at 0"
+            )
         # faery requires exactly this dtype: `p` is a title (NumPy's second field name) of `on`.
         titled: list[Any] = [("t", "<u8"), ("x", "<u2"), ("y", "<u2"), (("p", "on"), "?")]
         records = np.empty(len(self), np.dtype(titled))

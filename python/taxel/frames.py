@@ -118,7 +118,7 @@ class Frames(FrozenColumns):
         """
         instance("events", events, Events)
         if events.intensity is None or events.present is None:
-            raise ProblemError("events without intensities: frames need the held values")
+            raise ProblemError("these events have no intensities, so no frames can be made from them")
         period, array = integer("period_us", period_us, 1, unit="us"), events.array
         first = int(events.t.min()) if len(events) else 0
         first = first if start is None else integer("start", start, unit="us")
@@ -133,7 +133,7 @@ class Frames(FrozenColumns):
         t = np.arange(count, dtype=np.int64) * period + first
         begins = None if held is None else frozen_numbers("held", held, np.float32)
         if begins is not None and begins.shape != array.shape:
-            raise refused("held", f" has shape {begins.shape}: must have the array's, {array.shape}")
+            raise refused("held", f" has shape {begins.shape}: must be {array.shape}, that of the array")
         if begins is not None:
             _refuse_infinite("held", begins)
         values = _core.HeldValues(events._parts(), None, None if begins is None else begins.reshape(-1)).at(t)

@@ -254,8 +254,8 @@ def ahead_us(row: Note, recording: Path, clock: Clock | None, table: Path) -> in
     turns = (row.t - clock._about_us(row.at_ns)) / TURN_US
     if abs(turns - round(turns)) > 0.25:
         raise ProblemError(
-            f"{table}: {row.text} at {row.t} us and {row.at_ns} ns is of another run than "
-            f"{recording}: board's and host's time do not fit together"
+            f"{table}: {row.text} at {row.t} us and {row.at_ns} ns is from another run than "
+            f"{recording}: the board's time and the host's time do not match"
         )
     return int(round(turns) * TURN_US)
 
@@ -372,7 +372,7 @@ def _row(location: str, cells: Mapping[str, str]) -> Note:
             raise FormatError(f"{location}: {name} is {shown(written)}; must be whole {name[-2:]}") from None
     replaces = times.get("replaces_us")
     if not (values["label"] or replaces is not None) or any(abs(times.get(name, 0)) > 2**52 for name in _TIMES):
-        raise FormatError(f"{location}: must name a label, and a time within 2^52 us")
+        raise FormatError(f"{location}: must have a label, and a time within 2^52 us")
     if not 0 <= times.get("host_ns", 0) < 2**63:
         raise FormatError(f"{location}: host_ns must be ns since 1970")
     source = values.get("source", "")

@@ -82,8 +82,10 @@ def _filled(frames: Frames, path: Path) -> Frames:
     """Return frames without missing values; say how many were filled."""
     never = int(np.count_nonzero(np.isnan(frames.values).all(axis=0)))
     warn(
-        f"{path}: {frames.missing} of {frames.values.size} values are missing (NaN): each is held at the taxel's last "
-        "value" + f"; {counted(never, 'taxel')} without any value {'reads' if never == 1 else 'read'} 0" * bool(never),
+        f"{path}: {frames.missing} of {frames.values.size} values are missing (NaN): taxel uses the last value of the "
+        "same taxel instead"
+        + f"; {counted(never, 'taxel')} without any value {'reads' if never == 1 else 'read'} 0"
+        * bool(never),
         stacklevel=3,
     )
     return frames.held()

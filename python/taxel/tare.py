@@ -106,7 +106,8 @@ class Tare(Saved):
             raise refused("tare", f": there is no {noun}{why}")
         if isinstance(x, Events | Frames) and window[1] is not None and x.t.min() >= window[1]:
             raise ProblemError(
-                f"tare to {stop_us} us: no events are before this time; they are from {x.t.min()} to {x.t.max()} us"
+                f"tare to {stop_us} us: no events are before this time; the events are from {x.t.min()} to "
+                f"{x.t.max()} us"
             )
         if isinstance(x, Events):
             return cls.from_json(_core.tare_of_events(x._parts(), *window, note))
@@ -128,9 +129,9 @@ class Tare(Saved):
         instance("frames", frames, Frames)
         if not self.array.fits(frames.array):
             (rows, columns), (of_rows, of_columns) = frames.array.shape, self.array.shape
-            others = ", but other taxels of it exist" if frames.array.shape == self.array.shape else ""
+            others = " in which other taxels exist" if frames.array.shape == self.array.shape else ""
             expected = f"{of_rows} x {of_columns}{others}"
-            raise ProblemError(f"frames of {rows} x {columns} taxels: the tare is of {expected}")
+            raise ProblemError(f"frames of {rows} x {columns} taxels, but the tare is of {expected}")
         self.array._warn_apart(frames.array, "the frames")
         return frames._above(np.where(np.isnan(self.rest), np.inf, self.rest))
 

@@ -109,7 +109,7 @@ def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
         ([lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], "pattern 1: 2 trains, pattern 0 has 1"),
         ([lists([1.0])], [[float("nan")]], "pattern 0, target 0: time is NaN"),
         ([lists([1.0])], [[30.0, 20.0]], "pattern 0, target 1: 20 ms comes after 30 ms"),
-        ([lists([1.0])], [["soon"]], "targets of pattern 0: holds <U4, must hold numbers"),
+        ([lists([1.0])], [["soon"]], "targets of pattern 0: contains <U4; must contain numbers"),
         (["spikes"], [[5.0]], "pattern 0 is 'spikes': must be a taxel.SpikeTrains"),
         ([SpikeTrains.from_lists([[1.0]], stop=9.0, values=[[-1.0]])], [[5.0]], "pattern 0: spikes are signed"),
     ],

@@ -49,7 +49,7 @@ def test_the_report_shows_what_it_should(toy):
     assert page.count('<div class="picture"><svg') == 3
     for said in (
         "without the clock",
-        "does as well",
+        "as good as the neuron",
         "dashpot",
         "0.02 N",
         "seed 5",

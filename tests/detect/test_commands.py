@@ -146,7 +146,10 @@ def test_recordings_of_other_arrays_are_left_out_where_one_fits(
 def test_how_labels_name_trials_of_a_file_is_said_in_short_lines(tmp_path: Path, capsys) -> None:
     file, labels = write_plate(tmp_path, count=5), tmp_path / "labels.csv"
     code, said, _ = call(capsys, "info", file)
-    assert (code, said.splitlines()[-1]) == (0, "labels name a trial in their column recording, for example subj900/00")
+    assert (code, said.splitlines()[-1]) == (
+        0,
+        "labels of these trials need a column recording with the trial's name, for example subj900/00",
+    )
     names = f"subj900/00, subj900/01, subj900/02 and 2 more of {file}"
     labels.write_text("recording,label,t_us\n" + "".join(f"{name},contact,9000\n" for name in "abcde"))
     command = ("train", file, "--labels", labels, "-o", tmp_path / "r.json")
@@ -352,7 +355,7 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "none.json"), "none.json: no such file"),
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "tare.json", "--frame-us", "0"), "--frame-us is 0"),
         (("detect", "9.npz", "--readout", "touch.json", "--truth", "recipe.toml"), "recipe.toml, line 1"),
-        (("encode", "1.npz", "out.txt", "--encoder", "fa1"), "out.txt: spikes are written to a .npz"),
+        (("encode", "1.npz", "out.txt", "--encoder", "fa1"), "out.txt: the name of the spikes' file must end in .npz"),
         (("encode", "1.npz", "out.npz", "--encoder", "fa9"), "encoder fa9: must be one of"),
         (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings=2"), "wings"),
         (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings"), "--set wings: must be KEY=VALUE"),
@@ -528,8 +531,8 @@ def test_a_line_of_labels_that_makes_no_sense_is_named(tmp_path: Path) -> None:
         ("a,b\n", "line 1: no column 'label'; there are 'a', 'b'; must be label,t_us"),
         ("label,t_us\nstep,soon\n", "line 2: t_us is 'soon'; must be whole us"),
         ("label,t_us\nstep\n", "line 2: 1 cells, must have 2"),
-        ("label,t_us\n,5\n", "line 2: must name a label"),
-        ("label,t_us\nstep,99999999999999999999\n", "line 2: must name a label, and a time within 2"),
+        ("label,t_us\n,5\n", "line 2: must have a label"),
+        ("label,t_us\nstep,99999999999999999999\n", "line 2: must have a label, and a time within 2"),
     ]:
         table.write_text(text)
         with pytest.raises(taxel.FormatError, match=said.replace("^", r"\^")):
@@ -558,7 +561,10 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
     code, out, _ = call(capsys, *arguments, *point, "--search", "--folds", 3, "-o", tmp_path / "c.json", *report)
     assert code == 0
     page = (tmp_path / "r" / "report.html").read_text()
-    held, own = page.index("On held-out data: this counts"), page.index("On its own training data: does not count")
+    held, own = (
+        page.index("On held-out data: these scores count"),
+        page.index("On the readout's training data: these scores do not count"),
+    )
     assert page.count("9.npz</td>", held, own) == 2
     assert page.count("9.npz</td>", own, page.index("The worst")) == 1 + 2, "of all labels, then of each"
     assert out.startswith("held out: whole recordings, 3 folds (window 50 ms)\n")

@@ -237,7 +237,7 @@ def test_the_command_writes_the_graph_once(tmp_path: Path, capsys: pytest.Captur
     readout({}).save(tmp_path / "a.json")
     code, out, _ = call(capsys, "export", "nir", tmp_path / "a.json", tmp_path / "a.nir")
     assert code == 0
-    assert "NIR cannot hold: the refractory time" in out
+    assert "not in NIR: the refractory time" in out
     assert taxel.Readout.from_nir(tmp_path / "a.nir") == readout({})
     code, _, complaint = call(capsys, "export", "nir", tmp_path / "a.json", tmp_path / "a.nir")
     assert code == 2

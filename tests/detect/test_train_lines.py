@@ -226,7 +226,7 @@ def test_a_page_draws_labels_as_given_and_as_felt(tmp_path: Path, capsys) -> Non
     assert call(capsys, "train", recording, *options, tmp_path / "with")[0] == 0
     page = (tmp_path / "with" / "report.html").read_text()
     assert page.count('<div class="picture"><svg') == 2 * 4
-    assert page.count("labels were moved to what the sensor felt: median -") == 2
+    assert page.count("labels were moved to the touches in the recording: by -") == 2
     assert ">felt</text>" in page
     recording, _ = recorded(tmp_path, 2)
     options = ("--labels", tmp_path / "2.csv", *options[2:])

@@ -87,7 +87,7 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
         (lambda: Tare.take(EVENTS, start_us=1.5), "start_us is 1.5"),
         (lambda: Tare.take(EVENTS, stop_us=True), "stop_us is True"),
         (lambda: Tare.take(EVENTS, start_us=900, stop_us=900), "start must be before stop"),
-        (lambda: Tare.take(EVENTS, stop_us=-5), "tare to -5 us: no events are before this time; they are from "),
+        (lambda: Tare.take(EVENTS, stop_us=-5), "tare to -5 us: no events are before this time; the events are from "),
         (lambda: Tare.take(EVENTS.between(0, 0)), "tare: there is no event"),
         (lambda: Tare.take(EVENTS, note=3), "note is 3"),
         (lambda: Tare.take(Events([0], [0], [0], [1], array=Array(1, 1))), "without intensities"),

@@ -76,7 +76,7 @@ def test_only_what_is_wanted_is_read_and_a_name_that_is_missing_is_left_out(tmp_
     np.savez(place, t=[1, 2], strange=np.array([object()]))
     assert stored_names(place) == ("t", "strange")
     assert list(read_arrays(place, ["t", "y"])) == ["t"]
-    with pytest.raises(FormatError, match="array strange: holds Python objects"):
+    with pytest.raises(FormatError, match="array strange: contains Python objects"):
         read_arrays(place, ["strange"])
     assert stored_names(tmp_path / "none.npz") == ()
     with pytest.raises(FileNotFoundError):

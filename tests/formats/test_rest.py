@@ -150,7 +150,7 @@ def test_encode_train_and_detect_hold_missing_values_and_count_them(tmp_path, ca
     values[:, 0, 0] = np.nan
     holes = taxel.Frames(values, frames.t, unit=frames.unit, array=frames.array)
     taxel.convert(holes, tmp_path / "palm.npz")
-    said = f"{holes.missing} of {values.size} values are missing (NaN): each is held"
+    said = f"{holes.missing} of {values.size} values are missing (NaN): taxel uses the last value"
     at = tmp_path / "palm.npz"
     for command in (
         (

@@ -46,7 +46,7 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     assert done.exit_code == 0, done.output
     said = done.stdout
     assert "60 trials, 2 labels x" in said
-    assert "full: 1 ms, 2 taxels, to 60 ms 1.00 of 1.00 bits" in said
+    assert "full: 1 ms, 2 taxels, to 60 ms: 1.00 of 1.00 bits" in said
     assert said.splitlines()[4].startswith("in brackets: the range of the bits in 95 % of new draws of these trials")
     assert "<- cheapest" in said
     assert "10 ms " in said
@@ -67,7 +67,7 @@ def test_the_expected_time_stands_first_and_a_bar_shows_what_is_left(tmp_path, m
     with pytest.raises(SystemExit):
         main([*asked, *report])
     told = capsys.readouterr().err
-    assert re.fullmatch(r"24 trials: about \d+ s on an idle processor; Ctrl-C prints what is known by then\n", told)
+    assert re.fullmatch(r"24 trials: about \d+ s on an idle processor; Ctrl-C prints the results so far\n", told)
     monkeypatch.setenv("TTY_COMPATIBLE", "1")  # as a terminal
     with pytest.raises(SystemExit):
         main([*asked, *report])
@@ -195,7 +195,7 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
         (GOOD.replace("100000,a,200000", "1e30,a,200000"), [], "line 2: t_us is '1e30', must be whole us"),
         (GOOD.replace("100000,a,200000", "100000,a,500001"), [], "line 3: begins before line 2 ends at 500001 us"),
         (GOOD + GOOD.splitlines()[1], [], "line 26: begins where line 2 does"),
-        (GOOD.replace(",a,", ',"a,', 1), [], "labels.csv, line 2: a quote opens and does not close"),
+        (GOOD.replace(",a,", ',"a,', 1), [], "labels.csv, line 2: a quote is opened and not closed"),
         (
             GOOD.replace("group\n", "group,\n").replace("u\n", "u,9\n"),
             [],
@@ -255,7 +255,7 @@ def test_recordings_that_make_no_sense_together_are_one_clear_error(tmp_path):
     done = run(first, first, "--window-ms", "50", "--report", tmp_path / "page.html")
     assert "is named twice" in str(done.exception)
     done = run(first, "--window-ms", "50", "--report", tmp_path / "page")
-    assert "page: is one page, so its name must end in .html" in str(done.exception)
+    assert "page: the name of the report must end in .html" in str(done.exception)
     assert not (tmp_path / "page.html").exists()
 
 

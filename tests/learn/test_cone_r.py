@@ -505,7 +505,7 @@ def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
         ),
         ([lists([1.0])], [[130.0]], "pattern 0, target 0: 130 ms is outside the pattern's window 0 to 100"),
         ([lists([1.0])], [5.0], "targets of pattern 0 is 5: must be a list of times"),
-        ([lists([1.0])], [["soon"]], "targets of pattern 0: holds <U4, must hold numbers"),
+        ([lists([1.0])], [["soon"]], "targets of pattern 0: contains <U4; must contain numbers"),
         (["spikes"], [[5.0]], "pattern 0 is 'spikes': must be a taxel.SpikeTrains"),
         ([SpikeTrains.from_lists([[1.0]], stop=9.0, values=[[-1.0]])], [[5.0]], "pattern 0: spikes are signed"),
     ],

@@ -97,7 +97,7 @@ def test_a_sound_board_passes_and_holds_its_registers_afterwards(wire_version):
     assert check.pattern.version == wire_version
     assert check.pattern.events > 100
     assert check.pattern.speed < 0.5
-    assert "like that of a simulated board" in found(check, "frames").text
+    assert "as with a simulated board" in found(check, "frames").text
     assert np.nanmedian(check.rest.values) == pytest.approx(20, abs=0.3)
     # Of -1, 0 and 1, each a third.
     assert np.nanmedian(check.rest.noise) == pytest.approx((2 / 3) ** 0.5, abs=0.1)

@@ -139,7 +139,7 @@ def test_taxel_record_ends_with_the_boards_stop_marker(tmp_path: Path) -> None:
     assert process.returncode == 0
     first, *_, last = for_people.splitlines()
     assert first.startswith("listening on ")
-    assert last.endswith(" s: stop marked")
+    assert last.endswith(" s: the board marked a stop")
     assert summary["counters"]["markers"] >= 2
     assert summary["path"] == str(file)
 
@@ -252,7 +252,7 @@ def test_taxel_live_refuses_a_tare_that_nobody_keeps(tmp_path: Path) -> None:
     touch().save(tmp_path / "touch.json")
     done = run("live", "--readout", tmp_path / "touch.json", "--save-tare", tmp_path / "tare.json")
     assert done.returncode == 2
-    assert done.stderr == "taxel: --save-tare without a fresh tare: give --tare SECONDS\n"
+    assert done.stderr == "taxel: --save-tare needs a fresh tare: give --tare SECONDS\n"
 
 
 def test_taxel_live_to_which_nothing_came_names_no_latency(tmp_path: Path) -> None:
@@ -285,7 +285,7 @@ def test_a_board_with_more_taxels_than_the_array_is_said_while_it_runs(tmp_path:
         said = next(line for line in process.stderr if line.startswith("taxel: "))
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=60)
-    assert "words name taxels outside 8 x 8" in said
+    assert "words are of taxels outside 8 x 8" in said
     assert "--array" in said
     assert process.returncode == 2
     assert file.exists(), "the bytes are kept"

@@ -217,7 +217,7 @@ def test_saving_needs_few_descriptors(table: Path, tables) -> None:
 
 def test_a_lock_that_is_no_file_is_refused_at_once(table: Path, tables) -> None:
     os.mkfifo(table.with_name(".taxel-labels.lock"))
-    with pytest.raises(ProblemError, match=r"taxel-labels.lock: is not a regular file"):
+    with pytest.raises(ProblemError, match=r"taxel-labels.lock: the lock of tables must be a regular file"):
         mark(tables, table, "heel", 1)
 
 

@@ -131,7 +131,7 @@ def test_a_line_that_is_being_written_is_waited_for(table: Path, tables) -> None
     [
         (b"label,t_us\nheel,soon\n", "line 2: t_us is 'soon'"),
         (b"# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
-        (b'label,t_us\n"heel,1\n', "a quote opens"),
+        (b'label,t_us\n"heel,1\n', "a quote is opened"),
         (
             "label,t_us\nheel,1\n".encode("utf-16") + b"\0",
             r"csv, line 3, byte 38: not text in UTF-16 \(truncated data\); save it as UTF-8",
@@ -333,7 +333,9 @@ def test_a_file_system_that_cannot_exchange_files_is_written_too(table: Path, ta
 def test_what_was_acknowledged_is_damaged(table: Path, tables) -> None:
     mark(tables, table, "heel", 1)
     (table.parent / ".walk.notes.csv.acknowledged").write_text("[]")
-    with pytest.raises(FormatError, match=r"not what taxel saved of the labels.*delete it to continue"):
+    with pytest.raises(
+        FormatError, match=r"damaged, so the labels that taxel acknowledged are not known.*delete this file to continue"
+    ):
         mark(tables, table, "toe", 2)
     assert sorted(held(table)) == [("heel", 1)]
 
@@ -388,9 +390,9 @@ def test_recordings_of_one_stem_share_what_was_acknowledged(table: Path, tables)
 def test_what_no_table_has_was_not_acknowledged(row, table: Path, tables) -> None:
     saved = {"acknowledged": {"labels": [row], "deleted": [], "table": None}, "next": None}
     table.with_name(SAVED).write_text(json.dumps(saved))
-    with pytest.raises(FormatError, match="not what taxel saved of the labels"):
+    with pytest.raises(FormatError, match="damaged, so the labels that taxel acknowledged"):
         tables.read(table, OWN)
-    with pytest.raises(FormatError, match="not what taxel saved of the labels"):
+    with pytest.raises(FormatError, match="damaged, so the labels that taxel acknowledged"):
         mark(tables, table, "toe", 1)
     assert not table.exists()
 

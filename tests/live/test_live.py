@@ -262,7 +262,7 @@ def test_a_live_that_ended_says_its_summary_again_and_refuses_the_rest() -> None
         ("registers", 4, ProblemError, "registers is 4"),
         ("differences", 1, ProblemError, "differences is 1: must be True or False"),
         ("readout", "r.json", ProblemError, "readout is 'r.json': must be a taxel.Readout"),
-        ("tare", 1.0, ProblemError, "tare without a readout"),
+        ("tare", 1.0, ProblemError, "tare needs a readout"),
         ("record", 3, ProblemError, "record is 3: must be a path"),
         ("record", "a.txt", ProblemError, "a.txt: the name of a recording must end with .mcap"),
         ("guard_frames", -1, ProblemError, "guard_frames is -1: must be 0 or more"),

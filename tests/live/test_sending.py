@@ -33,17 +33,17 @@ KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "reported_us
         (
             12,
             np.full((2, 3), 0.5, np.float32),
-            "row 0, column 0 is 0.5; must be a whole number from 0 to 4095 (12 bits); scale readings to it first: "
-            "np.rint(readings / full * 4095), where full is the greatest of them",
+            "row 0, column 0 is 0.5; must be a whole number from 0 to 4095 (12 bits); scale the readings first: "
+            "np.rint(readings / full * 4095), where full is the greatest reading",
         ),
         (
             16,
             np.full((2, 3), np.nan),
             "row 0, column 0 is nan; must be a whole number from 0 to 65535 (16 bits); scale",
         ),
-        (12, np.zeros((3, 2)), "of shape 3 x 2, must be 2 x 3 (rows x columns), or 6 row by row"),
-        (12, np.zeros(7, np.int64), "of shape 7, must be 2 x 3 (rows x columns), or 6 row by row"),
-        (12, 3, "of shape one number, must be 2 x 3"),
+        (12, np.zeros((3, 2)), "has shape 3 x 2; must be 2 x 3 (rows x columns), or 6 row by row"),
+        (12, np.zeros(7, np.int64), "has shape 7; must be 2 x 3 (rows x columns), or 6 row by row"),
+        (12, 3, "has shape one number; must be 2 x 3"),
     ],
 )
 def test_a_source_refuses_what_its_bits_and_taxels_cannot_hold_by_name(bits: int, frame: Any, said: str) -> None:
@@ -264,7 +264,7 @@ def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:
             line = json.loads(other.recv(65_536))
             told = process.stderr.read()
     assert set(line) == KEYS
-    assert f"taxel: lines not sent to lines:{pipe}: 3 of 3: no reader" in told
+    assert f"taxel: 3 of 3 lines not sent to lines:{pipe}: no reader" in told
     assert process.returncode == 3
     said = subprocess.run(
         command("live", "--send", "lines+udp:127.0.0.1:9"), capture_output=True, text=True, check=False

@@ -81,9 +81,9 @@ def test_without_host_time_times_are_taken_as_they_are(tmp_path: Path) -> None:
 def test_labels_of_another_run_are_refused(tmp_path: Path) -> None:
     recording = record(tmp_path / "walk.mcap", 0, 2.0)
     (tmp_path / "labels.csv").write_text(f"label,t_us,host_ns\ntick,100000,{BEGAN_NS + 3_000_000_000}\n")
-    with pytest.raises(taxel.ProblemError, match="is of another run than"):
+    with pytest.raises(taxel.ProblemError, match="is from another run than"):
         taxel.Labels(tmp_path / "labels.csv").times(recording)
-    with pytest.raises(taxel.ProblemError, match="is of another run than"):
+    with pytest.raises(taxel.ProblemError, match="is from another run than"):
         taxel.information.read_trials(tmp_path / "labels.csv", [recording], window_ms=5.0)
 
 
@@ -168,7 +168,7 @@ def test_a_replaced_note_is_that_of_its_source_alone(tmp_path: Path) -> None:
     assert (labels._replaced(walk, "left", "", ""), labels._replaced(walk, "right", "", "")) == ({4, 9}, {9})
 
 
-@pytest.mark.parametrize(("cells", "said"), [(",5,", "must name a label"), ("a,5,x", "must be whole us")])
+@pytest.mark.parametrize(("cells", "said"), [(",5,", "must have a label"), ("a,5,x", "must be whole us")])
 def test_a_row_that_replaces_nothing_is_refused(tmp_path: Path, cells: str, said: str) -> None:
     (tmp_path / "walk.notes.csv").write_text(f"label,t_us,replaces_us\n{cells}\n")
     with pytest.raises(taxel.FormatError, match=f"line 2: .*{said}"):
@@ -301,15 +301,16 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
         ("t_s,event\nnan,auf\n", "line 2: t_s is 'nan'; must be a number"),
         (
             "time,t_s,event\n1,1,auf\n",
-            "line 1: 'time' and 't_s' all hold times: rename the column with the times of the labels to t_us",
+            "line 1: 'time' and 't_s' all contain times: rename the column with the times of the labels to t_us",
         ),
         ("t_s,what,comment\n1,auf,late\n", "line 1: 'what' and 'comment' are texts; there are 't_s', 'what', "),
         ("t_s,value\n1,2\n", "line 1: no column 'label'; there are 't_s', 'value'; must be label,t_us"),
         *(
             (
                 f"{name};Ereignis\n250;auf\n",
-                rf"line 1: no column 't_us'; there are .*; '{re.escape(name)}' holds numbers of frames, not times: "
-                r"write t_us = FRAME \* 1000000 / RATE \(frame 250 at 100 frames/s is at 2500000\); must be",
+                rf"line 1: no column 't_us'; there are .*; '{re.escape(name)}' contains numbers of frames, not times: "
+                r"write t_us = FRAME \* 1000000 / RATE \(frame 250 at 100 frames/s is at 2500000 us\); "
+                r"must be",
             )
             for name in ("frame", "Frames", "frame_number", "Frame #", "frame nr.", "Bild", "Bildnummer", "sample_idx")
         ),

@@ -281,7 +281,7 @@ def test_what_is_no_recording_is_refused_at_once(tmp_path):
     with pytest.raises(taxel.FormatError, match="not a recording"):
         Panel(tmp_path / "notes.txt")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(taxel.ProblemError, match="holds no recording"):
+    with pytest.raises(taxel.ProblemError, match="contains no recording"):
         Panel(tmp_path / "empty")
 
 

@@ -251,7 +251,7 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
     folder, layout = tmp_path / "tables", tmp_path / "said.toml"
     values, text = tables(folder)
     for words, reason in (
-        (folder, f"{folder}: holds no recording; name a file, or one of its folders"),
+        (folder, f"{folder}: contains no recording; name a file, or one of the folders in it"),
         (
             folder / "palm.npy",
             "layout.toml, or one given as layout, or rate_hz, describes it (docs/files.md):",

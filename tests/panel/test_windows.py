@@ -168,7 +168,7 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
         page.ask("live")
         address = live.address
         # The board: first something must be held that can be its rest.
-        assert "no value has arrived" in page.ask("read_out", readout="touch.json")["reason"]
+        assert "no values of taxels have arrived" in page.ask("read_out", readout="touch.json")["reason"]
         say(live, *(word(4000, x, y, 50) for x in range(8) for y in range(8)))
         heard(live, 64)
         time.sleep(0.2)

@@ -329,7 +329,7 @@ def test_frames_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest.C
         one.frames(50)
     code, said, _ = call(capsys, "info", tmp_path / "one.mcap")
     assert code == 0
-    assert "frames are numbered" in said
+    assert "the frames have only numbers" in said
     assert "at frame " in said
     assert " us" not in said
     assert " s)" not in said

@@ -126,7 +126,7 @@ def test_info_of_a_camera_has_its_rates_and_polarities_and_no_untouched_pixels(t
     shown = run("info", tmp_path / "a.npz").stdout
     assert "other taxels" not in shown
     assert " % on\n" in shown
-    assert "events/s in the quiet tenth of the time, " in shown
+    assert "events/s in the quietest tenth of the time, " in shown
     assert "on_share" not in json.loads(run("info", board(tmp_path), "--json").stdout)
 
 

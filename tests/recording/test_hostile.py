@@ -93,12 +93,12 @@ def test_a_declared_shape_of_a_million_millions_is_refused(tmp_path: Path) -> No
         for name, kind in {"t": "<i8", "x": "<u2", "y": "<u2", "p": "|b1"}.items():
             archive.writestr(f"{name}.npy", described(kind, f"({10**12},)"))
     unreadable(path, "array t: states 8000000000000")
-    unreadable(npz(path, "t", described("<i8", "(400,)")), r"array t: .* 3200 bytes .* there are 0")
+    unreadable(npz(path, "t", described("<i8", "(400,)")), r"array t: .* 3200 bytes .* contains 0")
 
 
 def test_a_huge_text_in_a_description_is_refused(tmp_path: Path) -> None:
     huge = described("<U500000000", "()")
-    unreadable(npz(tmp_path / "a.npz", "about", huge), "array about: states 2000000000 .* at most 134217728")
+    unreadable(npz(tmp_path / "a.npz", "about", huge), "array about: would have 2000000000 .* at most 134217728")
     unreadable(npz(tmp_path / "a.npz", "about", described("<U2000000000", "()")), "cannot be unpacked")
 
 

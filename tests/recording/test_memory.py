@@ -158,7 +158,7 @@ def test_a_recording_that_is_larger_than_what_is_available_is_refused_with_both_
 ) -> None:
     """A process that may address 2 GiB has less than 1.5 GiB for a recording."""
     said = opened(npz_bomb(tmp_path, 3 << 10), at_most=2048 * MIB)
-    assert "states 3221225472 bytes" in said["refused"]
+    assert "would have 3221225472 bytes" in said["refused"]
     assert "(3/4 of the memory that is available); a larger limit" in said["refused"]
 
 
@@ -470,7 +470,7 @@ def test_the_largest_sensor_with_a_mask_opens_again(tmp_path: Path, opened: Open
 
 def test_the_memory_of_a_conversion_counts(tmp_path: Path) -> None:
     np.savez_compressed(tmp_path / "a.npz", values=np.zeros((1000, 32, 32), bool), t=np.arange(1000))
-    with refused(r"states 40\d{5} bytes when unpacked; at most 3000000 are read; a larger limit", FormatError):
+    with refused(r"would have 40\d{5} bytes when unpacked; at most 3000000 are read; a larger limit", FormatError):
         taxel.open(tmp_path / "a.npz", limit=3_000_000)
 
 
@@ -593,7 +593,7 @@ def test_columns_that_grow_stop_at_the_limit() -> None:
     with limits.opening(1000):
         read = Growing("a.txt", t=((), np.int64))
         read.add(t=np.zeros(125))
-        with refused("a.txt: states 1008 bytes when unpacked; at most 1000", FormatError):
+        with refused("a.txt: would have 1008 bytes when unpacked; at most 1000", FormatError):
             read.add(t=[1])
     read.add(t=[1])
     with pytest.raises(ProblemError, match="limit is 0"):
@@ -601,7 +601,7 @@ def test_columns_that_grow_stop_at_the_limit() -> None:
 
 
 def test_what_no_opening_reads_names_no_option_of_one() -> None:
-    with refused(r"a: states 9 bytes when unpacked; at most 8 are read$", FormatError):
+    with refused(r"a: would have 9 bytes when unpacked; at most 8 are read$", FormatError):
         limits.unpacked("a", 9, 8)
     with limits.opening(), refused(r"at most 8 are read; a larger limit", FormatError):
         limits.unpacked("a", 9, 8)

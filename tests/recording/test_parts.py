@@ -246,12 +246,12 @@ def test_a_shell_counts_the_seconds_of_a_stretch_as_info_does(begin_us: int, tmp
     assert np.array_equal(taxel.open(tmp_path / "b.npz").frames().t, t[320:400])
     lasts = f"a.npz lasts from {first:g} to {first + 9.99:g} s"
     for ends, why in (
-        (("--from", first), "must cut something off"),
-        (("--from", first - 1, "--to", first + 10), "must cut something off"),
-        (("--from", first + 3, "--to", first + 3), "holds nothing there"),
-        (("--from", first + 3.001, "--to", first + 3.009), "holds nothing there"),
-        (("--from", first + 20), "must be at most its end"),
-        (("--to", first), "must be above its beginning"),
+        (("--from", first), "cuts nothing off"),
+        (("--from", first - 1, "--to", first + 10), "cuts nothing off"),
+        (("--from", first + 3, "--to", first + 3), "this part is empty"),
+        (("--from", first + 3.001, "--to", first + 3.009), "this part is empty"),
+        (("--from", first + 20), "must not be after its end"),
+        (("--to", first), "must be after its beginning"),
     ):
         said = run("cut", tmp_path / "a.npz", tmp_path / "c.npz", *ends)
         assert (said.returncode, said.stderr.count("\n")) == (2, 1)
@@ -275,7 +275,7 @@ def test_a_line_on_standard_input_is_a_note_of_the_recording(tmp_path: Path) -> 
     command = [sys.executable, "-m", "taxel", "record", path, "--port", "0", "--host", "127.0.0.1", "--seconds", "2"]
     lines = "heel\n\ntoe off\nlast"
     said = subprocess.run(command, input=lines, capture_output=True, text=True, check=False)
-    assert "a line on standard input writes a note" in said.stderr
+    assert "each line on standard input is saved as a note" in said.stderr
     assert [n.text for n in taxel.open(path).notes] == ["heel", "toe off", "last"]
 
 
@@ -291,7 +291,7 @@ def test_a_key_on_a_terminal_is_a_note_of_the_recording(tmp_path: Path) -> None:
         start_new_session=True,
     ) as process:
         assert process.stderr is not None
-        while b"a key writes a note" not in (said := process.stderr.readline()):
+        while b"press a key to write a note" not in (said := process.stderr.readline()):
             assert said, "it never said so"
         threading.Thread(target=process.stderr.read, daemon=True).start()
         # Another key's sequence is no note; two keys at once are two.

@@ -196,7 +196,7 @@ def test_the_command_line_shows_and_writes_one_source(
     assert refused.returncode == 2
     assert refused.stderr.startswith(f"taxel: {several[0]}: holds 4 sources (right, left, imu, given)")
     unknown = run("cut", several[0], tmp_path / "x.npz", "--source", "up")
-    assert unknown.stderr == f"taxel: --source up: {several[0]} holds right, left, imu, given\n"
+    assert unknown.stderr == f"taxel: --source up: {several[0]} contains only right, left, imu, given\n"
 
 
 @pytest.mark.parametrize(

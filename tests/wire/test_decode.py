@@ -243,11 +243,11 @@ def test_a_whole_recording_paired_by_taxel_keeps_its_markers():
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: wire.decode("text"), "data is 'text': must be bytes, or anything with a contiguous buffer"),
+        (lambda: wire.decode("text"), "data is 'text': must be bytes, or an object with a contiguous buffer"),
         (lambda: wire.decode([1, 2]), r"data is \[1, 2\]: must be bytes"),
         (lambda: wire.decode(None), "data is None: must be bytes"),
         (lambda: wire.decode(np.zeros(3)), "data is an array of float64: must be bytes or uint8"),
-        (lambda: wire.decode(memoryview(b"abcdef")[::2]), "must be bytes, or anything with a contiguous buffer"),
+        (lambda: wire.decode(memoryview(b"abcdef")[::2]), "must be bytes, or an object with a contiguous buffer"),
         (lambda: wire.decode(b"", array=64), "array is 64: must be a taxel.Array"),
         (lambda: wire.decode(b"", pairing="near"), "pairing is 'near': must be one of 'direct', 'taxel'"),
         (lambda: wire.Decoder(pairing=None), "pairing is None"),
@@ -258,7 +258,7 @@ def test_a_whole_recording_paired_by_taxel_keeps_its_markers():
         (lambda: wire.Decoder().push_into(None, b""), "columns is None: must be a taxel.wire.Columns"),
         (lambda: wire.Decoder().push_into(wire.Columns(2), bytes(15)), "room for 2 rows: 15 bytes may need 4"),
         (lambda: wire.Columns(0), "rows is 0: must be a whole number from 1"),
-        (lambda: wire.Columns(2**48), "there is no memory for so many"),
+        (lambda: wire.Columns(2**48), "not enough memory for so many"),
         (lambda: wire.Columns("many"), "rows is 'many'"),
         (lambda: wire.encode(b""), "events is b'': must be a taxel.Events"),
         (

@@ -95,7 +95,7 @@ def test_a_wrong_order_is_refused_half_way():
         ({"array": taxel.Array(65, 64), "wire_version": 1}, r"choose version 2 \(rule 8\)"),
         ({"lines": 0}, r"lines 0 does not fit: must be 1 to 256 \(rule 4\)"),
         ({"noise_floor": 256}, r"noise_floor 256 does not fit: must be 0 to 255 \(rule 4\)"),
-        ({"line_period": 1e9}, r"line_period 1000000000 us does not fit its bits \(rule 4\)"),
+        ({"line_period": 1e9}, r"line_period 1000000000 us does not fit into the bits of its register \(rule 4\)"),
         ({"channels": 32}, "32 channels: the converter has 16 or 64"),
         ({"array": taxel.Array(64, 8), "lines": 64}, r"64 lines: the array has 8 columns to drive \(rule 4\)"),
     ],

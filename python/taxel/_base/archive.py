@@ -127,12 +127,12 @@ def read_array(path: str | os.PathLike[str], dtype: DTypeLike | None = None) -> 
             shape, _, stored_as = _described(file)
             size, stored = math.prod(shape) * stored_as.itemsize, os.fstat(file.fileno()).st_size - file.tell()
             if stored_as.hasobject:
-                raise FormatError(f"{path}: holds Python objects; must be a NumPy array of numbers")
+                raise FormatError(f"{path}: contains Python objects; must be a NumPy array of numbers")
             if dtype is not None and stored_as.kind not in "biuf":
-                raise FormatError(f"{path}: {stored_as} of shape {shape}; must be a NumPy array of numbers")
+                raise FormatError(f"{path}: contains {stored_as} of shape {shape}; must be a NumPy array of numbers")
             if size > stored:
                 raise FormatError(
-                    f"{path}: states that it holds {size} bytes ({shape}, {stored_as}); there are {stored}"
+                    f"{path}: states {size} bytes of values ({shape}, {stored_as}), but contains {stored}"
                 )
             unpacked(str(path), _kept(shape, stored_as, dtype))
             file.seek(0)
@@ -190,7 +190,7 @@ def read_arrays(
         # NumPy and zipfile raise many kinds of errors on damage: zlib.error, NotImplementedError, TokenError,
         # struct.error, OSError for an archive with a negative offset ...
         except Exception as error:
-            raise FormatError(f"{path}: a .npz that cannot be unpacked ({first_line(error)}); write it again") from None
+            raise FormatError(f"{path}: the .npz cannot be unpacked ({first_line(error)}); write it again") from None
 
 
 def _arrays(
@@ -215,9 +215,9 @@ def _arrays(
             shape, _, dtype, begin = described[name]
             location = f"{path}, array {name}"
             if dtype.hasobject:
-                raise FormatError(f"{location}: holds Python objects; must be numbers or text")
+                raise FormatError(f"{location}: contains Python objects; must be numbers or text")
             if name in dtypes and dtype.kind not in "biuf":
-                raise FormatError(f"{location}: holds {dtype}; must hold numbers")
+                raise FormatError(f"{location}: contains {dtype}; must contain numbers")
             size = math.prod(shape) * dtype.itemsize
             kept = _kept(shape, dtype, dtypes.get(name))
             total += kept
@@ -227,7 +227,7 @@ def _arrays(
             stored = archive.getinfo(members[name]).file_size - begin
             if size != stored:
                 raise FormatError(
-                    f"{location}: states that it holds {size} bytes ({shape}, {dtype}); there are {stored}"
+                    f"{location}: states {size} bytes of values ({shape}, {dtype}), but contains {stored}"
                 )
         for name in there:
             with archive.open(members[name]) as array:
@@ -240,7 +240,7 @@ def _described(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     read = {1: (np.lib.format.read_array_header_1_0, 2), 2: (np.lib.format.read_array_header_2_0, 4)}
     version = np.lib.format.read_magic(file)
     if version[0] not in read:
-        raise ValueError(f"the header has version {version[0]}; versions 1 and 2 are read")
+        raise ValueError(f"the header has version {version[0]}; taxel reads versions 1 and 2")
     parse, width = read[version[0]]
     field = file.read(width)
     if (length := int.from_bytes(field, "little")) > _HEADER:
@@ -275,7 +275,7 @@ def _read(file: IO[bytes], dtype: DTypeLike | None, location: str) -> NDArray[An
         count = min(step, array.size - start)
         piece = np.frombuffer(file.read(count * stored.itemsize), stored)
         if len(piece) < count:
-            raise ValueError(f"ends after {start + len(piece)} of {array.size} values")
+            raise ValueError(f"the data end after {start + len(piece)} of {array.size} values")
         with np.errstate(over="ignore", invalid="ignore"):
             flat[start : start + count] = converted = piece.astype(dtype)
         if converted.dtype.kind != "f":

@@ -97,7 +97,7 @@ def several(name: str, values: object) -> list[Any]:
     except TypeError:
         raise refused(name, f" is {shown(values)}: must be a sequence") from None
     if not sized and len(entries) > _MOST_ENTRIES:
-        raise refused(name, f" is {shown(values)}: must give at most {_MOST_ENTRIES} entries")
+        raise refused(name, f" is {shown(values)}: must have at most {_MOST_ENTRIES} entries")
     return entries
 
 
@@ -156,14 +156,14 @@ def bare(name: str, values: Any, unit: str | None = None) -> Any:
         level = list(chain.from_iterable(nested.values()))
         if not level:
             return values
-    raise refused(name, f" is {shown(values)}: must be nested less than {DEPTH} times")
+    raise refused(name, f" is {shown(values)}: must have fewer than {DEPTH} levels of nesting")
 
 
 def _refuse_masked(name: str, values: list[Any]) -> None:
     """Refuse masked entries, for which NumPy would return the arbitrary value below the mask."""
     for value in values:
         if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-            raise refused(name, f" is {shown(value)}: must have no masked entry")
+            raise refused(name, f" is {shown(value)}: must not have masked entries")
 
 
 def _has_unit(kind: type[Any]) -> bool:
@@ -198,7 +198,7 @@ def _converted(name: str, values: Any, unit: str | None) -> Any:
         rounded = np.rint(plain)
         return np.where(np.abs(plain - rounded) <= 1e-15 * np.abs(plain), rounded, plain)
     except Exception:  # each library has its own errors for units that do not fit
-        right = "a plain number" if unit is None else f"a number of {unit}, or a quantity that converts to it"
+        right = "a plain number" if unit is None else f"a number of {unit}, or a quantity that converts to {unit}"
         raise refused(name, f" is {shown(values)}: must be {right}") from None
 
 
@@ -265,7 +265,7 @@ def text(name: str, value: object, among: Collection[str] = ()) -> str:
         expected = f"one of {', '.join(map(repr, among))}" if among else "a text"
         raise refused(name, f" is {shown(value)}: must be {expected}")
     if _lone_surrogate(value):
-        raise refused(name, f" is {shown(value)}: must be a text without lone surrogates")
+        raise refused(name, f" is {shown(value)}: must be a text that UTF-8 can encode")
     return value
 
 
@@ -305,7 +305,7 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
         if received.size == 0 and received.dtype.kind not in "biuf":
             received = received.astype(dtype)
         if received.dtype.kind not in "biufO":
-            raise refused(name, f": holds {received.dtype}, must hold numbers")
+            raise refused(name, f": contains {received.dtype}; must contain numbers")
         with np.errstate(invalid="ignore", over="ignore"):
             # A field of a single record is contiguous but may not be aligned.
             array = np.require(received, dtype, ["C", "A"]).reshape(received.shape)
@@ -366,7 +366,7 @@ def _refuse_others(name: str, values: NDArray[Any]) -> None:
 def _refuse_repeated(name: str, values: object) -> None:
     """Refuse a broadcast array whose copy would exceed the memory limit."""
     if isinstance(values, np.ndarray) and values.size > _MOST_REPEATED and 0 in values.strides:
-        raise refused(name, f" is an array broadcast to {values.size} values: must be at most {_MOST_REPEATED}")
+        raise refused(name, f" is an array broadcast to {values.size} values: must have at most {_MOST_REPEATED}")
 
 
 def finite_numbers(name: str, values: ArrayLike, unit: str | None = None) -> NDArray[np.float64]:
@@ -436,7 +436,7 @@ def buffer_bytes(data: object) -> NDArray[np.uint8]:
         view = memoryview(data)  # type: ignore[arg-type]
         return np.frombuffer(view.cast("B"), np.uint8) if view.nbytes else np.empty(0, np.uint8)
     except (TypeError, ValueError, BufferError):
-        raise refused("data", f" is {shown(data)}: must be bytes, or anything with a contiguous buffer") from None
+        raise refused("data", f" is {shown(data)}: must be bytes, or an object with a contiguous buffer") from None
 
 
 def fields(records: object, required: tuple[str, ...]) -> tuple[str, ...]:
@@ -462,7 +462,7 @@ def parameters(values: Mapping[str, object]) -> str:
             if left < 0:
                 raise refused(name, f" is {shown(value)}: must have at most {_MOST} entries")
             if depth == DEPTH:
-                raise ProblemError(f"{name[:_SHOWN]}...: must be nested less than {DEPTH} times")
+                raise ProblemError(f"{name[:_SHOWN]}...: must have fewer than {DEPTH} levels of nesting")
             if isinstance(value, Mapping):
                 return {
                     text(f"a name in {name}", key): plain(f"{name}.{key}", entry, depth + 1)

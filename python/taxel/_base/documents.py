@@ -190,18 +190,18 @@ def of_json(location: str, text: str, most: int = BY_HAND, *, room: int = UNPACK
 
 def _check_length(location: str, text: str, most: int) -> None:
     if len(text) > most:
-        raise FormatError(f"{location}: {len(text)} characters; must be at most {most}")
+        raise FormatError(f"{location}: {len(text)} characters; must have at most {most}")
 
 
 def _why(error: ValueError) -> str:
     """Return in plain words why a text is not read: Python's words for a long number name a function to call."""
     if "set_int_max_str_digits" in str(error):
-        return f"a whole number of more than {sys.get_int_max_str_digits()} digits"
+        return f"a whole number has more than {sys.get_int_max_str_digits()} digits"
     return first_line(error)
 
 
 def _too_deep(location: str) -> FormatError:
-    return FormatError(f"{location}: nested too deeply; must be at most {_DEPTH} levels")
+    return FormatError(f"{location}: nested too deeply; must have at most {_DEPTH} levels")
 
 
 def _check_depth(location: str, value: Any) -> None:

@@ -22,9 +22,9 @@ _REMEDIES = {
     "lay_out": "give {}, or rows and columns in a layout file, if they are a grid's taxels row by row",
     "pitch": "give {} with the pitch in mm, or pitch_mm in a layout file",
     "unfelt": (
-        "possible reasons: the tare contains a touch, because it ends before the first label, and this label is "
-        "late (give {}); readings fall with pressure (write falls = true in a layout file); or another source felt the "
-        "touch (add a column source to the labels); taxel info shows what was touched"
+        "possible reasons: the first label is later than its touch, so the tare contains a touch (give {}); "
+        "readings fall with pressure (write falls = true in a layout file); or the touch was on another source "
+        "(add a column source to the labels); taxel info shows what was touched"
     ),
 }
 

@@ -92,7 +92,7 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
         raise FileExistsError(errno.EEXIST, "exists already; give overwrite=True to replace it", str(target))
     # A rename would replace a device by a file: /dev/null for all programs, where a superuser asks for it.
     if target.exists() and not target.is_file():
-        raise OSError(errno.EINVAL, "is not a regular file, and is not replaced", str(target))
+        raise OSError(errno.EINVAL, "is not a regular file; taxel replaces only regular files", str(target))
     # A rename checks the permissions of the folder only; a write-protected file is refused here, also for the
     # superuser.
     if target.exists() and not (target.stat().st_mode & 0o222 and os.access(target, os.W_OK)):

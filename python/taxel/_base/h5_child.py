@@ -79,7 +79,7 @@ def main() -> None:
     # The errors that h5py raises on damage are not documented.
     except BaseException as error:
         if isinstance(error, MemoryError) or "memory allocation failed" in str(error):
-            send(refused=f"needs more than {most - begin} bytes of memory beside its values", entry="")
+            send(refused=f"needs more than {most - begin} bytes of memory in addition to its values", entry="")
         else:
             send(error=(str(error).splitlines() or [type(error).__name__])[0][:200])
 
@@ -163,7 +163,10 @@ class Listing:
         """Count a name; refuse more than may be listed."""
         self.size += len(name) + SHARE
         if self.size > LISTED:
-            raise Refused(f"the paths up to here have more than {LISTED} bytes, {SHARE} added for each", name)
+            raise Refused(
+                f"too many names in this file: their paths have more than {LISTED} bytes, with {SHARE} added for each",
+                name,
+            )
 
     def attributes(self, of: str) -> list[str]:
         """Return the names of the attributes of an entry."""
@@ -293,7 +296,7 @@ def packed_chunk(data: Any) -> tuple[int, ...]:
     if data.chunks is None or not data.id.get_create_plist().get_nfilters():
         return (1,) * len(data.shape)
     if (size := math.prod(data.chunks) * data.dtype.itemsize) > CHUNK:
-        raise Refused(f"has packed chunks of {size} bytes; at most {CHUNK} are read", data.name)
+        raise Refused(f"has compressed chunks of {size} bytes; at most {CHUNK} are read", data.name)
     return tuple(int(length) for length in data.chunks)
 
 
@@ -309,7 +312,7 @@ def send_numbers(data: Any) -> None:
 def send_texts(data: Any) -> None:
     """Send the texts of a data set in the order of its places, each in UTF-8, some at a time."""
     if (size := data.size * data.dtype.itemsize) > TEXT:
-        raise Refused(f"states {size} bytes of text; at most {TEXT} are read", data.name)
+        raise Refused(f"has {size} bytes of text; at most {TEXT} are read", data.name)
     packed_chunk(data)
     for block in blocks(data.shape, PIECE >> 10, (1,) * data.ndim):
         values = data.asstr()[block]

@@ -77,7 +77,7 @@ class H5File(ReadingChild):
                 if "entry" in answer:
                     self.entries[answer["entry"]] = Entry(answer["dtype"], tuple(answer["shape"]))
                 elif "left_out" in answer:
-                    why = f"a soft link to {shown(answer['target'])} that leads nowhere ({answer['why']})"
+                    why = f"a soft link to {shown(answer['target'])}, which does not exist ({answer['why']})"
                     self.left_out[answer["left_out"]] = why
         except BaseException:
             self.close()
@@ -125,7 +125,7 @@ class H5File(ReadingChild):
         """
         entry = self.entries[name]
         if entry.dtype != "text":
-            raise FormatError(f"{self._location(name)}: must hold texts")
+            raise FormatError(f"{self._location(name)}: must contain texts")
         size = _TEXT_BYTES * (math.prod(entry.shape) - 1)
         unpacked(self._location(name), size, most)
         read: list[str] = []
@@ -172,7 +172,7 @@ class H5File(ReadingChild):
         """
         entry = self.entries[name]
         if not entry.is_numbers:
-            problem = f"holds {entry.dtype}; must hold numbers" if entry.dtype else "a group; must be a column"
+            problem = f"contains {entry.dtype}; must contain numbers" if entry.dtype else "a group; must be a column"
             raise FormatError(f"{self._location(name)}: {problem}")
         stored, kept = np.dtype(entry.dtype), np.dtype(dtype or entry.dtype)
         size = math.prod(entry.shape) * kept.itemsize

@@ -124,7 +124,7 @@ class HeaderTable:
         """
         missing = [name for name in required if name not in self.header]
         if missing:
-            there = f"there are {', '.join(map(shown, self.header))}" if self.header else "it is empty"
+            there = f"there are {', '.join(map(shown, self.header))}" if self.header else "the line is empty"
             raise FormatError(
                 f"{self.location}, line 1: no column {missing[0]!r}; {there}; must be {','.join(required)} ..."
             )
@@ -162,7 +162,7 @@ def _rows(location: str | Path, lines: Iterable[str]) -> Iterator[tuple[int, tup
                 yield line, tuple(cells)
             line = reader.line_num + 1
     except csv.Error as error:
-        reason = "a quote opens and does not close" if "end of data" in str(error) else error
+        reason = "a quote is opened and not closed" if "end of data" in str(error) else error
         raise FormatError(f"{location}, line {line}: {reason}") from None
 
 

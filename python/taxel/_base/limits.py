@@ -139,7 +139,7 @@ def unpacked(location: str, size: int, most: int = UNPACKED) -> None:
     else:
         bound, why = _most() if room is None else room.most, " (3/4 of the memory that is available)"
     if claimed > bound:
-        error = FormatError(f"{location}: states {claimed} bytes when unpacked; at most {bound} are read{why}")
+        error = FormatError(f"{location}: would have {claimed} bytes when unpacked; at most {bound} are read{why}")
         # What is read outside an opening has no such option.
         raise error if room is None else helped(error, "limit", "larger")
 

@@ -102,14 +102,14 @@ def _matrices(path: str | os.PathLike[str]) -> Iterator[_Matrix]:
         data = file.read()
     order = {b"IM": "<", b"MI": ">"}.get(data[_HEADER - 2 : _HEADER])
     if order is None:
-        raise FormatError(f"{path}: not a MATLAB file of version 5 to 7.3; save it again, with -v7")
+        raise FormatError(f"{path}: not a MATLAB file of version 5 to 7.3; save it in MATLAB with -v7")
     at = _HEADER
     try:
         while at < len(data):
             kind, count = struct.unpack_from(f"{order}II", data, at)
             element = data[at + _TAG : at + _TAG + count]
             if len(element) < count:
-                raise ValueError(f"{count} bytes at byte {at}, of which {len(element)} are there")
+                raise ValueError(f"byte {at} begins a part of {count} bytes, but only {len(element)} follow")
             found = _matrix(element, kind, order)
             if found is not None:
                 yield found
@@ -150,7 +150,7 @@ def _part(data: bytes, at: int, order: str) -> tuple[int, bytes, int]:
         begin, end = at + _TAG, at + _TAG + -(-count // _TAG) * _TAG
     part = data[begin : begin + count]
     if len(part) < count:
-        raise ValueError(f"{count} bytes of an array, of which {len(part)} are there")
+        raise ValueError(f"an array states {count} bytes, but only {len(part)} follow")
     return kind, part, end
 
 

@@ -154,7 +154,7 @@ class Parameters:
             outer, nested, rest = name.partition("__")
             if outer not in names:
                 raise ProblemError(
-                    f"{type(self).__name__}: no parameter {outer!r}: the parameters are {', '.join(names)}"
+                    f"{type(self).__name__} has no parameter {outer!r}; its parameters are {', '.join(names)}"
                 )
             if nested:
                 inner.setdefault(outer, {})[rest] = value

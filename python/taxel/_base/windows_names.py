@@ -16,16 +16,16 @@ def name_fault(path: str) -> str:
     Examples
     --------
     >>> name_fault("data/aux.mcap")
-    "the name 'aux.mcap' is that of a device on Windows"
+    "on Windows, the name 'aux.mcap' is reserved for a device"
     >>> name_fault(r"C:\data\walk.mcap")
     ''
     """
     parts = PureWindowsPath(path)
     for name in parts.parts[1:] if parts.anchor else parts.parts:
         if _DEVICE.match(name):
-            return f"the name {name!r} is that of a device on Windows"
+            return f"on Windows, the name {name!r} is reserved for a device"
         if found := _FORBIDDEN.search(name):
-            return f"the name {name!r} has {found[0]!r}, which names on Windows cannot have"
+            return f"the name {name!r} contains {found[0]!r}, which Windows does not allow in names"
         if name != ".." and name[-1] in ". ":
-            return f"the name {name!r} ends with {name[-1]!r}, which names on Windows cannot"
+            return f"the name {name!r} ends with {name[-1]!r}, which Windows does not allow"
     return ""

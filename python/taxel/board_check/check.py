@@ -37,13 +37,13 @@ def _nothing(port: int, seconds: float) -> str:
     """Return why no datagram may have come."""
     found = interfaces()
     there = ", ".join(f"{name} {address}" for name, address, _, _ in found)
-    begin = f"none came to port {port} within {seconds:g} s{FIREWALL}. "
+    begin = f"none arrived at port {port} within {seconds:g} s{FIREWALL}. "
     for name, address, up, speed in found:
         if address == HOST:
             if not up:
                 return (
-                    f"{begin}The interface {name} has {HOST}, to which the board of rtl/boards sends, but is down: is "
-                    "the cable plugged in?"
+                    f"{begin}The board of rtl/boards sends to {HOST}. The interface {name} has this address, but is "
+                    "down: is the cable plugged in?"
                 )
             slow = f" at {speed} Mbit/s, not at 1000" if 0 < speed < 1000 else ""
             return (
@@ -51,7 +51,8 @@ def _nothing(port: int, seconds: float) -> str:
                 "does a firewall let UDP in?"
             )
     return (
-        f"{begin}The board of rtl/boards sends to {HOST}, and no interface of this machine has that address ({there})"
+        f"{begin}The board of rtl/boards sends to {HOST}, but no interface of this machine has this address "
+        f"(found: {there})"
     )
 
 
@@ -94,12 +95,12 @@ class _Check:
         more = (
             ""
             if values.version in said
-            else f", and the registers say {said.pop()}: does another program send here, too?"
+            else f", but the registers state version {said.pop()}: does another program send to this port, too?"
         )
         self.tell("version", not more, f"version {values.version} of the wire{more}")
         self.losses(values, before, device)
         if len(values.t) < 32:
-            why = "is its register pattern set, and are intensities sent?"
+            why = "is the board's register pattern set, and does the board send intensities?"
             self.tell("values", False, f"{len(values.t)} values are too few to find the ball: {why}")
             return None
         fits = [(registers, *numbered(values, array, registers)) for registers in given]
@@ -108,10 +109,10 @@ class _Check:
             why = (
                 "a frame does not last as long as the registers say"
                 if device is not None
-                else "the board does not make the pattern, or its registers are those of no preset: "
-                "state its serial port, for example taxel device check /dev/ttyACM0"
+                else "the board does not make the pattern, or its registers match no preset: "
+                "give its serial port, for example taxel device check /dev/ttyACM0"
             )
-            self.tell("values", False, f"only {share:.0%} of the values can be the ball's: {why}")
+            self.tell("values", False, f"only {share:.0%} of the values fit the pattern: {why}")
         found = compared(values, len(capture.datagrams), array, registers, frames, device is not None)
         if share >= _EXPLAINED:
             self.values(found)
@@ -129,7 +130,7 @@ class _Check:
         named = ", ".join(f"{name} {count}" for name, count in lost.items() if count)
         unnumbered = values.version == 1
         none = (
-            "none that can be seen: datagrams of version 1 have no numbers"
+            "none detected: datagrams of version 1 have no numbers, so taxel cannot count lost datagrams"
             if unnumbered
             else "none: no number is missing"
         )
@@ -139,7 +140,7 @@ class _Check:
         """Tell whether all values are the pattern's."""
         first, behind = found.first, counted(found.behind, "taxel")
         if first is None:
-            self.tell("values", True, f"all {found.events} values are the pattern's")
+            self.tell("values", True, f"all {found.events} values match the pattern")
             return
         self.tell(
             "values",
@@ -154,16 +155,16 @@ class _Check:
         registers, speed = found.registers, found.speed
         pace = ""
         if speed < 0.5:
-            pace = f"; the board's clock takes {1 / speed:.0f} s for a second, like that of a simulated board"
+            pace = f"; a second of the board's clock lasts {1 / speed:.0f} s here, as with a simulated board"
         period = period_of(array) * registers.frame_us / 1e6
         rest = (
             ""
             if found.taxels == array.rows * array.columns
-            else f" (the ball has been everywhere after {period:.2g} s)"
+            else f" (the ball reaches all taxels within {period:.2g} s)"
         )
         whose = " (guessed: no serial line)" if guessed else ""
         return (
-            f"{found.frames} stamps with events, {1e6 / registers.frame_us:.0f} frames/s{whose}; {found.taxels} of"
+            f"{found.frames} time stamps with events, {1e6 / registers.frame_us:.0f} frames/s{whose}; {found.taxels} of"
             f" {array.rows * array.columns} taxels had an event{rest}{pace}"
         )
 
@@ -193,27 +194,30 @@ class _Check:
         where = (
             f"; look at the comparators and the current of {quiet}, where all taxels stay at 0 or 1" if quiet else ""
         )
-        words = f"comparators had not returned when their ramp began, {counted(found.faults, 'time')}{where}"
+        words = f"comparators had not returned when their ramp began ({counted(found.faults, 'time')}){where}"
         self.tell(
             "comparators", found.faults == 0, words if found.faults else "all had returned when their ramps began"
         )
         full = found.full[:, : found.registers.lines]
         end = f"{counted(int(full.sum()), 'taxel')} stay at the ramp's end, {found.registers.ramp} ticks"
-        why = "no comparator is connected there, or the ramp does not reach its voltage"
+        why = "no comparator is connected there, or the ramp does not reach the voltage there"
         lines = lines_of(full)
         self.tell(
             "ramp end",
             not full.any(),
-            f"{end}{f' ({lines})' if lines else ''}: {why}" if full.any() else "no taxel stays there",
+            f"{end}{f' ({lines})' if lines else ''}: {why}" if full.any() else "no taxel stays at the ramp's end",
         )
         zero = int(driven.sum())
-        why = "this is right if nothing presses and the circuit has no offset; otherwise no current arrives"
+        why = (
+            "this is right if nothing presses on the sensor and the circuit has no offset; otherwise no current "
+            "arrives there"
+        )
         self.tell(
             "zero",
             None,
             f"{counted(zero, 'taxel')} stay at 0 or 1{f' ({quiet})' if quiet else ''}: {why}"
             if zero
-            else "no taxel stays there",
+            else "no taxel stays at 0 or 1",
         )
         if np.isfinite(found.noise).any():
             row, column = np.unravel_index(np.nanargmax(found.noise), found.noise.shape)
@@ -224,8 +228,9 @@ class _Check:
             self.tell(
                 "noise",
                 None,
-                f"standard deviation {median:.2f} ticks (the median), at most {largest:.2f} ({place}); three standard "
-                f"deviations are above the noise floor, {floor}, for {above}",
+                f"standard deviation {median:.2f} ticks (median), at most {largest:.2f} ticks ({place}); for {above}, "
+                f"three "
+                f"standard deviations are above the noise floor of {floor} ticks",
             )
 
 
@@ -300,7 +305,7 @@ def check_board(
     if preset is not None and text("preset", preset) not in PRESETS:
         raise ProblemError(f"preset {preset!r} is not known; presets: {', '.join(map(repr, PRESETS))}")
     if preset is not None and place is not None:
-        raise refused("preset", ": the board on the serial line states its registers: leave it out")
+        raise refused("preset", ": not needed with a serial line, where the board states its registers; leave it out")
     check = _Check(None if say is None else callback("say", say))
     receiver = Receiver(text("host", host), where)
     with contextlib.closing(receiver.socket):

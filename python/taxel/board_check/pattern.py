@@ -100,13 +100,14 @@ def _meaning(values: DecodedValues, at: int, frame: int, expected: int, array: A
         k = int(off[np.abs(off).argmin()])
         when = f"{counted(abs(k), 'frame')} {'later' if k > 0 else 'before'}"
         return (
-            f"it is this taxel's value {when}: frames do not last as long as the registers say, or a frame was left out"
+            f"it is the value of this taxel {when}: frames do not last as long as the registers say, or a frame was "
+            "left out"
         )
     if (value ^ expected).bit_count() == 1:
         return "one bit differs: the link is disturbed, or its clock does not suit the PHY"
     return (
-        "no value of the pattern is near: if the register pattern is off, it is a comparator's value; otherwise it was "
-        "damaged"
+        "the pattern has no similar value: if the register pattern is off, it is a comparator's value; otherwise it "
+        "was damaged"
     )
 
 

@@ -36,8 +36,8 @@ OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace outp
 
 #: What can be done instead of giving an option twice.
 _INSTEAD = {
-    "--readout": "; a command uses one readout: train one readout on the labels of both, or record and run taxel "
-    "detect with each"
+    "--readout": "; a command uses one readout: train one readout on the labels of both, or record the data and run "
+    "taxel detect once with each"
 }
 
 

@@ -19,7 +19,7 @@ from taxel._core import ProblemError
 
 #: Our commands, each a module of this name, and what they do, in the order of the work.
 OWN = {
-    "demo": "Play scenes on an emulated board, and report what was found.",
+    "demo": "Play scenes on an emulated board, and report detections.",
     "emulate": "Emulate a board that sends its events by UDP.",
     "simulate": "Simulate a scene on the emulated board, without waiting.",
     "device": "Find a board on its serial line; set and read registers.",

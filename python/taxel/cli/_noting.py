@@ -45,7 +45,7 @@ def noting(write: Callable[[str], None], report: Callable[[str], None]) -> Itera
         thread = threading.Thread(target=_read, args=(source, keys, over, write, report), daemon=True)
         thread.start()
         try:
-            yield "a key writes a note" if keys else "a line on standard input writes a note"
+            yield "press a key to write a note" if keys else "each line on standard input is saved as a note"
         finally:
             over.set()
             thread.join()

@@ -21,18 +21,17 @@ class FileOptions:
         typer.Option(
             metavar="ROWSxCOLUMNS[xMM]",
             help="Rows, columns and pitch (mm) of the sensor, for example 24x20x5, for files that do not state them "
-            "(.csv, .lsa, ROS bags), and for frames of one row with as many channels. Default: 64x64x2.67, or a "
-            "larger array if events are outside it; for a bag, the size of its messages. If no pitch is given, "
-            "it is 2.67 mm for events of the board, otherwise unknown.",
+            "(.csv, .lsa, ROS bags), and for frames of one row that list these taxels row by row. Default: 64x64x2.67, "
+            "or a larger array if events are outside it; for a bag, the size of its messages. If no pitch is given, it "
+            "is 2.67 mm for events of the board, otherwise unknown.",
         ),
     ] = None
     layout: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Layout file with the facts that a recording lacks: sensor, unit, rate, form of a table. Default: "
-            "NAME.layout.toml or layout.toml "
-            "beside it.",
+            help="Layout file with the facts that a recording lacks: sensor, unit, rate, columns of a table. Default: "
+            "NAME.layout.toml or layout.toml beside the recording.",
         ),
     ] = None
     topic: Annotated[
@@ -40,7 +39,7 @@ class FileOptions:
         typer.Option(
             metavar="NAME",
             help="Open this topic of a ROS bag as frames; taxel info lists the topics. May be repeated: each topic "
-            "is a source; give --field and --array once, or once for each.",
+            "is a source; give --field and --array once for all topics, or once for each.",
         ),
     ] = None
     field: Annotated[
@@ -82,8 +81,8 @@ class FileOptions:
             min=0.001,
             max=3.6e6,
             metavar="MS",
-            help="Read an event camera's file as frames of counts, each over this many ms (window_ms in taxel.open "
-            "and in layout files; --window-ms is the tolerance of a score).",
+            help="Read an event camera's file as frames of counts, each over this many ms. taxel.open and layout "
+            "files call it window_ms; the option --window-ms of other commands has another meaning.",
         ),
     ] = None
     polarity: Annotated[
@@ -92,7 +91,7 @@ class FileOptions:
     ] = None
     rate_hz: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Frames per second, for recordings whose frames have numbers and no times."),
+        typer.Option(metavar="HZ", help="Frames per second, for recordings whose frames have no times."),
     ] = None
     limit: Annotated[
         int | None,

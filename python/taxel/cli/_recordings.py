@@ -28,18 +28,19 @@ _REPORT_S = (0.5, 9.5, 20.0, 30.0)
 
 #: What every command that works on recordings reads.
 READ_HELP = ".mcap, .lsa, .npz, .csv or .h5, a ROS bag or a file of a sensor's maker"
-SET_HELP = "Set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
+SET_HELP = "Set a parameter to a value (TOML); a key with dots sets a nested parameter. May be repeated."
 
 ReportOption = Annotated[
-    Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
+    Path | None,
+    typer.Option(help="Write a report to this folder, with potential, weights, errors and the worst events."),
 ]
 
 
 def tare_option(default: str = "") -> Any:
     """Return the option ``--tare``, with what is taken without it."""
     about = (
-        "Rest of the taxels: a recording of them at rest (taxel cut), a saved tare, or seconds at rest at the "
-        "beginning of the recording."
+        "Tare (the taxels' values at rest): a recording of the sensor at rest (taxel cut makes one), a saved tare, or "
+        "how many seconds at the beginning of the recording are at rest."
     )
     return typer.Option(metavar="SECONDS|FILE", help=f"{about} {default}".rstrip())
 
@@ -159,5 +160,5 @@ def of_source(recording: Recording, name: str | None) -> Recording:
         return recording
     sources = recording.sources
     if name not in sources:
-        raise ProblemError(f"--source {name}: {recording.path} holds {', '.join(sources)}")
+        raise ProblemError(f"--source {name}: {recording.path} contains only {', '.join(sources)}")
     return sources[name]

@@ -17,7 +17,7 @@ def list_topics(file: Path, found: Sequence[Topic], as_json: bool) -> list[str]:
     if as_json:
         return [json.dumps({"file": str(file), "kind": "ros", "topics": [asdict(topic) for topic in found]})]
     if not found:
-        return [f"{file}: a ROS bag without a topic that holds numbers"]
+        return [f"{file}: this ROS bag has no topic with numbers"]
     rows = [("topic", "field", "shape", "numbers", "messages", "rate")]
     for topic in found:
         shape = " x ".join(map(str, topic.shape)) or "-"

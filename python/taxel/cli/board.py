@@ -43,8 +43,8 @@ RateOption = Annotated[
     float | None,
     typer.Option(
         min=0.0,
-        help="Frames per second of your own sensor, whose events taxel.live.Source sends. With --bits: sets the same "
-        "registers as the Source.",
+        help="Frames per second of your own sensor, if taxel.live.Source sends its events. Give --bits too: both set "
+        "the same registers as the Source.",
     ),
 ]
 BitsOption = Annotated[
@@ -152,7 +152,7 @@ def remote(
     """Return the receiver of another computer's board; `lossless`: it blocks by default, else it drops."""
     if address is None:
         if congestion is not None:
-            raise ProblemError("--congestion belongs to a board of another computer: give --remote ADDRESS")
+            raise ProblemError("--congestion needs a board of another computer: give --remote ADDRESS")
         return contextlib.nullcontext()
     received: contextlib.AbstractContextManager[RemoteBoard] = receiver_of(address)(
         address, congestion=congestion or ("block" if lossless else "drop")
@@ -194,7 +194,7 @@ def outside(counters: dict[str, Any], array: Array) -> str | None:
         return None
     size = f"{array.rows} x {array.columns}"
     return (
-        f"{beyond:,} of {words:,} words name taxels outside {size}, and are dropped: give the board's size by --array"
+        f"{beyond:,} of {words:,} words are of taxels outside {size}, and are dropped: give the board's size by --array"
     )
 
 
@@ -226,19 +226,19 @@ def _bridge_rows(counts: dict[str, Any] | None) -> list[tuple[str, str, str]]:
     if counts is None:
         return []
     if counts["ended"]:
-        state = "ended there; waiting for another"
+        state = "the bridge has ended; waiting for a new one"
     elif counts["received"]:
         state = "connected"
     else:
-        state = "SILENT: the other computer, or the network to it, is gone; waiting"
+        state = "SILENT: nothing arrives from the other computer; waiting"
     there = (counts["dropped_by_kernel"] or 0) + counts["dropped"]
     more = " or more" if counts["dropped_by_kernel"] is None else ""
-    lost = f"{counts['missing']:,} on the way, {there:,}{more} there"
+    lost = f"{counts['missing']:,} on the way, {there:,}{more} on the other computer"
     clock = counts["clock"]
     compared = "not compared yet"
     if clock is not None:
         ahead, within = (clock[name] / 1e6 for name in ("ahead_ns", "within_ns"))
-        compared = f"{ahead:+,.3f} ms, within {within:.3f} ms, {clock['drift_ppm']:+.1f} ppm"
+        compared = f"ahead by {ahead:+,.3f} ms (within {within:.3f} ms), drift {clock['drift_ppm']:+.1f} ppm"
     return [("other computer", state, ""), ("lost between", lost, ""), ("its clock", compared, "")]
 
 
@@ -265,9 +265,9 @@ _UNREAD = {
     "text": "of text",
     "other_length": "with another number of values",
     "no_text": "with bytes that are not text: is the speed of the line right?",
-    "unfinished_frames": "of frames that lack lines",
-    "repeated_stamps": "with a time that is not after the time before: is a part of it in another column (time=A+B "
-    "for seconds and nanoseconds), or is its unit wrong?",
+    "unfinished_frames": "of frames with missing lines",
+    "repeated_stamps": "with a time that is not after the previous time: is a part of the time in another column "
+    "(time=A+B for seconds and nanoseconds), or is the unit of the time wrong?",
 }
 
 

@@ -60,8 +60,8 @@ def calibrate(
     each: Annotated[
         bool, typer.Option("--each", help="Fit a gain for each taxel (needs uniform kPa, or loads on single taxels).")
     ] = False,
-    exponent: Annotated[float | None, typer.Option(help="The exponent, if it is not to be fitted.")] = None,
-    tare: Annotated[str | None, tare_option("Default: the rest in a quiet stretch.")] = None,
+    exponent: Annotated[float | None, typer.Option(help="A fixed exponent, which is then not fitted.")] = None,
+    tare: Annotated[str | None, tare_option("Default: measured in a quiet part of the recording.")] = None,
     date: Annotated[
         str | None, typer.Option(help="Date of the calibration, for example 2026-11-21. Default: today.")
     ] = None,
@@ -101,4 +101,4 @@ def calibrate(
     for number, (true, unit_of_load, value) in enumerate(calibration.loads, start=1):
         say(f"  load {number}: {true:g} {unit_of_load}, calibrated {value:.4g} {unit_of_load}")
     if calibration.loads and calibration.residual is None:
-        say("  no residual: there are no more loads than unknowns, so the fit is exact; more loads show how good it is")
+        say("  no residual: with this few loads the fit is exact; give more loads to see how good it is")

@@ -32,7 +32,7 @@ def convert(
         Path,
         typer.Argument(
             help="The new file; its extension gives the format. Without an extension, or for several recordings: a "
-            "folder, to which a .mcap of each is written."
+            "folder, with a new .mcap of each recording."
         ),
     ],
     files: FileOptions,
@@ -62,7 +62,7 @@ def convert(
         opened = [of_source(recording, part) for recording in files.opener.open_joined(source)]
         if target.suffix and len(opened) > 1:
             raise ProblemError(
-                f"{source}: holds {len(opened)} recordings; {target} must be a folder, so its name must have no "
+                f"{source}: contains {len(opened)} recordings; {target} must be a folder, so its name must have no "
                 f"extension"
             )
         targets = [target] if target.suffix else _targets(opened, target)

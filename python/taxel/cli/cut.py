@@ -108,15 +108,15 @@ def _stretch_us(recording: Recording, start: float | None, stop: float | None) -
     first_s, last_s = ((t - begin_us) / 1e6 for t in (first, last))
     lasts = f"{recording.path} lasts from {plain(first_s)} to {plain(last_s)} s"
     if start is not None and start_us > last:
-        raise ProblemError(f"--from {plain(start)}: {lasts}; must be at most its end")
+        raise ProblemError(f"--from {plain(start)}: {lasts}; must not be after its end")
     if stop is not None and stop_us <= first:
-        raise ProblemError(f"--to {plain(stop)}: {lasts}; must be above its beginning")
+        raise ProblemError(f"--to {plain(stop)}: {lasts}; must be after its beginning")
     options = {"--from": start, "--to": stop}
     given = " ".join(f"{option} {plain(s)}" for option, s in options.items() if s is not None)
     if start_us <= first and stop_us > last:
-        raise ProblemError(f"{given}: {lasts}; must cut something off")
+        raise ProblemError(f"{given}: cuts nothing off; {lasts}")
     if start_us == stop_us or not (recording.has_events or len(recording.frames().between(start_us, stop_us))):
-        raise ProblemError(f"{given}: {recording.path} holds nothing there; {lasts.removeprefix(f'{recording.path} ')}")
+        raise ProblemError(f"{given}: this part is empty; {lasts}")
     return start_us, stop_us
 
 

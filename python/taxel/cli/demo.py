@@ -21,13 +21,13 @@ app = App()
 def demo(
     scenes: Annotated[int, typer.Option(min=1, help="Number of scenes.")] = 12,
     seed: Annotated[
-        int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Seed of the random numbers. Default: drawn.")
+        int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Seed of the random numbers. Default: random.")
     ] = None,
     no_clock: Annotated[
-        bool, typer.Option("--no-clock", help="Simulate as fast as possible instead of in real time; no socket.")
+        bool, typer.Option("--no-clock", help="Simulate as fast as possible instead of in real time, without a socket.")
     ] = False,
     noise: Annotated[
-        float | None, typer.Option(help="Duration of the noise test, s. Default: 60, with --no-clock 120.")
+        float | None, typer.Option(help="Duration of the noise test, s. Default: 60, or 120 with --no-clock.")
     ] = None,
     readout: Annotated[
         Path | None, typer.Option(help="A readout to use instead of the one that comes with taxel.")
@@ -38,7 +38,7 @@ def demo(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON, and nothing else.")] = False,
 ) -> None:
-    """Play scenes on the emulated board, find contact and lift-off while they run, and leave a report.
+    """Play scenes on the emulated board, detect contact and lift-off while they run, and write a report.
 
     A ball falls on foam, is caught in flight, pressed by hand and lifted. The board is a separate process that sends
     real packets over UDP; this process records, encodes and detects contact and lift. A new folder gets report.html and

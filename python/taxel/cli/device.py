@@ -49,7 +49,7 @@ def listed(as_json: JsonOption = False) -> None:
         usb = "" if port.usb is None else f"{port.usb[0]:04x}:{port.usb[1]:04x}"
         say("  ".join(filter(None, (port.place, port.kind, usb, port.maker, port.product, port.serial))))
     if not serial_ports:
-        say("no serial port: is the cable plugged in, and are you allowed to open it?", err=True)
+        say("no serial port was found: is the cable plugged in, and are you allowed to open the port?", err=True)
 
 
 @app.command()
@@ -160,8 +160,8 @@ def check(
     place: Annotated[
         str | None,
         typer.Argument(
-            help="The serial port, or host:port. Without it, taxel checks only the pattern, if the board "
-            "sends it already."
+            help="The serial port, or host:port. Without it, taxel checks only the pattern, which the board "
+            "must send already."
         ),
     ] = None,
     port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port that the board sends to.")] = PORT,

@@ -57,7 +57,7 @@ class _EmulateArguments:
     host: Annotated[str, typer.Option(help="The machine to send to, by name or address.")] = "127.0.0.1"
     scenes: Annotated[int | None, typer.Option(min=0, help="Number of scenes. Default: play until Ctrl-C.")] = None
     scene: Annotated[
-        Path | None, typer.Option(help="Play the scene of this .toml, repeatedly, instead of random ones.")
+        Path | None, typer.Option(help="Play the scene of this .toml, repeatedly, instead of random scenes.")
     ] = None
     seed: Annotated[int | None, typer.Option(max=TRAINING_SEED - 1, **about(EmulateOptions, "seed"))] = None
     replay: Annotated[Path | None, typer.Option(help="Play a recording instead of scenes.")] = None
@@ -73,14 +73,16 @@ class _EmulateArguments:
     ] = False
     noise_floor: Annotated[
         int | None,
-        typer.Option(min=0, max=255, help="With --pipe: a change above this makes an event. Default: 3."),
+        typer.Option(
+            min=0, max=255, help="With --pipe: a value that changes by more than this makes an event. Default: 3."
+        ),
     ] = None
     tare: Annotated[
         float | None,
         typer.Option(
             min=0,
             max=60,
-            help="How long the noise floor is 0 before the start marker, s. Default: 0.05, or the scene's.",
+            help="How long the noise floor is 0 before the start marker, s. Default: as in the scene's file, or 0.05.",
         ),
     ] = None
     preset: Annotated[str | None, _option("preset")] = None
@@ -162,7 +164,7 @@ def _check_options(typed: _EmulateArguments) -> None:
     if typed.scene is not None and (others or typed.rest):
         raise ProblemError("--scene: leave out --replay, --pipe and --rest")
     if others and (typed.scenes is not None or typed.labels is not None or typed.rest):
-        raise ProblemError("--scenes, --truth and --rest belong to scenes: leave them out with --replay or --pipe")
+        raise ProblemError("--scenes, --truth and --rest are for scenes: leave them out with --replay or --pipe")
     for name, value, needed, there in (
         ("--speed", typed.speed, "--replay", typed.replay is not None),
         ("--limit", typed.limit, "--replay", typed.replay is not None),
@@ -170,7 +172,7 @@ def _check_options(typed: _EmulateArguments) -> None:
         ("--baud", typed.baud, "--line", typed.line is not None),
     ):
         if value is not None and not there:
-            raise ProblemError(f"{name} without {needed}")
+            raise ProblemError(f"{name} needs {needed}: give both, or neither")
 
 
 def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:

@@ -36,7 +36,7 @@ def encode(
     Example: taxel encode walk.mcap walk.npz --encoder level_crossing --set "levels=[40, 80]" --set hold_ms=2
     """
     if out.suffix != ".npz":
-        raise ProblemError(f"{out}: spikes are written to a .npz")
+        raise ProblemError(f"{out}: the name of the spikes' file must end in .npz")
     check_writable(out, overwrite=overwrite)
     options = taxel.tasks.EncodeOptions(encoder, assignments(values or []), tare)
     with progress(as_json) as update:

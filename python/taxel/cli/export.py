@@ -38,7 +38,7 @@ def nir(
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a readout as a NIR graph, in SI units, and report what NIR cannot hold.
+    """Write a readout as a NIR graph, in SI units, and report what the graph cannot represent.
 
     Example: taxel export nir walk.json walk.nir
     """
@@ -49,4 +49,4 @@ def nir(
     if as_json:
         say(json.dumps({"readout": str(readout), "written": str(out), "lost": lost}))
         return
-    say(f"written to {out}", *(f"  NIR cannot hold: {loss}" for loss in lost))
+    say(f"written to {out}", *(f"  not in NIR: {loss}" for loss in lost))

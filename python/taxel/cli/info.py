@@ -57,7 +57,7 @@ def info(
         Path | None,
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
-    tare: Annotated[str | None, tare_option("Default: the rest in a quiet stretch.")] = None,
+    tare: Annotated[str | None, tare_option("Default: measured in a quiet part of the recording.")] = None,
     each: Annotated[bool, typer.Option("--each", help="Print all facts about each recording of a folder.")] = False,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
@@ -103,7 +103,8 @@ def info(
             written = _draw(picture, sensors, tare, overwrite)
             say(*_of_several(file, of_each, written, as_json=as_json, each=each))
             if are_trials(recordings) and not as_json:
-                say(f"labels name a trial in their column recording, for example {trial_name(recordings[0])}")
+                example = trial_name(recordings[0])
+                say(f"labels of these trials need a column recording with the trial's name, for example {example}")
             say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
             return
         found = taxel.tasks.info(recording, tare)
@@ -112,7 +113,7 @@ def info(
     say_warnings(found.warnings)
     if table is not None:
         if pressed is None:
-            raise ProblemError(f"{file}: holds events without intensities, so there is no pressure to write")
+            raise ProblemError(f"{file}: contains events without intensities, so no pressure can be written to a table")
         text = "".join(f"{line}\n" for line in _lines(pressed))
         write_whole(table, lambda out: out.write(text.encode()), overwrite=overwrite)
         facts["table"] = str(table)
@@ -123,7 +124,7 @@ def info(
 def _spikes(file: Path, as_json: bool, *, drawn: bool) -> list[str]:
     """Return what a file of spike trains holds, as one line of JSON or as lines for people."""
     if drawn:
-        raise ProblemError(f"{file}: holds spike trains; a picture or a table needs a recording")
+        raise ProblemError(f"{file}: contains spike trains; a picture or a table needs a recording")
     trains = SpikeTrains.load(file)
     silent, seconds = int(np.count_nonzero(trains.counts == 0)), (trains.stop - trains.start) / to_ms(1_000_000)
     spikes = int(trains.counts.sum())
@@ -180,10 +181,10 @@ def _several(file: Path, recordings: Sequence[Recording]) -> str:
     if len(recordings) > 1:
         alone = f"taxel convert {quote(str(file))} FOLDER writes each to a separate file"
         alone = f"taxel info {quote(str(recordings[0].path))} --table FILE.csv" if file.is_dir() else alone
-        return f"{file}: holds {len(recordings)} recordings; a table can contain only one recording: {alone}"
+        return f"{file}: contains {len(recordings)} recordings; a table can contain only one recording: {alone}"
     names = ", ".join(recordings[0].sources)
     return (
-        f"{file}: holds {len(recordings[0].sources)} sources ({names}); a table can contain only one source: "
+        f"{file}: contains {len(recordings[0].sources)} sources ({names}); a table can contain only one source: "
         "taxel convert --source NAME writes a source to a separate file"
     )
 
@@ -312,7 +313,12 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     size = f"{array.rows} x {array.columns} taxels, {array._apart()}"
     # The default's name, and that of --array, say nothing more.
     size += "" if re.fullmatch(r"array|\d+x\d+\S*", array.name) else f", {array.name}"
-    yield "array", size + f"; a {kind_of_file(facts['kind'])} does not state it: give --array" * facts["array_assumed"]
+    yield (
+        "array",
+        size
+        + f"; assumed, because a {kind_of_file(facts['kind'])} does not state it: give --array"
+        * facts["array_assumed"],
+    )
     names = array.names or ()
     of_it = {"names": ", ".join(names[:8]) + " ..." * (len(names) > 8), "side": facts["side"], "heel": facts["heel"]}
     yield from ((name, value) for name, value in of_it.items() if value)
@@ -380,7 +386,10 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     unchanging = facts["taxels_unchanging"]
     if unchanging:
         where = at(facts["taxels_unchanging_at"], unchanging)
-        yield "unchanging taxels", f"{unchanging} read one value, while most change: dead, or never touched{where}"
+        yield (
+            "unchanging taxels",
+            f"{unchanging} always read the same value, while most change: dead, or never touched{where}",
+        )
     if (untested := facts["taxels_untested"]) and unchanging < untested:
         # The places of most of an array say nothing.
         few = 2 * untested <= Array._from_geometry(facts["array"]).taxels
@@ -390,7 +399,7 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 def _time(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if not facts["timed"]:
-        yield "time", "none: frames are numbered; give --rate-hz if a command needs times"
+        yield "time", "none: the frames have only numbers; give --rate-hz if a command needs times"
     elif facts["from_us"] is not None:
         begin = _begin_us(facts)
         yield "board time", f"{facts['from_us'] - begin} to {facts['to_us'] - begin} us ({facts['seconds']:.3f} s)"
@@ -415,7 +424,7 @@ def _pressure(pressed: dict[str, Any], begin_us: int, *, timed: bool) -> Iterato
             size = counted(int(most), "taxel") if unit == "taxels" else f"{most:g} {unit}"
             at = pressed[name]["t_us"] - begin_us
             yield words, f"at most {size}, at {f'{at} us' if timed else f'frame {at}'}"
-    for unit, more in (("mm", " mm"), ("taxels", ""), ("places", " in units of the places")):
+    for unit, more in (("mm", " mm"), ("taxels", ""), ("places", " in the unit of the places")):
         across, down = ("column", "row") if unit == "taxels" else ("x", "y")
         if pressed.get(f"centre_{unit}") is not None:
             x, y = (f"{low:.1f} to {high:.1f}{more}" for low, high in pressed[f"centre_{unit}"].values())
@@ -426,7 +435,7 @@ def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if facts.get("events_per_s_board") is not None:
         peak = f"{facts['peak_events_per_s_board']:.0f} events/s in the busiest 10 ms"
         if facts.get("events_per_s_rest") is not None:
-            peak = f"{facts['events_per_s_rest']:.0f} events/s in the quiet tenth of the time, {peak}"
+            peak = f"{facts['events_per_s_rest']:.0f} events/s in the quietest tenth of the time, {peak}"
         before = ", before the start marker, where a board sends the rest of every taxel" * facts["peak_before_start"]
         name = "rate" if "on_share" in facts else "rate, board"
         yield name, f"{facts['events_per_s_board']:.0f} events/s; {peak}{before}"

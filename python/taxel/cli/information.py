@@ -1,4 +1,4 @@
-"""``taxel information``: bits that labelled touches hold, by sampling period, number of taxels and time."""
+"""``taxel information``: bits that labelled touches give, by sampling period, number of taxels and time."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ def information(
         typer.Option(
             metavar="FILE",
             help="A CSV with a row for each trial: recording,t_us,label[,stop_us][,group] and columns of parameters; "
-            "for a single recording the column recording may be left out. notes: each note of the recordings is "
-            "a trial that begins at its time, and its text is the label. Default: each recording is a trial, "
-            "and its folder's name is the label.",
+            "for a single recording the column recording may be left out. Or the word notes: each note of the "
+            "recordings is a trial that begins at the time of the note, and the text of the note is the label. "
+            "Default: each recording is a trial, and its folder's name is the label.",
         ),
     ] = None,
     window_ms: Annotated[
@@ -65,22 +65,29 @@ def information(
     encoder: Annotated[str, typer.Option(help="The encoder: change_events or fa1.")] = "change_events",
     values: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=SET_HELP)] = None,
     classifiers: Annotated[
-        str, typer.Option("--also", help="Further classifiers: neighbours, cone_r; with taxel_rules tempotron.")
+        str,
+        typer.Option(
+            "--also", help="Further classifiers: neighbours, cone_r, and, if taxel_rules is installed, tempotron."
+        ),
     ] = "neighbours",
-    draws: Annotated[int, typer.Option(help="Number of random phases of the sampling that are averaged.")] = 5,
-    folds: Annotated[int, typer.Option(help="Number of folds; groups are never split.")] = 10,
+    draws: Annotated[
+        int, typer.Option(help="Number of random phases of the sampling; the results are their means.")
+    ] = 5,
+    folds: Annotated[int, typer.Option(help="Number of folds; all trials of a group are in the same fold.")] = 10,
     shuffles: Annotated[int, typer.Option(help="Number of shuffles of the labels, for the test against zero.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the random phases, folds, taxels and bootstrap.")] = 0,
-    report: Annotated[Path, typer.Option(help="The page with pictures, an .html.")] = Path("information.html"),
+    report: Annotated[Path, typer.Option(help="The report to write, an .html with pictures.")] = Path(
+        "information.html"
+    ),
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Estimate how many bits labelled touches hold, by sampling period, time, number of taxels and data rate.
+    """Estimate how many bits labelled touches give, by sampling period, time, number of taxels and data rate.
 
     Example: taxel information drops.mcap --labels drops.csv --window-ms 50
     """
     if report.suffix != ".html":
-        raise ProblemError(f"--report {report}: is one page, so its name must end in .html")
+        raise ProblemError(f"--report {report}: the name of the report must end in .html")
     check_writable(report, overwrite=overwrite)
     options = taxel.tasks.InformationOptions(
         encoder,
@@ -109,8 +116,8 @@ def information(
                 nonlocal trials
                 if total and not done and not as_json:
                     say(
-                        f"{trials}: about {duration(total / 1000)} on an idle processor; Ctrl-C prints what is known "
-                        "by then",
+                        f"{trials}: about {duration(total / 1000)} on an idle processor; Ctrl-C prints the results "
+                        "so far",
                         err=True,
                     )
                 trials = trials if total else step
@@ -151,7 +158,7 @@ class _KnownBits:
             + ", ".join(f"{bits:.2f} within {window:g} ms" for window, (bits, _) in by_window.items())
             for period, by_window in self._bits.items()
         )
-        return f"stopped; bits of {done} of {counted(draws, 'draw')}, without intervals: {by_period}"
+        return f"stopped after {done} of {counted(draws, 'draw')}; bits so far, without intervals: {by_period}"
 
 
 def lines(answer: Answer) -> list[str]:
@@ -164,7 +171,7 @@ def lines(answer: Answer) -> list[str]:
         f"{trials}, {labels} x {each}, {counted(answer.groups, 'group') if answer.groups else 'no groups'}",
         f"labels shuffled: {answer.zero}",
         "controls: " + " | ".join(f"{c.name} {_bits(c.found)} ({c.about})" for c in answer.controls),
-        f"full: {full.period_ms:g} ms, {counted(full.taxels, 'taxel')}, to {full.window_ms:g} ms "
+        f"full: {full.period_ms:g} ms, {counted(full.taxels, 'taxel')}, to {full.window_ms:g} ms: "
         f"{_interval(full.found)}, "
         f"{100 * full.found.right:.0f} % right"
         + "".join(f"; frames {e.bits:.2f}" for p, e in answer.frames.items() if p == full.period_ms)
@@ -174,7 +181,7 @@ def lines(answer: Answer) -> list[str]:
     ]
     text += [f"warning: {warning}" for warning in answer.warnings]
     columns = ("bits", "events", "millibits/event", "kb/s", "silent")
-    text += ["", _row("period", *columns, "95 % of the full?")]
+    text += ["", _row("period", *columns, "keeps 95 % of the full bits?")]
     text += [_point(f"{p.period_ms:g} ms", p, answer) for p in answer.by_period]
     if answer.taxels:
         text += ["", _row(f"taxels at {answer.taxels[0].period_ms:g} ms", *columns, "")]
@@ -185,7 +192,7 @@ def lines(answer: Answer) -> list[str]:
         by_period = "; ".join(
             f"{p.period_ms:g} ms {p.found.bits:.2f}" + (f" {p.verdict}" if p.verdict is not None else "") for p in here
         )
-        text.append(f"to {window:g} ms: {by_period}")
+        text.append(f"to {window:g} ms after contact: {by_period}")
     for name, points in answer.parameters.items():
         text.append(
             f"{name} ({points[0].found.most:.2f} bits at most): "
@@ -193,7 +200,11 @@ def lines(answer: Answer) -> list[str]:
         )
     if len(answer.training) > 1:
         (n, less), (most, bits) = answer.training[-2:]
-        rises, then = ("still", "more would add bits") if bits - less > 0.02 else ("hardly", "more would add little")
+        rises, then = (
+            ("still", "more trials would add bits")
+            if bits - less > 0.02
+            else ("hardly", "more trials would add little")
+        )
         text.append(
             f"bits {rises} rise with trials: {n} -> {most} training trials per label {bits - less:+.2f}; {then}"
         )
@@ -203,7 +214,7 @@ def lines(answer: Answer) -> list[str]:
 
 
 def _point(name: str, point: Point, answer: Answer) -> str:
-    verdict = "the full one" if point.verdict is None else str(point.verdict)
+    verdict = "the full setting" if point.verdict is None else str(point.verdict)
     if point is answer.cheapest and not answer.empty:
         verdict += " <- cheapest"
     return _row(

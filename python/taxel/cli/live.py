@@ -64,8 +64,8 @@ class _LiveArguments:
     control: Annotated[
         str | None,
         typer.Option(
-            help="The board's serial line (COM3, /dev/ttyACM0, host:port), for the panel's registers and for a noise "
-            "floor of 0 while a tare is taken."
+            help="The board's serial line (COM3, /dev/ttyACM0, host:port), on which the panel sets registers, and "
+            "taxel sets a noise floor of 0 while it takes a tare."
         ),
     ] = None
     save_tare: Annotated[Path | None, typer.Option(help="Save the fresh tare in a new file (JSON).")] = None
@@ -73,14 +73,14 @@ class _LiveArguments:
     report: Annotated[
         Path | None,
         typer.Option(
-            help="With --record: write a report to this folder: potential, weights, errors, the worst events."
+            help="With --record: write a report to this folder, with potential, weights, errors and the worst events."
         ),
     ] = None
     panel: Annotated[bool, typer.Option("--panel", help="Show the board in a browser.")] = False
     panel_host: PanelHostOption = "127.0.0.1"
     panel_port: PanelPortOption = 0
     folder: Annotated[
-        Path | None, typer.Option(help="With --panel: the folder of the recordings. Default: this folder.")
+        Path | None, typer.Option(help="With --panel: the folder of the recordings. Default: the current folder.")
     ] = None
     opens: OpenOption = False
 
@@ -93,9 +93,9 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
     JSON, written by the thread that made it: label; t_us, known_us, reported_us by the board's clock; slope_mv_per_ms;
     reported_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
-    which are counted. --panel shows the board in a browser; a slow viewer loses frames, never data. If the standard
-    input is the source, its end ends the command. Exit code 3: nothing was received, or data were lost after they had
-    arrived; 2: the board has more taxels than the array.
+    which are counted. --panel shows the board in a browser; a slow viewer loses frames, never data. If the source is
+    the standard input, the command ends with this input. Exit code 3: nothing was received, or data were lost after
+    they had arrived; 2: the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     Example: taxel live --readout ball.json --tare 0.05 --send lines+udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
@@ -110,7 +110,7 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     _check_fresh_tare(typed, rest, overwrite=options["overwrite"])
     if typed.report is not None:
         if record is None or record.suffix != ".mcap":
-            raise ProblemError("--report is made from the recording: give --record FILE.mcap")
+            raise ProblemError("--report needs a recording: give --record FILE.mcap")
         try_report(typed.report, overwrite=options["overwrite"])
     console = Console(stderr=True)
     with contextlib.ExitStack() as connected, contextlib.ExitStack() as at_rest:
@@ -123,8 +123,8 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
             sensor = trained.array if options["array"] is None else options["array"]
             frame_us = Registers(array=Array._of(sensor)).frame_us
             console.print(
-                f"the readout assumes frames of {plain(frame_us)} us, as a board has at reset; if the board has "
-                f"others, give --preset, or --rate-hz and --bits"
+                f"the readout assumes frames of {plain(frame_us)} us, the default of a board; if the board has "
+                f"other frames, give --preset, or --rate-hz and --bits"
             )
         say_waiting(options, console)
         with Live(**options | {"remote": board}) as pipeline:
@@ -135,7 +135,8 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
             for name, counts in pipeline.counters["sources"].items():
                 if "capture" in counts:  # else lines that are no frames, as of an IMU
                     console.print(
-                        f"{name}: recorded, but neither read out nor shown; a second taxel live can read it out"
+                        f"{name}: this source is recorded, but neither read out nor shown; a second taxel live can "
+                        "read it out"
                     )
             last = _show(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
             summary = last.stop()
@@ -155,7 +156,7 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     if typed.save_tare is not None and tare is None and not summary.nothing_came:
         seconds = summary.counters["seconds"]
         raise ProblemError(
-            f"--tare {given_tare}: not complete after {seconds:.1f} s; {typed.save_tare} was not written"
+            f"--tare {given_tare}: the tare was not complete after {seconds:.1f} s; {typed.save_tare} was not written"
         )
     raise typer.Exit(exit_code(summary, pipeline.array))
 
@@ -222,7 +223,7 @@ def _summary_lines(summary: Summary, guard_frames: float) -> Iterator[str]:
         wrong = counted(counters["wrong"], "detection")
         yield f"{wrong} output too early: events arrived more than {guard_frames:g} frames late"
     if counters["late"]:
-        yield f"{counted(counters['late'], 'event')} out of order: read out on arrival, and recorded"
+        yield f"{counted(counters['late'], 'event')} arrived out of order: read out on arrival, and recorded"
     if counters["events_dropped"]:
         yield f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow"
     yield from doubts(counters)
@@ -235,8 +236,8 @@ def _report_unsent(summary: Summary) -> None:
     """Report lines that did not reach their destination."""
     for line in summary.counters["sent"]:
         if lost := line["lost"]:
-            why = line["trouble"] or "read too slowly"
-            say(f"taxel: lines not sent to {line['to']}: {lost} of {line['sent'] + lost}: {why}", err=True)
+            why = line["trouble"] or "the receiver reads too slowly"
+            say(f"taxel: {lost} of {line['sent'] + lost} lines not sent to {line['to']}: {why}", err=True)
 
 
 def _check_options(options: dict[str, Any], typed: _LiveArguments) -> None:
@@ -245,9 +246,9 @@ def _check_options(options: dict[str, Any], typed: _LiveArguments) -> None:
     if readout is None and not typed.panel:
         raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to show the board")
     if readout is None and (tare or typed.report):
-        raise ProblemError("--tare and --report belong to a readout: give --readout FILE")
+        raise ProblemError("--tare and --report need a readout: give --readout FILE")
     if typed.folder is not None and not typed.panel:
-        raise ProblemError("--folder belongs to the panel: give --panel")
+        raise ProblemError("--folder needs the panel: give --panel")
 
 
 def _check_fresh_tare(typed: _LiveArguments, rest: Tare | float | None, *, overwrite: bool) -> None:
@@ -256,9 +257,9 @@ def _check_fresh_tare(typed: _LiveArguments, rest: Tare | float | None, *, overw
         if typed.save_tare is not None:
             check_writable(typed.save_tare, overwrite=overwrite)
     elif typed.save_tare is not None:
-        raise ProblemError("--save-tare without a fresh tare: give --tare SECONDS")
+        raise ProblemError("--save-tare needs a fresh tare: give --tare SECONDS")
     elif typed.control is not None and not typed.panel:
-        raise ProblemError("--control without a fresh tare: give --tare SECONDS, or --panel")
+        raise ProblemError("--control needs a fresh tare or the panel: give --tare SECONDS, or --panel")
 
 
 def _warn_of_unknown(tare: Tare) -> None:
@@ -267,9 +268,8 @@ def _warn_of_unknown(tare: Tare) -> None:
     if 2 * known < tare.array.taxels:
         say(
             f"taxel: the tare has only the {known} of {tare.array.taxels} taxels that changed while it was taken; "
-            "events of the other taxels are ignored. Start taxel live before the board, which then sends all values, "
-            "or "
-            "give --tare FILE",
+            "events of the other taxels are ignored. Start taxel live before the board, so that the board sends all "
+            "values, or give --tare FILE",
             err=True,
         )
 
@@ -390,7 +390,7 @@ def _silence(now: dict[str, Any], place: str) -> str:
         return f"quiet: {since}"
     within_ms = to_ms(arrival["heartbeat_us"])
     sign = "heartbeat" if now["lines"] is None else "frame"
-    return f"silent: {since} from {place}, which before sent a {sign} at least every {within_ms:g} ms"
+    return f"silent: {since} from {place}, which sent a {sign} at least every {within_ms:g} ms before"
 
 
 def _state(now: dict[str, Any], place: str) -> Text:
@@ -401,7 +401,7 @@ def _state(now: dict[str, Any], place: str) -> Text:
     if now["taring"]:
         return Text("taking a tare: leave the sensor at rest")
     sent = "".join(
-        f"\n{counted(counts['lost'], 'line')} lost to {counts['to']}" for counts in now["sent"] if counts["lost"]
+        f"\n{counted(counts['lost'], 'line')} not sent to {counts['to']}" for counts in now["sent"] if counts["lost"]
     )
     dropped = f"\n{counted(now['events_dropped'], 'event')} dropped before the readout" if now["events_dropped"] else ""
     return Text((dropped + sent).lstrip())

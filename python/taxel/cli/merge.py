@@ -27,7 +27,7 @@ def merge(
         typer.Option(
             min=0.0,
             metavar="S",
-            help="Put the recordings one after another, with this pause, s. Default: times are kept.",
+            help="Put the recordings one after another, with this pause, s. Default: keep their times.",
         ),
     ] = None,
     beside: Annotated[bool, typer.Option("--beside", help="Put the sensors side by side, left to right.")] = False,
@@ -39,7 +39,7 @@ def merge(
 ) -> None:
     """Merge recordings: by time, side by side, or the parts around a label in each.
 
-    A note with its file's name marks where each recording begins.
+    At the beginning of each recording, a note has the name of its file.
 
     Example: taxel merge left.mcap right.mcap -o both.mcap --beside
     """

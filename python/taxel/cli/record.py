@@ -87,8 +87,8 @@ def record(
     empty trials in a row end the command with exit code 3. While it records, a key on the terminal, or a line on any
     other standard input, writes a note with that label and the board's time into the .mcap (add < /dev/null if the
     input is not for taxel). --source names what is received, each source with its own clock: frames of numbers, boards,
-    lines of numbers. Exit code 3: nothing was received, or data were lost after they had arrived, such as bytes of a
-    source of lines that are in no line; 2: the board has more taxels than --array.
+    lines of numbers. Exit code 3: nothing was received, or data were lost after they had arrived, such as bytes
+    outside the lines of a source; 2: the board has more taxels than --array.
 
     Example: taxel record --port 5208 walk.mcap
     Example: taxel record walk.mcap --port 5208 --source left=board:0.0.0.0:5209 --source imu=serial:COM3
@@ -96,7 +96,7 @@ def record(
     Example: taxel record --remote zenoh:192.168.1.5:7447/left walk.mcap
     """
     if typed.length is None and typed.trials is not None:
-        raise ProblemError("--trials without --length: automatic mode needs the length of each trial")
+        raise ProblemError("--trials needs --length, the length of each trial: give both")
     if typed.length is not None and typed.seconds is not None:
         raise ProblemError("--seconds and --length: give --length for automatic mode, --seconds for one recording")
     live = for_live(options, typed.rate_hz, typed.bits, typed.seconds)
@@ -171,7 +171,7 @@ def _automatic(file: Path, live: dict[str, Any], typed: _RecordArguments, consol
 def _count_down(name: Path, seconds: int, console: Console) -> None:
     for left in range(seconds, 0, -1):
         console.bell()
-        console.print(f"{name}: in {left} s")
+        console.print(f"{name}: begins in {left} s")
         time.sleep(1.0)
     # The manual's last beep is higher; a terminal has one bell, so it rings twice.
     console.bell()
@@ -215,7 +215,7 @@ def _watch(
             left = REDRAW_S if seconds is None else min(REDRAW_S, seconds - (before["seconds"] - began))
             live.next(left)
             for t, start in live.take_markers():
-                console.print(f"{t / 1e6:.4f} s: {'start' if start else 'stop'} marked")
+                console.print(f"{t / 1e6:.4f} s: the board marked a {'start' if start else 'stop'}")
                 if markers and not start:
                     return
             now = live.counters

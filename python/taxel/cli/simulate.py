@@ -38,7 +38,9 @@ def simulate(
     labels: Annotated[
         Path | None, typer.Option("--truth", help="Write the true times of the touches to this CSV, label,t_us.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of taxels and noise. Default: the scene's.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of taxels and noise. Default: as in the scene's file.")
+    ] = None,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:

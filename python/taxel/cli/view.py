@@ -32,8 +32,8 @@ def view(
     recording: Annotated[
         Path,
         typer.Argument(
-            help="A recording, a file of a sensor's maker, or a folder; the options then apply to each of its files. "
-            "The page can open the other files of the folder."
+            help="A recording, a file of a sensor's maker, or a folder. If it is a folder, the options apply to each "
+            "of its files. The page can open the other files of the folder."
         ),
     ],
     files: FileOptions,

@@ -113,8 +113,9 @@ def play_live(
     verdicts = [emulator["verdict"], summary.verdict]
     if summary.counters["late"]:
         verdicts.append(
-            f"{counted(summary.counters['late'], 'event')} came after the readout's time had moved on, 5 frames behind "
-            "the host's clock: this machine was too busy. Detections of these events came late, moved or were "
-            "missed. The recording has every event, and --no-clock simulates without the clock"
+            f"{counted(summary.counters['late'], 'event')} arrived more than 5 frames late, so the readout had "
+            f"continued "
+            "without them: this machine was too busy. Detections of these events are late, at wrong times or missing. "
+            "The recording contains all events. --no-clock simulates without the clock"
         )
     return Playing(evaluation, summary.counters, emulator, verdicts, recording, agrees)

@@ -46,7 +46,7 @@ def figures(
         "what": "taxel demo",
         "seed": seed,
         "scenes": scenes,
-        "clock": "without the clock: board time as fast as it goes, no socket"
+        "clock": "without the clock: as fast as possible, without a socket"
         if playing is None
         else "in real time, over UDP",
         "board_seconds": evaluation.seconds,

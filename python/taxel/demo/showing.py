@@ -92,7 +92,7 @@ def show(
         page = write(folder, values, evaluation)
     _print_table(console, evaluation.judged)
     within = sum(evaluation.judged.false_within.values())
-    off = f" ({within} within a press, more than 50 ms off)" if within else ""
+    off = f" ({within} of them during a press, but more than 50 ms off)" if within else ""
     console.print(
         f"false detections: {sum(evaluation.judged.false_counts.values())} in the scenes{off}, "
         f"{len(quiet.detections)} in {quiet.seconds:.0f} s of noise"
@@ -122,4 +122,4 @@ def _print_table(console: Console, judged: TouchMatches) -> None:
     for line in lines(judged):
         table.add_row(line["touch"], line["label"], line["found"], line["error"], f"{line['p50']} / {line['p95']}")
     console.print(table)
-    console.print("error: time minus true, mean; known: minus true, median / 95 %", style="dim")
+    console.print("error: mean of time minus true time; known: median / 95 % of known minus true time", style="dim")

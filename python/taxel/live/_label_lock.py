@@ -128,7 +128,7 @@ def _file(path: Path) -> Iterator[bool]:
         lock = os.open(path, os.O_RDONLY | _HOW)
     try:
         if not stat.S_ISREG(os.fstat(lock).st_mode):
-            raise ProblemError(f"{path}: is not a regular file, as the lock of tables must be; nothing was saved")
+            raise ProblemError(f"{path}: the lock of tables must be a regular file; nothing was saved")
         if not _lock(lock):
             yield False
             return

@@ -49,7 +49,7 @@ def to_json(known: Acknowledged) -> dict[str, Any]:
 
 def integer(value: object, least: int, most: int) -> int:
     if type(value) is not int or not least <= value <= most:
-        raise ValueError("a time that no table has")
+        raise ValueError("a time is invalid")
     return value
 
 
@@ -59,7 +59,7 @@ def _time(t: object) -> int:
 
 def _text(text: object) -> str:
     if not isinstance(text, str) or len(text) > csv.field_size_limit():
-        raise ValueError("a text that no table has")
+        raise ValueError("a text is invalid")
     # Half of a pair of UTF-16 is no character.
     text.encode()
     return text
@@ -84,8 +84,8 @@ def from_json(saved: dict[str, Any]) -> Acknowledged:
 
 
 def not_saved(path: Path, error: Exception) -> FormatError:
-    reason = f"not what taxel saved of the labels that it acknowledged ({error})"
-    return FormatError(f"{state_path(path)}: {reason}; delete it to continue without it")
+    reason = f"damaged, so the labels that taxel acknowledged are not known ({error})"
+    return FormatError(f"{state_path(path)}: {reason}; delete this file to continue without them")
 
 
 def newest_of(path: Path, link: Path | None) -> Path:

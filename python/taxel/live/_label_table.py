@@ -540,7 +540,7 @@ class LabelTables:
         except FormatError as error:
             raise ProblemError(f"{error}; nothing was saved") from None
         if unlike := minus(joined.rows, again):
-            raise ProblemError(f"{path}: a table cannot hold {shown(unlike[0].text)} as it is; nothing was saved")
+            raise ProblemError(f"{path}: a table cannot contain {shown(unlike[0].text)} unchanged; nothing was saved")
         states = {"acknowledged": to_json(known), "next": to_json(joined.acknowledged)}
         _save(file, {**states, "before": _digest(file.text), "after": _digest(text)})
         replaced = False

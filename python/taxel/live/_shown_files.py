@@ -184,14 +184,14 @@ class ShownFiles:
             known = self._trials
         recordings = known[1] if known is not None and known[0] == key else list(self._opening.open(path))
         if not recordings:
-            raise FormatError(f"{path.name}: holds no recording")
+            raise FormatError(f"{path.name}: contains no recording")
         if len(recordings) == 1:
             return recordings[0], []
         with self._lock:
             self._trials = key, recordings
         names = [recording.name for recording in recordings]
         if trial is not None and trial not in names:
-            raise ProblemError(f"{path.name}: holds no trial {trial}")
+            raise ProblemError(f"{path.name}: contains no trial {trial}")
         return recordings[0 if trial is None else names.index(trial)], names
 
     def read(self, path: Path, trial: str | None, *, entire: bool) -> tuple[Path | None, ReadFrames | None]:

@@ -205,7 +205,7 @@ class Live:
         ProblemError : the board is another computer's
         """
         if self._remote is not None:
-            raise refused("live", f": receives from {self.place}, and on no address of this computer")
+            raise refused("live", f": receives from {self.place}, so it has no address on this computer")
         return self._core.address()
 
     @property
@@ -361,11 +361,11 @@ class Live:
         >>> with Live(0, host="127.0.0.1") as live:
         ...     live.source_address("left")
         Traceback (most recent call last):
-        taxel.ProblemError: source 'left': no further board of this recording has that name
+        taxel.ProblemError: source 'left': this recording has no further board of that name
         """
         address = self._core.source_address(text("name", name))
         if address is None:
-            raise ProblemError(f"source {name!r}: no further board of this recording has that name")
+            raise ProblemError(f"source {name!r}: this recording has no further board of that name")
         return address
 
     def sample(self, name: str, values: ArrayLike, arrived_ns: int | None = None) -> None:
@@ -415,12 +415,16 @@ class Live:
         columns, rows = (numbers(name, value, np.int64).reshape(-1) for name, value in (("x", x), ("y", y)))
         if len(columns) != len(rows):
             raise refused(
-                "x", f" has {counted(len(columns), 'column')}, y {counted(len(rows), 'row')}: must be equally many"
+                "x",
+                f" has {counted(len(columns), 'column')}, but y has {counted(len(rows), 'row')}: must be as many rows "
+                "as columns",
             )
         for name, indices in (("x", columns), ("y", rows)):
             if len(indices) and (indices.min() < 0 or indices.max() > _MOST_INDEX):
                 wrong = indices.min() if indices.min() < 0 else indices.max()
-                raise ProblemError(f"{name}: holds {wrong}, must be a taxel's")
+                raise ProblemError(
+                    f"{name}: contains {wrong}; must be the {'column' if name == 'x' else 'row'} of a taxel"
+                )
         return tuple(
             Zeroing(**zeroing) for zeroing in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True)))
         )

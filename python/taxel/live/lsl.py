@@ -66,7 +66,7 @@ class LslInlet:
         try:
             labels = self._inlet.info(_LOOK_S).get_channel_labels() or []
         except Exception as error:  # its library's errors have no base of their own
-            raise ProblemError(f"lsl:{name}: does not name its channels ({error})") from None
+            raise ProblemError(f"lsl:{name}: the stream does not name its channels ({error})") from None
         count = streams[0].channel_count()
         names = [str(label) for label in labels if label]
         plain = len(set(names)) == count and not any(set(name) & set(",:=") for name in names) and "t_s" not in names

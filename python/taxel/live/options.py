@@ -51,7 +51,7 @@ class LiveOptions(StatedOptions):
         if self.say is not None and not callable(self.say):
             raise refused("say", f" is {shown(self.say)}: must be a function of a Detection")
         if readout is None and self.tare is not None:
-            raise ProblemError("tare without a readout: only a readout uses a tare")
+            raise ProblemError("tare needs a readout: only a readout uses a tare")
         array = Array._of(array)
         if registers is None:
             registers = Registers(array=array)

@@ -88,7 +88,7 @@ class Panel:
             if control is not None:
                 raise refused("control", ": a recording has no board; give a taxel.live.Live")
             if folder is not None:
-                raise refused("folder", ": is the recording's own")
+                raise refused("folder", ": must be left out, because a recording is shown with its folder")
             folder, opened = _folder_and_name(shown_path, how)
             opens = how.open_joined if opens is None and how.given() else opens
             shown = None if is_folder(shown_path) else folder / opened
@@ -265,10 +265,11 @@ class Panel:
         if self._live is None:
             raise ProblemError(f"{action}: this panel shows recordings only")
         if self._live._options.record is not None:
-            raise ProblemError(f"{action}: a recording was begun with this address; end it first")
+            raise ProblemError(f"{action}: a recording from this address is running; end it first")
         if self._live._remote is not None:
             raise ProblemError(
-                f"{action}: the board is another computer's, which sets its address and the meaning of its intensities"
+                f"{action}: the board is connected to another computer, which sets its address and the meaning of its "
+                f"intensities"
             )
         return self._live
 
@@ -303,7 +304,7 @@ def _folder_and_name(path: Path, options: TextOptions) -> tuple[Path, str]:
     if is_folder(path):
         files = recordings_in(path, options.layout)
         if not files:
-            raise ProblemError(f"{path}: holds no recording; name a file, or one of its folders")
+            raise ProblemError(f"{path}: contains no recording; name a file, or one of the folders in it")
         path = files[0]
     if not path.exists():
         raise FileNotFoundError(2, "no such recording", str(path))
@@ -320,7 +321,9 @@ def _rest_of_held(live: Live) -> Tare:
     """Return the values that the taxels hold now as their rest."""
     values = live.frame.astype(float)
     if not np.nan_to_num(values).any():
-        raise ProblemError("read_out: no value has arrived yet that could be the taxels' rest; wait for the board")
+        raise ProblemError(
+            "read_out: no values of taxels have arrived yet, so their rest is unknown; wait for the board"
+        )
     return Tare.take(
         Frames([values, values], [0, 1], unit=live.unit, array=live.array), note="held when the readout began"
     )

@@ -95,7 +95,7 @@ class Source:
         values, shape, most = numbers("frame", frame, np.float64), self.array.shape, 2**self.bits - 1
         if values.shape not in (shape, (shape[0] * shape[1],)):
             right = f"{shape[0]} x {shape[1]} (rows x columns), or {shape[0] * shape[1]} row by row"
-            raise refused("frame", f": of shape {' x '.join(map(str, values.shape)) or 'one number'}, must be {right}")
+            raise refused("frame", f": has shape {' x '.join(map(str, values.shape)) or 'one number'}; must be {right}")
         values = values.reshape(shape)
         is_whole = values == np.rint(values)
         wrong = np.argwhere(~(is_whole & (values >= 0) & (values <= most)))
@@ -103,7 +103,7 @@ class Source:
             row, column = (int(k) for k in wrong[0])
             value = float(values[row, column])
             scaled = (
-                f"; scale readings to it first: np.rint(readings / full * {most}), where full is the greatest of them"
+                f"; scale the readings first: np.rint(readings / full * {most}), where full is the greatest reading"
             )
             raise refused(
                 "frame",

@@ -161,7 +161,8 @@ class FileRequests:
         for option, key in (("layout", ""), ("rate_hz", "rate_hz"), ("array", "rows"), ("topic", "ros.topic")):
             if option in stated and (key in keys or not key):
                 raise refused(
-                    option, f" is {stated[option]} by the command: start taxel view without it, or change this option"
+                    option,
+                    f" is {stated[option]} in the command taxel view: change it there, or start taxel view without it",
                 )
         with reasons():
             # A layout of the whole folder stays as it is; this recording gets a copy with these keys.

@@ -34,7 +34,9 @@ class PresetRequests:
     def write(self, presets: Mapping[str, Mapping[str, object]]) -> None:
         """Write the user's presets."""
         path = _path()
-        lines = ["# Presets of the panel: a table each, every register in its own unit (taxel's docs, registers)."]
+        lines = [
+            "# Presets of the panel: one table for each preset; registers are in the units of taxel's docs, registers."
+        ]
         for name, values in sorted(presets.items()):
             # A basic string of TOML has the escapes of JSON.
             lines += ["", f"[{json.dumps(name)}]"]
